@@ -1,0 +1,188 @@
+//! Path loss: how much weaker a signal arrives than it was sent, for every kind of link.
+//!
+//! Received power is sent power / (mu d^2), with d the distance in metres (the paper's path-loss exponent of 2) and
+//! mu = C (4 pi f / c)^2. C is the excess loss by shadowing and scattering, one for line of sight and one without.
+
+use core::f64::consts::PI;
+
+/// Speed of light in vacuum, m/s.
+const SPEED_OF_LIGHT: f64 = 299_792_458.0;
+
+/// How the link between a drone and a place on the ground is modelled: the paper's eta.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum AirGround {
+    /// Line of sight: eta = `mu_los`.
+    Los,
+    /// No line of sight: eta = `mu_nlos`.
+    Nlos,
+    /// Something between, with the weight w of line of sight in [0, 1]: eta = w `mu_los` + (1 - w) `mu_nlos`.
+    Weighted(f64),
+}
+
+/// The path-loss factors of the three kinds of link, dimensionless (loss = factor x distance^2, with metres).
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Channel {
+    /// Drone to drone.
+    mu_los: f64,
+    /// Interferer to receiver, both on the ground.
+    mu_nlos: f64,
+    /// Drone to ground and ground to drone.
+    eta: f64,
+}
+
+/// Why a channel was refused.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum ChannelError {
+    /// The carrier frequency is not within 1 MHz to 1 THz.
+    Carrier,
+    /// An excess loss factor is not within 1 (0 dB) to 1e20 (200 dB).
+    ExcessLoss,
+    /// The excess loss without line of sight is smaller than with it.
+    LossOrder,
+    /// The weight of line of sight is not within 0 to 1.
+    Weight,
+}
+
+impl core::fmt::Display for ChannelError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Carrier => "carrier frequency must be within 1e6 to 1e12 Hz",
+            Self::ExcessLoss => "excess loss factors must be within 1 to 1e20 (0 to 200 dB)",
+            Self::LossOrder => "excess loss without line of sight must not be below that with it",
+            Self::Weight => "weight of line of sight must be within 0 to 1",
+        })
+    }
+}
+
+impl core::error::Error for ChannelError {}
+
+impl Channel {
+    /// The channel at `carrier_hz` (1e6 to 1e12) with the excess loss *factors* `excess_los` and `excess_nlos` (1 to 1e20).
+    ///
+    /// # Errors
+    /// [`ChannelError`] names the parameter that is outside its range.
+    pub const fn new(
+        carrier_hz: f64,
+        excess_los: f64,
+        excess_nlos: f64,
+        air_ground: AirGround,
+    ) -> Result<Self, ChannelError> {
+        if !(carrier_hz >= 1e6 && carrier_hz <= 1e12) {
+            return Err(ChannelError::Carrier);
+        }
+        if !(excess_los >= 1.0 && excess_los <= 1e20 && excess_nlos >= 1.0 && excess_nlos <= 1e20) {
+            return Err(ChannelError::ExcessLoss);
+        }
+        if excess_nlos < excess_los {
+            return Err(ChannelError::LossOrder);
+        }
+        let wave_number = 4.0 * PI * carrier_hz / SPEED_OF_LIGHT;
+        let free_space = wave_number * wave_number;
+        let mu_los = excess_los * free_space;
+        let mu_nlos = excess_nlos * free_space;
+        let eta = match air_ground {
+            AirGround::Los => mu_los,
+            AirGround::Nlos => mu_nlos,
+            AirGround::Weighted(w) => {
+                if !(w >= 0.0 && w <= 1.0) {
+                    return Err(ChannelError::Weight);
+                }
+                w * mu_los + (1.0 - w) * mu_nlos
+            }
+        };
+        Ok(Self {
+            mu_los,
+            mu_nlos,
+            eta,
+        })
+    }
+
+    /// As [`Channel::new`], with the excess losses in dB (0 to 200), the way data sheets and the paper state them.
+    ///
+    /// # Errors
+    /// [`ChannelError`] names the parameter that is outside its range.
+    pub fn from_db(
+        carrier_hz: f64,
+        excess_los_db: f64,
+        excess_nlos_db: f64,
+        air_ground: AirGround,
+    ) -> Result<Self, ChannelError> {
+        let factor = |db: f64| libm::pow(10.0, db / 10.0);
+        Self::new(
+            carrier_hz,
+            factor(excess_los_db),
+            factor(excess_nlos_db),
+            air_ground,
+        )
+    }
+
+    /// Path-loss factor between two drones.
+    pub const fn mu_los(&self) -> f64 {
+        self.mu_los
+    }
+
+    /// Path-loss factor between two places on the ground.
+    pub const fn mu_nlos(&self) -> f64 {
+        self.mu_nlos
+    }
+
+    /// Path-loss factor between a drone and the ground.
+    pub const fn eta(&self) -> f64 {
+        self.eta
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{AirGround, Channel, ChannelError};
+
+    #[test]
+    fn the_papers_channel() {
+        let channel = Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap();
+        assert!((channel.mu_los() / 7_191.811_792_421_722 - 1.0).abs() < 1e-12);
+        assert!((channel.mu_nlos() / 884_786.145_377_666_5 - 1.0).abs() < 1e-12);
+        assert!((channel.eta() / channel.mu_los() - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn eta_lies_between_the_two_losses() {
+        let eta = |w| {
+            Channel::new(2e9, 1.0, 100.0, AirGround::Weighted(w))
+                .unwrap()
+                .eta()
+        };
+        let ends = Channel::new(2e9, 1.0, 100.0, AirGround::Nlos).unwrap();
+        assert!((eta(1.0) / ends.mu_los() - 1.0).abs() < 1e-15);
+        assert!((eta(0.0) / ends.mu_nlos() - 1.0).abs() < 1e-15);
+        assert!((eta(0.5) / ends.mu_los() - 50.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_named() {
+        let new = Channel::new;
+        assert_eq!(
+            new(f64::NAN, 1.0, 2.0, AirGround::Los),
+            Err(ChannelError::Carrier)
+        );
+        assert_eq!(
+            new(2e9, 0.9, 2.0, AirGround::Los),
+            Err(ChannelError::ExcessLoss)
+        );
+        assert_eq!(
+            new(2e9, 1.0, f64::INFINITY, AirGround::Los),
+            Err(ChannelError::ExcessLoss)
+        );
+        assert_eq!(
+            new(2e9, 3.0, 2.0, AirGround::Los),
+            Err(ChannelError::LossOrder)
+        );
+        assert_eq!(
+            new(2e9, 1.0, 2.0, AirGround::Weighted(-0.1)),
+            Err(ChannelError::Weight)
+        );
+    }
+}

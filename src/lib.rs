@@ -1,0 +1,25 @@
+#![no_std]
+#![forbid(unsafe_code)]
+//! tour
+
+pub mod channel;
+pub mod mission;
+pub mod node;
+pub mod placement;
+pub mod relay;
+pub mod sir;
+pub mod time;
+pub mod wire;
+
+pub use channel::Channel;
+pub use mission::{Interferer, Mission, MissionConfig, Profile};
+pub use node::Side;
+pub use node::align::Phase;
+pub use node::event::Event;
+pub use node::settings::{Identity, Settings, Wiring};
+pub use node::stats::Stats;
+pub use placement::search::Schedule;
+pub use relay::{Port, Relay, Transmit};
+pub use sir::Placement;
+pub use time::{Duration, Instant};
+pub use wire::frame::FrameBuf;

@@ -1,0 +1,59 @@
+//! When a neighbour counts as lost.
+//!
+//! Any intact frame from it is a sign of life. After `Settings::quiet` without one it is asked for a heartbeat, eight times
+//! over until `Settings::lost` has passed; then it is lost, and asked every `quiet` from there on.
+
+use super::settings::Settings;
+use crate::time::{Duration, Instant};
+
+/// Questions between `quiet` and `lost`.
+const QUESTIONS: u64 = 8;
+
+/// What is known of a neighbour's being alive.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Neighbour {
+    /// When it was heard last, or when this relay was switched on.
+    heard: Instant,
+    lost: bool,
+}
+
+/// What follows from a silence.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Silence {
+    /// Whether the neighbour counts as lost since this moment.
+    pub(crate) lost: bool,
+    /// When to look again, later than now.
+    pub(crate) look_again: Instant,
+}
+
+impl Neighbour {
+    pub(crate) const fn new(now: Instant) -> Self {
+        Self {
+            heard: now,
+            lost: false,
+        }
+    }
+
+    /// A frame has come; whether it had been lost until then.
+    pub(crate) fn heard(&mut self, now: Instant) -> bool {
+        self.heard = now;
+        core::mem::take(&mut self.lost)
+    }
+
+    /// Nothing has come for a while.
+    pub(crate) fn silent(&mut self, now: Instant, settings: &Settings) -> Silence {
+        let gone = now.since(self.heard) >= settings.lost;
+        let lost = gone && !self.lost;
+        self.lost |= gone;
+        let look_again = if self.lost {
+            now + settings.quiet
+        } else {
+            let span = settings
+                .lost
+                .as_micros()
+                .saturating_sub(settings.quiet.as_micros());
+            (now + Duration::from_micros((span / QUESTIONS).max(1))).min(self.heard + settings.lost)
+        };
+        Silence { lost, look_again }
+    }
+}

@@ -1,0 +1,64 @@
+//! What a relay counts. Remote faults end here: they are never an error of the caller's and never a panic.
+
+/// Counters since the relay was switched on; each stays at its maximum once it gets there.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Stats {
+    /// Frames handed to the link, repetitions included.
+    pub sent: u32,
+    /// Sweeps sent again because no answer came.
+    pub repeats: u32,
+    /// Sweeps the head has begun.
+    pub sweeps: u32,
+    /// Frames accepted.
+    pub received: u32,
+    /// Sweeps that had arrived before and were answered again.
+    pub repeated: u32,
+    /// Intact frames between other nodes of the network, heard on a shared channel.
+    pub overheard: u32,
+    /// Frames too long for the format.
+    pub oversized: u32,
+    /// Frames cut short.
+    pub truncated: u32,
+    /// Frames whose CRC does not match.
+    pub crc: u32,
+    /// Intact frames of another version of the format.
+    pub version: u32,
+    /// Intact frames that hold no message, or one with a number out of range.
+    pub malformed: u32,
+    /// Intact frames of another network.
+    pub foreign: u32,
+    /// Intact frames from a node that is no neighbour, or for another node on a link that only this one should hear.
+    pub misaddressed: u32,
+    /// Messages from the wrong side: a sweep from downstream, a verdict from upstream.
+    pub misdirected: u32,
+    /// Messages of another mission.
+    pub mission: u32,
+    /// Messages of a sweep that is over.
+    pub stale: u32,
+}
+
+impl Stats {
+    /// Frames that were refused, for whatever reason.
+    pub fn rejected(&self) -> u32 {
+        [
+            self.oversized,
+            self.truncated,
+            self.crc,
+            self.version,
+            self.malformed,
+            self.foreign,
+            self.misaddressed,
+            self.misdirected,
+            self.mission,
+            self.stale,
+        ]
+        .into_iter()
+        .fold(0, u32::saturating_add)
+    }
+}
+
+/// Counts one more, up to the maximum.
+pub(crate) fn bump(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
+}

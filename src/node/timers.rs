@@ -1,0 +1,80 @@
+//! Every timer of a relay, in one table.
+
+use crate::time::Instant;
+
+/// What a timer is for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Timer {
+    /// The head has a computation to go on with.
+    Work,
+    /// The verdict on a sweep is overdue.
+    Repeat,
+    /// The neighbour toward Tx has been silent.
+    Upstream,
+    /// The neighbour toward Rx has been silent.
+    Downstream,
+}
+
+const ALL: [Timer; 4] = [
+    Timer::Work,
+    Timer::Repeat,
+    Timer::Upstream,
+    Timer::Downstream,
+];
+
+/// When each timer runs out, if it runs.
+#[derive(Clone, Debug)]
+pub(crate) struct Timers {
+    work: Option<Instant>,
+    repeat: Option<Instant>,
+    upstream: Option<Instant>,
+    downstream: Option<Instant>,
+}
+
+impl Timers {
+    pub(crate) const fn new() -> Self {
+        Self {
+            work: None,
+            repeat: None,
+            upstream: None,
+            downstream: None,
+        }
+    }
+
+    fn slot(&mut self, timer: Timer) -> &mut Option<Instant> {
+        match timer {
+            Timer::Work => &mut self.work,
+            Timer::Repeat => &mut self.repeat,
+            Timer::Upstream => &mut self.upstream,
+            Timer::Downstream => &mut self.downstream,
+        }
+    }
+
+    pub(crate) fn set(&mut self, timer: Timer, at: Instant) {
+        *self.slot(timer) = Some(at);
+    }
+
+    pub(crate) fn stop(&mut self, timer: Timer) {
+        *self.slot(timer) = None;
+    }
+
+    /// When the next timer runs out.
+    pub(crate) fn next(&self) -> Option<Instant> {
+        [self.work, self.repeat, self.upstream, self.downstream]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    /// A timer that has run out by `now`, stopped before it is handed out: handling it cannot make it come again at once.
+    pub(crate) fn expired(&mut self, now: Instant) -> Option<Timer> {
+        ALL.into_iter().find(|&timer| {
+            let slot = self.slot(timer);
+            let expired = slot.is_some_and(|at| at <= now);
+            if expired {
+                *slot = None;
+            }
+            expired
+        })
+    }
+}

@@ -1,0 +1,251 @@
+//! The targets of one sweep, in six bytes.
+//!
+//! Sixteen targets rise by gaps that are smallest in the middle: target j + 1 is target j times 1 + gap x growth^|j - 7|.
+//! So one ladder is dense where the optimum is expected and still spans everything it may be instead. It is laid out from
+//! target 7 both ways, so that rounding gathers at the ends and not where it matters. Every relay works the targets out
+//! from the six bytes with the same f32 operations, hence to the same bits.
+
+use super::PerTarget;
+
+/// Targets in a full ladder.
+pub const TARGETS: usize = 16;
+
+/// Gaps from the middle one to either end of a full ladder, both included.
+const HALF: usize = TARGETS / 2;
+
+/// Target SIRs (linear, rising), as one target and two one-byte codes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Ladder {
+    /// The target below the middle gap.
+    anchor: f32,
+    /// The middle gap as a float of 5 exponent and 3 mantissa bits, 3e-8 to 112; 0 makes `anchor` the only target.
+    gap: u8,
+    /// What each gap is to its inner neighbour: 1 + `growth` / 16.
+    growth: u8,
+}
+
+impl Ladder {
+    /// The one target `target`, above 0: what the tail finds feasible, it commits.
+    pub const fn single(target: f32) -> Self {
+        Self {
+            anchor: target,
+            gap: 0,
+            growth: 0,
+        }
+    }
+
+    /// Targets with equal ratios, the lowest just below `low` and the highest just above `high`; 0 < `low` < `high`.
+    pub fn spanning(low: f32, high: f32) -> Self {
+        Self::centred(
+            geometric_mean(low, high),
+            gap_code(equal_gap(low, high, 15.0)).saturating_add(1),
+            0,
+        )
+    }
+
+    /// Targets with equal ratios strictly between `low` and `high`, which are known already; 0 < `low` < `high`.
+    pub fn between(low: f32, high: f32) -> Self {
+        Self::centred(
+            geometric_mean(low, high),
+            gap_code(equal_gap(low, high, 17.0)),
+            0,
+        )
+    }
+
+    /// Targets with `centre` in the middle of a gap of `gap` (relative), growing outward until they span [`low`, `high`].
+    pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
+        let code = gap_code(gap);
+        let wanted = (centre / low).max(high / centre);
+        let spans = |growth: u8| half_span(code, growth) >= wanted;
+        // Bisection for the smallest growth that spans, or the largest there is.
+        let (mut below, mut growth) = (0_u8, u8::MAX);
+        if spans(0) {
+            growth = 0;
+        }
+        while growth - below > 1 {
+            let middle = below + (growth - below) / 2;
+            if spans(middle) {
+                growth = middle;
+            } else {
+                below = middle;
+            }
+        }
+        Self::centred(centre, code, growth)
+    }
+
+    fn centred(centre: f32, gap: u8, growth: u8) -> Self {
+        Self {
+            anchor: centre / libm::sqrtf(1.0 + gap_value(gap)),
+            gap,
+            growth,
+        }
+    }
+
+    /// A ladder from its bytes, if its targets are normal f32s above zero.
+    pub fn from_parts(anchor: f32, gap: u8, growth: u8) -> Option<Self> {
+        let ladder = Self {
+            anchor,
+            gap,
+            growth,
+        };
+        let targets = ladder.targets();
+        // Subnormal targets would make a hop depend on how the processor treats subnormals.
+        let sound = targets.first()? >= &f32::MIN_POSITIVE && targets.last()?.is_finite();
+        sound.then_some(ladder)
+    }
+
+    /// Anchor, gap code and growth code, as [`Ladder::from_parts`] takes them.
+    pub const fn parts(&self) -> (f32, u8, u8) {
+        (self.anchor, self.gap, self.growth)
+    }
+
+    /// Whether this is a single target, which the tail commits when it is feasible.
+    pub const fn is_single(&self) -> bool {
+        self.gap == 0
+    }
+
+    /// How many targets there are, 1 or [`TARGETS`].
+    #[expect(clippy::len_without_is_empty, reason = "there is always a target")]
+    pub const fn len(&self) -> usize {
+        if self.is_single() { 1 } else { TARGETS }
+    }
+
+    /// The targets, rising.
+    pub fn targets(&self) -> PerTarget {
+        if self.is_single() {
+            return PerTarget::from([self.anchor]);
+        }
+        let mut targets = [0.0; TARGETS];
+        let gaps = gaps(self.gap, self.growth);
+        let (lower, upper) = targets.split_at_mut(HALF);
+        let mut target = self.anchor;
+        for (slot, gap) in upper.iter_mut().zip(gaps) {
+            target += target * gap;
+            *slot = target;
+        }
+        target = self.anchor;
+        for (slot, gap) in lower
+            .iter_mut()
+            .rev()
+            .zip(gaps.into_iter().skip(1).chain([0.0]))
+        {
+            *slot = target;
+            target /= 1.0 + gap;
+        }
+        PerTarget::from(targets)
+    }
+}
+
+/// The middle gap and those outward of it.
+fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
+    let ratio = 1.0 + f32::from(growth) / 16.0;
+    let mut next = gap_value(gap);
+    core::array::from_fn(|_| {
+        let this = next;
+        next *= ratio;
+        this
+    })
+}
+
+/// The ratio of the highest target to the lower of the middle two, and of the higher of those to the lowest target.
+fn half_span(gap: u8, growth: u8) -> f32 {
+    gaps(gap, growth)
+        .iter()
+        .fold(1.0, |span, gap| span + span * gap)
+}
+
+fn geometric_mean(low: f32, high: f32) -> f32 {
+    libm::sqrtf(low) * libm::sqrtf(high)
+}
+
+/// The gap of which `gaps` lead from `low` to `high`.
+fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
+    libm::expm1f(libm::log1pf((high - low) / low) / gaps)
+}
+
+/// The eight bits of `code` put where an f32 has its low exponent and high mantissa bits: (1 + m / 8) 2^(e - 25).
+const fn gap_value(code: u8) -> f32 {
+    f32::from_bits(((code as u32) << 20) + (102 << 23))
+}
+
+/// The code whose value is nearest to `gap`, within 1 to 254.
+fn gap_code(gap: f32) -> u8 {
+    let bits = gap.to_bits().saturating_sub(102 << 23);
+    let rounded = bits.saturating_add(1 << 19) >> 20;
+    u8::try_from(rounded)
+        .unwrap_or(u8::MAX)
+        .clamp(1, u8::MAX - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Ladder, TARGETS, gap_code, gap_value};
+
+    #[test]
+    fn a_gap_code_keeps_its_value_within_a_sixteenth() {
+        let mut gap = 4e-8_f32;
+        while gap < 100.0 {
+            let kept = gap_value(gap_code(gap));
+            assert!(
+                (kept / gap - 1.0).abs() <= 1.0 / 16.0 + 1e-6,
+                "{gap} became {kept}"
+            );
+            gap *= 1.07;
+        }
+        for code in 1..=254 {
+            assert_eq!(gap_code(gap_value(code)), code);
+        }
+    }
+
+    #[test]
+    fn a_spanning_ladder_covers_both_ends() {
+        for (low, high) in [(0.4, 1026.0), (1e-9, 1e6), (3.0, 3.1)] {
+            let targets = Ladder::spanning(low, high).targets();
+            assert_eq!(targets.len(), TARGETS);
+            assert!(targets[0] <= low && targets[15] >= high, "{targets:?}");
+            assert!(targets[14] < high, "two targets wasted: {targets:?}");
+        }
+    }
+
+    #[test]
+    fn a_ladder_between_stays_strictly_inside() {
+        for (low, high) in [(0.4, 1026.0), (1.0, 1.001), (2.0, 200.0)] {
+            let targets = Ladder::between(low, high).targets();
+            assert!(targets[0] > low && targets[14] < high, "{targets:?}");
+        }
+    }
+
+    #[test]
+    fn a_ladder_around_a_centre_is_dense_there_and_spans_the_bracket() {
+        for (centre, gap, low, high) in [
+            (1.62, 2.5e-5, 0.41, 1026.0),
+            (5.0, 2.5e-7, 4.9, 5.1),
+            (5.0, 2.5e-5, 1e-3, 1e3),
+            (7.0, 2.5e-5, 6.9999, 7.0001),
+        ] {
+            let targets = Ladder::around(centre, gap, low, high).targets();
+            assert!(targets[7] < centre && targets[8] > centre, "{targets:?}");
+            assert!((targets[8] / targets[7] - 1.0 - gap).abs() < 0.07 * gap + 2e-7);
+            assert!(
+                targets[0] <= low * 1.001 && targets[15] >= high * 0.999,
+                "{targets:?}"
+            );
+            assert!(targets.windows(2).all(|pair| pair[0] <= pair[1]));
+        }
+    }
+
+    #[test]
+    fn unsound_bytes_are_refused() {
+        assert!(Ladder::from_parts(f32::NAN, 100, 0).is_none());
+        assert!(Ladder::from_parts(0.0, 100, 0).is_none());
+        assert!(Ladder::from_parts(-1.0, 0, 0).is_none());
+        assert!(
+            Ladder::from_parts(1.0, 255, 255).is_none(),
+            "its targets overflow"
+        );
+        let ladder = Ladder::around(1.6, 1e-5, 1.0, 2.0);
+        let (first, gap, growth) = ladder.parts();
+        assert_eq!(Ladder::from_parts(first, gap, growth), Some(ladder));
+    }
+}

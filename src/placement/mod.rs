@@ -1,0 +1,14 @@
+//! Placement maths for a chain at given altitudes: pure functions of the mission, no state beyond what they are handed.
+//!
+//! [`spacing`] answers how far one hop reaches for a target SIR; [`ladder`] is the set of targets that one sweep tries;
+//! [`verdict`] closes a chain at its tail; [`search`] narrows the targets from one sweep to the next; [`plan`] runs all
+//! of it for a whole chain without a message. The node walks the same functions one hop a relay.
+
+pub mod ladder;
+pub mod plan;
+pub mod search;
+pub mod spacing;
+pub mod verdict;
+
+/// Up to one number a target: reaches, slacks or the targets themselves.
+pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

@@ -1,0 +1,162 @@
+//! The whole chain from the mission alone, without a message: the radio-silent form of Algorithm 1.
+//!
+//! It walks the hops with the very functions the relays use, so what it finds is what they agree on by messages, to the
+//! bit. The head predicts with it, a relay that must keep silent finds its own place with it, and so does a planner.
+
+use super::PerTarget;
+use super::ladder::{Ladder, TARGETS};
+use super::search::{Infeasible, Schedule, Search};
+use super::spacing::Hop;
+use super::verdict::Verdict;
+use crate::mission::{Mission, Profile};
+use crate::sir::{Placement, Sender};
+
+/// A target the whole chain meets, as the ladder and the place in it that the tail would commit.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Agreed {
+    /// The ladder of the sweep that settles the chain.
+    pub ladder: Ladder,
+    /// Which of its targets.
+    pub commit: u8,
+    /// That target, linear SIR.
+    pub target: f32,
+    /// Sweeps it took to find.
+    pub sweeps: u32,
+}
+
+/// A chain being solved, a few hops at a time. Its size does not depend on N.
+#[derive(Clone, Debug)]
+pub struct Planner {
+    search: Search,
+    targets: PerTarget,
+    reaches: PerTarget,
+    /// The relay whose reaches come next, 1 to N.
+    index: u16,
+    sender: Sender,
+    sweeps: u32,
+}
+
+impl Planner {
+    /// Starts to solve `mission`, whose head holds `head`.
+    ///
+    /// # Errors
+    /// [`Infeasible`] where the receiver can have no SIR at all.
+    pub fn new(mission: &Mission, head: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
+        let search = Search::new(mission, head, schedule)?;
+        let mut planner = Self {
+            search,
+            targets: PerTarget::new(),
+            reaches: PerTarget::new(),
+            index: 1,
+            sender: Sender::transmitter(mission),
+            sweeps: 0,
+        };
+        planner.start_sweep(mission);
+        Ok(planner)
+    }
+
+    fn start_sweep(&mut self, mission: &Mission) {
+        self.targets = self.search.ladder().targets();
+        self.reaches = origins();
+        self.index = 1;
+        self.sender = Sender::transmitter(mission);
+        self.sweeps = self.sweeps.saturating_add(1);
+    }
+
+    /// Works through at most `hops` hops (at most 16 reaches each); `Ok(Some(..))` when the chain is solved.
+    ///
+    /// `profile_of` gives what relay 1..=N holds; it must answer the same every time.
+    ///
+    /// # Errors
+    /// [`Infeasible`] when no target is left to try.
+    pub fn step(
+        &mut self,
+        mission: &Mission,
+        profile_of: impl Fn(u16) -> Profile,
+        hops: u16,
+    ) -> Result<Option<Agreed>, Infeasible> {
+        for _ in 0..hops {
+            let profile = profile_of(self.index);
+            let hop = Hop::new(mission, self.sender, self.index, profile.altitude_m);
+            let mut reaches = PerTarget::new();
+            hop.extend(&self.targets, &self.reaches, &mut reaches);
+            self.reaches = reaches;
+            if self.index < mission.relays() {
+                self.sender = Sender::relay(mission, profile);
+                self.index += 1;
+                continue;
+            }
+            let verdict = Verdict::reach(mission, profile, self.search.ladder(), &self.reaches);
+            if let Some(commit) = verdict.commit
+                && let Some(&target) = self.targets.get(usize::from(commit))
+            {
+                return Ok(Some(Agreed {
+                    ladder: *self.search.ladder(),
+                    commit,
+                    target,
+                    sweeps: self.sweeps,
+                }));
+            }
+            self.search.advance(&verdict.slacks)?;
+            self.start_sweep(mission);
+        }
+        Ok(None)
+    }
+}
+
+/// Solves the chain in one go: at most about fifty sweeps over N hops with the bracketed schedule.
+///
+/// # Errors
+/// [`Infeasible`] when no target can be met.
+pub fn solve(
+    mission: &Mission,
+    schedule: Schedule,
+    profile_of: impl Fn(u16) -> Profile,
+) -> Result<Agreed, Infeasible> {
+    let mut planner = Planner::new(mission, profile_of(1), schedule)?;
+    loop {
+        if let Some(agreed) = planner.step(mission, &profile_of, u16::MAX)? {
+            return Ok(agreed);
+        }
+    }
+}
+
+/// Where relay `index` stands when the chain takes `target`: the farthest place that meets it on every hop up to there.
+///
+/// `None` when a hop cannot meet the target. `index` reaches' worth of work.
+pub fn place(
+    mission: &Mission,
+    target: f32,
+    index: u16,
+    profile_of: impl Fn(u16) -> Profile,
+) -> Option<Placement> {
+    let mut sender = Sender::transmitter(mission);
+    let mut x_m = 0.0;
+    let mut altitude_m = 0.0;
+    for at in 1..=index {
+        let profile = profile_of(at);
+        x_m = Hop::new(mission, sender, at, profile.altitude_m).reach(target, x_m)?;
+        altitude_m = profile.altitude_m;
+        sender = Sender::relay(mission, profile);
+    }
+    Some(Placement { x_m, altitude_m })
+}
+
+/// The place relay `index` finds for itself without a message, where every relay holds what the mission has in common.
+///
+/// Equal to the bit to what the chain settles on by messages: `silent_places_equal_those_by_messages` in
+/// `host-tests/tests/chain.rs`.
+///
+/// # Errors
+/// [`Infeasible`] when no target can be met.
+pub fn silent_place(mission: &Mission, index: u16) -> Result<Placement, Infeasible> {
+    let common = |_| mission.config().common;
+    let agreed = solve(mission, Schedule::Bracketed, common)?;
+    place(mission, agreed.target, index, common).ok_or(Infeasible)
+}
+
+/// The transmitter's own "reaches": x = 0 for every target.
+pub(crate) fn origins() -> PerTarget {
+    PerTarget::from([0.0; TARGETS])
+}

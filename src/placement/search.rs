@@ -1,0 +1,236 @@
+//! The search for the highest target that the chain can meet: which targets to try next, from what the last ones gave.
+//!
+//! Both schedules of Algorithm 1 are one path. The paper's tries gamma_0, gamma_0 - epsilon, ... one a sweep. The bracketed
+//! one tries a ladder of targets a sweep; feasibility is monotone in the target, so the answer lies between the highest
+//! that was met and the lowest that was not, and the slacks, smooth in log gamma, tell where: inverse interpolation puts
+//! the next ladder's dense middle there while its ends still span the bracket.
+
+use super::ladder::Ladder;
+use super::verdict::met;
+use crate::mission::{Mission, MissionConfig, Profile};
+use crate::sir::{self, Placement, Sender};
+
+/// Which targets the head tries.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Schedule {
+    /// Sixteen targets a sweep around the interpolated optimum, until it is known to the mission's tolerance.
+    #[default]
+    Bracketed,
+    /// The paper's: one target a sweep, from the highest any chain can meet downward.
+    FixedStep {
+        /// Epsilon, linear SIR, above 0. In f64: it is taken up to ten thousand times from one start.
+        step: f64,
+    },
+}
+
+/// No target down to a millionth of a millionth of the ceiling can be met.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Infeasible;
+
+impl core::fmt::Display for Infeasible {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("no target SIR can be met by this chain")
+    }
+}
+
+impl core::error::Error for Infeasible {}
+
+/// How far below the ceiling the search gives up.
+const DEPTH: f32 = 1e-12;
+
+/// How much of a bracket a sweep must cut off for the interpolation to be trusted with the next one.
+const PROGRESS: f32 = 0.25;
+
+/// Sweeps after which the search settles for the best target it has met.
+const MOST_SWEEPS: u32 = 48;
+
+/// The state of a search: the bracket so far and the ladder to try next.
+#[derive(Clone, Debug)]
+pub struct Search {
+    schedule: Schedule,
+    tolerance: f32,
+    /// What the first hop can have at most, hence the chain.
+    ceiling: f32,
+    /// The first target of the fixed-step schedule: the paper's gamma_0.
+    start: f32,
+    /// Highest target known to be met.
+    feasible: Option<f32>,
+    /// Lowest target known not to be met.
+    infeasible: Option<f32>,
+    /// infeasible / feasible - 1 before the last sweep.
+    width: f32,
+    ladder: Ladder,
+    /// Sweeps whose verdict has come in.
+    tried: u32,
+}
+
+impl Search {
+    /// A search by the head of `mission`, which holds `head`; the other relays need not hold what the mission has in common.
+    ///
+    /// # Errors
+    /// [`Infeasible`] where even a relay right above the receiver gives it no SIR: an interferer standing at the receiver.
+    pub fn new(mission: &Mission, head: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
+        let MissionConfig {
+            distance_m, common, ..
+        } = *mission.config();
+        let above_receiver = |profile: Profile| Placement {
+            x_m: distance_m,
+            altitude_m: profile.altitude_m,
+        };
+        let ceiling = sir::first_hop_ceiling(mission, head.altitude_m);
+        let start = ceiling.min(sir::at_receiver(
+            mission,
+            above_receiver(common),
+            common.power_w,
+        ));
+        // A subnormal start has no digits left to search with.
+        if !(start >= f32::MIN_POSITIVE / DEPTH) {
+            return Err(Infeasible);
+        }
+        let ladder = match schedule {
+            Schedule::FixedStep { .. } => Ladder::single(start),
+            Schedule::Bracketed => {
+                // With every relay above the receiver a chain of equals meets this; half of it leaves room for rounding.
+                let met = Sender::transmitter(mission).sir_at(mission, 0.0, above_receiver(head));
+                Ladder::spanning(met.min(start).max(start * DEPTH) / 2.0, start * 1.01)
+            }
+        };
+        Ok(Self {
+            schedule,
+            tolerance: mission.config().tolerance,
+            ceiling,
+            start,
+            feasible: None,
+            infeasible: None,
+            width: f32::INFINITY,
+            ladder,
+            tried: 0,
+        })
+    }
+
+    /// The targets to try now.
+    pub const fn ladder(&self) -> &Ladder {
+        &self.ladder
+    }
+
+    /// Tries `ladder` next instead: the one by which the head, having solved the chain beforehand, expects a commit.
+    pub(crate) fn expect(&mut self, ladder: Ladder) {
+        self.ladder = ladder;
+    }
+
+    /// Takes the slacks of [`Search::ladder`], in metres for as many targets as every hop could meet, and moves on.
+    ///
+    /// Constant work: at most some 200 floating-point operations and three logarithms.
+    ///
+    /// # Errors
+    /// [`Infeasible`] when no target is left to try.
+    pub fn advance(&mut self, slacks: &[f32]) -> Result<(), Infeasible> {
+        self.tried = self.tried.saturating_add(1);
+        self.ladder = match self.schedule {
+            Schedule::FixedStep { step } => self.step_down(step)?,
+            Schedule::Bracketed => self.narrow(slacks)?,
+        };
+        Ok(())
+    }
+
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a target is an f32; the subtraction is what needs the width"
+    )]
+    fn step_down(&self, step: f64) -> Result<Ladder, Infeasible> {
+        let target = (f64::from(self.start) - f64::from(self.tried) * step) as f32;
+        if target >= f32::MIN_POSITIVE {
+            Ok(Ladder::single(target))
+        } else {
+            Err(Infeasible)
+        }
+    }
+
+    fn narrow(&mut self, slacks: &[f32]) -> Result<Ladder, Infeasible> {
+        let targets = self.ladder.targets();
+        let met = met(slacks);
+        let best = met
+            .checked_sub(1)
+            .and_then(|last| targets.get(last))
+            .copied();
+        let worst = targets.get(met).copied();
+        self.feasible = best.into_iter().chain(self.feasible).reduce(f32::max);
+        self.infeasible = worst.into_iter().chain(self.infeasible).reduce(f32::min);
+        if let (Some(low), Some(high)) = (self.feasible, self.infeasible)
+            && low >= high
+        {
+            // A relay changed since: only the last sweep speaks of the chain as it is.
+            (self.feasible, self.infeasible) = (best, worst);
+            self.width = f32::INFINITY;
+        }
+        match (self.feasible, self.infeasible) {
+            (Some(low), Some(high)) => Ok(self.inside(low, high, &targets, slacks)),
+            (Some(low), None) if low < self.ceiling => {
+                Ok(Ladder::spanning(low, (self.ceiling * 1.01).min(low * 1e3)))
+            }
+            (Some(low), None) => Ok(Ladder::single(low)),
+            (None, Some(high)) if high > self.start * DEPTH => {
+                Ok(Ladder::spanning(high / 1e3, high))
+            }
+            (None, _) => Err(Infeasible),
+        }
+    }
+
+    /// The next ladder inside a bracket.
+    fn inside(&mut self, low: f32, high: f32, targets: &[f32], slacks: &[f32]) -> Ladder {
+        let width = (high - low) / low;
+        let stalled = width > PROGRESS * self.width;
+        self.width = width;
+        if width <= self.tolerance || low.next_up() >= high || self.tried >= MOST_SWEEPS {
+            return Ladder::single(low);
+        }
+        let centre = if stalled {
+            None
+        } else {
+            interpolate(targets, slacks)
+        };
+        match centre.filter(|centre| low < *centre && *centre < high) {
+            // A quarter of the tolerance in the middle: the root may lie in a neighbouring gap and still be close enough.
+            Some(centre) => Ladder::around(centre, self.tolerance / 4.0, low, high),
+            None => Ladder::between(low, high),
+        }
+    }
+}
+
+/// The target at which the slack is zero: log target as a cubic in the slack through the four points about its change of sign.
+fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
+    let met = met(slacks);
+    let reference = *targets.get(met.checked_sub(1)?)?;
+    let cubic = met.saturating_sub(2)..(met + 2).min(slacks.len());
+    let secant = met - 1..met + 1;
+    [cubic, secant].into_iter().find_map(|window| {
+        let mut points: heapless::Vec<(f32, f32), 4> = heapless::Vec::new();
+        for (&target, &slack) in targets.get(window.clone())?.iter().zip(slacks.get(window)?) {
+            points
+                .push((slack, libm::log1pf((target - reference) / reference)))
+                .ok()?;
+        }
+        let (_, top) = *points.last()?;
+        let root = neville_at_zero(&mut points)?;
+        (0.0..=top)
+            .contains(&root)
+            .then(|| reference + reference * libm::expm1f(root))
+    })
+}
+
+/// The polynomial through `points` (abscissa, value) at abscissa 0; `None` unless the abscissae fall strictly.
+fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
+    for order in 1..points.len() {
+        for i in 0..points.len() - order {
+            let (far, (_, upper)) = (points.get(i + order)?.0, *points.get(i + 1)?);
+            let (near, lower) = *points.get(i)?;
+            if !(near > far) {
+                return None;
+            }
+            points.get_mut(i)?.1 = (near * upper - far * lower) / (near - far);
+        }
+    }
+    points.first().map(|point| point.1)
+}

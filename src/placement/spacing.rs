@@ -1,0 +1,136 @@
+//! How far a hop reaches: the closed forms of the paper's `d_1`, `d_k` and `d_max` as one stable rule.
+//!
+//! With the sender at (x0, h0), the node at (x0 + d, h), the interferer at (X, Y, 0), u = X - x0 and A the sender's gain,
+//! SIR >= gamma is
+//!
+//! ```text
+//! f(d) = -e d^2 - 2 u d + C >= 0,    e = gamma / A - 1,    C = u^2 + H,    H = Y^2 + h0 (2h - h0) - e (h - h0)^2
+//! ```
+//!
+//! The reach is the largest d in `[0, end - x0]` with f(d) >= 0. `end` if f is not negative there; else the largest root
+//! inside, which the signs of e, u and C decide:
+//!
+//! | C | u | largest root below `end` |
+//! | --- | --- | --- |
+//! | >= 0 | >= 0 | C / (u + r) |
+//! | >= 0 | < 0 | (r - u) / e, and e > 0 follows from f(end) < 0 |
+//! | < 0 | < 0 and e > 0 | (r - u) / e, if inside |
+//! | < 0 | otherwise | none: the target cannot be met |
+//!
+//! with r = sqrt((1 + e) u^2 + e H); the discriminant u^2 + e C is the same number, but cancels. No case subtracts two
+//! nearly equal numbers, and e is formed from a gain of twice f32's width, so targets next to A lose nothing. The printed
+//! case distinction picks wrong roots once the chain has passed the interferer.
+//!
+//! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement.rs` asserts it against a bisection of the
+//! SIR itself in f64.
+
+use super::PerTarget;
+use crate::mission::{Mission, Profile};
+use crate::sir::{Sender, square};
+
+/// Above this the interferer outshines any hop longer than a millionth of its own distance; keeps f32 finite.
+const MOST_EXCESS: f32 = 1e12;
+
+/// One hop toward Rx, ready to be evaluated for many targets.
+///
+/// The terms that do not depend on the target are worked out once, so a reach costs two divisions and a square root.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Hop {
+    sender: Sender,
+    /// X, m.
+    interferer_x_m: f32,
+    /// Y^2 + h0 (2h - h0), m^2.
+    base: f32,
+    /// (h - h0)^2, m^2.
+    climb_squared: f32,
+    /// The least step to the node, m.
+    least_step: f32,
+    /// The last place the node may take, m.
+    end_m: f32,
+}
+
+impl Hop {
+    /// The hop from `sender` to relay `index`, which holds `altitude_m`.
+    pub fn new(mission: &Mission, sender: Sender, index: u16, altitude_m: f32) -> Self {
+        let interferer = mission.interferer();
+        let climb = altitude_m - sender.altitude_m;
+        Self {
+            sender,
+            interferer_x_m: interferer.x_m,
+            base: square(interferer.y_m) + sender.altitude_m * (altitude_m + climb),
+            climb_squared: square(climb),
+            // The transmitter stands on the ground: its altitude alone keeps the head clear of it.
+            least_step: if index <= 1 {
+                0.0
+            } else {
+                mission.least_step(climb)
+            },
+            end_m: mission.end_for(index),
+        }
+    }
+
+    /// The farthest place in [`from_m`, end] at which the node still meets `target`, m along x; `None` if there is none.
+    ///
+    /// `target` is a linear SIR above zero, `from_m` the sender's place in [0, D]. The place is rounded toward the sender,
+    /// so what is promised for the target holds at the f32 that is returned. Constant work.
+    pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
+        let room = self.end_m - from_m;
+        if room < self.least_step {
+            return None;
+        }
+        let e = self.sender.gain.excess(target).min(MOST_EXCESS);
+        let u = self.interferer_x_m - from_m;
+        let h = self.base - e * self.climb_squared;
+        let c = square(u) + h;
+        if c - room * (e * room + 2.0 * u) >= 0.0 {
+            return Some(self.end_m);
+        }
+        let ahead = u >= 0.0;
+        if c < 0.0 && (ahead || e <= 0.0) {
+            return None;
+        }
+        let discriminant = (1.0 + e) * square(u) + e * h;
+        if discriminant < 0.0 && c < 0.0 {
+            return None;
+        }
+        let r = libm::sqrtf(discriminant.max(0.0));
+        let d = if ahead { c / (u + r) } else { (r - u) / e };
+        if !(d >= self.least_step) {
+            return None;
+        }
+        if d >= room {
+            // With C < 0 the feasible stretch lies wholly beyond the end; else rounding put the root on it.
+            return if c < 0.0 { None } else { Some(self.end_m) };
+        }
+        let place = from_m + d;
+        Some(if place - from_m > d {
+            place.next_down()
+        } else {
+            place
+        })
+    }
+
+    /// Extends a chain by this hop: `onto` gets the reach for every target that the sender's `reaches` still meet.
+    ///
+    /// Feasibility is monotone in the target, so the first target that cannot be met ends the list.
+    pub fn extend(&self, targets: &[f32], reaches: &[f32], onto: &mut PerTarget) {
+        onto.clear();
+        for (&target, &from_m) in targets.iter().zip(reaches) {
+            let Some(place) = self.reach(target, from_m) else {
+                break;
+            };
+            if onto.push(place).is_err() {
+                break;
+            }
+        }
+    }
+}
+
+/// The farthest a relay may be from the receiver, m along x, for the receiver to meet `target`: the paper's `d_max`.
+///
+/// sqrt(K / gamma - h^2), at most 1e9; `None` where even a relay right above the receiver is too weak. Not cut at D: it
+/// stays smooth in the target for the search that looks for its root.
+pub fn receiver_reach(mission: &Mission, profile: Profile, target: f32) -> Option<f32> {
+    let squared = mission.receiver_gain(profile.power_w) / target - square(profile.altitude_m);
+    (squared >= 0.0).then(|| libm::sqrtf(squared).min(1e9))
+}

@@ -1,0 +1,248 @@
+//! The facade a firmware uses: bytes in, bytes and setpoints out, and no input or output of its own.
+
+use crate::mission::{Mission, Profile};
+use crate::node::align::Phase;
+use crate::node::event::Event;
+use crate::node::settings::{Identity, Settings, SetupError, Wiring, check};
+use crate::node::stats::{Stats, bump};
+use crate::node::{Node, Side};
+use crate::sir::Placement;
+use crate::time::Instant;
+use crate::wire::deframe::{DeframeError, Deframer};
+use crate::wire::frame::{self, FrameBuf, FrameError, Header};
+
+/// Where bytes come from and go to.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Port {
+    /// The link toward the transmitter, with [`Wiring::Pair`].
+    Upstream,
+    /// The link toward the receiver, with [`Wiring::Pair`].
+    Downstream,
+    /// The one channel, with [`Wiring::Shared`].
+    Shared,
+}
+
+/// A frame to be sent: the first `len` bytes of the buffer, through `port`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Transmit {
+    /// Where to.
+    pub port: Port,
+    /// Bytes, the delimiter included; at most [`frame::MAX_FRAME`].
+    pub len: usize,
+}
+
+/// One relay's share of the placement, sans-IO.
+///
+/// # Contract
+/// - *Inputs* [`handle_bytes`](Self::handle_bytes) and [`handle_timeout`](Self::handle_timeout) take anything, never fail
+///   and do a bounded amount of work; what is wrong with it is counted in [`stats`](Self::stats).
+/// - *Time* is an argument and should not run backward. The relay never reads a clock.
+/// - *Output* is made from the state when it is asked for, so nothing can overflow. After every input, call
+///   [`poll_transmit`](Self::poll_transmit) until it gives `None`, then [`poll_event`](Self::poll_event) until `None`,
+///   then sleep until [`poll_timeout`](Self::poll_timeout) or the next byte.
+/// - Once drained, `poll_timeout` is `None` or later than `now`: the loop cannot spin.
+/// - *Setpoints* are finite, inside [0, D], at the altitude the relay holds, and at least the mission's separation from
+///   those of its neighbours for the same sweep. There is none before the first agreement, and nothing but a new agreement
+///   moves it.
+///
+/// ```
+/// use uav_relay::{Channel, Identity, Instant, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
+/// use uav_relay::channel::AirGround;
+///
+/// let mission = Mission::try_new(MissionConfig {
+///     relays: 1,
+///     distance_m: 1000.0,
+///     min_separation_m: 4.0,
+///     tx_power_w: 80.0,
+///     common: Profile { altitude_m: 20.0, power_w: 1.0 },
+///     channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?,
+///     interferer: Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 },
+///     tolerance: 1e-4,
+/// })?;
+/// let identity = Identity { network: 7, index: 1 };
+/// let mut relay = Relay::new(mission, identity, Settings::default(), 1, Instant::ZERO)?;
+/// while relay.setpoint().is_none() {
+///     let now = relay.poll_timeout().expect("a head has work to do");
+///     relay.handle_timeout(now);
+/// }
+/// assert!((relay.setpoint().unwrap().x_m - 349.85).abs() < 0.01);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Relay {
+    node: Node,
+    network: u16,
+    wiring: Wiring,
+    /// Upstream or shared, and downstream.
+    deframers: [Deframer; 2],
+    counter: u32,
+}
+
+impl Relay {
+    /// A relay that has just been switched on at `now`; relay 1 begins by itself.
+    ///
+    /// `seed` should differ from relay to relay and from one start to the next (a chip's number, a noisy ADC); only the timing of
+    /// repetitions and the numbering of sweeps depend on it, never a placement.
+    ///
+    /// # Errors
+    /// [`SetupError`] names the part of `identity` or `settings` that does not fit.
+    pub fn new(
+        mission: Mission,
+        identity: Identity,
+        settings: Settings,
+        seed: u32,
+        now: Instant,
+    ) -> Result<Self, SetupError> {
+        check(&mission, identity, &settings)?;
+        Ok(Self {
+            node: Node::new(mission, identity, settings, seed, now),
+            network: identity.network,
+            wiring: settings.wiring,
+            deframers: [Deframer::new(), Deframer::new()],
+            counter: 0,
+        })
+    }
+
+    /// Takes in bytes received at `port`, however they are cut.
+    ///
+    /// A dozen instructions a byte, and for each whole frame its CRC, its decoding and at most 16 reaches.
+    pub fn handle_bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
+        let shared = self.wiring == Wiring::Shared;
+        if shared != (port == Port::Shared) {
+            return;
+        }
+        let [first, second] = &mut self.deframers;
+        let deframer = if port == Port::Downstream {
+            second
+        } else {
+            first
+        };
+        for &byte in bytes {
+            match deframer.push(byte) {
+                None => {}
+                Some(Err(error)) => {
+                    let stats = &mut self.node.stats;
+                    let counter = match error {
+                        DeframeError::Oversized => &mut stats.oversized,
+                        DeframeError::Truncated => &mut stats.truncated,
+                    };
+                    bump(counter);
+                }
+                Some(Ok(plain)) => receive(&mut self.node, self.network, now, port, plain),
+            }
+        }
+    }
+
+    /// Handles what is due by `now`. Bounded by 256 reaches, at the head while it predicts; next to nothing otherwise.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.node.handle_timeout(now);
+    }
+
+    /// Writes the next frame to be sent into `frame`, if there is one.
+    pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
+        let (side, message) = self.node.poll_message(now)?;
+        let sender = self.node.index();
+        let header = Header {
+            network: self.network,
+            sender,
+            destination: match side {
+                Side::Upstream => sender.saturating_sub(1),
+                Side::Downstream => sender.saturating_add(1),
+            },
+            counter: self.counter,
+        };
+        self.counter = self.counter.wrapping_add(1);
+        let len = frame::encode(header, &message, frame);
+        bump(&mut self.node.stats.sent);
+        let port = match (self.wiring, side) {
+            (Wiring::Shared, _) => Port::Shared,
+            (Wiring::Pair, Side::Upstream) => Port::Upstream,
+            (Wiring::Pair, Side::Downstream) => Port::Downstream,
+        };
+        Some(Transmit { port, len })
+    }
+
+    /// The next thing the firmware should know of, if there is one.
+    pub fn poll_event(&mut self) -> Option<Event> {
+        self.node.poll_event()
+    }
+
+    /// When [`Relay::handle_timeout`] wants to be called, if nothing comes in before.
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        self.node.poll_timeout()
+    }
+
+    /// Where to fly, once the chain has agreed.
+    pub fn setpoint(&self) -> Option<Placement> {
+        self.node.setpoint()
+    }
+
+    /// The SIR (linear) that every hop of the agreed chain meets.
+    pub fn target(&self) -> Option<f32> {
+        self.node.target()
+    }
+
+    /// Where the relay is in the protocol.
+    pub fn phase(&self) -> Phase {
+        self.node.phase()
+    }
+
+    /// What has been counted since the start.
+    pub fn stats(&self) -> &Stats {
+        &self.node.stats
+    }
+
+    /// The mission the relay flies.
+    pub fn mission(&self) -> &Mission {
+        self.node.mission()
+    }
+
+    /// What the relay holds.
+    pub fn profile(&self) -> Profile {
+        self.node.profile()
+    }
+}
+
+/// One frame, decoded from COBS.
+fn receive(node: &mut Node, network: u16, now: Instant, port: Port, plain: &[u8]) {
+    let own = node.index();
+    let stats = &mut node.stats;
+    let (header, message) = match frame::decode(plain) {
+        Ok(frame) => frame,
+        Err(error) => {
+            let counter = match error {
+                FrameError::Short => &mut stats.truncated,
+                FrameError::Crc => &mut stats.crc,
+                FrameError::Version => &mut stats.version,
+                FrameError::Message(_) => &mut stats.malformed,
+            };
+            return bump(counter);
+        }
+    };
+    let side = if header.sender.checked_add(1) == Some(own) {
+        Some(Side::Upstream)
+    } else if own.checked_add(1) == Some(header.sender) {
+        Some(Side::Downstream)
+    } else {
+        None
+    };
+    let through = match port {
+        Port::Upstream => Some(Side::Upstream),
+        Port::Downstream => Some(Side::Downstream),
+        Port::Shared => side,
+    };
+    let stats = &mut node.stats;
+    if header.network != network {
+        return bump(&mut stats.foreign);
+    }
+    if header.destination != own && port == Port::Shared {
+        return bump(&mut stats.overheard);
+    }
+    let Some(side) = side.filter(|_| header.destination == own && side == through) else {
+        return bump(&mut stats.misaddressed);
+    };
+    bump(&mut stats.received);
+    node.handle_message(now, side, message);
+}

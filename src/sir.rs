@@ -1,0 +1,130 @@
+//! Signal-to-interference ratio of every kind of hop: the one place these formulas live.
+//!
+//! The chain is as good as its worst hop: `SIR_S` = min over hops (paper, section "Position planning for multiple UAVs").
+//! All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
+//! `host-tests/tests/placement.rs`.
+
+use crate::mission::{Gain, Mission, Profile};
+
+/// A place in the vertical plane through transmitter and receiver.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Placement {
+    /// Distance from the transmitter along the ground, m, in [0, D].
+    pub x_m: f32,
+    /// Height above the ground, m.
+    pub altitude_m: f32,
+}
+
+/// A node that feeds a hop: where it stands and what its power is worth against the interferer's.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sender {
+    pub(crate) altitude_m: f32,
+    pub(crate) gain: Gain,
+}
+
+impl Sender {
+    /// The ground transmitter, node 0.
+    pub const fn transmitter(mission: &Mission) -> Self {
+        Self {
+            altitude_m: 0.0,
+            gain: mission.tx_gain(),
+        }
+    }
+
+    /// A relay with the given altitude and power.
+    pub const fn relay(mission: &Mission, profile: Profile) -> Self {
+        Self {
+            altitude_m: profile.altitude_m,
+            gain: mission.relay_gain(profile.power_w),
+        }
+    }
+
+    /// SIR at a relay at `to`, fed by this node standing at `from_m` along x; infinite when both share one place.
+    ///
+    /// With s = X - x0: A ((s - d)^2 + Y^2 + h^2) / (d^2 + (h - h0)^2), which is the paper's `SIR_1` for h0 = 0 and A =
+    /// `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`).
+    pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
+        let interferer = mission.interferer();
+        let step = to.x_m - from_m;
+        let climb = to.altitude_m - self.altitude_m;
+        let to_interferer =
+            square(interferer.x_m - to.x_m) + square(interferer.y_m) + square(to.altitude_m);
+        self.gain.value() * to_interferer / (square(step) + square(climb))
+    }
+}
+
+/// SIR at the ground receiver, fed by a relay of `power_w` watts at `from`: K / (d^2 + h^2), the paper's `SIR_{N+1}`.
+pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
+    let distance = mission.config().distance_m - from.x_m;
+    mission.receiver_gain(power_w) / (square(distance) + square(from.altitude_m))
+}
+
+/// The largest SIR that a relay at `altitude_m` can have on the first hop, over all x in [0, D].
+///
+/// At x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`). For X < 0 `SIR_1` has its maximum at the other
+/// stationary point, (q - sqrt(q^2 + 4 X^2 h^2)) / 2X with q = X^2 + Y^2, written here without cancellation.
+pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
+    let interferer = mission.interferer();
+    let x_m = if interferer.x_m < 0.0 {
+        let q = square(interferer.x_m) + square(interferer.y_m);
+        let twice_area = 2.0 * interferer.x_m * altitude_m;
+        let peak = -2.0 * interferer.x_m * square(altitude_m) / (q + libm::hypotf(q, twice_area));
+        peak.min(mission.config().distance_m)
+    } else {
+        0.0
+    };
+    Sender::transmitter(mission).sir_at(mission, 0.0, Placement { x_m, altitude_m })
+}
+
+pub(crate) const fn square(x: f32) -> f32 {
+    x * x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Placement, Sender, first_hop_ceiling};
+    use crate::mission::tests::paper;
+    use crate::mission::{Interferer, Mission, MissionConfig};
+
+    #[test]
+    fn the_ceiling_of_the_first_hop_is_never_below_what_a_scan_finds() {
+        for (x_m, y_m, altitude_m) in [
+            (500.0, 400.0, 20.0),
+            (-10.0, 0.0, 50.0),
+            (-300.0, 200.0, 80.0),
+            (-1e5, 3.0, 900.0),
+        ] {
+            let interferer = Interferer {
+                power_w: 80.0,
+                x_m,
+                y_m,
+            };
+            let mission = Mission::try_new(MissionConfig {
+                interferer,
+                ..paper(1)
+            })
+            .unwrap();
+            let tx = Sender::transmitter(&mission);
+            let best = (0..=10_000_u16)
+                .map(|i| {
+                    tx.sir_at(
+                        &mission,
+                        0.0,
+                        Placement {
+                            x_m: f32::from(i) * 0.1,
+                            altitude_m,
+                        },
+                    )
+                })
+                .fold(0.0, f32::max);
+            let ceiling = first_hop_ceiling(&mission, altitude_m);
+            assert!(
+                (ceiling / best - 1.0).abs() < 1e-4,
+                "{x_m} {y_m} {altitude_m}: {ceiling} against {best}"
+            );
+            assert!(ceiling >= best * (1.0 - 1e-6));
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! One frame: header, body, CRC; then COBS and a zero byte that ends it.
+
+use super::crc::Crc32c;
+use super::message::{MAX_BODY, Message, MessageError};
+
+/// Version of the format, in the top four bits of the first word.
+pub const VERSION: u8 = 1;
+
+/// Bytes of the header.
+pub const HEADER: usize = 10;
+
+/// Bytes of the check sequence.
+const CHECK: usize = 4;
+
+/// The longest frame before COBS.
+pub const MAX_DECODED: usize = HEADER + MAX_BODY + CHECK;
+
+/// The longest frame on the wire: COBS adds one byte to anything this short, the delimiter is another.
+pub const MAX_FRAME: usize = MAX_DECODED + 2;
+
+/// The largest node number an address can hold; 4095 is kept for a broadcast.
+pub const MAX_NODE: u16 = 4094;
+
+/// Room for one frame on its way to the link.
+pub type FrameBuf = [u8; MAX_FRAME];
+
+/// Who sends a frame to whom.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Header {
+    /// The network both belong to.
+    pub network: u16,
+    /// Node number of the sender: 0 is Tx, 1 to N the relays, N + 1 Rx.
+    pub sender: u16,
+    /// Node number of the one it is meant for.
+    pub destination: u16,
+    /// Counts the sender's frames, wrapping.
+    pub counter: u32,
+}
+
+/// Why a frame was refused.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum FrameError {
+    /// Too short for a header and a CRC.
+    Short,
+    /// The CRC does not match.
+    Crc,
+    /// Another version of the format, or flags this version does not know.
+    Version,
+    /// The body is no message.
+    Message(MessageError),
+}
+
+impl core::fmt::Display for FrameError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Short => f.write_str("the frame is too short"),
+            Self::Crc => f.write_str("the CRC does not match"),
+            Self::Version => f.write_str("the frame is of another version of the format"),
+            Self::Message(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for FrameError {}
+
+/// Writes the frame for `message` into `out` and returns its length, delimiter included; 0 if a node number is too large.
+///
+/// Work linear in the length of the frame, at most [`MAX_FRAME`] bytes.
+pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
+    if header.sender > MAX_NODE || header.destination > MAX_NODE {
+        return 0;
+    }
+    let mut plain = [0; MAX_DECODED];
+    let Some((head, rest)) = plain.split_first_chunk_mut::<HEADER>() else {
+        return 0;
+    };
+    let [a, b] = (u16::from(VERSION) << 12 | header.sender).to_le_bytes();
+    let [c, d] = header.destination.to_le_bytes();
+    let [e, f] = header.network.to_le_bytes();
+    let [g, h, i, j] = header.counter.to_le_bytes();
+    *head = [a, b, c, d, e, f, g, h, i, j];
+    let Some(body) = rest
+        .split_at_mut_checked(MAX_BODY)
+        .and_then(|(body, _)| message.encode(body))
+    else {
+        return 0;
+    };
+    let checked = HEADER + body;
+    let mut crc = Crc32c::new();
+    crc.update(plain.get(..checked).unwrap_or_default());
+    if let Some(place) = plain.get_mut(checked..checked + CHECK) {
+        place.copy_from_slice(&crc.finish().to_le_bytes());
+    }
+    stuff(plain.get(..checked + CHECK).unwrap_or_default(), out)
+}
+
+/// The header and message in `plain`, a frame without COBS and delimiter.
+///
+/// Whether the frame is meant for this node is the receiver's to say.
+///
+/// # Errors
+/// [`FrameError`] says what is wrong; the CRC is looked at first, so every other error is one of an intact frame.
+pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
+    let (checked, check) = plain.split_last_chunk::<CHECK>().ok_or(FrameError::Short)?;
+    let (head, body) = checked
+        .split_first_chunk::<HEADER>()
+        .ok_or(FrameError::Short)?;
+    let mut crc = Crc32c::new();
+    crc.update(checked);
+    if crc.finish() != u32::from_le_bytes(*check) {
+        return Err(FrameError::Crc);
+    }
+    let [a, b, c, d, e, f, g, h, i, j] = *head;
+    let first = u16::from_le_bytes([a, b]);
+    let destination = u16::from_le_bytes([c, d]);
+    if first >> 12 != u16::from(VERSION) || destination >> 12 != 0 {
+        return Err(FrameError::Version);
+    }
+    let header = Header {
+        network: u16::from_le_bytes([e, f]),
+        sender: first & 0x0FFF,
+        destination,
+        counter: u32::from_le_bytes([g, h, i, j]),
+    };
+    let message = Message::decode(body).map_err(FrameError::Message)?;
+    Ok((header, message))
+}
+
+/// COBS: `plain`, of fewer than 254 bytes, without its zeros, and the delimiter. Returns the length.
+fn stuff(plain: &[u8], out: &mut FrameBuf) -> usize {
+    let mut at = 0;
+    for run in plain.split(|&byte| byte == 0) {
+        let Some((code, rest)) = out.get_mut(at..).and_then(<[u8]>::split_first_mut) else {
+            return 0;
+        };
+        let Some(place) = rest.get_mut(..run.len()) else {
+            return 0;
+        };
+        *code = u8::try_from(run.len() + 1).unwrap_or(u8::MAX);
+        place.copy_from_slice(run);
+        at += run.len() + 1;
+    }
+    let Some(end) = out.get_mut(at) else { return 0 };
+    *end = 0;
+    at + 1
+}

@@ -1,0 +1,7 @@
+//! Bytes on the link: [`deframe`] cuts the byte stream at delimiters and undoes COBS, [`frame`] checks integrity and holds
+//! the addresses, [`message`] is what neighbours say. `FORMAT.md` beside this file has byte tables and examples.
+
+pub mod crc;
+pub mod deframe;
+pub mod frame;
+pub mod message;
