@@ -70,7 +70,7 @@ pub enum MissionError {
     Distance,
     /// `min_separation_m` is not within 0 to 1e5.
     Separation,
-    /// The relays, `min_separation_m` apart, are longer than `distance_m`.
+    /// The relays, `min_separation_m` (and a rounding of 5e-7 `distance_m`) apart, are longer than `distance_m`.
     TooManyForDistance,
     /// `tx_power_w` is not within 1e-6 to 1e6.
     TxPower,
@@ -135,6 +135,11 @@ impl Gain {
         self.hi
     }
 
+    /// `target` / gain, rounded.
+    pub const fn ratio(&self, target: f32) -> f32 {
+        target / self.hi
+    }
+
     /// `target` / gain - 1, relative error below 2e-7 even where the two are next to each other.
     pub const fn excess(&self, target: f32) -> f32 {
         ((target - self.hi) - self.lo) / self.hi
@@ -153,8 +158,11 @@ pub struct Mission {
     receiver_gain_per_w: f64,
 }
 
-/// A relay nearer to its neighbour than this part of the distance could not be told from it in f32.
-const FINEST_STEP: f32 = 1.0 / 1_048_576.0;
+/// Two steps of an f32 just below the distance, as a part of it: relays that all gather at its end still stand apart.
+const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
+
+/// What rounding may take from a step between two places, as a part of the distance.
+const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
 impl Mission {
     /// Checks every parameter. Usable in a constant, where [`Mission::new`] turns a mistake into a failed build.
@@ -181,7 +189,7 @@ impl Mission {
         if !within(min_separation_m, 0.0, 1e5) {
             return Err(MissionError::Separation);
         }
-        if (relays - 1) as f32 * min_separation_m > distance_m {
+        if (relays - 1) as f32 * (min_separation_m + distance_m * ROUNDING) > distance_m {
             return Err(MissionError::TooManyForDistance);
         }
         if !within(tx_power_w, 1e-6, 1e6) {
@@ -270,28 +278,26 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// The least step in x between neighbours whose altitudes differ by `climb_m`, m.
-    ///
-    /// The separation asked for, or a millionth of the distance where none is asked for: two relays never share a place.
+    /// The least step in x between neighbours whose altitudes differ by `climb_m`, m: what keeps the separation asked for.
     pub(crate) fn least_step(&self, climb_m: f32) -> f32 {
         let apart = self.config.min_separation_m;
-        let level = apart * apart - climb_m * climb_m;
-        let finest = self.config.distance_m * FINEST_STEP;
-        if level > 0.0 {
-            libm::sqrtf(level).max(finest)
-        } else {
-            finest
-        }
+        libm::sqrtf((apart * apart - climb_m * climb_m).max(0.0))
     }
 
     /// The farthest place toward Rx that leaves relays `index` + 1 to N room to stand `min_separation_m` apart, m.
     pub(crate) fn end_for(&self, index: u16) -> f32 {
         let behind = f32::from(self.config.relays.saturating_sub(index));
-        let step = self
-            .config
-            .min_separation_m
-            .max(self.config.distance_m * FINEST_STEP);
-        (self.config.distance_m - behind * step).max(0.0)
+        let MissionConfig {
+            distance_m,
+            min_separation_m,
+            ..
+        } = self.config;
+        let step = if min_separation_m > 0.0 {
+            min_separation_m + distance_m * ROUNDING
+        } else {
+            distance_m * FINEST_STEP
+        };
+        (distance_m - behind * step).max(0.0)
     }
 
     /// A 16-bit digest of every parameter, by which relays tell whether they fly the same mission.
@@ -411,10 +417,10 @@ pub(crate) mod tests {
         assert_eq!(Mission::try_new(paper(0)), Err(MissionError::Relays));
         assert_eq!(Mission::try_new(paper(1001)), Err(MissionError::Relays));
         assert_eq!(
-            Mission::try_new(paper(252)),
+            Mission::try_new(paper(251)),
             Err(MissionError::TooManyForDistance)
         );
-        assert!(Mission::try_new(paper(251)).is_ok());
+        assert!(Mission::try_new(paper(250)).is_ok());
     }
 
     #[test]

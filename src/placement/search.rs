@@ -5,6 +5,8 @@
 //! that was met and the lowest that was not, and the slacks, smooth in log gamma, tell where: inverse interpolation puts
 //! the next ladder's dense middle there while its ends still span the bracket.
 
+use core::ops::Range;
+
 use super::ladder::Ladder;
 use super::verdict::met;
 use crate::mission::{Mission, MissionConfig, Profile};
@@ -39,6 +41,9 @@ impl core::error::Error for Infeasible {}
 
 /// How far below the ceiling the search gives up.
 const DEPTH: f32 = 1e-12;
+
+/// How far, as a part of the gap between two targets, a smooth slack may make the cubic's root differ from the line's.
+const BEND: f32 = 0.25;
 
 /// How much of a bracket a sweep must cut off for the interpolation to be trusted with the next one.
 const PROGRESS: f32 = 0.25;
@@ -200,24 +205,25 @@ impl Search {
 }
 
 /// The target at which the slack is zero: log target as a cubic in the slack through the four points about its change of sign.
+///
+/// `None` where the cubic and the straight line disagree: the slack jumps there, and a root of either means nothing.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
-    let cubic = met.saturating_sub(2)..(met + 2).min(slacks.len());
-    let secant = met - 1..met + 1;
-    [cubic, secant].into_iter().find_map(|window| {
+    let root_within = |window: Range<usize>| {
         let mut points: heapless::Vec<(f32, f32), 4> = heapless::Vec::new();
         for (&target, &slack) in targets.get(window.clone())?.iter().zip(slacks.get(window)?) {
             points
                 .push((slack, libm::log1pf((target - reference) / reference)))
                 .ok()?;
         }
-        let (_, top) = *points.last()?;
-        let root = neville_at_zero(&mut points)?;
-        (0.0..=top)
-            .contains(&root)
-            .then(|| reference + reference * libm::expm1f(root))
-    })
+        neville_at_zero(&mut points)
+    };
+    let gap = libm::log1pf((targets.get(met)? - reference) / reference);
+    let line = root_within(met - 1..met + 1)?;
+    let cubic = root_within(met.saturating_sub(2)..(met + 2).min(slacks.len()))?;
+    let trusted = (0.0..=gap).contains(&cubic) && (cubic - line).abs() <= BEND * gap;
+    trusted.then(|| reference + reference * libm::expm1f(cubic))
 }
 
 /// The polynomial through `points` (abscissa, value) at abscissa 0; `None` unless the abscissae fall strictly.

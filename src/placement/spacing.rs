@@ -17,8 +17,8 @@
 //! | < 0 | < 0 and e > 0 | (r - u) / e, if inside |
 //! | < 0 | otherwise | none: the target cannot be met |
 //!
-//! with r = sqrt((1 + e) u^2 + e H); the discriminant u^2 + e C is the same number, but cancels. No case subtracts two
-//! nearly equal numbers, and e is formed from a gain of twice f32's width, so targets next to A lose nothing. The printed
+//! with r = sqrt((gamma / A) u^2 + e H); the discriminant u^2 + e C is the same number, but cancels, and so does 1 + e for
+//! small targets. e is formed from a gain of twice f32's width, so targets next to A lose nothing. The printed
 //! case distinction picks wrong roots once the chain has passed the interferer.
 //!
 //! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement.rs` asserts it against a bisection of the
@@ -33,7 +33,7 @@ const MOST_EXCESS: f32 = 1e12;
 
 /// One hop toward Rx, ready to be evaluated for many targets.
 ///
-/// The terms that do not depend on the target are worked out once, so a reach costs two divisions and a square root.
+/// The terms that do not depend on the target are worked out once, so a reach costs three divisions and a square root.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
@@ -89,7 +89,7 @@ impl Hop {
         if c < 0.0 && (ahead || e <= 0.0) {
             return None;
         }
-        let discriminant = (1.0 + e) * square(u) + e * h;
+        let discriminant = self.sender.gain.ratio(target).min(MOST_EXCESS) * square(u) + e * h;
         if discriminant < 0.0 && c < 0.0 {
             return None;
         }
@@ -103,11 +103,13 @@ impl Hop {
             return if c < 0.0 { None } else { Some(self.end_m) };
         }
         let place = from_m + d;
-        Some(if place - from_m > d {
+        let place = if place - from_m > d {
             place.next_down()
         } else {
             place
-        })
+        };
+        // A hop too short for an f32 is none: two relays never share a place.
+        (place > from_m).then_some(place)
     }
 
     /// Extends a chain by this hop: `onto` gets the reach for every target that the sender's `reaches` still meet.

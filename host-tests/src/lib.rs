@@ -1,0 +1,10 @@
+//! A chain of relays simulated on a PC, and what the tools and tests of uav-relay share.
+
+pub mod brief;
+pub mod cases;
+pub mod random;
+pub mod reference;
+pub mod report;
+pub mod scenario;
+pub mod sim;
+pub mod svg;

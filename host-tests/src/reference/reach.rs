@@ -1,0 +1,61 @@
+//! How far a single node may stand, and the greedy chain built from that.
+
+use super::hop::{Hop, bisect};
+use super::{Link, meets};
+
+impl Link {
+    /// The farthest place in [`from_x`, D], metres, at which relay `k` in 1..=N meets `target` (linear, > 0) while relay k-1
+    /// stands at `from_x` (for k = 1 Tx stands at 0); `None` when no place does.
+    ///
+    /// About 60 SIR evaluations, at most about 150.
+    pub fn farthest(&self, k: usize, from_x: f64, target: f64) -> Option<f64> {
+        let end = self.distance_m;
+        if !(0.0..=end).contains(&from_x) {
+            return None;
+        }
+        let hop = Hop::new(self, k, from_x)?;
+        let meets = |x: f64| hop.meets(x, target);
+        if meets(end) {
+            return Some(end);
+        }
+        // With the far end failing and one turning point at most, there is exactly one crossing beyond any place that meets
+        // the target. If the near end fails too, only the top of a hill can meet it.
+        let inside = if meets(from_x) {
+            from_x
+        } else {
+            hop.turn(from_x, end)
+        };
+        meets(inside).then(|| bisect(inside, end, meets))
+    }
+
+    /// The largest distance from Rx, metres, at which the last relay meets `target` (linear, > 0) at Rx; it may exceed D.
+    ///
+    /// `None` when the target is missed even above Rx, or is not positive. About 60 SIR evaluations.
+    pub fn rx_reach(&self, target: f64) -> Option<f64> {
+        let sir = |distance: f64| self.sir_rx(self.distance_m - distance);
+        let meets = |distance: f64| sir(distance).is_some_and(|sir| meets(sir, target));
+        if !(target > 0.0 && meets(0.0)) {
+            return None;
+        }
+        let mut outside = self.distance_m;
+        while outside.is_finite() && meets(outside) {
+            outside *= 2.0;
+        }
+        Some(bisect(0.0, outside, meets))
+    }
+
+    /// Places, metres, of the chain in which each relay in turn goes as far as `target` (linear, > 0) lets it; `None` when a
+    /// relay has no place or Rx is out of the last one's reach.
+    ///
+    /// This is what the on-board protocol does with the same target. When all relays share one altitude, `None` proves that
+    /// no chain meets the target; otherwise see [`Link::placement`]. N reaches.
+    pub fn feasible(&self, target: f64) -> Option<Vec<f64>> {
+        let mut from = 0.0;
+        let mut x = Vec::with_capacity(self.len());
+        for k in 1..=self.len() {
+            from = self.farthest(k, from, target)?;
+            x.push(from);
+        }
+        meets(self.sir_rx(from)?, target).then_some(x)
+    }
+}

@@ -1,0 +1,310 @@
+//! What a run came to, as people and programs read it.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+use uav_relay::sir::{Sender, at_receiver};
+use uav_relay::{Mission, Placement, Profile};
+
+use crate::sim::chain::{Ending, Outcome};
+
+/// One relay at its place.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct RelayReport {
+    /// Index in the chain, from 1.
+    pub index: u16,
+    /// Distance from the transmitter, m.
+    pub x_m: f64,
+    /// Altitude, m.
+    pub h_m: f64,
+    /// SIR of the hop that ends here, linear.
+    pub sir: f64,
+    /// The same in dB.
+    pub sir_db: f64,
+}
+
+/// What happened to frames.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct FaultReport {
+    /// Frames that never arrived.
+    pub lost: u64,
+    /// Frames that arrived changed.
+    pub corrupted: u64,
+    /// Frames that arrived twice.
+    pub duplicated: u64,
+    /// Frames that others could overtake.
+    pub reordered: u64,
+    /// Frames the relays refused, for whatever reason.
+    pub rejected: u64,
+}
+
+/// A relay whose silence was noticed.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct SilenceReport {
+    /// The relay that went silent.
+    pub silent: u16,
+    /// The neighbour that noticed.
+    pub noticed_by: u16,
+    /// When it had been silent for long enough, s of virtual time.
+    pub at_s: f64,
+}
+
+/// The result of `cargo chain`.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct ChainReport {
+    /// The method, as on the command line.
+    pub method: String,
+    /// Number of relays.
+    pub uavs: u16,
+    /// What went wrong, if anything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    /// The most that could be had, where nothing could be placed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub best_sir: Option<f64>,
+    /// SIR of the worst hop, linear; absent unless every relay has its place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir: Option<f64>,
+    /// The same in dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir_db: Option<f64>,
+    /// The target the relays agreed on, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<f64>,
+    /// The relays that have a place, from the transmitter on.
+    pub relays: Vec<RelayReport>,
+    /// SIR at the receiver, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rx_sir: Option<f64>,
+    /// The same in dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rx_sir_db: Option<f64>,
+    /// Forward passes along the chain.
+    pub sweeps: u32,
+    /// Frames put on any link.
+    pub messages: u64,
+    /// Bytes put on any link.
+    pub bytes: u64,
+    /// Virtual time the run took, s.
+    pub virtual_s: f64,
+    /// What happened to frames.
+    pub faults: FaultReport,
+    /// Whose silence was noticed by whom.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub silences: Vec<SilenceReport>,
+    /// Seed of every random draw.
+    pub seed: u64,
+}
+
+/// A linear power ratio in dB.
+pub fn db(linear: f64) -> f64 {
+    10.0 * linear.log10()
+}
+
+/// The SIR of every hop, from the transmitter's to the receiver's, for relays that stand at `places`.
+///
+/// By the formulas of the crate, as a relay works them out.
+pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
+    let mut sender = Sender::transmitter(mission);
+    let mut from_m = 0.0;
+    let mut sirs = Vec::with_capacity(places.len() + 1);
+    for (place, profile) in places {
+        sirs.push(f64::from(sender.sir_at(mission, from_m, *place)));
+        sender = Sender::relay(mission, *profile);
+        from_m = place.x_m;
+    }
+    if let Some((place, profile)) = places.last() {
+        sirs.push(f64::from(at_receiver(mission, *place, profile.power_w)));
+    }
+    sirs
+}
+
+impl ChainReport {
+    /// The report of a run.
+    pub fn new(method: &str, mission: &Mission, outcome: &Outcome, seed: u64) -> Self {
+        let places: Option<Vec<_>> = outcome
+            .relays
+            .iter()
+            .map(|relay| Some((relay.setpoint?, relay.profile)))
+            .collect();
+        let places = places.unwrap_or_default();
+        let sirs = hop_sirs(mission, &places);
+        let worst = sirs.iter().copied().reduce(f64::min);
+        let relays = (1..)
+            .zip(places.iter().zip(&sirs))
+            .map(|(index, ((place, _), &sir))| RelayReport {
+                index,
+                x_m: f64::from(place.x_m),
+                h_m: f64::from(place.altitude_m),
+                sir,
+                sir_db: db(sir),
+            })
+            .collect();
+        let rx_sir = sirs.last().copied();
+        let injected = outcome.injected;
+        Self {
+            method: method.to_owned(),
+            uavs: mission.relays(),
+            error: error(outcome),
+            best_sir: (outcome.ending == Ending::Infeasible).then_some(0.0),
+            sir: worst,
+            sir_db: worst.map(db),
+            target: outcome
+                .relays
+                .first()
+                .and_then(|head| head.target)
+                .map(f64::from),
+            relays,
+            rx_sir,
+            rx_sir_db: rx_sir.map(db),
+            sweeps: outcome.sweeps,
+            messages: outcome.messages,
+            bytes: outcome.bytes,
+            virtual_s: seconds(outcome.ended),
+            faults: FaultReport {
+                lost: injected.lost,
+                corrupted: injected.corrupted,
+                duplicated: injected.duplicated,
+                reordered: injected.reordered,
+                rejected: outcome
+                    .relays
+                    .iter()
+                    .map(|relay| u64::from(relay.stats.rejected()))
+                    .sum(),
+            },
+            silences: silences(outcome),
+            seed,
+        }
+    }
+
+    /// The report of a run that could not be started.
+    pub fn refused(method: &str, uavs: u16, seed: u64, why: &str) -> Self {
+        Self {
+            method: method.to_owned(),
+            uavs,
+            error: Some(why.to_owned()),
+            best_sir: None,
+            sir: None,
+            sir_db: None,
+            target: None,
+            relays: Vec::new(),
+            rx_sir: None,
+            rx_sir_db: None,
+            sweeps: 0,
+            messages: 0,
+            bytes: 0,
+            virtual_s: 0.0,
+            faults: FaultReport {
+                lost: 0,
+                corrupted: 0,
+                duplicated: 0,
+                reordered: 0,
+                rejected: 0,
+            },
+            silences: Vec::new(),
+            seed,
+        }
+    }
+
+    /// The report as a table to read, and what it cost.
+    pub fn table(&self) -> String {
+        let mut text = String::new();
+        if !self.relays.is_empty() {
+            _ = writeln!(
+                text,
+                "{:>6} {:>12} {:>10} {:>12} {:>9}",
+                "relay", "x [m]", "h [m]", "SIR", "SIR [dB]"
+            );
+            for relay in &self.relays {
+                _ = writeln!(
+                    text,
+                    "{:>6} {:>12.3} {:>10.2} {:>12.6} {:>9.3}",
+                    relay.index, relay.x_m, relay.h_m, relay.sir, relay.sir_db
+                );
+            }
+        }
+        if let (Some(rx_sir), Some(rx_sir_db)) = (self.rx_sir, self.rx_sir_db) {
+            _ = writeln!(
+                text,
+                "{:>6} {:>12} {:>10} {:>12.6} {:>9.3}",
+                "Rx", "", "", rx_sir, rx_sir_db
+            );
+        }
+        if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
+            _ = writeln!(
+                text,
+                "worst hop: SIR {sir:.6} ({sir_db:.3} dB) with {} relays by `{}`",
+                self.uavs, self.method
+            );
+        }
+        _ = writeln!(
+            text,
+            "cost: {} sweeps, {} messages, {} bytes, {:.3} s of virtual time",
+            self.sweeps, self.messages, self.bytes, self.virtual_s
+        );
+        let faults = self.faults;
+        if faults.lost + faults.corrupted + faults.duplicated + faults.reordered + faults.rejected
+            > 0
+        {
+            _ = writeln!(
+                text,
+                "faults: {} lost, {} corrupted, {} duplicated, {} reordered; {} frames rejected (seed {})",
+                faults.lost,
+                faults.corrupted,
+                faults.duplicated,
+                faults.reordered,
+                faults.rejected,
+                self.seed
+            );
+        }
+        for silence in &self.silences {
+            _ = writeln!(
+                text,
+                "relay {} noticed at {:.3} s that relay {} is silent",
+                silence.noticed_by, silence.at_s, silence.silent
+            );
+        }
+        text
+    }
+}
+
+fn seconds(at: uav_relay::Instant) -> f64 {
+    at.as_micros() as f64 / 1e6
+}
+
+fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
+    outcome
+        .noticed
+        .iter()
+        .map(|&(by, side, at)| SilenceReport {
+            silent: match side {
+                uav_relay::Side::Upstream => by.saturating_sub(1),
+                uav_relay::Side::Downstream => by.saturating_add(1),
+            },
+            noticed_by: by,
+            at_s: seconds(at),
+        })
+        .collect()
+}
+
+fn error(outcome: &Outcome) -> Option<String> {
+    match outcome.ending {
+        Ending::Settled => None,
+        Ending::Infeasible => Some("no placement gives every hop an SIR above 0".to_owned()),
+        Ending::Broken => {
+            let silent: Vec<String> = (1..)
+                .zip(&outcome.relays)
+                .filter(|(_, relay): &(u16, _)| relay.killed.is_some())
+                .map(|(index, _)| index.to_string())
+                .collect();
+            Some(format!(
+                "the chain is broken: relay {} went silent",
+                silent.join(", ")
+            ))
+        }
+        Ending::OutOfTime => Some(format!(
+            "the chain had not settled after {:.0} s",
+            seconds(outcome.ended)
+        )),
+    }
+}

@@ -1,0 +1,164 @@
+//! A file against the table of keys: shape, known and required keys, ranges; and the words for a wrong type.
+
+use serde_path_to_error::Segment;
+use toml::{Table, Value};
+
+use super::error::{Problem, ScenarioError, cut, quote};
+use super::keys::Rule::{LinkOrNumber, Number, Whole};
+use super::keys::{FILE, Keys, Rule, names};
+
+/// A mistake in the value of a key.
+pub(super) fn mistake(
+    file: &str,
+    key: &str,
+    value: Option<String>,
+    problem: Problem,
+    allowed: String,
+) -> ScenarioError {
+    ScenarioError {
+        file: file.to_owned(),
+        key: Some(key.to_owned()),
+        value,
+        problem,
+        allowed,
+    }
+}
+
+/// Checks shape, known and required keys, and every range. A scalar of the wrong type is left for serde to find.
+pub(super) fn table(file: &str, table: &Table) -> Result<(), ScenarioError> {
+    Check { file }.table("", table, FILE)
+}
+
+struct Check<'a> {
+    file: &'a str,
+}
+
+impl Check<'_> {
+    fn table(&self, path: &str, table: &Table, keys: Keys) -> Result<(), ScenarioError> {
+        if let Some((name, value)) = table
+            .iter()
+            .find(|(name, _)| keys.iter().all(|key| key.name != *name))
+        {
+            let allowed = format!("the keys {}", names(keys));
+            // The name is the file's own, and a quoted key may be as long as the file.
+            let path = join(path, &cut(name));
+            return Err(mistake(
+                self.file,
+                &path,
+                Some(quote(value)),
+                Problem::UnknownKey,
+                allowed,
+            ));
+        }
+        for key in keys {
+            let path = join(path, key.name);
+            match table.get(key.name) {
+                Some(value) => self.value(&path, value, &key.rule)?,
+                None if !key.required => {}
+                // An absent table is as good as an empty one: its first required key is what is missing.
+                None => match key.rule {
+                    Rule::Table(inner) => self.table(&path, &Table::new(), inner)?,
+                    ref rule => {
+                        return Err(mistake(
+                            self.file,
+                            &path,
+                            None,
+                            Problem::Missing,
+                            rule.to_string(),
+                        ));
+                    }
+                },
+            }
+        }
+        Ok(())
+    }
+
+    fn value(&self, path: &str, value: &Value, rule: &Rule) -> Result<(), ScenarioError> {
+        let fail = |problem| {
+            Err(mistake(
+                self.file,
+                path,
+                Some(quote(value)),
+                problem,
+                rule.to_string(),
+            ))
+        };
+        match (rule, value) {
+            (Number(range) | LinkOrNumber(range), _) => match as_number(value) {
+                Some(number) if !range.holds(number) => fail(Problem::OutOfRange),
+                _ => Ok(()),
+            },
+            (Whole(range), Value::Integer(whole)) if !range.holds(*whole as f64) => {
+                fail(Problem::OutOfRange)
+            }
+            (Whole(_), _) => Ok(()),
+            (Rule::Table(keys), Value::Table(table)) => self.table(path, table, keys),
+            (Rule::Tables(_, least), Value::Array(list)) if list.len() < *least => {
+                fail(Problem::EmptyList)
+            }
+            (Rule::Tables(keys, _), Value::Array(list)) => {
+                for (index, item) in list.iter().enumerate() {
+                    self.value(&format!("{path}[{index}]"), item, &Rule::Table(keys))?;
+                }
+                Ok(())
+            }
+            // serde would take a list for a table, field by field; nobody who writes one means that.
+            (Rule::Table(_) | Rule::Tables(..), _) => fail(Problem::WrongType),
+        }
+    }
+}
+
+/// The key a path leads to, in the file's own words.
+fn join(path: &str, name: &str) -> String {
+    if path.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{path}.{name}")
+    }
+}
+
+/// A number, whether or not it was written with a decimal point.
+fn as_number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Integer(whole) => Some(*whole as f64),
+        Value::Float(number) => Some(*number),
+        _ => None,
+    }
+}
+
+/// The mistake at a path that serde stumbled over: in a file that passed [`table`], a scalar of the wrong type.
+pub(super) fn wrong_type(
+    file: &str,
+    table: &Table,
+    path: &serde_path_to_error::Path,
+) -> ScenarioError {
+    let mut value = None;
+    let mut allowed = format!("the keys {}", names(FILE));
+    let (mut here, mut keys) = (Some(table), FILE);
+    let mut list = None;
+    for segment in path {
+        match segment {
+            Segment::Map { key } => {
+                let Some(known) = keys.iter().find(|known| known.name == key) else {
+                    break;
+                };
+                value = here.and_then(|table| table.get(key));
+                allowed = known.rule.to_string();
+                if let Rule::Table(inner) | Rule::Tables(inner, _) = known.rule {
+                    keys = inner;
+                }
+            }
+            Segment::Seq { index } => value = list.and_then(|list: &Vec<Value>| list.get(*index)),
+            Segment::Enum { .. } | Segment::Unknown => break,
+        }
+        here = value.and_then(Value::as_table);
+        list = value.and_then(Value::as_array);
+    }
+    mistake(
+        file,
+        &path.to_string(),
+        value.map(quote),
+        Problem::WrongType,
+        allowed,
+    )
+}

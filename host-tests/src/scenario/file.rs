@@ -1,0 +1,283 @@
+//! The file as serde reads it, and the checks that take several keys at once.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use toml::Table;
+
+use super::check::{mistake, wrong_type};
+use super::error::{Problem, ScenarioError};
+use super::keys::number;
+use super::{
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
+};
+
+/// `deny_unknown_fields` guards the table of keys: a key listed there and forgotten here fails at once.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawFile {
+    geometry: RawGeometry,
+    power: RawPower,
+    #[serde(default)]
+    channel: RawChannel,
+    interferer: Option<Vec<RawSource>>,
+    #[serde(default)]
+    relay: Vec<RawRelay>,
+    field: Option<RawField>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(
+    clippy::struct_field_names,
+    reason = "the fields are the keys of the file"
+)]
+struct RawGeometry {
+    distance_m: f64,
+    altitude_m: f64,
+    altitude_min_m: Option<f64>,
+    altitude_max_m: Option<f64>,
+    /// No separation is asked for unless the file does.
+    #[serde(default)]
+    min_separation_m: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPower {
+    tx_w: f64,
+    uav_w: f64,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct RawChannel {
+    carrier_hz: Option<f64>,
+    excess_loss_los_db: Option<f64>,
+    excess_loss_nlos_db: Option<f64>,
+    air_ground: Option<RawAirGround>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum RawAirGround {
+    Link(RawLink),
+    Weight(f64),
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum RawLink {
+    Los,
+    Nlos,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSource {
+    power_w: f64,
+    x_m: f64,
+    y_m: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawRelay {
+    index: u16,
+    altitude_m: Option<f64>,
+    power_w: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawField {
+    i_max_w: f64,
+    beta: Vec<RawBeta>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawBeta {
+    x_m: f64,
+    alpha: f64,
+    beta: f64,
+}
+
+/// The typed form of a table that [`super::check::table`] has passed.
+pub(super) fn from_table(file: &str, table: &Table) -> Result<RawFile, ScenarioError> {
+    serde_path_to_error::deserialize(table.clone())
+        .map_err(|error| wrong_type(file, table, error.path()))
+}
+
+/// The scenario, once its keys agree with each other.
+pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError> {
+    let geometry = raw.geometry;
+    let altitude_m = geometry.altitude_m;
+    let altitude_min_m = geometry.altitude_min_m.unwrap_or(altitude_m);
+    let altitude_max_m = geometry.altitude_max_m.unwrap_or(altitude_m);
+    let band = |key: &str, value, side: &str| {
+        let allowed = format!("at {side} altitude_m, {} m", number(altitude_m));
+        Err(mistake(
+            file,
+            key,
+            Some(number(value)),
+            Problem::OutOfRange,
+            allowed,
+        ))
+    };
+    if altitude_min_m > altitude_m {
+        return band("geometry.altitude_min_m", altitude_min_m, "most");
+    }
+    if altitude_max_m < altitude_m {
+        return band("geometry.altitude_max_m", altitude_max_m, "least");
+    }
+    Ok(Scenario {
+        distance_m: geometry.distance_m,
+        altitude_m,
+        altitude_min_m,
+        altitude_max_m,
+        min_separation_m: geometry.min_separation_m,
+        tx_w: raw.power.tx_w,
+        uav_w: raw.power.uav_w,
+        channel: channel(file, &raw.channel)?,
+        interference: interference(file, raw.interferer, raw.field)?,
+        relays: relays(file, raw.relay)?,
+    })
+}
+
+fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {
+    let default = ChannelSpec::default();
+    let spec = ChannelSpec {
+        carrier_hz: raw.carrier_hz.unwrap_or(default.carrier_hz),
+        excess_loss_los_db: raw.excess_loss_los_db.unwrap_or(default.excess_loss_los_db),
+        excess_loss_nlos_db: raw
+            .excess_loss_nlos_db
+            .unwrap_or(default.excess_loss_nlos_db),
+        air_ground: match raw.air_ground {
+            Some(RawAirGround::Link(RawLink::Los)) => AirGround::Los,
+            Some(RawAirGround::Link(RawLink::Nlos)) => AirGround::Nlos,
+            Some(RawAirGround::Weight(weight)) => AirGround::Weight(weight),
+            None => default.air_ground,
+        },
+    };
+    let (los, nlos) = (spec.excess_loss_los_db, spec.excess_loss_nlos_db);
+    if nlos >= los {
+        return Ok(spec);
+    }
+    // The blame goes to a key that the file has.
+    let (key, value, allowed) = match raw.excess_loss_nlos_db {
+        Some(_) => (
+            "channel.excess_loss_nlos_db",
+            nlos,
+            format!("{} (excess_loss_los_db) to 200 dB", number(los)),
+        ),
+        None => (
+            "channel.excess_loss_los_db",
+            los,
+            format!("0 to {} dB (excess_loss_nlos_db by default)", number(nlos)),
+        ),
+    };
+    Err(mistake(
+        file,
+        key,
+        Some(number(value)),
+        Problem::OutOfRange,
+        allowed,
+    ))
+}
+
+fn interference(
+    file: &str,
+    sources: Option<Vec<RawSource>>,
+    field: Option<RawField>,
+) -> Result<Interference, ScenarioError> {
+    let one = || "either one [field] or one or more [[interferer]]".to_owned();
+    match (sources, field) {
+        (None, None) => Err(mistake(
+            file,
+            "interferer",
+            None,
+            Problem::NoInterference,
+            one(),
+        )),
+        (Some(sources), Some(_)) => {
+            let both = format!("[field] beside {} [[interferer]]", sources.len());
+            Err(mistake(
+                file,
+                "field",
+                Some(both),
+                Problem::TwoInterferences,
+                one(),
+            ))
+        }
+        (Some(sources), None) => {
+            let sources = sources.into_iter().map(|raw| Source {
+                power_w: raw.power_w,
+                x_m: raw.x_m,
+                y_m: raw.y_m,
+            });
+            Ok(Interference::Sources(sources.collect()))
+        }
+        (None, Some(raw)) => {
+            let points = raw.beta.into_iter();
+            let beta: Vec<_> = points
+                .map(|raw| BetaPoint {
+                    x_m: raw.x_m,
+                    alpha: raw.alpha,
+                    beta: raw.beta,
+                })
+                .collect();
+            for (index, (before, here)) in (1..).zip(beta.iter().zip(beta.iter().skip(1))) {
+                if here.x_m <= before.x_m {
+                    let key = format!("field.beta[{index}].x_m");
+                    let allowed = format!(
+                        "above {} (the x_m of the entry before it) to 1e7 m",
+                        number(before.x_m)
+                    );
+                    return Err(mistake(
+                        file,
+                        &key,
+                        Some(number(here.x_m)),
+                        Problem::Unsorted,
+                        allowed,
+                    ));
+                }
+            }
+            Ok(Interference::Field(Field {
+                i_max_w: raw.i_max_w,
+                beta,
+            }))
+        }
+    }
+}
+
+fn relays(file: &str, raw: Vec<RawRelay>) -> Result<BTreeMap<u16, RelayOverride>, ScenarioError> {
+    let mut relays = BTreeMap::new();
+    for (place, raw) in raw.into_iter().enumerate() {
+        let key = format!("relay[{place}].index");
+        let fail = |problem, allowed| {
+            Err(mistake(
+                file,
+                &key,
+                Some(raw.index.to_string()),
+                problem,
+                allowed,
+            ))
+        };
+        if raw.altitude_m.is_none() && raw.power_w.is_none() {
+            return fail(
+                Problem::NothingDiffers,
+                "altitude_m, power_w or both beside index".to_owned(),
+            );
+        }
+        let relay = RelayOverride {
+            altitude_m: raw.altitude_m,
+            power_w: raw.power_w,
+        };
+        if relays.insert(raw.index, relay).is_some() {
+            let allowed = "1 to 1000, each in one [[relay]] only".to_owned();
+            return fail(Problem::DuplicateRelay, allowed);
+        }
+    }
+    Ok(relays)
+}

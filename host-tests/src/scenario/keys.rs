@@ -1,0 +1,189 @@
+//! Every key a scenario file may have, with what it allows: the one table that both the checks and the error
+//! messages read, so that neither can say what the other does not do.
+
+use core::fmt;
+
+/// A range of numbers; both ends belong to it, except a low end that is `open`.
+pub(super) struct Range {
+    low: f64,
+    high: f64,
+    open: bool,
+    unit: &'static str,
+}
+
+/// What a key's value has to be.
+pub(super) enum Rule {
+    Number(Range),
+    Whole(Range),
+    /// "los", "nlos" or a number.
+    LinkOrNumber(Range),
+    Table(Keys),
+    /// An array of tables with at least so many entries.
+    Tables(Keys, usize),
+}
+
+/// One key of a table.
+pub(super) struct Key {
+    pub(super) name: &'static str,
+    pub(super) required: bool,
+    pub(super) rule: Rule,
+}
+
+/// The keys of a table.
+pub(super) type Keys = &'static [Key];
+
+const fn range(low: f64, high: f64, unit: &'static str) -> Range {
+    Range {
+        low,
+        high,
+        open: false,
+        unit,
+    }
+}
+
+const fn above(low: f64, high: f64) -> Range {
+    Range {
+        low,
+        high,
+        open: true,
+        unit: "",
+    }
+}
+
+const fn required(name: &'static str, rule: Rule) -> Key {
+    Key {
+        name,
+        required: true,
+        rule,
+    }
+}
+
+const fn optional(name: &'static str, rule: Rule) -> Key {
+    Key {
+        name,
+        required: false,
+        rule,
+    }
+}
+
+use Rule::{LinkOrNumber, Number, Whole};
+
+const ALTITUDE: Range = range(0.1, 1e5, "m");
+const POWER: Range = range(1e-6, 1e6, "W");
+const PLACE: Range = range(-1e7, 1e7, "m");
+const LOSS: Range = range(0.0, 200.0, "dB");
+
+/// The whole file.
+pub(super) const FILE: Keys = &[
+    required("geometry", Rule::Table(GEOMETRY)),
+    required("power", Rule::Table(POWERS)),
+    optional("channel", Rule::Table(CHANNEL)),
+    optional("interferer", Rule::Tables(INTERFERER, 1)),
+    optional("relay", Rule::Tables(RELAY, 0)),
+    optional("field", Rule::Table(FIELD)),
+];
+
+const GEOMETRY: Keys = &[
+    required("distance_m", Number(range(1.0, 1e6, "m"))),
+    required("altitude_m", Number(ALTITUDE)),
+    optional("altitude_min_m", Number(ALTITUDE)),
+    optional("altitude_max_m", Number(ALTITUDE)),
+    optional("min_separation_m", Number(range(0.0, 1e5, "m"))),
+];
+
+const POWERS: Keys = &[
+    required("tx_w", Number(POWER)),
+    required("uav_w", Number(POWER)),
+];
+
+const CHANNEL: Keys = &[
+    optional("carrier_hz", Number(range(1e6, 1e12, "Hz"))),
+    optional("excess_loss_los_db", Number(LOSS)),
+    optional("excess_loss_nlos_db", Number(LOSS)),
+    optional("air_ground", LinkOrNumber(range(0.0, 1.0, ""))),
+];
+
+const INTERFERER: Keys = &[
+    required("power_w", Number(range(1e-6, 1e9, "W"))),
+    required("x_m", Number(PLACE)),
+    required("y_m", Number(PLACE)),
+];
+
+const RELAY: Keys = &[
+    required("index", Whole(range(1.0, 1000.0, ""))),
+    optional("altitude_m", Number(ALTITUDE)),
+    optional("power_w", Number(POWER)),
+];
+
+const FIELD: Keys = &[
+    required("i_max_w", Number(range(1e-30, 1e6, "W"))),
+    required("beta", Rule::Tables(BETA, 1)),
+];
+
+const BETA: Keys = &[
+    required("x_m", Number(PLACE)),
+    required("alpha", Number(above(1.0, 1e6))),
+    required("beta", Number(above(0.0, 1e6))),
+];
+
+impl Range {
+    /// Whether a number belongs to the range.
+    pub(super) fn holds(&self, value: f64) -> bool {
+        // A NaN fails the first comparison, an infinity one of the two.
+        let low = if self.open {
+            value > self.low
+        } else {
+            value >= self.low
+        };
+        low && value <= self.high
+    }
+}
+
+/// A number as a person would write it: neither a row of zeros nor needless digits.
+pub(super) fn number(value: f64) -> String {
+    let size = value.abs();
+    if size > 0.0 && !(1e-3..1e5).contains(&size) {
+        format!("{value:e}")
+    } else {
+        format!("{value}")
+    }
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let gap = if self.unit.is_empty() { "" } else { " " };
+        let low = if self.open { "above " } else { "" };
+        write!(
+            f,
+            "{low}{} to {}{gap}{}",
+            number(self.low),
+            number(self.high),
+            self.unit
+        )
+    }
+}
+
+impl fmt::Display for Rule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Number(range) => write!(f, "a number, {range}"),
+            Whole(range) => write!(f, "a whole number, {range}"),
+            LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
+            Rule::Table(keys) => write!(f, "a table with the keys {}", names(keys)),
+            Rule::Tables(keys, 0) => write!(f, "a list of tables with the keys {}", names(keys)),
+            Rule::Tables(keys, least) => write!(
+                f,
+                "a list of {least} or more tables with the keys {}",
+                names(keys)
+            ),
+        }
+    }
+}
+
+/// The names of some keys, for a message.
+pub(super) fn names(keys: Keys) -> String {
+    keys.iter()
+        .map(|key| key.name)
+        .collect::<Vec<_>>()
+        .join(", ")
+}

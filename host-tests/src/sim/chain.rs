@@ -1,0 +1,434 @@
+//! The relays, connected, run until they hold their places.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::node::settings::SetupError;
+use uav_relay::{
+    Event, FrameBuf, Identity, Instant, Mission, Phase, Placement, Port, Profile, Relay, Settings,
+    Side, Stats, Wiring,
+};
+
+use super::faults::{Faults, Injected};
+use super::link::{Line, LinkSpec};
+use super::queue::{Happening, Queue};
+
+/// After this many happenings the run is given up: some minutes of computing.
+const MOST_HAPPENINGS: u64 = 400_000_000;
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// The mission of every relay.
+    pub mission: Mission,
+    /// What relays hold of their own, by index from 1.
+    pub profiles: Vec<(u16, Profile)>,
+    /// What every relay is set to; `hop_time` and `profile` are filled in.
+    pub settings: Settings,
+    /// The links.
+    pub link: LinkSpec,
+    /// What happens to frames on them.
+    pub faults: Faults,
+    /// Relays that go silent: index from 1, and when.
+    pub kills: Vec<(u16, Instant)>,
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// The run ends at this time at the latest.
+    pub deadline: Instant,
+}
+
+impl Setup {
+    /// A faultless run of `mission` with the default settings, links and seed 1.
+    pub fn new(mission: Mission) -> Self {
+        Self {
+            mission,
+            profiles: Vec::new(),
+            settings: Settings::default(),
+            link: LinkSpec::default(),
+            faults: Faults::default(),
+            kills: Vec::new(),
+            seed: 1,
+            deadline: Instant::from_millis(1_000 * 3_600 * 24 * 30),
+        }
+    }
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Ending {
+    /// Every relay holds its place, for the same target.
+    Settled,
+    /// The head found that no target can be met.
+    Infeasible,
+    /// Relays went silent, and every neighbour of theirs has noticed.
+    Broken,
+    /// The deadline, or the limit on the work of a run.
+    OutOfTime,
+}
+
+/// One relay when the run has ended.
+#[derive(Clone, Debug)]
+pub struct RelayEnd {
+    /// Where it was told to fly, if anywhere.
+    pub setpoint: Option<Placement>,
+    /// The target it holds that place for.
+    pub target: Option<f32>,
+    /// What it brought along.
+    pub profile: Profile,
+    /// Its counters.
+    pub stats: Stats,
+    /// When it went silent, if it did.
+    pub killed: Option<Instant>,
+}
+
+/// What came of a run.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// How it ended.
+    pub ending: Ending,
+    /// The relays, from the head.
+    pub relays: Vec<RelayEnd>,
+    /// Forward passes along the chain.
+    pub sweeps: u32,
+    /// Frames put on any link.
+    pub messages: u64,
+    /// Bytes put on any link.
+    pub bytes: u64,
+    /// When the run ended.
+    pub ended: Instant,
+    /// What was done to frames.
+    pub injected: Injected,
+    /// Who noticed whose silence: index from 1 of the one that noticed, the side, and when.
+    pub noticed: Vec<(u16, Side, Instant)>,
+    /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.
+    pub unsafe_setpoints: u64,
+}
+
+/// One relay in the run.
+#[derive(Debug)]
+struct Member {
+    relay: Relay,
+    /// Its lines: toward Tx (or to all), toward Rx.
+    lines: [Line; 2],
+    killed: Option<Instant>,
+    /// The earliest wake-up that is in the queue, so that it is not put there twice.
+    wake: Option<Instant>,
+}
+
+/// A chain under way.
+#[derive(Debug)]
+pub struct Chain {
+    setup: Setup,
+    members: Vec<Member>,
+    queue: Queue,
+    rng: ChaCha8Rng,
+    outcome: Outcome,
+    now: Instant,
+    happenings: u64,
+    /// How often a relay has taken a place.
+    holding: usize,
+    /// Kills that are still to come.
+    kills_ahead: usize,
+}
+
+impl Chain {
+    /// Switches every relay on at time 0.
+    ///
+    /// # Errors
+    /// [`SetupError`] where a profile or setting is refused by the relay.
+    pub fn new(setup: Setup) -> Result<Self, SetupError> {
+        let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
+        let mut members = Vec::new();
+        for index in 1..=setup.mission.relays() {
+            let own = setup.profiles.iter().find(|(of, _)| *of == index);
+            let settings = Settings {
+                profile: own.map(|(_, profile)| *profile),
+                hop_time: setup.link.hop_time(),
+                ..setup.settings
+            };
+            let identity = Identity { network: 1, index };
+            let relay = Relay::new(
+                setup.mission,
+                identity,
+                settings,
+                rng.random(),
+                Instant::ZERO,
+            )?;
+            members.push(Member {
+                relay,
+                lines: [Line::default(); 2],
+                killed: None,
+                wake: None,
+            });
+        }
+        let mut queue = Queue::default();
+        for &(index, at) in &setup.kills {
+            queue.put(at, usize::from(index.saturating_sub(1)), Happening::Kill);
+        }
+        let kills_ahead = setup.kills.len();
+        let mut chain = Self {
+            setup,
+            members,
+            queue,
+            rng,
+            outcome: Outcome {
+                ending: Ending::OutOfTime,
+                relays: Vec::new(),
+                sweeps: 0,
+                messages: 0,
+                bytes: 0,
+                ended: Instant::ZERO,
+                injected: Injected::default(),
+                noticed: Vec::new(),
+                unsafe_setpoints: 0,
+            },
+            now: Instant::ZERO,
+            happenings: 0,
+            holding: 0,
+            kills_ahead,
+        };
+        for index in 0..chain.members.len() {
+            chain.drain(index);
+        }
+        Ok(chain)
+    }
+
+    /// Sweeps the head has begun and virtual time so far.
+    pub fn progress(&self) -> (u32, Instant) {
+        let sweeps = self
+            .members
+            .first()
+            .map_or(0, |head| head.relay.stats().sweeps);
+        (sweeps, self.now)
+    }
+
+    /// Runs up to `happenings` happenings; whether the run has ended.
+    pub fn step(&mut self, happenings: u64) -> bool {
+        for _ in 0..happenings {
+            if let Some(ending) = self.ending() {
+                self.outcome.ending = ending;
+                return true;
+            }
+            let Some((at, relay, happening)) = self.queue.take() else {
+                return true;
+            };
+            if at > self.setup.deadline || self.happenings >= MOST_HAPPENINGS {
+                return true;
+            }
+            self.happenings += 1;
+            self.now = at;
+            self.happen(relay, happening);
+        }
+        false
+    }
+
+    /// Runs to the end.
+    pub fn run(mut self) -> Outcome {
+        while !self.step(u64::MAX) {}
+        self.finish()
+    }
+
+    /// What came of the run so far.
+    pub fn finish(mut self) -> Outcome {
+        self.outcome.ended = self.now;
+        self.outcome.sweeps = self.progress().0;
+        self.outcome.relays = self
+            .members
+            .into_iter()
+            .map(|member| RelayEnd {
+                setpoint: member.relay.setpoint(),
+                target: member.relay.target(),
+                profile: member.relay.profile(),
+                stats: *member.relay.stats(),
+                killed: member.killed,
+            })
+            .collect();
+        self.outcome
+    }
+
+    fn ending(&self) -> Option<Ending> {
+        let killed = self.members.iter().any(|member| member.killed.is_some());
+        if killed && self.kills_ahead == 0 {
+            return self.all_noticed().then_some(Ending::Broken);
+        }
+        if self.kills_ahead > 0 {
+            return None;
+        }
+        if self
+            .members
+            .first()
+            .is_some_and(|head| head.relay.phase() == Phase::Infeasible)
+        {
+            return Some(Ending::Infeasible);
+        }
+        let settled = self.holding >= self.members.len()
+            && self
+                .members
+                .iter()
+                .all(|member| member.relay.phase() == Phase::Holding);
+        settled.then_some(Ending::Settled)
+    }
+
+    /// Whether every living neighbour of a silent relay has noticed.
+    fn all_noticed(&self) -> bool {
+        let noticed = |by: usize, side| {
+            let Some(member) = self.members.get(by) else {
+                return true;
+            };
+            let alive = member.killed.is_none();
+            !alive
+                || self
+                    .outcome
+                    .noticed
+                    .iter()
+                    .any(|&(index, at, _)| usize::from(index) == by + 1 && at == side)
+        };
+        self.members
+            .iter()
+            .enumerate()
+            .filter(|(_, member)| member.killed.is_some())
+            .all(|(silent, _)| {
+                let before = silent
+                    .checked_sub(1)
+                    .is_none_or(|by| noticed(by, Side::Downstream));
+                before && noticed(silent + 1, Side::Upstream)
+            })
+    }
+
+    fn happen(&mut self, index: usize, happening: Happening) {
+        let now = self.now;
+        let Some(member) = self.members.get_mut(index) else {
+            return;
+        };
+        if member.killed.is_some() {
+            return;
+        }
+        match happening {
+            Happening::Kill => {
+                member.killed = Some(now);
+                self.kills_ahead -= 1;
+                return;
+            }
+            Happening::Bytes { port, bytes } => {
+                // However a driver cuts the stream, the relay must not care: cut it at random.
+                let cut = self.rng.random_range(0..=bytes.len());
+                let (first, second) = bytes.split_at_checked(cut).unwrap_or((&bytes, &[]));
+                member.relay.handle_bytes(now, port, first);
+                member.relay.handle_bytes(now, port, second);
+            }
+            Happening::Wake => {
+                member.wake = None;
+                member.relay.handle_timeout(now);
+            }
+        }
+        self.drain(index);
+    }
+
+    /// Takes out what the relay has to say, and when it wants to be called again.
+    fn drain(&mut self, index: usize) {
+        let now = self.now;
+        let mut frame: FrameBuf = [0; _];
+        while let Some(member) = self.members.get_mut(index)
+            && let Some(transmit) = member.relay.poll_transmit(now, &mut frame)
+        {
+            let bytes = frame.get(..transmit.len).unwrap_or_default();
+            self.transmit(index, transmit.port, bytes);
+        }
+        let Some(member) = self.members.get_mut(index) else {
+            return;
+        };
+        while let Some(event) = member.relay.poll_event() {
+            match event {
+                Event::NeighbourLost(side) => {
+                    let by = u16::try_from(index + 1).unwrap_or(u16::MAX);
+                    self.outcome.noticed.push((by, side, now));
+                }
+                Event::NeighbourBack(side) => {
+                    self.outcome
+                        .noticed
+                        .retain(|&(by, at, _)| (usize::from(by), at) != (index + 1, side));
+                }
+                Event::Converged => self.holding += 1,
+                _ => {}
+            }
+        }
+        if let Some(place) = member.relay.setpoint() {
+            let end = self.setup.mission.config().distance_m;
+            let altitude = member.relay.profile().altitude_m;
+            let inside = (0.0..=end).contains(&place.x_m)
+                && place.altitude_m.to_bits() == altitude.to_bits();
+            self.outcome.unsafe_setpoints += u64::from(!inside);
+        }
+        if let Some(at) = member.relay.poll_timeout()
+            && member.wake.is_none_or(|wake| at < wake)
+        {
+            // The contract of a relay: drained, it never wants to be called at once.
+            debug_assert!(at > now, "relay {} would spin", index + 1);
+            member.wake = Some(at);
+            self.queue.put(at, index, Happening::Wake);
+        }
+    }
+
+    /// Puts a frame on a link.
+    fn transmit(&mut self, index: usize, port: Port, frame: &[u8]) {
+        self.outcome.messages += 1;
+        self.outcome.bytes += frame.len() as u64;
+        let Some(member) = self.members.get_mut(index) else {
+            return;
+        };
+        let line = if port == Port::Downstream {
+            &mut member.lines[1]
+        } else {
+            &mut member.lines[0]
+        };
+        let arrives = line.send(self.now, frame.len(), &self.setup.link);
+        let before = index.checked_sub(1);
+        let (receivers, into) = match port {
+            Port::Upstream => ([before, None, None, None], Port::Downstream),
+            Port::Downstream => ([Some(index + 1), None, None, None], Port::Upstream),
+            // A radio is heard two relays away.
+            Port::Shared => (
+                [
+                    before,
+                    index.checked_sub(2),
+                    Some(index + 1),
+                    Some(index + 2),
+                ],
+                Port::Shared,
+            ),
+        };
+        let late_by = self.setup.link.hop_time();
+        for receiver in receivers
+            .into_iter()
+            .flatten()
+            .filter(|&receiver| receiver < self.members.len())
+        {
+            let arrivals =
+                self.setup
+                    .faults
+                    .inject(frame, &mut self.rng, &mut self.outcome.injected);
+            for arrival in arrivals {
+                let late = late_by.times(u32::try_from(arrival.late).unwrap_or(u32::MAX));
+                let happening = Happening::Bytes {
+                    port: into,
+                    bytes: arrival.bytes,
+                };
+                self.queue.put(arrives + late, receiver, happening);
+            }
+        }
+    }
+}
+
+/// Runs `setup` to the end.
+///
+/// # Errors
+/// [`SetupError`] where a profile or setting is refused by the relay.
+pub fn run(setup: Setup) -> Result<Outcome, SetupError> {
+    Chain::new(setup).map(Chain::run)
+}
+
+/// A setup on one shared channel.
+pub fn on_shared_channel(mission: Mission) -> Setup {
+    let mut setup = Setup::new(mission);
+    setup.settings.wiring = Wiring::Shared;
+    setup
+}

@@ -1,0 +1,13 @@
+//! A chain of relays on a virtual clock: every relay runs the on-board code, every byte goes through a simulated link.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | [`link`] | one direction of a serial link: baud rate, latency |
+//! | [`faults`] | what may happen to a frame on its way |
+//! | [`queue`] | what happens when, in order |
+//! | [`chain`] | the relays, connected, run until they hold their places |
+
+pub mod chain;
+pub mod faults;
+pub mod link;
+pub mod queue;

@@ -1,0 +1,70 @@
+//! What happens when, in order: a virtual clock that jumps from one happening to the next.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use uav_relay::{Instant, Port};
+
+/// Something that happens to one relay.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Happening {
+    /// Bytes arrive.
+    Bytes {
+        /// Where.
+        port: Port,
+        /// What.
+        bytes: Vec<u8>,
+    },
+    /// It may have something to do.
+    Wake,
+    /// It goes silent for good.
+    Kill,
+}
+
+/// One happening, at its time. Equal times keep the order in which they were put in.
+#[derive(Clone, PartialEq, Eq, Debug)]
+struct Entry {
+    at: Instant,
+    order: u64,
+    /// Which relay, counted from 0.
+    relay: usize,
+    happening: Happening,
+}
+
+impl Ord for Entry {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        (self.at, self.order).cmp(&(other.at, other.order))
+    }
+}
+
+impl PartialOrd for Entry {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// The happenings to come.
+#[derive(Debug, Default)]
+pub struct Queue {
+    entries: BinaryHeap<Reverse<Entry>>,
+    order: u64,
+}
+
+impl Queue {
+    /// Puts in that `happening` happens to `relay` (from 0) at `at`.
+    pub fn put(&mut self, at: Instant, relay: usize, happening: Happening) {
+        self.entries.push(Reverse(Entry {
+            at,
+            order: self.order,
+            relay,
+            happening,
+        }));
+        self.order += 1;
+    }
+
+    /// The next happening: when, to which relay, what.
+    pub fn take(&mut self) -> Option<(Instant, usize, Happening)> {
+        let Reverse(entry) = self.entries.pop()?;
+        Some((entry.at, entry.relay, entry.happening))
+    }
+}

@@ -1,0 +1,168 @@
+//! The hops: lines coloured by how far their SIR is above the worst one's, and their SIR in dB beside them.
+
+use super::axis::Frame;
+use super::canvas::{Canvas, Point};
+use super::labels::{Area, Labels, width};
+use super::{Picture, decibels, length, placed, worst};
+
+/// Colours by dB above the worst hop, up to so many dB. Four of Okabe and Ito's, told apart by every kind of eye;
+/// the worst hops are also the widest lines, for prints without colour.
+pub(super) const CLASSES: [(f64, &str, f64, &str); 4] = [
+    (0.1, "#d55e00", 3.2, "< 0.1 dB"),
+    (1.0, "#e69f00", 2.4, "< 1 dB"),
+    (6.0, "#56b4e9", 2.4, "< 6 dB"),
+    (f64::INFINITY, "#0072b2", 2.4, "≥ 6 dB"),
+];
+
+/// A hop whose SIR is unknown.
+const UNKNOWN: (&str, f64) = ("#999999", 2.4);
+
+/// Height of a number, in units of the picture.
+const SIZE: f64 = 10.0;
+
+/// From a line to its number: more than the radius of a relay, so that a number may stand over one.
+const GAP: f64 = 4.6;
+
+/// Where along a hop its number may stand, and how far above (or, if negative, below) the nearest row.
+const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
+const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
+
+/// With more hops than this the numbers are thinned out instead of stacked.
+const FEW: usize = 21;
+
+/// One hop as it is drawn.
+pub(super) struct Hop {
+    number: usize,
+    line: [Point; 2],
+    decibels: Option<f64>,
+    colour: (&'static str, f64),
+    silent: bool,
+}
+
+/// The hops between the nodes that have a place.
+pub(super) fn of(picture: &Picture, frame: &Frame) -> Vec<Hop> {
+    let worst = worst(picture).and_then(decibels);
+    let last = picture.nodes.len() + 1;
+    let ends = placed(picture).chain([(last, (length(picture), 0.0))]);
+    let mut hops = Vec::new();
+    let mut before = (0, (0.0, 0.0));
+    for (number, place) in ends {
+        // Past a relay without a place no line is known.
+        if number == before.0 + 1 {
+            let decibels = picture.hop_sir.get(number - 1).copied().and_then(decibels);
+            let colour = decibels.zip(worst).map_or(UNKNOWN, |(here, worst)| {
+                let class = CLASSES
+                    .into_iter()
+                    .find(|(below, ..)| here - worst < *below);
+                class.map_or(UNKNOWN, |(_, colour, width, _)| (colour, width))
+            });
+            hops.push(Hop {
+                number,
+                line: [frame.at(before.1), frame.at(place)],
+                decibels,
+                colour,
+                silent: [number - 1, number]
+                    .iter()
+                    .any(|node| picture.lost.contains(node)),
+            });
+        }
+        before = (number, place);
+    }
+    hops
+}
+
+/// Draws the lines, the worst hops last so that nothing hides them.
+pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
+    let mut order: Vec<&Hop> = hops.iter().collect();
+    order.sort_by(|a, b| a.colour.1.total_cmp(&b.colour.1));
+    for hop in order {
+        let sir = hop
+            .decibels
+            .map_or_else(|| "unknown".to_owned(), |value| format!("{value:.2} dB"));
+        canvas.hop(
+            hop.line,
+            hop.colour,
+            hop.silent,
+            &format!("hop {}: SIR {sir}", hop.number),
+        );
+        labels.take_line(hop.line);
+    }
+}
+
+/// Writes as many SIRs as there is room for: the worst hop's first, then the two ends', then the rest in turn.
+pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
+    let last = hops.last().map_or(0, |hop| hop.number);
+    let lowest = hops.iter().filter_map(|hop| hop.decibels).reduce(f64::min);
+    let dense = hops.len() > FEW;
+    let mut worst_seen = false;
+    let mut order: Vec<(u8, &Hop)> = Vec::new();
+    for hop in hops {
+        // Where every hop is as bad as the next, the first one stands for all of them.
+        let worst = !worst_seen
+            && hop
+                .decibels
+                .zip(lowest)
+                .is_some_and(|(here, lowest)| here <= lowest);
+        worst_seen |= worst;
+        let end = hop.number == 1 || hop.number == last;
+        order.push((if worst { 0 } else { 2 - u8::from(end) }, hop));
+    }
+    order.sort_by_key(|(rank, hop)| (*rank, hop.number));
+    for (_, hop) in order {
+        let Some(value) = hop.decibels else { continue };
+        // Adding zero turns the -0 that rounding may leave into 0.
+        let words = format!("{:.1}", (10.0 * value).round() / 10.0 + 0.0);
+        let size = (width(&words, SIZE) + 3.0, SIZE);
+        // In a dense chain the numbers stand in one row, well apart, and each points to its hop.
+        let in_row = dense && hop.number != 1 && hop.number != last;
+        let places = if in_row {
+            places(hop, size, &[0.5], &[4.0])
+        } else {
+            places(hop, size, &SHARES, &SIDES)
+        };
+        let room = if in_row { (size.0 + 9.0, size.1) } else { size };
+        let free = places
+            .into_iter()
+            .find(|(_, place)| labels.try_take(Area::around(*place, room)));
+        if let Some((from, (x, y))) = free {
+            leader(canvas, hop, from, (x, y), size);
+            canvas.text((x, y + 0.36 * SIZE), "halo sir", &words);
+        }
+    }
+}
+
+/// Places for a hop's number, the best first: at each share of its length, on each side, each side so far off.
+fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> Vec<(Point, Point)> {
+    let [(x1, y1), (x2, y2)] = hop.line;
+    let (run, rise) = (x2 - x1, y2 - y1);
+    let span = run.hypot(rise).max(1e-9);
+    // Across the line and upward; for an upright line, to the right.
+    let across = (rise / span, -run / span);
+    let clear = f64::midpoint(across.0.abs() * width, across.1.abs() * height) + GAP;
+    let mut places = Vec::new();
+    for share in shares {
+        let (x, y) = (x1 + share * run, y1 + share * rise);
+        for side in sides {
+            let off = side + clear.copysign(*side);
+            places.push(((x, y), (x + off * across.0, y + off * across.1)));
+        }
+    }
+    places
+}
+
+/// Ties a number to a hop much shorter than itself.
+fn leader(canvas: &mut Canvas, hop: &Hop, from: Point, to: Point, (width, height): Point) {
+    let [(x1, y1), (x2, y2)] = hop.line;
+    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+    if (x2 - x1).hypot(y2 - y1) > width || dx.hypot(dy) < 1e-9 {
+        return;
+    }
+    // Up to the edge of the number, not under it.
+    let share = 1.0
+        - f64::min(
+            width / 2.0 / dx.abs().max(1e-9),
+            height / 2.0 / dy.abs().max(1e-9),
+        )
+        .min(1.0);
+    canvas.line(from, (from.0 + share * dx, from.1 + share * dy), "leader");
+}

@@ -1,0 +1,37 @@
+//! What the colours and signs mean.
+
+use super::canvas::Canvas;
+use super::hops::CLASSES;
+use super::nodes::cross;
+use super::{HEIGHT, Picture};
+
+/// Draws the legend below the plot.
+pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
+    let row = HEIGHT - 27.0;
+    canvas.text((24.0, row + 3.6), "start", "Hop SIR above the worst hop's:");
+    for ((_, colour, width, words), left) in CLASSES.into_iter().zip([188.0, 264.0, 333.0, 402.0]) {
+        canvas.swatch((left, row), 18.0, (colour, width));
+        canvas.text((left + 22.0, row + 3.6), "start", words);
+    }
+    let row = HEIGHT - 10.0;
+    canvas.text((24.0, row + 3.6), "start", "Numbers at hops: SIR in dB");
+    canvas.disc((197.0, row), 4.0, "relay");
+    canvas.text((210.0, row + 3.6), "start", "relay");
+    if !picture.lost.is_empty() {
+        canvas.disc((273.0, row), 4.0, "relay lost");
+        cross(canvas, (273.0, row), 5.5);
+        canvas.text((286.0, row + 3.6), "start", "silent");
+    }
+    if !picture.interferers.is_empty() {
+        canvas.shape(
+            &[
+                (342.0, row - 6.0),
+                (348.0, row),
+                (342.0, row + 6.0),
+                (336.0, row),
+            ],
+            "source",
+        );
+        canvas.text((355.0, row + 3.6), "start", "interferer (at offset y)");
+    }
+}

@@ -1,0 +1,162 @@
+//! A picture of the chain in the x-h plane, as one self-contained SVG file.
+//!
+//! The markup is written here by hand: it is a handful of shapes, the order and the digits of every attribute stay
+//! ours (the same run gives the same bytes), and a crate would bring nothing but a second vocabulary.
+
+mod axis;
+mod canvas;
+mod hops;
+mod labels;
+mod legend;
+mod nodes;
+mod sources;
+
+use axis::{Frame, Scale};
+use canvas::Canvas;
+use labels::Labels;
+
+/// Size of the picture in its own units; at half a page wide the smallest text is still about 5 pt.
+const WIDTH: f64 = 480.0;
+const HEIGHT: f64 = 330.0;
+
+/// The plot inside it, edge by edge: room for the title, the vertical axis, and the legend.
+const LEFT: f64 = 54.0;
+const RIGHT: f64 = WIDTH - 14.0;
+const TOP: f64 = 46.0;
+const BOTTOM: f64 = HEIGHT - 80.0;
+
+/// What [`draw`] shows of a chain of N relays.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Picture {
+    /// How the places were found, for the title; any text.
+    pub title_method: String,
+    /// Distance from Tx to Rx, in metres, above 0.
+    pub distance_m: f64,
+    /// Every interferer: transmit power in watts, place along x and offset y on the ground, both in metres.
+    pub interferers: Vec<(f64, f64, f64)>,
+    /// The relays from Tx to Rx: place along x and altitude, both in metres. One that is not finite is left out.
+    pub nodes: Vec<(f64, f64)>,
+    /// Linear SIR of every hop, N + 1 of them, above 0; any other value is drawn grey and without a number.
+    pub hop_sir: Vec<f64>,
+    /// The relays that went silent, each 1 to N: they are crossed out, and their hops are dashed.
+    pub lost: Vec<usize>,
+}
+
+/// Draws the chain as an SVG document.
+///
+/// Numbers beside hops (their SIR in dB) and relays are thinned out until none covers another; every hop and relay
+/// carries its own as a tooltip. The work grows with the square of N at most.
+#[must_use]
+pub fn draw(picture: &Picture) -> String {
+    let frame = frame(picture);
+    let mut canvas = Canvas::new(WIDTH, HEIGHT);
+    let mut labels = Labels::inside((LEFT, TOP), (RIGHT, BOTTOM));
+    let hops = hops::of(picture, &frame);
+    canvas.describe(&format!("Relay chain: {}", summary(picture)));
+    title(&mut canvas, picture);
+    axis::draw(&mut canvas, &frame);
+    hops::draw(&mut canvas, &mut labels, &hops);
+    nodes::relays(&mut canvas, &mut labels, &frame, picture);
+    sources::draw(&mut canvas, &mut labels, &frame, picture);
+    nodes::ends(&mut canvas, &mut labels, &frame, length(picture));
+    sources::label(&mut canvas, &mut labels, &frame, picture);
+    hops::label(&mut canvas, &mut labels, &hops);
+    nodes::label(&mut canvas, &mut labels, &frame, picture);
+    legend::draw(&mut canvas, picture);
+    canvas.finish()
+}
+
+/// The distance from Tx to Rx, or 1 m where it makes no sense: a picture has to have a width.
+fn length(picture: &Picture) -> f64 {
+    let distance = picture.distance_m;
+    if distance.is_finite() && distance > 0.0 {
+        distance
+    } else {
+        1.0
+    }
+}
+
+/// The relays that have a place, each with its number.
+fn placed(picture: &Picture) -> impl Iterator<Item = (usize, (f64, f64))> {
+    let nodes = picture.nodes.iter().copied();
+    (1..)
+        .zip(nodes)
+        .filter(|(_, (x, h))| x.is_finite() && h.is_finite())
+}
+
+/// An SIR in dB, if it is one that has a logarithm.
+fn decibels(sir: f64) -> Option<f64> {
+    (sir.is_finite() && sir > 0.0).then(|| 10.0 * sir.log10())
+}
+
+/// The SIR of the chain's worst hop, linear.
+fn worst(picture: &Picture) -> Option<f64> {
+    let sirs = picture
+        .hop_sir
+        .iter()
+        .copied()
+        .filter(|sir| decibels(*sir).is_some());
+    sirs.reduce(f64::min)
+}
+
+/// The scales: x holds the chain and every interferer near enough, h starts at the ground and leaves room for numbers.
+fn frame(picture: &Picture) -> Frame {
+    let distance = length(picture);
+    let (mut low, mut high, mut top) = (0.0_f64, distance, 0.0_f64);
+    for (_, (x, h)) in placed(picture) {
+        // A relay far off the line is a bug elsewhere, and must not squeeze the rest into a dot.
+        let x = x.clamp(-distance, 2.0 * distance);
+        (low, high, top) = (low.min(x), high.max(x), top.max(h));
+    }
+    for (_, x, _) in &picture.interferers {
+        if sources::near(*x, distance) {
+            (low, high) = (low.min(*x), high.max(*x));
+        }
+    }
+    let margin = 0.07 * (high - low);
+    // Above the highest relay: its numbers, and what is said of far interferers.
+    let share = 1.0 - (46.0 + sources::headroom(picture)) / (BOTTOM - TOP);
+    let top = if top > 0.0 { top / share } else { 1.0 };
+    Frame {
+        x: Scale::new((low - margin, high + margin), (LEFT, RIGHT)),
+        h: Scale::new((0.0, top), (BOTTOM, TOP)),
+    }
+}
+
+/// The title's words, also those that a screen reader says.
+fn summary(picture: &Picture) -> String {
+    let sir = worst(picture).map_or_else(|| "unknown".to_owned(), both_units);
+    format!(
+        "{}, N = {}, chain SIR {sir}",
+        picture.title_method,
+        picture.nodes.len()
+    )
+}
+
+/// An SIR both linear and in dB.
+fn both_units(sir: f64) -> String {
+    let linear = if (1e-3..1e5).contains(&sir) {
+        format!("{sir:.4}")
+    } else {
+        format!("{sir:.3e}")
+    };
+    format!("{linear} ({:.2} dB)", decibels(sir).unwrap_or_default())
+}
+
+fn title(canvas: &mut Canvas, picture: &Picture) {
+    let count = picture.nodes.len();
+    let relays = if count == 1 { "relay" } else { "relays" };
+    let method: String = picture.title_method.chars().take(50).collect();
+    let middle = f64::midpoint(LEFT, RIGHT);
+    canvas.text(
+        (middle, 18.0),
+        "title",
+        &format!("{method}, N = {count} {relays}"),
+    );
+    let sir = worst(picture).map_or_else(|| "unknown".to_owned(), both_units);
+    canvas.subscripted(
+        (middle, 35.0),
+        "subtitle",
+        ("SIR", "S", &format!("= {sir}")),
+    );
+}

@@ -1,0 +1,224 @@
+//! The interferers: on the ground when they are abreast of the chain or nearly so, else arrows toward them.
+
+use super::axis::Frame;
+use super::canvas::{Canvas, Point};
+use super::labels::{Area, Labels, width};
+use super::{LEFT, Picture, RIGHT, TOP, length};
+
+/// Height of the words, and from one line of them to the next.
+const SIZE: f64 = 10.0;
+const LINE: f64 = 12.0;
+
+/// More markers than this on the ground are told of together: so many words would fill the plot.
+const CROWD: usize = 8;
+
+/// Lines that far interferers may fill above the chain.
+const FAR_LINES: usize = 4;
+
+/// Power in watts, x and y in metres.
+type Source = (f64, f64, f64);
+
+/// Whether the x axis is stretched to hold an interferer: it is no more than a fifth of the distance off the chain.
+pub(super) fn near(x: f64, distance: f64) -> bool {
+    x >= -0.2 * distance && x <= 1.2 * distance
+}
+
+/// The interferers that the plot holds, and those beyond it.
+fn sorted(picture: &Picture) -> (Vec<Source>, Vec<Source>) {
+    let distance = length(picture);
+    let known = |(power, x, y): &Source| [power, x, y].iter().all(|part| part.is_finite());
+    picture
+        .interferers
+        .iter()
+        .copied()
+        .filter(known)
+        .partition(|(_, x, _)| near(*x, distance))
+}
+
+/// Height kept free above the chain for the words about far interferers.
+pub(super) fn headroom(picture: &Picture) -> f64 {
+    let (_, far) = sorted(picture);
+    far.len().min(FAR_LINES) as f64 * LINE
+}
+
+/// Draws the markers, and the arrows with their words.
+pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
+    let (inside, far) = sorted(picture);
+    beyond(canvas, labels, &far);
+    let ground = frame.h.at(0.0);
+    for (power, x, y) in inside {
+        let at = frame.x.at(x);
+        let tip = format!(
+            "interferer: {} W, x = {} m, y = {} m",
+            plain(power),
+            plain(x),
+            plain(y)
+        );
+        let diamond = [
+            (at, ground - 6.0),
+            (at + 6.0, ground),
+            (at, ground + 6.0),
+            (at - 6.0, ground),
+        ];
+        canvas.marked(&diamond, "source", &tip);
+        labels.take(Area::around((at, ground - 3.0), (12.0, 6.0)));
+    }
+}
+
+/// Writes what is known of the interferers on the ground, once everything else there has its place.
+pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
+    let (mut inside, _) = sorted(picture);
+    let ground = frame.h.at(0.0);
+    if inside.len() > CROWD {
+        let span = |part: fn(&Source) -> f64| {
+            let parts = || inside.iter().map(part);
+            let (low, high) = (
+                parts().fold(f64::INFINITY, f64::min),
+                parts().fold(0.0, f64::max),
+            );
+            if low < high {
+                format!("{} to {}", plain(low), plain(high))
+            } else {
+                plain(high)
+            }
+        };
+        let (powers, offsets) = (span(|(power, _, _)| *power), span(|(_, _, y)| y.abs()));
+        let words = format!(
+            "{} interferers, {powers} W, |y| = {offsets} m",
+            inside.len()
+        );
+        let at = (f64::midpoint(LEFT, RIGHT), ground - 14.0);
+        labels.take(Area::around(at, (width(&words, SIZE), LINE)));
+        canvas.text((at.0, at.1 + 0.36 * SIZE), "halo", &words);
+        return;
+    }
+    inside.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let xs: Vec<f64> = inside.iter().map(|(_, x, _)| frame.x.at(*x)).collect();
+    for ((power, x, y), at) in inside.iter().zip(&xs) {
+        let lines = [
+            format!("{} W", plain(*power)),
+            format!("|y| = {} m", plain(y.abs())),
+        ];
+        let wide = lines
+            .iter()
+            .map(|line| width(line, SIZE))
+            .fold(0.0, f64::max)
+            + 4.0;
+        // A neighbour on one side only: lean away from it.
+        let crowded = |side: f64| {
+            xs.iter()
+                .any(|other| (0.1..wide).contains(&(side * (other - at))))
+        };
+        let lean = f64::from(i8::from(crowded(-1.0)) - i8::from(crowded(1.0)));
+        words(
+            canvas,
+            labels,
+            (frame.x.at(*x), ground),
+            (lines, wide),
+            lean,
+        );
+    }
+}
+
+/// Two lines above a marker, as low as there is room, tied to it when they are not next to it.
+fn words(
+    canvas: &mut Canvas,
+    labels: &mut Labels,
+    (x, ground): Point,
+    (lines, wide): ([String; 2], f64),
+    lean: f64,
+) {
+    let size = (wide, 2.0 * LINE);
+    let places = (0..5).flat_map(|row| {
+        let height = ground - 20.0 - 13.0 * f64::from(row);
+        [0.5 * lean, 0.0, 0.5, -0.5].map(|shift| (x + shift * wide, height))
+    });
+    for (middle, y) in places {
+        let place = (
+            middle
+                .min(RIGHT - wide / 2.0 - 1.0)
+                .max(LEFT + wide / 2.0 + 1.0),
+            y,
+        );
+        let foot = (
+            x.min(place.0 + wide / 2.0).max(place.0 - wide / 2.0),
+            y + LINE,
+        );
+        let start = (x, ground - 8.0);
+        let tie = [start, foot];
+        let apart = ground - foot.1 > 12.0;
+        if (apart && !labels.clear(&tie)) || !labels.try_take(Area::around(place, size)) {
+            continue;
+        }
+        if apart {
+            labels.take_line(tie);
+            canvas.line(start, foot, "leader");
+        }
+        for (line, words) in [-0.5, 0.5].into_iter().zip(&lines) {
+            canvas.text(
+                (place.0, place.1 + line * LINE + 0.36 * SIZE),
+                "halo",
+                words,
+            );
+        }
+        return;
+    }
+}
+
+/// One line each at the top of the plot, with an arrow to the side where the interferer is.
+fn beyond(canvas: &mut Canvas, labels: &mut Labels, far: &[Source]) {
+    let shown = if far.len() > FAR_LINES {
+        FAR_LINES - 1
+    } else {
+        far.len()
+    };
+    let mut y = TOP + 0.5 * LINE;
+    for (power, x, offset) in far.iter().take(shown) {
+        let words = format!(
+            "interferer {} W, x = {} m, |y| = {} m",
+            plain(*power),
+            plain(*x),
+            plain(offset.abs())
+        );
+        let (edge, inward, class) = if *x < 0.0 {
+            (LEFT, 1.0, "start halo")
+        } else {
+            (RIGHT, -1.0, "end halo")
+        };
+        let (tip, back) = (edge + inward * 3.0, edge + inward * 11.0);
+        canvas.marked(
+            &[(tip, y), (back, y - 4.5), (back, y + 4.5)],
+            "source",
+            &words,
+        );
+        canvas.text((edge + inward * 16.0, y + 0.36 * SIZE), class, &words);
+        let wide = width(&words, SIZE) + 18.0;
+        labels.take(Area::around((edge + inward * wide / 2.0, y), (wide, LINE)));
+        y += LINE;
+    }
+    if far.len() > shown {
+        let words = format!("and {} interferers more beyond the plot", far.len() - shown);
+        canvas.text((RIGHT - 3.0, y + 0.36 * SIZE), "end halo", &words);
+        let wide = width(&words, SIZE) + 6.0;
+        labels.take(Area::around((RIGHT - wide / 2.0, y), (wide, LINE)));
+    }
+}
+
+/// A quantity to four digits or so, without needless zeros.
+fn plain(value: f64) -> String {
+    let size = value.abs();
+    if size > 0.0 && !(1e-2..1e6).contains(&size) {
+        let text = format!("{value:.2e}");
+        return text.replace(".00e", "e");
+    }
+    let text = if size < 100.0 {
+        format!("{value:.2}")
+    } else {
+        format!("{value:.0}")
+    };
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}

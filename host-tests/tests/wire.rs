@@ -1,0 +1,66 @@
+//! The wire format judged from outside: against golden vectors, against a second codec written from `FORMAT.md`'s rules,
+//! and with everything that must be refused.
+//!
+//! Random tests draw from the environment variable `SEED` (1 if unset), which each of them prints.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    missing_docs
+)]
+
+use crc::{CRC_32_ISCSI, Crc};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngSeed};
+use uav_relay::wire::crc::Crc32c;
+
+#[path = "wire/codec.rs"]
+mod codec;
+#[path = "wire/document.rs"]
+mod document;
+#[path = "wire/golden.rs"]
+mod golden;
+#[path = "wire/ladder.rs"]
+mod ladder;
+#[path = "wire/random.rs"]
+mod random;
+#[path = "wire/receive.rs"]
+mod receive;
+#[path = "wire/reject.rs"]
+mod reject;
+#[path = "wire/strategies.rs"]
+mod strategies;
+#[path = "wire/stream.rs"]
+mod stream;
+
+/// `cases` cases from the seed in `SEED`; a failure prints its shrunk input and leaves no file behind.
+fn config(cases: u32) -> Config {
+    let seed = std::env::var("SEED")
+        .ok()
+        .and_then(|text| text.trim().parse().ok())
+        .unwrap_or(1);
+    println!("SEED={seed}");
+    Config {
+        cases,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(seed),
+        ..Config::default()
+    }
+}
+
+proptest! {
+    #![proptest_config(config(1000))]
+
+    #[test]
+    fn crc_agrees_with_a_published_one(pieces in vec(vec(any::<u8>(), 0..100), 0..8)) {
+        let mut own = Crc32c::new();
+        for piece in &pieces {
+            own.update(piece);
+        }
+        let published = Crc::<u32>::new(&CRC_32_ISCSI).checksum(&pieces.concat());
+        prop_assert_eq!(own.finish(), published);
+    }
+}

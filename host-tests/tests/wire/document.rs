@@ -1,0 +1,91 @@
+//! `FORMAT.md` read as a test: its annotated examples, its ladders and every row of its rejection table.
+
+use uav_relay::wire::frame;
+use uav_relay::{Port, Wiring};
+
+use super::golden::{bytes, only_frame, vectors};
+use super::receive::{counted, relay};
+
+const DOCUMENT: &str = include_str!("../../../src/wire/FORMAT.md");
+
+/// The cells of a table's row, without the outer ones.
+fn cells(row: &str) -> Vec<&str> {
+    let row = row.trim().trim_matches('|');
+    row.split('|').map(str::trim).collect()
+}
+
+/// The rows of the first table in `text`, below its head.
+fn rows(text: &str) -> impl Iterator<Item = Vec<&str>> {
+    let table = text.lines().skip_while(|line| !line.starts_with('|'));
+    table
+        .skip(2)
+        .take_while(|line| line.starts_with('|'))
+        .map(cells)
+}
+
+/// What stands between two backticks.
+fn code(cell: &str) -> &str {
+    cell.strip_prefix('`').unwrap().strip_suffix('`').unwrap()
+}
+
+#[test]
+fn the_annotated_examples_are_golden_vectors() {
+    let vectors = vectors().frames;
+    let mut seen = Vec::new();
+    for section in DOCUMENT.split("### Example: ").skip(1) {
+        let name = section.lines().next().unwrap();
+        let vector = vectors.iter().find(|vector| vector.name == name).unwrap();
+        let mut plain = Vec::new();
+        for row in rows(section) {
+            assert_eq!(row[0], plain.len().to_string(), "offset in {name}");
+            plain.extend(bytes(code(row[1])));
+        }
+        assert_eq!(plain, vector.plain(), "{name}");
+        let block = section.split("```").nth(1).unwrap();
+        let wire = bytes(block.strip_prefix("text").unwrap());
+        assert_eq!(wire, vector.wire(), "{name}");
+        let len = format!("On the wire, {} bytes:", wire.len());
+        assert!(section.contains(&len), "{name}");
+        let (_, message) = frame::decode(&only_frame(&wire)).unwrap();
+        seen.push(core::mem::discriminant(&message));
+    }
+    seen.sort_by_key(|kind| format!("{kind:?}"));
+    seen.dedup();
+    assert_eq!(seen.len(), 4, "each kind of message has an example");
+}
+
+#[test]
+fn the_ladders_of_the_document_are_golden_vectors() {
+    let section = DOCUMENT.split("## Ladder").nth(1).unwrap();
+    let vectors = vectors().ladders;
+    let mut found = 0;
+    for row in rows(section) {
+        let targets: Vec<&str> = code(row[3]).split(' ').collect();
+        assert!(vectors.iter().any(|vector| vector.targets == targets));
+        found += 1;
+    }
+    assert!(found > 1);
+}
+
+#[test]
+fn every_row_of_the_rejection_table_is_counted_as_it_says() {
+    let section = DOCUMENT.split("## Rejected").nth(1).unwrap();
+    let mut found = 0;
+    for row in rows(section) {
+        let mut stream = Vec::new();
+        for word in code(row[0]).split(' ') {
+            let (byte, times) = word.split_once('*').unwrap_or((word, "1"));
+            stream.extend(bytes(byte).repeat(times.parse().unwrap()));
+        }
+        stream.push(0);
+        let mut relay = relay(2, 8, Wiring::Pair);
+        assert_ne!(relay.mission().digest(), 0x5A3C);
+        let now = uav_relay::Instant::ZERO;
+        relay.handle_bytes(now, Port::Upstream, &stream);
+        let mut wanted: Vec<&str> = row[2].split(", ").collect();
+        wanted.sort_unstable();
+        assert_eq!(counted(relay.stats()), wanted, "{}", row[1]);
+        found += 1;
+    }
+    assert!(found > 30);
+}

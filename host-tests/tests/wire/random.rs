@@ -1,0 +1,148 @@
+//! Random messages and random bytes, where the crate and the codec written from the rules must say the same.
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
+use uav_relay::wire::message::{MAX_BODY, Message, MessageError};
+
+use super::codec::{self, Said, plain, sealed, wire};
+use super::config;
+use super::golden::only_frame;
+use super::strategies::{bodies, headers, messages, sweeps};
+
+/// Bodies are compared rather than messages: bytes tell -0 from 0.
+fn body_of(message: &Message) -> Vec<u8> {
+    let mut body = [0; MAX_BODY];
+    let len = message.encode(&mut body).unwrap();
+    body[..len].to_vec()
+}
+
+proptest! {
+    #![proptest_config(config(2000))]
+
+    #[test]
+    fn both_codecs_write_the_same_and_read_each_other(said in messages(), head in headers()) {
+        let message = said.message();
+        let mut frame = [0; MAX_FRAME];
+        let len = frame::encode(head, &message, &mut frame);
+        let written = plain(head, &said.body());
+        prop_assert_eq!(&frame[..len], wire(&written));
+        prop_assert_eq!(Said::read(&body_of(&message)).unwrap().body(), said.body());
+        let (head_read, message_read) = frame::decode(&written).unwrap();
+        prop_assert_eq!(head_read, head);
+        prop_assert_eq!(body_of(&message_read), said.body());
+        prop_assert_eq!(message_read, message);
+    }
+
+    #[test]
+    fn every_frame_fits_in_a_hundred_bytes_with_one_zero(said in messages(), head in headers()) {
+        let mut frame = [0; MAX_FRAME];
+        let len = frame::encode(head, &said.message(), &mut frame);
+        prop_assert!(len <= 100);
+        prop_assert_eq!(frame[..len].iter().position(|&byte| byte == 0), Some(len - 1));
+        prop_assert_eq!(only_frame(&frame[..len]).len(), len - 2);
+        let expected = match said {
+            Said::Sweep { reaches, .. } => 36 + 4 * reaches.len(),
+            Said::Verdict { commit, slacks, .. } => {
+                23 + usize::from(commit.is_some()) + 4 * slacks.len()
+            }
+            Said::Busy { .. } => 19,
+            Said::Heartbeat { .. } => 20,
+        };
+        prop_assert_eq!(len, expected);
+    }
+
+    #[test]
+    fn every_full_sweep_takes_exactly_a_hundred_bytes(said in sweeps(16), head in headers()) {
+        let mut frame = [0; MAX_FRAME];
+        prop_assert_eq!(frame::encode(head, &said.message(), &mut frame), 100);
+    }
+
+    #[test]
+    fn a_buffer_one_byte_short_is_refused(said in messages()) {
+        let mut body = vec![0; said.body().len()];
+        prop_assert_eq!(said.message().encode(&mut body), Some(body.len()));
+        body.pop();
+        prop_assert_eq!(said.message().encode(&mut body), None);
+    }
+}
+
+proptest! {
+    #![proptest_config(config(20_000))]
+
+    #[test]
+    fn any_body_is_read_or_refused_as_the_rules_say(body in bodies()) {
+        let read = Message::decode(&body);
+        match Said::read(&body) {
+            Ok(said) => {
+                prop_assert_eq!(said.body(), &*body, "one encoding a message");
+                prop_assert_eq!(read.as_ref().map(body_of), Ok(body));
+                prop_assert_eq!(read, Ok(said.message()));
+            }
+            Err(error) => prop_assert_eq!(read, Err(error)),
+        }
+    }
+
+    #[test]
+    fn any_bytes_with_a_good_crc_are_read_or_refused_as_the_rules_say(
+        bytes in vec(any::<u8>(), 0..120),
+        version in prop_oneof![3 => Just(Some(0x10)), 1 => Just(None)],
+        flags in prop_oneof![3 => Just(Some(0)), 1 => Just(None)],
+        body in proptest::option::of(bodies()),
+    ) {
+        let mut bytes = bytes;
+        if let Some(body) = &body && bytes.len() >= 10 {
+            bytes.truncate(10);
+            bytes.extend(body);
+        }
+        for (at, nibble) in [(1, version), (3, flags)] {
+            if let (Some(nibble), Some(byte)) = (nibble, bytes.get_mut(at)) {
+                *byte = nibble | *byte & 0x0F;
+            }
+        }
+        let expected = if bytes.len() < 10 {
+            Err(FrameError::Short)
+        } else if bytes[1] >> 4 != 1 || bytes[3] >> 4 != 0 {
+            Err(FrameError::Version)
+        } else {
+            Said::read(&bytes[10..]).map_err(FrameError::Message)
+        };
+        let read = frame::decode(&sealed(bytes.clone()));
+        match expected {
+            Err(error) => prop_assert_eq!(read, Err(error)),
+            Ok(said) => {
+                let (head, message) = read.unwrap();
+                prop_assert_eq!(message, said.message());
+                prop_assert_eq!(codec::header(head), &bytes[..10]);
+            }
+        }
+    }
+
+    #[test]
+    fn any_bytes_at_all_are_refused(bytes in vec(any::<u8>(), 0..300)) {
+        // A right CRC among random ones comes once in 2^32; these draws hold none.
+        let expected = if bytes.len() < 14 { FrameError::Short } else { FrameError::Crc };
+        prop_assert_eq!(frame::decode(&bytes), Err(expected));
+        let read = Said::read(&bytes).map(|said| said.message());
+        prop_assert_eq!(Message::decode(&bytes), read);
+    }
+}
+
+#[test]
+fn the_draws_reach_messages_and_both_refusals() {
+    use proptest::strategy::ValueTree;
+    use proptest::test_runner::TestRunner;
+
+    let mut runner = TestRunner::new(config(1));
+    let (mut good, mut encoding, mut value) = (0, 0, 0);
+    for _ in 0..2000 {
+        let body = bodies().new_tree(&mut runner).unwrap().current();
+        match Said::read(&body) {
+            Ok(_) => good += 1,
+            Err(MessageError::Encoding) => encoding += 1,
+            Err(_) => value += 1,
+        }
+    }
+    println!("{good} messages, {encoding} wrongly encoded, {value} out of range");
+    assert!(good.min(encoding).min(value) > 50);
+}
