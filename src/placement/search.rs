@@ -161,26 +161,30 @@ impl Search {
             .and_then(|last| targets.get(last))
             .copied();
         let worst = targets.get(met).copied();
+        if self.ladder.is_single() && best.is_none() {
+            // What had been met is not any more: a relay has changed.
+            self.feasible = None;
+        }
         self.feasible = best.into_iter().chain(self.feasible).reduce(f32::max);
         self.infeasible = worst.into_iter().chain(self.infeasible).reduce(f32::min);
-        if let (Some(low), Some(high)) = (self.feasible, self.infeasible)
-            && low >= high
-        {
-            // A relay changed since: only the last sweep speaks of the chain as it is.
-            (self.feasible, self.infeasible) = (best, worst);
+        let Some(low) = self.feasible else {
+            let high = self.infeasible.ok_or(Infeasible)?;
+            let hopeless = high <= self.start * DEPTH || self.tried >= MOST_SWEEPS;
+            return if hopeless {
+                Err(Infeasible)
+            } else {
+                Ok(Ladder::between(high / 1e3, high))
+            };
+        };
+        // No chain meets more than its first hop can have.
+        let high = self.infeasible.unwrap_or(self.ceiling * 1.000_001);
+        if low >= high {
+            // With altitudes of their own, relays may meet a target and miss a lower one. What is met is met.
+            self.infeasible = None;
             self.width = f32::INFINITY;
+            return Ok(Ladder::single(low));
         }
-        match (self.feasible, self.infeasible) {
-            (Some(low), Some(high)) => Ok(self.inside(low, high, &targets, slacks)),
-            (Some(low), None) if low < self.ceiling => {
-                Ok(Ladder::spanning(low, (self.ceiling * 1.01).min(low * 1e3)))
-            }
-            (Some(low), None) => Ok(Ladder::single(low)),
-            (None, Some(high)) if high > self.start * DEPTH => {
-                Ok(Ladder::spanning(high / 1e3, high))
-            }
-            (None, _) => Err(Infeasible),
-        }
+        Ok(self.inside(low, high, &targets, slacks))
     }
 
     /// The next ladder inside a bracket.

@@ -29,7 +29,7 @@ use crate::mission::{Mission, Profile};
 use crate::sir::{Sender, square};
 
 /// Above this the interferer outshines any hop longer than a millionth of its own distance; keeps f32 finite.
-const MOST_EXCESS: f32 = 1e12;
+const MOST_RATIO: f32 = 1e12;
 
 /// One hop toward Rx, ready to be evaluated for many targets.
 ///
@@ -39,6 +39,8 @@ pub struct Hop {
     sender: Sender,
     /// X, m.
     interferer_x_m: f32,
+    /// Y^2 + h^2, m^2.
+    aside_squared: f32,
     /// Y^2 + h0 (2h - h0), m^2.
     base: f32,
     /// (h - h0)^2, m^2.
@@ -57,6 +59,7 @@ impl Hop {
         Self {
             sender,
             interferer_x_m: interferer.x_m,
+            aside_squared: square(interferer.y_m) + square(altitude_m),
             base: square(interferer.y_m) + sender.altitude_m * (altitude_m + climb),
             climb_squared: square(climb),
             // The transmitter stands on the ground: its altitude alone keeps the head clear of it.
@@ -78,18 +81,20 @@ impl Hop {
         if room < self.least_step {
             return None;
         }
-        let e = self.sender.gain.excess(target).min(MOST_EXCESS);
+        let ratio = self.sender.gain.ratio(target).min(MOST_RATIO);
         let u = self.interferer_x_m - from_m;
-        let h = self.base - e * self.climb_squared;
-        let c = square(u) + h;
-        if c - room * (e * room + 2.0 * u) >= 0.0 {
+        // f(end) as the SIR's own two terms: expanded, they would cancel right next to the interferer.
+        if square(u - room) + self.aside_squared >= ratio * (square(room) + self.climb_squared) {
             return Some(self.end_m);
         }
+        let e = self.sender.gain.excess(target).min(MOST_RATIO);
+        let h = self.base - e * self.climb_squared;
+        let c = square(u) + h;
         let ahead = u >= 0.0;
         if c < 0.0 && (ahead || e <= 0.0) {
             return None;
         }
-        let discriminant = self.sender.gain.ratio(target).min(MOST_EXCESS) * square(u) + e * h;
+        let discriminant = ratio * square(u) + e * h;
         if discriminant < 0.0 && c < 0.0 {
             return None;
         }

@@ -1,0 +1,424 @@
+//! The simulated chain: what it settles on, what that costs, and that no fault changes it.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    missing_docs
+)]
+
+use host_tests::brief::{as_relays_know_it, of_link};
+use host_tests::random::{self, Chain as Kind, Style};
+use host_tests::reference::Link;
+use host_tests::sim::chain::{Ending, Outcome, Setup, on_shared_channel, run};
+use host_tests::sim::faults::Faults;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use uav_relay::placement::plan;
+use uav_relay::{Duration, Instant, Mission, Profile, Schedule, Side};
+
+/// The optimum of the default scenario by number of relays, from a program that shares nothing with this one.
+const OPTIMA: [(u16, f64); 12] = [
+    (1, 1.490_121_51),
+    (2, 1.616_583_02),
+    (3, 1.747_031_29),
+    (4, 1.881_667_00),
+    (5, 2.020_675_28),
+    (8, 2.465_535_75),
+    (10, 2.786_622_55),
+    (16, 3.875_573_20),
+    (20, 4.710_644_20),
+    (32, 7.756_114_78),
+    (50, 13.859_132_9),
+    (100, 40.441_345_0),
+];
+
+/// Everything at once, as a bad day has it.
+const BAD_DAY: Faults = Faults {
+    loss: 0.3,
+    corrupt: 0.15,
+    duplicate: 0.1,
+    reorder: 0.1,
+};
+
+fn paper(relays: u16) -> Mission {
+    of_link(&Link::paper(usize::from(relays)), 1e-4).unwrap().0
+}
+
+fn reached(link: &Link, outcome: &Outcome) -> f64 {
+    let x: Vec<f64> = outcome
+        .relays
+        .iter()
+        .map(|relay| f64::from(relay.setpoint.unwrap().x_m))
+        .collect();
+    link.chain_sir(&x)
+}
+
+fn bits(outcome: &Outcome) -> Vec<(u32, u32)> {
+    let place =
+        |relay: &host_tests::sim::chain::RelayEnd| relay.setpoint.expect("the chain has settled");
+    outcome
+        .relays
+        .iter()
+        .map(|relay| {
+            (
+                place(relay).x_m.to_bits(),
+                place(relay).altitude_m.to_bits(),
+            )
+        })
+        .collect()
+}
+
+fn settle(setup: Setup) -> Outcome {
+    let outcome = run(setup).unwrap();
+    assert_eq!(outcome.ending, Ending::Settled);
+    assert_eq!(outcome.unsafe_setpoints, 0);
+    outcome
+}
+
+#[test]
+fn the_optima_are_reached_in_one_round_trip() {
+    for (relays, best) in OPTIMA {
+        let outcome = settle(Setup::new(paper(relays)));
+        let sir = reached(&Link::paper(usize::from(relays)), &outcome);
+        let short = 1.0 - sir / best;
+        println!(
+            "N = {relays}: {sir:.8}, short by {short:.1e}, {} bytes",
+            outcome.bytes
+        );
+        assert!(
+            (-1e-6..=2e-4).contains(&short),
+            "N = {relays}: {sir} of {best}"
+        );
+        assert_eq!(outcome.sweeps, 1);
+        assert_eq!(outcome.messages, 2 * u64::from(relays - 1), "N = {relays}");
+    }
+}
+
+#[test]
+fn without_prediction_four_sweeps_are_enough() {
+    for (relays, best) in OPTIMA {
+        let mut setup = Setup::new(paper(relays));
+        setup.settings.predict = false;
+        let outcome = settle(setup);
+        let short = 1.0 - reached(&Link::paper(usize::from(relays)), &outcome) / best;
+        println!(
+            "N = {relays}: {} sweeps, short by {short:.1e}",
+            outcome.sweeps
+        );
+        assert!((-1e-6..=2e-4).contains(&short), "N = {relays}: {short}");
+        assert!(
+            outcome.sweeps <= 4,
+            "N = {relays}: {} sweeps",
+            outcome.sweeps
+        );
+        assert_eq!(
+            outcome.messages,
+            2 * u64::from(relays - 1) * u64::from(outcome.sweeps)
+        );
+    }
+}
+
+#[test]
+fn random_links_settle_at_their_optimum_with_and_without_prediction() {
+    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(21));
+    let (mut settled, mut hopeless) = (0, 0);
+    let mut sweeps = [0_u32; 8];
+    while settled < 400 {
+        let link = as_relays_know_it(&random::link(&mut rng, &Style::ALIKE));
+        let Some((mission, _)) = of_link(&link, 1e-4) else {
+            continue;
+        };
+        for predict in [true, false] {
+            let mut setup = Setup::new(mission);
+            setup.settings.predict = predict;
+            let outcome = run(setup).unwrap();
+            let Some(best) = link.optimum() else {
+                assert_eq!(outcome.ending, Ending::Infeasible, "{link:?}");
+                hopeless += 1;
+                continue;
+            };
+            assert_eq!(outcome.ending, Ending::Settled, "{link:?}");
+            let short = 1.0 - reached(&link, &outcome) / best;
+            assert!((-1e-6..=2e-4).contains(&short), "{short} in {link:?}");
+            if predict {
+                assert_eq!(outcome.sweeps, 1, "{link:?}");
+                settled += 1;
+            } else {
+                sweeps[outcome.sweeps as usize] += 1;
+            }
+        }
+    }
+    println!("{settled} settled, {hopeless} hopeless runs; sweeps without prediction: {sweeps:?}");
+    assert!(hopeless > 0);
+}
+
+/// The same number of targets as the paper's step of 0.1 takes, and the same last one.
+#[test]
+fn the_fixed_step_takes_the_papers_ten_thousand_sweeps() {
+    for (relays, targets, last) in [(1, 10_247, 1.4), (2, 10_245, 1.6), (8, 10_237, 2.4)] {
+        let mut setup = Setup::new(paper(relays));
+        setup.settings.schedule = Schedule::FixedStep { step: 0.1 };
+        let outcome = settle(setup);
+        assert_eq!(outcome.sweeps, targets, "N = {relays}");
+        let target = f64::from(outcome.relays[0].target.unwrap());
+        assert!((target - last).abs() < 1e-6, "N = {relays}: {target}");
+    }
+}
+
+#[test]
+fn silent_places_equal_those_by_messages() {
+    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(22));
+    let mut compared = 0;
+    while compared < 60 {
+        let link = as_relays_know_it(&random::link(
+            &mut rng,
+            &Style {
+                relays: 1..=20,
+                chain: Kind::Alike,
+            },
+        ));
+        let Some((mission, _)) = of_link(&link, 1e-4) else {
+            continue;
+        };
+        let outcome = run(Setup::new(mission)).unwrap();
+        for (index, relay) in (1..).zip(&outcome.relays) {
+            assert_eq!(
+                plan::silent_place(&mission, index).ok(),
+                relay.setpoint,
+                "relay {index} of {link:?}"
+            );
+        }
+        compared += 1;
+    }
+}
+
+/// 1 000 seeds of everything at once at N = 8: the very placement of the faultless run.
+#[test]
+fn faults_change_nothing_but_the_time_it_takes() {
+    let undisturbed = settle(Setup::new(paper(8)));
+    for predict in [true, false] {
+        let quiet = {
+            let mut setup = Setup::new(paper(8));
+            setup.settings.predict = predict;
+            settle(setup)
+        };
+        if predict {
+            assert_eq!(bits(&quiet), bits(&undisturbed));
+        }
+        let first = random::seed(1);
+        let mut slowest = Instant::ZERO;
+        let (mut injected, mut rejected) = ([0; 4], 0);
+        for seed in first..first + 1_000 {
+            let mut setup = Setup::new(paper(8));
+            setup.settings.predict = predict;
+            setup.faults = BAD_DAY;
+            setup.seed = seed;
+            let outcome = settle(setup);
+            assert_eq!(bits(&outcome), bits(&quiet), "seed {seed}");
+            let done = outcome.injected;
+            injected = [
+                injected[0] + done.lost,
+                injected[1] + done.corrupted,
+                injected[2] + done.duplicated,
+                injected[3] + done.reordered,
+            ];
+            let damaged =
+                |stats: &uav_relay::Stats| u64::from(stats.crc + stats.truncated + stats.oversized);
+            rejected += outcome
+                .relays
+                .iter()
+                .map(|relay| damaged(&relay.stats))
+                .sum::<u64>();
+            slowest = slowest.max(outcome.ended);
+        }
+        assert!(
+            injected.iter().all(|&count| count > 2_000),
+            "{injected:?}: the faults did not happen"
+        );
+        assert!(
+            rejected > injected[1] * 3 / 4,
+            "{rejected} damaged frames of {injected:?}"
+        );
+        println!(
+            "predict {predict}: slowest of 1000 took {:.1} s",
+            slowest.as_micros() as f64 / 1e6
+        );
+    }
+}
+
+#[test]
+fn each_fault_alone_and_at_its_worst_changes_nothing() {
+    let quiet = bits(&settle(Setup::new(paper(5))));
+    let none = Faults::default();
+    for faults in [
+        Faults { loss: 0.9, ..none },
+        Faults {
+            corrupt: 0.9,
+            ..none
+        },
+        Faults {
+            duplicate: 0.9,
+            ..none
+        },
+        Faults {
+            reorder: 0.9,
+            ..none
+        },
+        Faults {
+            loss: 0.6,
+            corrupt: 0.6,
+            duplicate: 0.9,
+            reorder: 0.9,
+        },
+    ] {
+        for seed in 1..=20 {
+            let mut setup = Setup::new(paper(5));
+            setup.faults = faults;
+            setup.seed = seed;
+            assert_eq!(bits(&settle(setup)), quiet, "seed {seed} of {faults:?}");
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run() {
+    let go = |seed| {
+        let mut setup = Setup::new(paper(6));
+        setup.faults = BAD_DAY;
+        setup.seed = seed;
+        format!("{:?}", settle(setup))
+    };
+    assert_eq!(go(7), go(7));
+    assert_ne!(go(7), go(8));
+}
+
+#[test]
+fn one_shared_channel_does_as_well_as_two_wires() {
+    let wires = bits(&settle(Setup::new(paper(8))));
+    let outcome = settle(on_shared_channel(paper(8)));
+    assert_eq!(bits(&outcome), wires);
+    assert_eq!(outcome.messages, 14);
+    assert!(
+        outcome.relays.iter().any(|relay| relay.stats.overheard > 0),
+        "nobody overheard anything"
+    );
+    for seed in 1..=50 {
+        let mut setup = on_shared_channel(paper(8));
+        setup.faults = BAD_DAY;
+        setup.seed = seed;
+        assert_eq!(bits(&settle(setup)), wires, "seed {seed}");
+    }
+}
+
+/// Relays with an altitude and a power of their own: the head predicts wrong, and the bracket finds what the exact
+/// reference calls feasible for the farthest chain.
+#[test]
+fn a_mixed_chain_is_solved_as_it_is() {
+    let mission = paper(8);
+    let profiles = vec![
+        (
+            3,
+            Profile {
+                altitude_m: 30.0,
+                power_w: 0.5,
+            },
+        ),
+        (
+            5,
+            Profile {
+                altitude_m: 20.0,
+                power_w: 4.0,
+            },
+        ),
+        (
+            8,
+            Profile {
+                altitude_m: 35.0,
+                power_w: 1.0,
+            },
+        ),
+    ];
+    let mut link = Link::paper(8);
+    for (index, profile) in &profiles {
+        link.relays[usize::from(*index) - 1].altitude_m = f64::from(profile.altitude_m);
+        link.relays[usize::from(*index) - 1].power_w = f64::from(profile.power_w);
+    }
+    let best = link.optimum().unwrap();
+    for predict in [true, false] {
+        let mut setup = Setup::new(mission);
+        setup.profiles = profiles.clone();
+        setup.settings.predict = predict;
+        let outcome = settle(setup.clone());
+        let short = 1.0 - reached(&link, &outcome) / best;
+        println!(
+            "predict {predict}: {} sweeps, short by {short:.1e} of {best}",
+            outcome.sweeps
+        );
+        assert!((-1e-6..=2e-4).contains(&short), "{short}");
+        assert!(outcome.sweeps > 1, "the prediction cannot have been right");
+        assert!(outcome.sweeps <= 7, "{} sweeps", outcome.sweeps);
+        setup.faults = BAD_DAY;
+        for seed in 1..=20 {
+            setup.seed = seed;
+            assert_eq!(bits(&settle(setup.clone())), bits(&outcome), "seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn a_silent_relay_is_noticed_by_both_neighbours_within_the_stated_time() {
+    for at in [0, 20, 60_000] {
+        let killed = Instant::from_millis(at);
+        let mut setup = Setup::new(paper(5));
+        setup.kills = vec![(3, killed)];
+        let outcome = run(setup).unwrap();
+        assert_eq!(outcome.ending, Ending::Broken);
+        let mut noticed: Vec<_> = outcome
+            .noticed
+            .iter()
+            .map(|&(by, side, _)| (by, side))
+            .collect();
+        noticed.sort_by_key(|&(by, _)| by);
+        assert_eq!(noticed, [(2, Side::Downstream), (4, Side::Upstream)]);
+        for &(by, _, when) in &outcome.noticed {
+            // `Settings::lost` is 15 s since the last frame, which may be up to `quiet` old.
+            assert!(
+                when.since(killed) <= Duration::from_millis(15_000),
+                "relay {by} took until {when:?}"
+            );
+            assert!(
+                when.since(killed) >= Duration::from_millis(10_000) || at == 0,
+                "relay {by} gave up at {when:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn neighbours_that_live_are_not_lost_over_an_hour_of_bad_days() {
+    let mut setup = Setup::new(paper(4));
+    setup.faults = BAD_DAY;
+    // Nobody dies before the end of the hour, so the run goes on until then.
+    setup.kills = vec![(4, Instant::from_millis(3_600_000))];
+    let outcome = run(setup).unwrap();
+    let lost_alive: Vec<_> = outcome
+        .noticed
+        .iter()
+        .filter(|&&(by, side, _)| (by, side) != (3, Side::Downstream))
+        .collect();
+    assert!(lost_alive.is_empty(), "{lost_alive:?}");
+    assert!(outcome.injected.lost > 1_000, "the hour was too quiet");
+}
+
+#[test]
+fn an_interferer_at_the_receiver_leaves_nothing_to_place() {
+    let mut link = Link::paper(4);
+    link.x_i = 1000.0;
+    link.y_i = 0.0;
+    let (mission, _) = of_link(&link, 1e-4).unwrap();
+    let outcome = run(Setup::new(mission)).unwrap();
+    assert_eq!(outcome.ending, Ending::Infeasible);
+    assert!(outcome.relays.iter().all(|relay| relay.setpoint.is_none()));
+}
