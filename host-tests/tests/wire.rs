@@ -12,6 +12,7 @@
 )]
 
 use crc::{CRC_32_ISCSI, Crc};
+use host_tests::random::seed;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
@@ -19,12 +20,16 @@ use uav_relay::wire::crc::Crc32c;
 
 #[path = "wire/codec.rs"]
 mod codec;
+#[path = "wire/damage.rs"]
+mod damage;
 #[path = "wire/document.rs"]
 mod document;
 #[path = "wire/golden.rs"]
 mod golden;
 #[path = "wire/ladder.rs"]
 mod ladder;
+#[path = "wire/lies.rs"]
+mod lies;
 #[path = "wire/random.rs"]
 mod random;
 #[path = "wire/receive.rs"]
@@ -38,15 +43,10 @@ mod stream;
 
 /// `cases` cases from the seed in `SEED`; a failure prints its shrunk input and leaves no file behind.
 fn config(cases: u32) -> Config {
-    let seed = std::env::var("SEED")
-        .ok()
-        .and_then(|text| text.trim().parse().ok())
-        .unwrap_or(1);
-    println!("SEED={seed}");
     Config {
         cases,
         failure_persistence: None,
-        rng_seed: RngSeed::Fixed(seed),
+        rng_seed: RngSeed::Fixed(seed(1)),
         ..Config::default()
     }
 }

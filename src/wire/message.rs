@@ -68,7 +68,7 @@ pub struct Answer {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MessageError {
-    /// Not the postcard encoding of any message, or bytes are left over.
+    /// Not the one encoding of any message, or bytes are left over.
     Encoding,
     /// A number is not finite or outside its range.
     Value,
@@ -131,6 +131,21 @@ enum Body {
     },
 }
 
+impl Body {
+    /// Bytes of the shortest encoding. postcard reads longer ones too, whose tag or count is padded with empty varint bytes,
+    /// and how many it puts up with depends on the width of a usize: what one node took, another would refuse.
+    fn shortest(&self) -> usize {
+        match self {
+            Self::Sweep { reaches, .. } => 20 + 4 * reaches.len(),
+            Self::Verdict { commit, slacks, .. } => {
+                7 + usize::from(commit.is_some()) + 4 * slacks.len()
+            }
+            Self::Busy { .. } => 3,
+            Self::Heartbeat { .. } => 4,
+        }
+    }
+}
+
 impl Message {
     /// Writes the body into `buffer` and returns how many bytes it takes, at most [`MAX_BODY`]; `None` if it does not fit.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
@@ -172,15 +187,15 @@ impl Message {
             .map(|written| written.len())
     }
 
-    /// The message in `body`, with every number in its range. Work linear in `body`, at most [`MAX_BODY`] bytes of use.
+    /// The message in `bytes`, with every number in its range. Work linear in their number, at most [`MAX_BODY`] of use.
     ///
     /// # Errors
-    /// [`MessageError::Encoding`] if it is not one message and nothing else, [`MessageError::Value`] for a number that is
-    /// not finite or outside its range.
-    pub fn decode(body: &[u8]) -> Result<Self, MessageError> {
+    /// [`MessageError::Encoding`] if it is not one message in its shortest form and nothing else, [`MessageError::Value`] for
+    /// a number that is not finite or outside its range.
+    pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
         let (body, rest): (Body, _) =
-            postcard::take_from_bytes(body).map_err(|_| MessageError::Encoding)?;
-        if !rest.is_empty() {
+            postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)?;
+        if !rest.is_empty() || bytes.len() != body.shortest() {
             return Err(MessageError::Encoding);
         }
         Ok(match body {
@@ -194,6 +209,10 @@ impl Message {
                 power_w,
                 reaches,
             } => {
+                // A single target has no gaps to grow; with a growth it would be a second way to write the same ladder.
+                if gap == 0 && growth != 0 {
+                    return Err(MessageError::Value);
+                }
                 let ladder =
                     Ladder::from_parts(anchor.into(), gap, growth).ok_or(MessageError::Value)?;
                 let profile = Profile {

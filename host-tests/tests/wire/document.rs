@@ -1,5 +1,6 @@
 //! `FORMAT.md` read as a test: its annotated examples, its ladders and every row of its rejection table.
 
+use crc::{CRC_32_ISCSI, Crc};
 use uav_relay::wire::frame;
 use uav_relay::{Port, Wiring};
 
@@ -88,4 +89,30 @@ fn every_row_of_the_rejection_table_is_counted_as_it_says() {
         found += 1;
     }
     assert!(found > 30);
+}
+
+#[test]
+fn the_digest_is_what_the_document_says() {
+    let mission = *relay(1, 8, Wiring::Pair).mission();
+    let config = mission.config();
+    let mut bytes = config.relays.to_le_bytes().to_vec();
+    for number in [
+        config.distance_m,
+        config.min_separation_m,
+        config.tx_power_w,
+        config.common.altitude_m,
+        config.common.power_w,
+        config.interferer.power_w,
+        config.interferer.x_m,
+        config.interferer.y_m,
+        config.tolerance,
+    ] {
+        bytes.extend(number.to_le_bytes());
+    }
+    let channel = config.channel;
+    for number in [channel.mu_los(), channel.mu_nlos(), channel.eta()] {
+        bytes.extend(number.to_le_bytes());
+    }
+    let crc = Crc::<u32>::new(&CRC_32_ISCSI).checksum(&bytes);
+    assert_eq!(u32::from(mission.digest()), crc & 0xFFFF);
 }

@@ -1,5 +1,5 @@
-//! Golden vectors, both ways: `data/vectors.json`, made by a program of its own (bodies by the byte tables and again by
-//! another implementation of postcard, CRC bit by bit, COBS by its definition).
+//! Golden vectors, both ways: `data/vectors.json`, made by a Python program of its own (bodies by the byte tables and again
+//! by the postcard implementation pohlednice 0.2.1, CRC bit by bit, COBS by its definition, ladders with each step rounded).
 
 use serde::Deserialize;
 use uav_relay::placement::ladder::Ladder;

@@ -68,7 +68,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(config(20_000))]
+    #![proptest_config(config(8000))]
 
     #[test]
     fn any_body_is_read_or_refused_as_the_rules_say(body in bodies()) {

@@ -1,4 +1,6 @@
 //! What proptest draws: messages in range with all their extremes, bodies that are nearly messages, headers, streams.
+//!
+//! Nested ones are boxed: by value their trees overflow the stack of a test's thread.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -33,7 +35,7 @@ fn metres(least: f32) -> impl Strategy<Value = f32> {
 }
 
 /// Anchor, gap code and growth code of a valid ladder.
-pub(crate) fn ladders() -> impl Strategy<Value = (f32, u8, u8)> {
+pub(crate) fn ladders() -> BoxedStrategy<(f32, u8, u8)> {
     let ordinary = (-20.0..20.0_f32).prop_map(f32::exp2);
     let any_normal = (0x0080_0000..0x7F80_0000_u32).prop_map(f32::from_bits);
     let anchors = prop_oneof![3 => ordinary, 1 => any_normal];
@@ -44,10 +46,11 @@ pub(crate) fn ladders() -> impl Strategy<Value = (f32, u8, u8)> {
             let targets = targets(anchor, gap, growth);
             targets[0] >= f32::MIN_POSITIVE && targets[targets.len() - 1].is_finite()
         })
+        .boxed()
 }
 
 /// A sweep in range, of `least` reaches at least and with as many targets as that takes.
-pub(crate) fn sweeps(least: usize) -> impl Strategy<Value = Said> {
+pub(crate) fn sweeps(least: usize) -> BoxedStrategy<Said> {
     let ladders = prop_oneof![
         4 => ladders(),
         1 => (0.1..10.0_f32).prop_map(|anchor| (anchor, 0, 0)),
@@ -82,10 +85,11 @@ pub(crate) fn sweeps(least: usize) -> impl Strategy<Value = Said> {
                 }
             },
         )
+        .boxed()
 }
 
 /// A message in range.
-pub(crate) fn messages() -> impl Strategy<Value = Said> {
+pub(crate) fn messages() -> BoxedStrategy<Said> {
     let verdicts = (
         any::<u16>(),
         any::<u16>(),
@@ -105,15 +109,37 @@ pub(crate) fn messages() -> impl Strategy<Value = Said> {
         1 => (any::<u16>(), any::<bool>())
             .prop_map(|(mission, answer)| Said::Heartbeat { mission, answer }),
     ]
+    .boxed()
 }
 
 /// Bytes that are a body, nearly one, or none.
-pub(crate) fn bodies() -> impl Strategy<Value = Vec<u8>> {
-    let valid = || messages().prop_map(|said| said.body());
-    let replaced =
-        (valid(), any::<proptest::sample::Index>(), any::<u8>()).prop_map(|(mut body, at, byte)| {
+pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
+    let valid = || messages().prop_map(|said| said.body()).boxed();
+    let replaced = (valid(), any::<proptest::sample::Index>(), any::<u8>()).prop_map(
+        |(mut body, at, byte)| {
             let at = at.index(body.len());
             body[at] = byte;
+            body
+        },
+    );
+    let strange = proptest::sample::select(&[
+        0.0,
+        -0.0,
+        -1.0,
+        3e9,
+        1e-40,
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+    ]);
+    let renumbered =
+        (valid(), any::<proptest::sample::Index>(), strange).prop_map(|(mut body, at, number)| {
+            // Numbers begin at 5, 11, 15 and 20 in a sweep, at 7 or 8 in a verdict, and every four bytes from there.
+            let starts = [5, 7, 8, 11, 15, 20, 24];
+            let at = starts[at.index(starts.len())];
+            if let Some(place) = body.get_mut(at..at + 4) {
+                place.copy_from_slice(&f32::to_le_bytes(number));
+            }
             body
         });
     let cut = (valid(), any::<proptest::sample::Index>()).prop_map(|(mut body, at)| {
@@ -131,13 +157,15 @@ pub(crate) fn bodies() -> impl Strategy<Value = Vec<u8>> {
     });
     prop_oneof![
         2 => valid(),
-        3 => replaced,
-        1 => cut,
-        1 => longer,
-        1 => padded,
-        2 => tagged,
-        1 => vec(any::<u8>(), 0..=84),
+        3 => replaced.boxed(),
+        2 => renumbered.boxed(),
+        1 => cut.boxed(),
+        1 => longer.boxed(),
+        1 => padded.boxed(),
+        2 => tagged.boxed(),
+        1 => vec(any::<u8>(), 0..=84).boxed(),
     ]
+    .boxed()
 }
 
 /// Writes the tag or the count of a body as a varint with one byte more, and another `more` on top.
@@ -156,8 +184,11 @@ pub(crate) fn pad(body: &mut Vec<u8>, tag: bool, more: usize) {
 }
 
 /// Pieces of a stream: good frames, damaged ones, noise, oversized ones, delimiters.
-pub(crate) fn pieces(heads: impl Strategy<Value = Header> + Clone) -> BoxedStrategy<Vec<u8>> {
-    let good = (heads.clone(), messages()).prop_map(|(head, said)| wire(&plain(head, &said.body())));
+pub(crate) fn pieces(heads: impl Strategy<Value = Header> + 'static) -> BoxedStrategy<Vec<u8>> {
+    let heads = heads.boxed();
+    let good = (heads.clone(), messages())
+        .prop_map(|(head, said)| wire(&plain(head, &said.body())))
+        .boxed();
     let sealed_body = (heads, bodies()).prop_map(|(head, body)| wire(&plain(head, &body)));
     let sealed_noise = vec(any::<u8>(), 0..=94).prop_map(|bytes| wire(&sealed(bytes)));
     let damaged = (good.clone(), any::<proptest::sample::Index>(), 0..8_u8).prop_map(
@@ -167,15 +198,18 @@ pub(crate) fn pieces(heads: impl Strategy<Value = Header> + Clone) -> BoxedStrat
             frame
         },
     );
-    let cut = (good.clone(), any::<proptest::sample::Index>(), any::<bool>()).prop_map(
-        |(mut frame, at, ended)| {
+    let cut = (
+        good.clone(),
+        any::<proptest::sample::Index>(),
+        any::<bool>(),
+    )
+        .prop_map(|(mut frame, at, ended)| {
             frame.truncate(at.index(frame.len()));
             if ended {
                 frame.push(0);
             }
             frame
-        },
-    );
+        });
     let noise = vec(any::<u8>(), 0..150);
     let oversized = vec(1..=u8::MAX, 90..400).prop_map(|mut bytes| {
         bytes.push(0);
@@ -183,13 +217,13 @@ pub(crate) fn pieces(heads: impl Strategy<Value = Header> + Clone) -> BoxedStrat
     });
     prop_oneof![
         4 => good,
-        2 => sealed_body,
-        1 => sealed_noise,
-        2 => damaged,
-        1 => cut,
-        1 => noise,
-        1 => oversized,
-        1 => vec(Just(0), 1..4),
+        2 => sealed_body.boxed(),
+        1 => sealed_noise.boxed(),
+        2 => damaged.boxed(),
+        1 => cut.boxed(),
+        1 => noise.boxed(),
+        1 => oversized.boxed(),
+        1 => vec(Just(0), 1..4).boxed(),
     ]
     .boxed()
 }

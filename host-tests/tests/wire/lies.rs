@@ -1,0 +1,107 @@
+//! Frames in good order: what neighbours may lie about, and what a relay sends itself.
+
+use std::cell::Cell;
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use uav_relay::wire::frame::{self, Header, MAX_FRAME};
+use uav_relay::wire::message::Message;
+use uav_relay::{Instant, Port, Wiring};
+
+use super::codec::{Said, plain, wire};
+use super::config;
+use super::receive::{NETWORK, drain, relay};
+use super::strategies::{messages, sweeps};
+use super::stream::unstuffed;
+
+/// Puts a number and a digest into a message, where it has them.
+fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
+    match &mut said {
+        Said::Sweep {
+            number, mission, ..
+        }
+        | Said::Verdict {
+            number, mission, ..
+        } => (*number, *mission) = (as_number, as_mission),
+        Said::Busy { number } => *number = as_number,
+        Said::Heartbeat { mission, .. } => *mission = as_mission,
+    }
+    said
+}
+
+/// Messages in range that fit the sweep under way, from neighbours that lie: whatever they lead to stays on the line.
+#[test]
+fn lies_within_the_ranges_never_lead_out_of_bounds() {
+    let setpoints = Cell::new(0);
+    let lies = vec((sweeps(0), messages(), any::<bool>()), 1..6);
+    TestRunner::new(config(1000))
+        .run(&(lies, prop_oneof![Just(4_u16), Just(8)]), |(lies, own)| {
+            let mut relay = relay(own, 8, Wiring::Pair);
+            let mission = relay.mission().digest();
+            let now = Instant::ZERO;
+            for (number, (sweep, verdict, plausible)) in (0..).zip(lies) {
+                let mut sweep = renamed(sweep, number, mission);
+                if let Said::Sweep { reaches, .. } = &mut sweep
+                    && plausible
+                {
+                    for reach in reaches {
+                        *reach %= 1000.0;
+                    }
+                }
+                let verdict = renamed(verdict, number, mission);
+                for (sender, port, said) in [
+                    (own - 1, Port::Upstream, sweep),
+                    (own + 1, Port::Downstream, verdict),
+                ] {
+                    let header = Header {
+                        network: NETWORK,
+                        sender,
+                        destination: own,
+                        counter: 0,
+                    };
+                    let bytes = wire(&plain(header, &said.body()));
+                    relay.handle_bytes(now, port, &bytes);
+                    drain(&mut relay, now);
+                    if let Some(place) = relay.setpoint() {
+                        prop_assert!((0.0..=1000.0).contains(&place.x_m), "{place:?}");
+                        prop_assert_eq!(place.altitude_m, 20.0);
+                        setpoints.set(setpoints.get() + 1);
+                    }
+                }
+            }
+            prop_assert_eq!(relay.stats().mission, 0);
+            Ok(())
+        })
+        .unwrap();
+    println!("{} setpoints", setpoints.get());
+    assert!(setpoints.get() > 20);
+}
+
+#[test]
+fn what_a_relay_sends_is_what_the_rules_give() {
+    let mut head = relay(1, 8, Wiring::Pair);
+    let mut buffer = [0; MAX_FRAME];
+    let mut counter = 0;
+    while counter < 3 {
+        let now = head.poll_timeout().unwrap();
+        head.handle_timeout(now);
+        while let Some(transmit) = head.poll_transmit(now, &mut buffer) {
+            let chunk = &buffer[..transmit.len - 1];
+            let bytes = unstuffed(chunk).unwrap();
+            let said = Said::read(&bytes[10..bytes.len() - 4]).unwrap();
+            let header = Header {
+                network: NETWORK,
+                sender: 1,
+                destination: 2,
+                counter,
+            };
+            assert_eq!(bytes, plain(header, &said.body()), "frame {counter}");
+            let (_, message) = frame::decode(&bytes).unwrap();
+            if let Message::Sweep(sweep) = message {
+                assert_eq!(sweep.mission, head.mission().digest());
+            }
+            counter += 1;
+        }
+    }
+}

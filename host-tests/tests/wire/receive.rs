@@ -1,0 +1,248 @@
+//! The receiving side of a relay, fed with anything: each frame is counted once and where the document says, nothing
+//! panics, and noise makes no setpoint.
+
+use std::cell::Cell;
+use std::collections::BTreeMap;
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use uav_relay::channel::AirGround;
+use uav_relay::wire::deframe::DeframeError;
+use uav_relay::wire::frame::{self, Header, MAX_FRAME};
+use uav_relay::{
+    Channel, Duration, Identity, Instant, Interferer, Mission, MissionConfig, Port, Profile, Relay,
+    Settings, Stats, Wiring,
+};
+
+use super::codec::{Said, sealed};
+use super::config;
+use super::strategies::pieces;
+use super::stream::{chunks, unstuffed};
+
+pub(crate) const NETWORK: u16 = 7;
+
+/// Relay `index` of `relays` in the paper's scenario, on network 7.
+pub(crate) fn relay(index: u16, relays: u16, wiring: Wiring) -> Relay {
+    let mission = Mission::try_new(MissionConfig {
+        relays,
+        distance_m: 1000.0,
+        min_separation_m: 4.0,
+        tx_power_w: 80.0,
+        common: Profile {
+            altitude_m: 20.0,
+            power_w: 1.0,
+        },
+        channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
+        interferer: Interferer {
+            power_w: 80.0,
+            x_m: 500.0,
+            y_m: 400.0,
+        },
+        tolerance: 1e-4,
+    })
+    .unwrap();
+    let identity = Identity {
+        network: NETWORK,
+        index,
+    };
+    let settings = Settings {
+        wiring,
+        ..Settings::default()
+    };
+    Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
+}
+
+/// The counters of which each incoming frame raises one.
+fn of_frames(stats: &Stats) -> [(&'static str, u32); 9] {
+    [
+        ("crc", stats.crc),
+        ("foreign", stats.foreign),
+        ("malformed", stats.malformed),
+        ("misaddressed", stats.misaddressed),
+        ("overheard", stats.overheard),
+        ("oversized", stats.oversized),
+        ("received", stats.received),
+        ("truncated", stats.truncated),
+        ("version", stats.version),
+    ]
+}
+
+/// The counters of incoming frames and messages that are above zero, by name.
+pub(crate) fn counted(stats: &Stats) -> Vec<&'static str> {
+    let of_messages = [
+        ("misdirected", stats.misdirected),
+        ("mission", stats.mission),
+        ("repeated", stats.repeated),
+        ("stale", stats.stale),
+    ];
+    let mut names: Vec<&str> = of_frames(stats)
+        .into_iter()
+        .chain(of_messages)
+        .filter_map(|(name, count)| (count > 0).then_some(name))
+        .collect();
+    names.sort_unstable();
+    names
+}
+
+/// Which counter the table of the document has for the bytes between two delimiters.
+fn by_the_rules(chunk: &[u8], own: u16, port: Port) -> &'static str {
+    let plain = match unstuffed(chunk) {
+        Ok(plain) => plain,
+        Err(DeframeError::Oversized) => return "oversized",
+        Err(_) => return "truncated",
+    };
+    let Some(bytes) = plain.len().checked_sub(4).filter(|&bytes| bytes >= 10) else {
+        return "truncated";
+    };
+    let checked = &plain[..bytes];
+    if sealed(checked.to_vec()) != plain {
+        return "crc";
+    }
+    let word = |at: usize| u16::from(checked[at]) | u16::from(checked[at + 1]) << 8;
+    if word(0) >> 12 != 1 || word(2) >> 12 != 0 {
+        return "version";
+    }
+    if Said::read(&checked[10..]).is_err() {
+        return "malformed";
+    }
+    if word(4) != NETWORK {
+        return "foreign";
+    }
+    if word(2) != own {
+        return if port == Port::Shared {
+            "overheard"
+        } else {
+            "misaddressed"
+        };
+    }
+    let sender = word(0) & 0x0FFF;
+    let neighbour = match port {
+        Port::Upstream => sender == own - 1,
+        Port::Downstream => sender == own + 1,
+        Port::Shared => sender == own - 1 || sender == own + 1,
+    };
+    if neighbour {
+        "received"
+    } else {
+        "misaddressed"
+    }
+}
+
+/// Lets the relay do all it has to do at `now`; what it sends must be frames. Returns how many it sent.
+pub(crate) fn drain(relay: &mut Relay, now: Instant) -> usize {
+    let mut sent = 0;
+    let mut buffer = [0; MAX_FRAME];
+    while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
+        let chunk = &buffer[..transmit.len - 1];
+        let (header, _) = frame::decode(&unstuffed(chunk).unwrap()).unwrap();
+        assert_eq!(header.network, NETWORK);
+        sent += 1;
+    }
+    while relay.poll_event().is_some() {}
+    assert!(relay.poll_timeout().is_none_or(|wake| wake > now));
+    sent
+}
+
+/// Headers that are mostly for relay 4, from its neighbours, and sometimes anything.
+fn near_relay_4() -> impl Strategy<Value = Header> {
+    let network = prop_oneof![8 => Just(NETWORK), 1 => any::<u16>()];
+    let sender = prop_oneof![4 => Just(3), 4 => Just(5), 1 => 0..10_u16, 1 => 0..=4095_u16];
+    let destination = prop_oneof![8 => Just(4), 1 => 0..10_u16, 1 => 0..=4095_u16];
+    (network, sender, destination, any::<u32>()).prop_map(
+        |(network, sender, destination, counter)| Header {
+            network,
+            sender,
+            destination,
+            counter,
+        },
+    )
+}
+
+/// Feeds relay `index` of 8 with random pieces at random ports and compares every counter; all of `expected` must occur.
+fn fed_with_anything(index: u16, wiring: Wiring, ports: &'static [Port], expected: &[&str]) {
+    let seen = Cell::new(BTreeMap::new());
+    let steps = (
+        proptest::sample::select(ports),
+        pieces(near_relay_4()),
+        0..2000_u64,
+    );
+    TestRunner::new(config(400))
+        .run(&vec(steps, 0..24), |steps| {
+            let mut relay = relay(index, 8, wiring);
+            let mut streams: BTreeMap<String, (Port, Vec<u8>)> = BTreeMap::new();
+            let mut now = Instant::ZERO;
+            for (port, piece, wait_ms) in steps {
+                relay.handle_bytes(now, port, &piece);
+                let stream = streams.entry(format!("{port:?}"));
+                stream.or_insert((port, Vec::new())).1.extend(piece);
+                drain(&mut relay, now);
+                now = now + Duration::from_millis(wait_ms);
+                relay.handle_timeout(now);
+                drain(&mut relay, now);
+            }
+            let mut wanted = of_frames(&Stats::default()).map(|(name, _)| (name, 0));
+            let shared = wiring == Wiring::Shared;
+            for (port, stream) in streams.values() {
+                for chunk in chunks(stream) {
+                    let name = by_the_rules(chunk, index, *port);
+                    let counter = wanted.iter_mut().find(|(other, _)| *other == name);
+                    counter.unwrap().1 += u32::from(shared == (*port == Port::Shared));
+                }
+            }
+            prop_assert_eq!(of_frames(relay.stats()), wanted);
+            prop_assert_eq!(relay.setpoint(), None);
+            let mut all = seen.take();
+            for (name, count) in wanted {
+                *all.entry(name).or_insert(0) += count;
+            }
+            seen.set(all);
+            Ok(())
+        })
+        .unwrap();
+    let seen = seen.take();
+    println!("{seen:?}");
+    for name in expected {
+        assert!(seen[name] > 5, "{name} hardly ever happened");
+    }
+}
+
+#[test]
+fn with_two_links_every_frame_is_counted_once() {
+    let expected = [
+        "crc",
+        "foreign",
+        "malformed",
+        "misaddressed",
+        "oversized",
+        "received",
+        "truncated",
+        "version",
+    ];
+    let ports = &[Port::Upstream, Port::Downstream];
+    fed_with_anything(4, Wiring::Pair, ports, &expected);
+    fed_with_anything(1, Wiring::Pair, ports, &["misaddressed"]);
+}
+
+#[test]
+fn on_a_shared_channel_every_frame_is_counted_once() {
+    let expected = [
+        "crc",
+        "foreign",
+        "malformed",
+        "misaddressed",
+        "overheard",
+        "oversized",
+        "received",
+        "truncated",
+        "version",
+    ];
+    fed_with_anything(4, Wiring::Shared, &[Port::Shared], &expected);
+}
+
+#[test]
+fn bytes_at_a_port_that_is_not_wired_are_dropped() {
+    let all = &[Port::Upstream, Port::Downstream, Port::Shared];
+    fed_with_anything(4, Wiring::Pair, all, &["received"]);
+    fed_with_anything(4, Wiring::Shared, all, &["received"]);
+}

@@ -1,0 +1,225 @@
+//! The deframer: the same frames however the stream is cut, nothing accepted out of an oversized frame, and what another
+//! implementation of COBS says.
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use uav_relay::wire::deframe::{DeframeError, Deframer};
+use uav_relay::{Instant, Port, Relay, Wiring};
+
+use super::codec::wire;
+use super::config;
+use super::golden::vectors;
+use super::receive::relay;
+use super::strategies::{headers, pieces};
+
+type Outcome = Result<Vec<u8>, DeframeError>;
+
+/// What the deframer gives for a stream.
+fn deframed(stream: &[u8]) -> Vec<Outcome> {
+    let mut deframer = Deframer::new();
+    let mut out = Vec::new();
+    for &byte in stream {
+        if let Some(outcome) = deframer.push(byte) {
+            out.push(outcome.map(<[u8]>::to_vec));
+        }
+    }
+    out
+}
+
+/// What the rules give for the bytes between two delimiters; there is at least one.
+pub(crate) fn unstuffed(mut stuffed: &[u8]) -> Outcome {
+    let mut plain = Vec::new();
+    let mut whole = true;
+    while let Some((&code, rest)) = stuffed.split_first() {
+        let run = usize::from(code) - 1;
+        whole = run <= rest.len();
+        let (run, rest) = rest.split_at(run.min(rest.len()));
+        plain.extend(run);
+        if code < 255 && !rest.is_empty() {
+            plain.push(0);
+        }
+        stuffed = rest;
+    }
+    if plain.len() > 98 {
+        Err(DeframeError::Oversized)
+    } else if whole {
+        Ok(plain)
+    } else {
+        Err(DeframeError::Truncated)
+    }
+}
+
+/// The frames of a stream, stuffed, without empty ones and what follows the last delimiter.
+pub(crate) fn chunks(stream: &[u8]) -> Vec<&[u8]> {
+    let mut chunks: Vec<&[u8]> = stream.split(|&byte| byte == 0).collect();
+    chunks.pop();
+    chunks.retain(|chunk| !chunk.is_empty());
+    chunks
+}
+
+fn by_the_rules(stream: &[u8]) -> Vec<Outcome> {
+    chunks(stream).into_iter().map(unstuffed).collect()
+}
+
+/// All a relay has become after the stream, cut at the given lengths over and over.
+fn state_after(stream: &[u8], cuts: &[usize]) -> String {
+    let mut relay: Relay = relay(2, 8, Wiring::Pair);
+    let mut rest = stream;
+    for &cut in cuts.iter().cycle() {
+        let (now, later) = rest.split_at(cut.min(rest.len()));
+        relay.handle_bytes(Instant::ZERO, Port::Upstream, now);
+        rest = later;
+        if rest.is_empty() {
+            break;
+        }
+    }
+    format!("{relay:?}")
+}
+
+/// Every golden frame, and between them noise, cut and oversized frames and empty ones.
+fn fixed_stream() -> Vec<u8> {
+    let mut stream = b"noise before the first delimiter\0\0\0".to_vec();
+    for (k, vector) in vectors().frames.into_iter().enumerate() {
+        let wire = vector.wire();
+        stream.extend(&wire);
+        match k % 5 {
+            0 => stream.extend([0, 0]),
+            1 => stream.extend(&wire[..wire.len() / 2]),
+            2 => stream.extend([&wire[..wire.len() / 2], &[0]].concat()),
+            3 => stream.extend([&[0x55; 120][..], &wire].concat()),
+            _ => stream.extend([0xFF, 1, 1, 0]),
+        }
+    }
+    stream
+}
+
+#[test]
+fn every_chunk_size_gives_the_same() {
+    let stream = fixed_stream();
+    let outcomes = deframed(&stream);
+    assert_eq!(outcomes, by_the_rules(&stream));
+    for error in [DeframeError::Oversized, DeframeError::Truncated] {
+        assert!(outcomes.contains(&Err(error)), "{error}");
+    }
+    let whole = state_after(&stream, &[stream.len()]);
+    for size in 1..stream.len() {
+        assert!(state_after(&stream, &[size]) == whole, "chunks of {size}");
+    }
+}
+
+#[test]
+fn the_tail_of_an_oversized_frame_is_never_a_frame() {
+    let vectors = vectors().frames;
+    let good = vectors[0].wire();
+    // However many bytes a deframer had swallowed before it gave up and began anew, one of these puts a good frame there.
+    let data_runs = |len: usize| -> Vec<u8> {
+        let bytes = std::iter::repeat_n([0x64; 100], len / 100 + 1).flatten();
+        bytes.take(len).collect()
+    };
+    for len in 101..=600 {
+        for before in [data_runs(len), vec![1; len], vec![0xFF; len], vec![2; len]] {
+            let stream = [&before[..], &good, &good].concat();
+            let outcomes = deframed(&stream);
+            assert_eq!(
+                outcomes,
+                [Err(DeframeError::Oversized), Ok(vectors[0].plain())],
+                "{len} bytes of {}",
+                before[0]
+            );
+        }
+    }
+}
+
+#[test]
+fn the_longest_frame_fits_and_one_byte_more_does_not() {
+    for zeros in 0..=99 {
+        for len in [97, 98, 99, 100] {
+            let plain: Vec<u8> = (0..len).map(|k| u8::from(k >= zeros)).collect();
+            let expected = if len <= 98 {
+                Ok(plain.clone())
+            } else {
+                Err(DeframeError::Oversized)
+            };
+            assert_eq!(deframed(&wire(&plain)), [expected], "{zeros} zeros");
+        }
+    }
+}
+
+#[test]
+fn the_delimiter_after_a_bad_frame_begins_a_good_one() {
+    let vector = &vectors().frames[0];
+    let good = vector.wire();
+    for bad in [
+        vec![5, 1, 0],
+        vec![0xFF, 0],
+        [vec![0x64; 100], vec![0]].concat(),
+        [vec![0xFF; 5000], vec![0]].concat(),
+        [&good[..14], &[0]].concat(),
+    ] {
+        let outcomes = deframed(&[&bad[..], &good].concat());
+        assert_eq!(outcomes.len(), 2);
+        assert!(outcomes[0].is_err());
+        assert_eq!(outcomes[1], Ok(vector.plain()));
+    }
+}
+
+#[test]
+fn empty_frames_are_ignored() {
+    assert_eq!(deframed(&[0; 1000]), []);
+    let vector = &vectors().frames[0];
+    let stream = [&[0, 0, 0][..], &vector.wire(), &[0, 0]].concat();
+    assert_eq!(deframed(&stream), [Ok(vector.plain())]);
+    // A lone code byte is a frame without bytes, and no empty frame: it counts as one that is too short.
+    assert_eq!(deframed(&[1, 0]), [Ok(vec![])]);
+}
+
+proptest! {
+    #![proptest_config(config(3000))]
+
+    #[test]
+    fn what_cobs_encodes_is_decoded(plain in vec(prop_oneof![Just(0), any::<u8>()], 0..=98)) {
+        prop_assert_eq!(deframed(&wire(&plain)), [Ok(plain)]);
+    }
+
+    #[test]
+    fn what_cobs_decodes_is_decoded_the_same(stuffed in vec(1..=u8::MAX, 1..=98)) {
+        let small: Vec<u8> = stuffed.iter().map(|byte| (byte - 1) % 9 + 1).collect();
+        for stuffed in [stuffed, small] {
+            let expected = cobs::decode_vec(&stuffed).map_err(|_| DeframeError::Truncated);
+            let stream = [&stuffed[..], &[0]].concat();
+            prop_assert_eq!(deframed(&stream), [expected]);
+        }
+    }
+
+    #[test]
+    fn any_stream_gives_what_the_rules_say(pieces in vec(pieces(headers()), 0..12)) {
+        let stream = pieces.concat();
+        prop_assert_eq!(deframed(&stream), by_the_rules(&stream));
+    }
+
+    #[test]
+    fn any_bytes_give_what_the_rules_say(draws in vec(any::<u16>(), 0..1000)) {
+        // One byte in 64 is a delimiter, half are small: runs end and zeros come often.
+        let bytes = draws.into_iter().map(|draw| match draw.to_le_bytes() {
+            [_, 0..4] => 0,
+            [byte, 4..128] => byte % 8,
+            [byte, _] => byte,
+        });
+        let stream: Vec<u8> = bytes.collect();
+        prop_assert_eq!(deframed(&stream), by_the_rules(&stream));
+    }
+}
+
+proptest! {
+    #![proptest_config(config(300))]
+
+    #[test]
+    fn every_way_of_cutting_gives_the_same(
+        pieces in vec(pieces(headers()), 0..12),
+        cuts in vec(0..60_usize, 1..8),
+    ) {
+        prop_assume!(cuts.iter().any(|&cut| cut > 0));
+        let stream = pieces.concat();
+        prop_assert_eq!(state_after(&stream, &cuts), state_after(&stream, &[stream.len() + 1]));
+    }
+}
