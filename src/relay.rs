@@ -10,6 +10,7 @@ use crate::sir::Placement;
 use crate::time::Instant;
 use crate::wire::deframe::{DeframeError, Deframer};
 use crate::wire::frame::{self, FrameBuf, FrameError, Header};
+use crate::wire::message::Message;
 
 /// Where bytes come from and go to.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -207,44 +208,39 @@ impl Relay {
     }
 }
 
-/// One frame, decoded from COBS.
+/// One frame, decoded from COBS: checked, addressed and only then read.
 fn receive(node: &mut Node, network: u16, now: Instant, port: Port, plain: &[u8]) {
     let own = node.index();
     let stats = &mut node.stats;
-    let (header, message) = match frame::decode(plain) {
-        Ok(frame) => frame,
-        Err(error) => {
-            let counter = match error {
-                FrameError::Short => &mut stats.truncated,
-                FrameError::Crc => &mut stats.crc,
-                FrameError::Version => &mut stats.version,
-                FrameError::Message(_) => &mut stats.malformed,
-            };
-            return bump(counter);
-        }
+    let (header, body) = match frame::open(plain) {
+        Ok(opened) => opened,
+        Err(FrameError::Short) => return bump(&mut stats.truncated),
+        Err(FrameError::Crc) => return bump(&mut stats.crc),
+        Err(FrameError::Version) => return bump(&mut stats.version),
+        Err(FrameError::Message(_)) => return bump(&mut stats.malformed),
     };
-    let side = if header.sender.checked_add(1) == Some(own) {
-        Some(Side::Upstream)
-    } else if own.checked_add(1) == Some(header.sender) {
-        Some(Side::Downstream)
-    } else {
-        None
-    };
-    let through = match port {
-        Port::Upstream => Some(Side::Upstream),
-        Port::Downstream => Some(Side::Downstream),
-        Port::Shared => side,
-    };
-    let stats = &mut node.stats;
     if header.network != network {
         return bump(&mut stats.foreign);
     }
     if header.destination != own && port == Port::Shared {
         return bump(&mut stats.overheard);
     }
-    let Some(side) = side.filter(|_| header.destination == own && side == through) else {
-        return bump(&mut stats.misaddressed);
+    let through = match port {
+        Port::Upstream => Some(Side::Upstream),
+        Port::Downstream => Some(Side::Downstream),
+        Port::Shared => None,
     };
-    bump(&mut stats.received);
-    node.handle_message(now, side, message);
+    let side = node
+        .side_of(header.sender)
+        .filter(|side| through.is_none_or(|through| through == *side));
+    let Some(side) = side.filter(|_| header.destination == own) else {
+        return bump(&mut node.stats.misaddressed);
+    };
+    match Message::decode(body) {
+        Ok(message) => {
+            bump(&mut node.stats.received);
+            node.handle_message(now, side, message);
+        }
+        Err(_) => bump(&mut node.stats.malformed),
+    }
 }

@@ -244,11 +244,14 @@ impl Align {
         profile: Profile,
         answer: Answer,
     ) -> Next {
-        let fits = answer
-            .verdict
-            .commit
-            .is_none_or(|target| usize::from(target) < self.reaches.len())
-            && answer.verdict.slacks.len() <= self.reaches.len();
+        let slacks = &answer.verdict.slacks;
+        // What is committed must be met, by a target that this relay has a place for.
+        let met = |target: u8| {
+            slacks
+                .get(usize::from(target))
+                .is_some_and(|slack| *slack >= 0.0)
+        };
+        let fits = slacks.len() <= self.reaches.len() && answer.verdict.commit.is_none_or(met);
         if self.phase == Phase::Waiting && answer.number == self.number && fits {
             self.conclude(mission, index, profile, answer.verdict)
         } else {

@@ -150,6 +150,17 @@ impl Node {
         }
     }
 
+    /// Which neighbour node `sender` is. Neither Tx nor Rx runs this protocol, so they are none.
+    pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
+        if sender.checked_add(1) == Some(self.index) {
+            self.upstream.as_ref().map(|_| Side::Upstream)
+        } else if self.index.checked_add(1) == Some(sender) {
+            self.downstream.as_ref().map(|_| Side::Downstream)
+        } else {
+            None
+        }
+    }
+
     /// A message from the neighbour at `side`, intact and addressed to this relay. Bounded by 16 reaches.
     pub(crate) fn handle_message(&mut self, now: Instant, side: Side, message: Message) {
         let quiet = self.settings.quiet;

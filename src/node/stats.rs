@@ -10,7 +10,8 @@ pub struct Stats {
     pub repeats: u32,
     /// Sweeps the head has begun.
     pub sweeps: u32,
-    /// Frames accepted.
+    /// Messages from a neighbour, in range; what becomes of them may still be counted below as misdirected, of another
+    /// mission or stale.
     pub received: u32,
     /// Sweeps that had arrived before and were answered again.
     pub repeated: u32,

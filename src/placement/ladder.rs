@@ -19,7 +19,7 @@ const HALF: usize = TARGETS / 2;
 pub struct Ladder {
     /// The target below the middle gap.
     anchor: f32,
-    /// The middle gap as a float of 5 exponent and 3 mantissa bits, 3e-8 to 112; 0 makes `anchor` the only target.
+    /// The middle gap as a float of 5 exponent and 3 mantissa bits, 3e-8 to 120; 0 makes `anchor` the only target.
     gap: u8,
     /// What each gap is to its inner neighbour: 1 + `growth` / 16.
     growth: u8,
@@ -82,7 +82,7 @@ impl Ladder {
         }
     }
 
-    /// A ladder from its bytes, if its targets are normal f32s above zero.
+    /// A ladder from its bytes, if its targets are normal f32s above zero and it could not be written otherwise.
     pub fn from_parts(anchor: f32, gap: u8, growth: u8) -> Option<Self> {
         let ladder = Self {
             anchor,
@@ -92,7 +92,9 @@ impl Ladder {
         let targets = ladder.targets();
         // Subnormal targets would make a hop depend on how the processor treats subnormals.
         let sound = targets.first()? >= &f32::MIN_POSITIVE && targets.last()?.is_finite();
-        sound.then_some(ladder)
+        // A single target has no gaps that could grow.
+        let unique = gap != 0 || growth == 0;
+        (sound && unique).then_some(ladder)
     }
 
     /// Anchor, gap code and growth code, as [`Ladder::from_parts`] takes them.

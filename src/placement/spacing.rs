@@ -141,3 +141,54 @@ pub fn receiver_reach(mission: &Mission, profile: Profile, target: f32) -> Optio
     let squared = mission.receiver_gain(profile.power_w) / target - square(profile.altitude_m);
     (squared >= 0.0).then(|| libm::sqrtf(squared).min(1e9))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Hop;
+    use crate::mission::tests::paper;
+    use crate::mission::{Interferer, Mission, MissionConfig};
+    use crate::sir::Sender;
+
+    fn first_hop(x_m: f32, distance_m: f32, altitude_m: f32) -> Hop {
+        let interferer = Interferer {
+            power_w: 80.0,
+            x_m,
+            y_m: 0.0,
+        };
+        let config = MissionConfig {
+            interferer,
+            distance_m,
+            ..paper(1)
+        };
+        let mission = Mission::try_new(config).unwrap();
+        Hop::new(&mission, Sender::transmitter(&mission), 1, altitude_m)
+    }
+
+    /// Behind the transmitter an interferer makes SIR_1 rise at first: at 10 m behind, from 1.04 above Tx to 1.22 at 45 m.
+    #[test]
+    fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
+        // SIR_1 is at least 1.22 from 40.9 m to 50 m.
+        assert_eq!(
+            first_hop(-10.0, 35.0, 50.0).reach(1.22, 0.0),
+            None,
+            "it lies beyond the end"
+        );
+        assert_eq!(
+            first_hop(-10.0, 45.0, 50.0).reach(1.22, 0.0),
+            Some(45.0),
+            "the end lies in it"
+        );
+        let inside = first_hop(-10.0, 60.0, 50.0).reach(1.22, 0.0).unwrap();
+        assert!((inside - 50.0).abs() < 1e-3, "it ends at 50 m: {inside}");
+        assert_eq!(
+            first_hop(-10.0, 60.0, 50.0).reach(1.23, 0.0),
+            None,
+            "nothing meets that much"
+        );
+    }
+
+    #[test]
+    fn there_is_no_way_back() {
+        assert_eq!(first_hop(500.0, 1000.0, 20.0).reach(1.0, 1000.5), None);
+    }
+}

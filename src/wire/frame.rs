@@ -97,13 +97,13 @@ pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
     stuff(plain.get(..checked + CHECK).unwrap_or_default(), out)
 }
 
-/// The header and message in `plain`, a frame without COBS and delimiter.
+/// The header and the body in `plain`, a frame without COBS and delimiter.
 ///
-/// Whether the frame is meant for this node is the receiver's to say.
+/// Whether the frame is meant for this node is the receiver's to say, before it decodes the body.
 ///
 /// # Errors
 /// [`FrameError`] says what is wrong; the CRC is looked at first, so every other error is one of an intact frame.
-pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
+pub fn open(plain: &[u8]) -> Result<(Header, &[u8]), FrameError> {
     let (checked, check) = plain.split_last_chunk::<CHECK>().ok_or(FrameError::Short)?;
     let (head, body) = checked
         .split_first_chunk::<HEADER>()
@@ -125,6 +125,15 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
         destination,
         counter: u32::from_le_bytes([g, h, i, j]),
     };
+    Ok((header, body))
+}
+
+/// The header and the message in `plain`: [`open`], then [`Message::decode`].
+///
+/// # Errors
+/// [`FrameError`] says what is wrong.
+pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
+    let (header, body) = open(plain)?;
     let message = Message::decode(body).map_err(FrameError::Message)?;
     Ok((header, message))
 }

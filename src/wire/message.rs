@@ -209,10 +209,6 @@ impl Message {
                 power_w,
                 reaches,
             } => {
-                // A single target has no gaps to grow; with a growth it would be a second way to write the same ladder.
-                if gap == 0 && growth != 0 {
-                    return Err(MessageError::Value);
-                }
                 let ladder =
                     Ladder::from_parts(anchor.into(), gap, growth).ok_or(MessageError::Value)?;
                 let profile = Profile {

@@ -103,9 +103,6 @@ fn by_the_rules(chunk: &[u8], own: u16, port: Port) -> &'static str {
     if word(0) >> 12 != 1 || word(2) >> 12 != 0 {
         return "version";
     }
-    if Said::read(&checked[10..]).is_err() {
-        return "malformed";
-    }
     if word(4) != NETWORK {
         return "foreign";
     }
@@ -122,10 +119,12 @@ fn by_the_rules(chunk: &[u8], own: u16, port: Port) -> &'static str {
         Port::Downstream => sender == own + 1,
         Port::Shared => sender == own - 1 || sender == own + 1,
     };
-    if neighbour {
-        "received"
-    } else {
+    if !neighbour || sender == 0 {
         "misaddressed"
+    } else if Said::read(&checked[10..]).is_err() {
+        "malformed"
+    } else {
+        "received"
     }
 }
 
