@@ -1,12 +1,14 @@
 #![no_std]
 #![forbid(unsafe_code)]
-//! tour
+#![doc = include_str!("tour.md")]
 
 pub mod channel;
 pub mod mission;
 pub mod node;
 pub mod placement;
+pub mod pointing;
 pub mod relay;
+pub mod serial;
 pub mod sir;
 pub mod time;
 pub mod wire;
@@ -23,3 +25,7 @@ pub use relay::{Port, Relay, Transmit};
 pub use sir::Placement;
 pub use time::{Duration, Instant};
 pub use wire::frame::FrameBuf;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -9,7 +9,7 @@
 //! | [`event`] | what the firmware is told |
 //! | [`stats`] | what was counted |
 //!
-//! [`Node`] connects them. It answers messages by setting flags, and builds what it sends from its state when asked to, so
+//! `Node` connects them. It answers messages by setting flags, and builds what it sends from its state when asked to, so
 //! nothing queues up and a message sent twice is harmless.
 
 pub mod align;

@@ -1,0 +1,61 @@
+//! A relay that must keep radio silence finds its own place from the mission alone.
+//!
+//! `cargo run --example silent_place`: the places of a chain of five, each worked out by itself, as messages would have it.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+use uav_relay::channel::{AirGround, Channel};
+use uav_relay::placement::plan::silent_place;
+use uav_relay::{Interferer, Mission, MissionConfig, Profile};
+
+/// 2 GHz, excess losses of 0.1 dB and 21 dB as factors. A number out of range fails the build.
+const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
+    Ok(channel) => channel,
+    Err(_) => panic!("a channel parameter is out of range"),
+};
+
+const MISSION: Mission = Mission::new(MissionConfig {
+    relays: 5,
+    distance_m: 1000.0,
+    min_separation_m: 4.0,
+    tx_power_w: 80.0,
+    common: Profile {
+        altitude_m: 20.0,
+        power_w: 1.0,
+    },
+    channel: CHANNEL,
+    interferer: Interferer {
+        power_w: 80.0,
+        x_m: 500.0,
+        y_m: 400.0,
+    },
+    tolerance: 1e-4,
+});
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    for index in 1..=MISSION.relays() {
+        match silent_place(&MISSION, index) {
+            Ok(place) => println!(
+                "relay {index}: {:.3} m from Tx, {} m high",
+                place.x_m, place.altitude_m
+            ),
+            Err(error) => println!("relay {index}: {error}"),
+        }
+    }
+}
+
+#[cfg(target_os = "none")]
+use panic_halt as _;
+#[cfg(target_os = "none")]
+use stm32f4xx_hal as _;
+
+/// On the target the place is left to the debugger.
+#[cfg(target_os = "none")]
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let place = silent_place(&MISSION, 3);
+    loop {
+        core::hint::black_box(&place);
+        cortex_m::asm::wfi();
+    }
+}

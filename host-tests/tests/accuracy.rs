@@ -1,0 +1,183 @@
+//! What micromath and libm are worth in f32, function by function: why the one is used for bearings and the other for all
+//! the rest. `cargo test -p host-tests --test accuracy -- --nocapture` prints the table, and with `--release` and
+//! `--include-ignored` how long each takes on the host.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    missing_docs
+)]
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use micromath::F32;
+
+/// How an error is measured.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Error {
+    /// Share of the exact value.
+    Relative,
+    /// Difference from it, in the unit of the row.
+    Absolute,
+}
+
+/// One function: what both libraries make of two arguments, and the truth about the same two.
+struct Function {
+    name: &'static str,
+    /// Of an absolute error.
+    unit: &'static str,
+    error: Error,
+    /// What x runs over, evenly, or by factors if it is above 0.
+    range: [f64; 2],
+    /// The arguments for x; a function of one argument ignores the second.
+    arguments: fn(f64) -> [f64; 2],
+    micromath: fn([f32; 2]) -> f32,
+    libm: fn([f32; 2]) -> f32,
+    exact: fn([f64; 2]) -> f64,
+    /// The largest errors, measured and rounded up: micromath's, libm's.
+    largest: [f64; 2],
+}
+
+const FUNCTIONS: [Function; 6] = [
+    Function {
+        name: "atan2",
+        unit: "degrees",
+        error: Error::Absolute,
+        range: [-179.99, 179.99],
+        arguments: |x| [x.to_radians().sin(), x.to_radians().cos()],
+        micromath: |[y, x]| F32(y).atan2(F32(x)).0.to_degrees(),
+        libm: |[y, x]| libm::atan2f(y, x).to_degrees(),
+        exact: |[y, x]| y.atan2(x).to_degrees(),
+        largest: [0.1621, 2e-5],
+    },
+    Function {
+        name: "sqrt",
+        unit: "",
+        error: Error::Relative,
+        range: [1e-12, 1e12],
+        arguments: |x| [x, 1.0],
+        micromath: |[x, _]| F32(x).sqrt().0,
+        libm: |[x, _]| libm::sqrtf(x),
+        exact: |[x, _]| x.sqrt(),
+        largest: [0.0607, 6e-8],
+    },
+    Function {
+        name: "hypot",
+        unit: "",
+        error: Error::Relative,
+        range: [1e-6, 1e6],
+        arguments: |x| [x, 1.0],
+        micromath: |[x, y]| F32(x).hypot(F32(y)).0,
+        libm: |[x, y]| libm::hypotf(x, y),
+        exact: |[x, y]| x.hypot(y),
+        largest: [0.0607, 9e-8],
+    },
+    Function {
+        name: "10 log10",
+        unit: "dB",
+        error: Error::Absolute,
+        range: [1e-12, 1e12],
+        arguments: |x| [x, 1.0],
+        micromath: |[x, _]| 10.0 * F32(x).log10().0,
+        libm: |[x, _]| 10.0 * libm::log10f(x),
+        exact: |[x, _]| 10.0 * x.log10(),
+        largest: [0.512, 9e-6],
+    },
+    Function {
+        name: "ln",
+        unit: "",
+        error: Error::Absolute,
+        range: [1e-12, 1e12],
+        arguments: |x| [x, 1.0],
+        micromath: |[x, _]| F32(x).ln().0,
+        libm: |[x, _]| libm::logf(x),
+        exact: |[x, _]| x.ln(),
+        largest: [0.119, 1e-6],
+    },
+    Function {
+        name: "exp",
+        unit: "",
+        error: Error::Relative,
+        range: [-20.0, 20.0],
+        arguments: |x| [x, 1.0],
+        micromath: |[x, _]| F32(x).exp().0,
+        libm: |[x, _]| libm::expf(x),
+        exact: |[x, _]| x.exp(),
+        largest: [2.4e-3, 8e-8],
+    },
+];
+
+const POINTS: u32 = 400_000;
+
+/// The arguments of a function, as f32.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the functions under test take f32"
+)]
+fn arguments(function: &Function) -> impl Iterator<Item = [f32; 2]> {
+    let [low, high] = function.range;
+    (0..=POINTS).map(move |i| {
+        let share = f64::from(i) / f64::from(POINTS);
+        let x = if low > 0.0 {
+            low * (high / low).powf(share)
+        } else {
+            low + (high - low) * share
+        };
+        (function.arguments)(x).map(|argument| argument as f32)
+    })
+}
+
+fn largest(function: &Function, approximate: fn([f32; 2]) -> f32) -> f64 {
+    arguments(function)
+        .map(|x| {
+            let exact = (function.exact)(x.map(f64::from));
+            let off = (f64::from(approximate(x)) - exact).abs();
+            match function.error {
+                Error::Relative => off / exact.abs(),
+                Error::Absolute => off,
+            }
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn the_errors_of_both_libraries_are_as_stated() {
+    println!("| function | error | micromath | libm |\n| --- | --- | --- | --- |");
+    for function in &FUNCTIONS {
+        let found = [function.micromath, function.libm].map(|f| largest(function, f));
+        let [micromath, libm] = found;
+        println!(
+            "| {} | {:?} {} | {micromath:.2e} | {libm:.2e} |",
+            function.name, function.error, function.unit
+        );
+        for (found, stated) in found.into_iter().zip(function.largest) {
+            assert!(found <= stated, "{}: {found}", function.name);
+            // A statement much above the truth says nothing.
+            assert!(found >= 0.5 * stated, "{}: {found}", function.name);
+        }
+    }
+}
+
+#[test]
+#[ignore = "measures time"]
+fn the_cost_of_both_libraries_on_the_host() {
+    println!("| function | micromath, ns | libm, ns | ratio |\n| --- | --- | --- | --- |");
+    for function in &FUNCTIONS {
+        let x: Vec<[f32; 2]> = arguments(function).collect();
+        let [micromath, libm] = [function.micromath, function.libm].map(|f| {
+            let start = Instant::now();
+            for &x in &x {
+                black_box(f(black_box(x)));
+            }
+            start.elapsed().as_secs_f64() * 1e9 / f64::from(POINTS)
+        });
+        println!(
+            "| {} | {micromath:.1} | {libm:.1} | {:.2} |",
+            function.name,
+            libm / micromath
+        );
+    }
+}

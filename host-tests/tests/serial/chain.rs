@@ -1,0 +1,207 @@
+//! A chain of relays on mock ports, run on a virtual clock; and the same chain without any ports, to compare with.
+
+use uav_relay::channel::{AirGround, Channel};
+use uav_relay::serial::{Io, Nb, Pair, SerialLink, SerialPort, SerialStats, Shared, byte_time};
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{
+    Duration, Event, FrameBuf, Identity, Instant, Interferer, Mission, MissionConfig, Placement,
+    Port, Profile, Relay, Settings, Side, Wiring,
+};
+
+use crate::pipe::{End, IoEnd, NbEnd, Trouble};
+
+pub(crate) const BYTE_TIME: Duration = byte_time(115_200);
+
+pub(crate) fn mission(relays: u16) -> Mission {
+    Mission::try_new(MissionConfig {
+        relays,
+        distance_m: 1000.0,
+        min_separation_m: 4.0,
+        tx_power_w: 80.0,
+        common: Profile {
+            altitude_m: 20.0,
+            power_w: 1.0,
+        },
+        channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
+        interferer: Interferer {
+            power_w: 80.0,
+            x_m: 500.0,
+            y_m: 400.0,
+        },
+        tolerance: 1e-4,
+    })
+    .unwrap()
+}
+
+pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
+    let identity = Identity { network: 7, index };
+    let settings = Settings {
+        wiring,
+        ..Settings::default()
+    };
+    let seed = u32::from(index) * 77;
+    Relay::new(mission(relays), identity, settings, seed, Instant::ZERO).unwrap()
+}
+
+/// A driver of either wiring over ports of either kind.
+pub(crate) trait Driver {
+    fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant>;
+    /// Upstream or shared, then downstream.
+    fn stats(&self) -> Vec<SerialStats>;
+}
+
+impl<U: SerialPort, D: SerialPort> Driver for Pair<U, D> {
+    fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
+        self.poll(now, relay)
+    }
+
+    fn stats(&self) -> Vec<SerialStats> {
+        vec![*self.upstream.stats(), *self.downstream.stats()]
+    }
+}
+
+impl<P: SerialPort> Driver for Shared<P> {
+    fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
+        self.poll(now, relay)
+    }
+
+    fn stats(&self) -> Vec<SerialStats> {
+        vec![*self.channel.stats()]
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Kind {
+    Nb,
+    Io,
+}
+
+/// A relay with its ports.
+pub(crate) struct Node {
+    pub(crate) relay: Relay,
+    pub(crate) driver: Box<dyn Driver>,
+    pub(crate) ends: Vec<End>,
+    pub(crate) events: Vec<Event>,
+    pub(crate) polls: u32,
+}
+
+impl Node {
+    pub(crate) fn new(kind: Kind, relay: Relay, ends: &[End], trouble: &Trouble) -> Self {
+        let nb = |end: &End| {
+            let (end, trouble) = (end.clone(), trouble.clone());
+            SerialLink::new(Nb(NbEnd { end, trouble }), BYTE_TIME)
+        };
+        let io = |end: &End| {
+            let (end, trouble) = (end.clone(), trouble.clone());
+            SerialLink::new(Io(IoEnd { end, trouble }), BYTE_TIME)
+        };
+        let driver: Box<dyn Driver> = match (kind, ends) {
+            (Kind::Nb, [up, down]) => Box::new(Pair::new(nb(up), nb(down))),
+            (Kind::Io, [up, down]) => Box::new(Pair::new(io(up), io(down))),
+            (Kind::Nb, [channel]) => Box::new(Shared::new(nb(channel))),
+            (Kind::Io, [channel]) => Box::new(Shared::new(io(channel))),
+            _ => panic!("one port or two"),
+        };
+        Self {
+            relay,
+            driver,
+            ends: ends.to_vec(),
+            events: Vec::new(),
+            polls: 0,
+        }
+    }
+}
+
+/// A chain with wires, or a channel, that hold `capacity` bytes. The far ends of the first and last wire come with it.
+pub(crate) fn chain(
+    kind: Kind,
+    wiring: Wiring,
+    relays: u16,
+    capacity: usize,
+    trouble: &Trouble,
+) -> (Vec<Node>, Vec<End>) {
+    let count = usize::from(relays);
+    let mut far = Vec::new();
+    let ends: Vec<Vec<End>> = match wiring {
+        Wiring::Shared => {
+            let ends = End::channel(count, capacity);
+            ends.into_iter().map(|end| vec![end]).collect()
+        }
+        Wiring::Pair => {
+            let wires: Vec<[End; 2]> = (0..=count).map(|_| End::wire(capacity)).collect();
+            far = vec![wires[0][0].clone(), wires[count][1].clone()];
+            let pairs = wires.windows(2);
+            pairs
+                .map(|pair| vec![pair[0][1].clone(), pair[1][0].clone()])
+                .collect()
+        }
+    };
+    let nodes = (1..=relays)
+        .zip(&ends)
+        .map(|(index, ends)| Node::new(kind, relay(relays, index, wiring), ends, trouble))
+        .collect();
+    (nodes, far)
+}
+
+/// Polls all nodes whenever one of them wants to be polled or has bytes to read, and checks what `poll` promises.
+pub(crate) fn run(nodes: &mut [Node], from: Instant, until: Instant) -> Instant {
+    let mut now = from;
+    while now < until {
+        let mut next = until;
+        for node in &mut *nodes {
+            node.polls += 1;
+            let wake = node.driver.poll(now, &mut node.relay);
+            let wake = wake.into_iter().chain(node.relay.poll_timeout()).min();
+            assert!(wake.is_none_or(|wake| wake > now), "{wake:?} at {now:?}");
+            next = next.min(wake.unwrap_or(next));
+            while let Some(event) = node.relay.poll_event() {
+                node.events.push(event);
+            }
+        }
+        if nodes
+            .iter()
+            .flat_map(|node| &node.ends)
+            .any(|end| end.waiting() > 0)
+        {
+            next = next.min(now + BYTE_TIME);
+        }
+        now = next;
+    }
+    now
+}
+
+pub(crate) fn setpoints(nodes: &[Node]) -> Vec<Option<Placement>> {
+    nodes.iter().map(|node| node.relay.setpoint()).collect()
+}
+
+/// Where the same relays go when frames are handed from one to the next by the test.
+pub(crate) fn direct(relays: u16) -> Vec<Option<Placement>> {
+    let mut chain: Vec<Relay> = (1..=relays)
+        .map(|index| relay(relays, index, Wiring::Pair))
+        .collect();
+    let mut now = Instant::ZERO;
+    while chain.iter().any(|relay| relay.setpoint().is_none()) {
+        let mut frame: FrameBuf = [0; MAX_FRAME];
+        let mut mail = Vec::new();
+        for (at, relay) in chain.iter_mut().enumerate() {
+            relay.handle_timeout(now);
+            while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
+                mail.push((at, transmit.port, frame[..transmit.len].to_vec()));
+            }
+        }
+        for (at, port, bytes) in mail {
+            match port {
+                Port::Upstream => chain[at - 1].handle_bytes(now, Port::Downstream, &bytes),
+                _ => chain[at + 1].handle_bytes(now, Port::Upstream, &bytes),
+            }
+        }
+        now = now + Duration::from_millis(1);
+        assert!(now < Instant::from_millis(5_000));
+    }
+    chain.iter().map(Relay::setpoint).collect()
+}
+
+/// Whether a neighbour has been lost so far.
+pub(crate) fn has_lost(node: &Node, side: Side) -> bool {
+    node.events.contains(&Event::NeighbourLost(side))
+}

@@ -1,0 +1,233 @@
+//! Ports over queues of a few bytes: a wire between two ends, or a channel that everybody hears.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use embedded_hal_nb::serial::ErrorKind;
+
+/// What carries bytes from one end to all others.
+struct Medium {
+    /// What has arrived at each end and has not been read.
+    inboxes: Vec<VecDeque<u8>>,
+    capacity: usize,
+    /// Whether one end speaks at a time, a frame long, as a modem with carrier sense sees to it.
+    turns: bool,
+    talker: Option<usize>,
+    carried: usize,
+}
+
+/// One end of a medium.
+#[derive(Clone)]
+pub(crate) struct End {
+    medium: Rc<RefCell<Medium>>,
+    number: usize,
+}
+
+impl End {
+    fn medium(ends: usize, capacity: usize, turns: bool) -> Vec<Self> {
+        let medium = Rc::new(RefCell::new(Medium {
+            inboxes: vec![VecDeque::new(); ends],
+            capacity,
+            turns,
+            talker: None,
+            carried: 0,
+        }));
+        (0..ends)
+            .map(|number| Self {
+                medium: Rc::clone(&medium),
+                number,
+            })
+            .collect()
+    }
+
+    /// The two ends of a full-duplex wire with `capacity` bytes in it each way.
+    pub(crate) fn wire(capacity: usize) -> [Self; 2] {
+        Self::medium(2, capacity, false).try_into().ok().unwrap()
+    }
+
+    /// The ends of a channel that everybody hears.
+    pub(crate) fn channel(ends: usize, capacity: usize) -> Vec<Self> {
+        Self::medium(ends, capacity, true)
+    }
+
+    /// Bytes that wait to be read here.
+    pub(crate) fn waiting(&self) -> usize {
+        self.medium.borrow().inboxes[self.number].len()
+    }
+
+    /// Bytes that any end has sent.
+    pub(crate) fn carried(&self) -> usize {
+        self.medium.borrow().carried
+    }
+
+    /// Puts bytes here as if they had come in.
+    pub(crate) fn stuff(&self, bytes: &[u8]) {
+        self.medium.borrow_mut().inboxes[self.number].extend(bytes);
+    }
+
+    pub(crate) fn get(&self) -> Option<u8> {
+        self.medium.borrow_mut().inboxes[self.number].pop_front()
+    }
+
+    fn has_room(&self) -> bool {
+        let medium = self.medium.borrow();
+        let mine = !medium.turns || medium.talker.is_none_or(|talker| talker == self.number);
+        let mut others = medium.inboxes.iter().enumerate();
+        mine && others.all(|(at, inbox)| at == self.number || inbox.len() < medium.capacity)
+    }
+
+    fn put(&self, byte: u8) {
+        let mut medium = self.medium.borrow_mut();
+        medium.talker = (byte != 0).then_some(self.number);
+        medium.carried += 1;
+        for (at, inbox) in medium.inboxes.iter_mut().enumerate() {
+            if at != self.number {
+                inbox.push_back(byte);
+            }
+        }
+    }
+}
+
+/// Read errors in turn, one every so many bytes, each of which loses its byte.
+#[derive(Clone, Default)]
+pub(crate) struct Trouble {
+    pub(crate) every: usize,
+    pub(crate) left: usize,
+    pub(crate) count: usize,
+    seen: usize,
+}
+
+const KINDS: [ErrorKind; 5] = [
+    ErrorKind::Overrun,
+    ErrorKind::FrameFormat,
+    ErrorKind::Parity,
+    ErrorKind::Noise,
+    ErrorKind::Other,
+];
+
+impl Trouble {
+    pub(crate) fn times(left: usize, every: usize) -> Self {
+        Self {
+            every,
+            left,
+            ..Self::default()
+        }
+    }
+
+    fn strike(&mut self) -> Option<ErrorKind> {
+        self.seen += 1;
+        if self.left == 0 || !self.seen.is_multiple_of(self.every) {
+            return None;
+        }
+        self.left -= 1;
+        self.count += 1;
+        Some(KINDS[self.count % KINDS.len()])
+    }
+}
+
+/// An end behind `embedded_hal_nb`.
+pub(crate) struct NbEnd {
+    pub(crate) end: End,
+    pub(crate) trouble: Trouble,
+}
+
+mod as_nb {
+    use super::NbEnd;
+    use embedded_hal_nb::nb;
+    use embedded_hal_nb::serial::{ErrorKind, ErrorType, Read, Write};
+
+    impl ErrorType for NbEnd {
+        type Error = ErrorKind;
+    }
+
+    impl Read<u8> for NbEnd {
+        fn read(&mut self) -> nb::Result<u8, ErrorKind> {
+            let byte = self.end.get().ok_or(nb::Error::WouldBlock)?;
+            match self.trouble.strike() {
+                Some(kind) => Err(nb::Error::Other(kind)),
+                None => Ok(byte),
+            }
+        }
+    }
+
+    impl Write<u8> for NbEnd {
+        fn write(&mut self, byte: u8) -> nb::Result<(), ErrorKind> {
+            if !self.end.has_room() {
+                return Err(nb::Error::WouldBlock);
+            }
+            self.end.put(byte);
+            Ok(())
+        }
+
+        fn flush(&mut self) -> nb::Result<(), ErrorKind> {
+            Ok(())
+        }
+    }
+}
+
+/// An end behind `embedded_io`, which panics where a real one would block.
+pub(crate) struct IoEnd {
+    pub(crate) end: End,
+    pub(crate) trouble: Trouble,
+}
+
+mod as_io {
+    use super::IoEnd;
+    use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
+
+    impl ErrorType for IoEnd {
+        type Error = ErrorKind;
+    }
+
+    impl ReadReady for IoEnd {
+        fn read_ready(&mut self) -> Result<bool, ErrorKind> {
+            Ok(self.end.waiting() > 0)
+        }
+    }
+
+    impl Read for IoEnd {
+        fn read(&mut self, into: &mut [u8]) -> Result<usize, ErrorKind> {
+            assert!(self.end.waiting() > 0, "this read would block");
+            let mut count = 0;
+            // Never more than 5 at once, though more may be there: the trait allows that.
+            for place in into.iter_mut().take(5) {
+                let Some(byte) = self.end.get() else { break };
+                if self.trouble.strike().is_some() {
+                    return if count == 0 {
+                        Err(ErrorKind::Other)
+                    } else {
+                        Ok(count)
+                    };
+                }
+                *place = byte;
+                count += 1;
+            }
+            Ok(count)
+        }
+    }
+
+    impl WriteReady for IoEnd {
+        fn write_ready(&mut self) -> Result<bool, ErrorKind> {
+            Ok(self.end.has_room())
+        }
+    }
+
+    impl Write for IoEnd {
+        fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+            assert!(self.end.has_room(), "this write would block");
+            let fits = bytes.iter().take_while(|&&byte| {
+                let room = self.end.has_room();
+                if room {
+                    self.end.put(byte);
+                }
+                room
+            });
+            Ok(fits.count())
+        }
+
+        fn flush(&mut self) -> Result<(), ErrorKind> {
+            panic!("a flush may block");
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! One serial port: what comes in, what waits to go out, and who drives the line.
+
+use core::convert::Infallible;
+
+use embedded_hal::digital::{ErrorType, OutputPin};
+use heapless::Deque;
+
+use super::port::SerialPort;
+use super::stats::SerialStats;
+use crate::node::stats::bump;
+use crate::relay::{Port, Relay};
+use crate::time::{Duration, Instant};
+use crate::wire::frame::MAX_FRAME;
+
+/// The most bytes, or failed reads, that one poll takes from one port.
+pub const READ_LIMIT: usize = 64;
+
+/// Room for two frames: one on its way, and one that is due before it has left.
+const QUEUE: usize = 2 * MAX_FRAME;
+
+/// The longest pause, in byte times, between two attempts at a port that takes nothing.
+const LONGEST_PAUSE: u32 = 128;
+
+/// The driver-enable pin of a link that has none: full duplex, or a radio that switches by itself.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum NoPin {}
+
+impl ErrorType for NoPin {
+    type Error = Infallible;
+}
+
+impl OutputPin for NoPin {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        match *self {}
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        match *self {}
+    }
+}
+
+/// The least time one byte of 10 bits (a start bit, 8 data bits, a stop bit) takes on a line of `baud` bit/s, rounded up to
+/// a microsecond. `baud` is at least 1; 0 counts as 1.
+pub const fn byte_time(baud: u32) -> Duration {
+    let baud = if baud == 0 { 1 } else { baud as u64 };
+    Duration::from_micros(10_000_000_u64.div_ceil(baud))
+}
+
+/// A serial port, the frames that wait for it, and its driver-enable pin if it has one.
+///
+/// The pin is high from before the first byte of a frame until the last bit of the last waiting frame has left, and low
+/// otherwise. When that is, an [`Nb`](super::Nb) port is asked; for an [`Io`](super::Io) port it is worked out from the time of
+/// a byte, on the safe side: every byte counts from the first poll after the one that wrote it.
+#[derive(Debug)]
+pub struct SerialLink<P, D = NoPin> {
+    port: P,
+    pin: Option<D>,
+    /// The pin as it was last set; unknown before, and after an error.
+    level: Option<bool>,
+    byte_time: Duration,
+    waiting: Deque<u8, QUEUE>,
+    /// When a byte was taken last, or the first one began to wait.
+    moved_at: Instant,
+    /// Bytes written by the last poll: when exactly is not known, so they count from the next one.
+    uncounted: u32,
+    /// When everything counted has left.
+    quiet_at: Instant,
+    /// Whether the last poll stopped reading at its limit.
+    unread: bool,
+    stats: SerialStats,
+}
+
+impl<P: SerialPort> SerialLink<P> {
+    /// A link over `port`, on which a byte takes `byte_time` (see [`byte_time`]; at least 1 us).
+    pub fn new(port: P, byte_time: Duration) -> Self {
+        Self::with_pin(port, byte_time, None)
+    }
+}
+
+impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
+    /// A link over `port`, on which a byte takes `byte_time` (at least 1 us), with a pin that is high while this relay sends.
+    ///
+    /// The pin is set low by the first poll, unless that one has something to send.
+    pub fn half_duplex(port: P, byte_time: Duration, pin: D) -> Self {
+        Self::with_pin(port, byte_time, Some(pin))
+    }
+
+    fn with_pin(port: P, byte_time: Duration, pin: Option<D>) -> Self {
+        Self {
+            port,
+            pin,
+            level: None,
+            byte_time: byte_time.max(Duration::from_micros(1)),
+            waiting: Deque::new(),
+            moved_at: Instant::ZERO,
+            uncounted: 0,
+            quiet_at: Instant::ZERO,
+            unread: false,
+            stats: SerialStats::default(),
+        }
+    }
+}
+
+impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
+    /// Whether the line is this relay's to send on, after asking for it.
+    fn raise(&mut self) -> bool {
+        if let Some(pin) = &mut self.pin
+            && self.level != Some(true)
+        {
+            if pin.set_high().is_err() {
+                self.level = None;
+                bump(&mut self.stats.pin);
+                return false;
+            }
+            self.level = Some(true);
+        }
+        true
+    }
+
+    /// Gives the line up, if everything has left.
+    fn lower(&mut self, now: Instant) {
+        let Some(pin) = self.pin.as_mut().filter(|_| self.level != Some(false)) else {
+            return;
+        };
+        let by_time = self.uncounted == 0 && now >= self.quiet_at;
+        let left = if let Ok(known) = self.port.has_left() {
+            known.unwrap_or(by_time)
+        } else {
+            bump(&mut self.stats.write);
+            by_time
+        };
+        if left {
+            if pin.set_low().is_ok() {
+                self.level = Some(false);
+            } else {
+                bump(&mut self.stats.pin);
+            }
+        }
+    }
+}
+
+impl<P, D> SerialLink<P, D> {
+    /// What has been counted since the link was made.
+    pub fn stats(&self) -> &SerialStats {
+        &self.stats
+    }
+
+    /// The port, for what this crate does not do: another baud rate, an interrupt.
+    pub fn port_mut(&mut self) -> &mut P {
+        &mut self.port
+    }
+
+    /// The port and the pin. What was waiting is gone, and the pin stays as it is.
+    pub fn release(self) -> (P, Option<D>) {
+        (self.port, self.pin)
+    }
+}
+
+/// A link, whatever it is made of.
+pub(super) trait Link {
+    /// Takes in at most [`READ_LIMIT`] bytes as those of `port`.
+    fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay);
+    /// Whether one more frame of any length fits.
+    fn has_room(&self) -> bool;
+    /// Takes a frame to be sent, or counts that it cannot.
+    fn queue(&mut self, now: Instant, frame: &[u8]);
+    /// Counts a frame for a port that is not there.
+    fn unrouted(&mut self);
+    /// Writes what fits, and sees to the pin.
+    fn transmit(&mut self, now: Instant);
+    /// When to be polled again, for the sake of this link; later than `now`.
+    fn wake(&self, now: Instant) -> Option<Instant>;
+}
+
+impl<P: SerialPort, D: OutputPin> Link for SerialLink<P, D> {
+    fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay) {
+        let written = core::mem::take(&mut self.uncounted);
+        if written > 0 {
+            self.quiet_at = self.quiet_at.max(now) + self.byte_time.times(written);
+        }
+        let mut buffer = [0; READ_LIMIT];
+        let mut room = buffer.as_mut_slice();
+        self.unread = true;
+        for _ in 0..READ_LIMIT {
+            if room.is_empty() {
+                break;
+            }
+            match self.port.read(room) {
+                Ok(0) => {
+                    self.unread = false;
+                    break;
+                }
+                Ok(count) => room = room.get_mut(count..).unwrap_or_default(),
+                Err(fault) => self.stats.read_failed(fault),
+            }
+        }
+        let len = READ_LIMIT - room.len();
+        relay.handle_bytes(now, port, buffer.get(..len).unwrap_or_default());
+    }
+
+    fn has_room(&self) -> bool {
+        QUEUE - self.waiting.len() >= MAX_FRAME
+    }
+
+    fn queue(&mut self, now: Instant, frame: &[u8]) {
+        if frame.len() > QUEUE - self.waiting.len() {
+            return bump(&mut self.stats.dropped);
+        }
+        if self.waiting.is_empty() {
+            self.moved_at = now;
+        }
+        for &byte in frame {
+            // There is room, as just seen.
+            let _ = self.waiting.push_back(byte);
+        }
+    }
+
+    fn unrouted(&mut self) {
+        bump(&mut self.stats.unrouted);
+    }
+
+    fn transmit(&mut self, now: Instant) {
+        if !self.waiting.is_empty() && !self.raise() {
+            return;
+        }
+        // A port that is ready takes at least a byte, so this ends.
+        while let (front @ [_, ..], _) = self.waiting.as_slices() {
+            match self.port.write(front) {
+                Ok(0) => return,
+                Ok(count) => {
+                    self.moved_at = now;
+                    for _ in 0..count.min(front.len()) {
+                        let _ = self.waiting.pop_front();
+                        self.uncounted = self.uncounted.saturating_add(1);
+                    }
+                }
+                Err(_) => return bump(&mut self.stats.write),
+            }
+        }
+        self.lower(now);
+    }
+
+    fn wake(&self, now: Instant) -> Option<Instant> {
+        let driving = self.pin.is_some() && self.level != Some(false);
+        if self.unread || (driving && self.waiting.is_empty()) {
+            return Some(now + self.byte_time);
+        }
+        // A port that takes nothing is left alone for as long again as it has been stuck.
+        let longest = self.byte_time.times(LONGEST_PAUSE);
+        let pause = now.since(self.moved_at).min(longest).max(self.byte_time);
+        (!self.waiting.is_empty()).then(|| now + pause)
+    }
+}

@@ -1,0 +1,197 @@
+//! A relay on real serial ports: it moves bytes between a [`Relay`] and one or two ports, and never waits for them.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | [`port`] | a port that never blocks, made of [`embedded_hal_nb`] ([`Nb`]) or [`embedded_io`] ([`Io`]) |
+//! | [`link`] | one port with the frames that wait for it and its driver-enable pin |
+//! | [`stats`] | local faults, counted |
+//! | this one | the relay and its links: [`Pair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`Shared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
+//!
+//! # One call
+//! `poll` reads up to [`READ_LIMIT`] bytes a port into the relay, has it handle what is due, takes its frames, and writes
+//! what fits. The relay is drained by then: take its events, and sleep until the time that `poll` returned or until a byte
+//! comes in, whichever is first. The time is always later than `now`; with bytes still to be written or read, or a pin to be
+//! lowered, it is one byte time ahead, which keeps a line without a FIFO busy. A port that takes nothing is tried less and
+//! less often, at last every 128 byte times: wake up when it takes bytes again, if it can tell.
+//!
+//! # What does not fit
+//! A link has room for two frames of full length. A frame that does not fit any more is dropped and counted in
+//! [`SerialStats::dropped`]: that neighbour's port takes nothing, and the other neighbour must not wait for it. With one
+//! shared port nothing is ever dropped: frames stay in the relay until there is room. Faults of the ports are counted,
+//! never returned.
+//!
+//! # Example
+//! The main loop of a firmware, with a port that stands in for the HAL's. A HAL whose ports are of an older `embedded_io` (say
+//! 0.6) can be used through its [`embedded_hal_nb`] side.
+//! ```
+//! use uav_relay::channel::{AirGround, Channel};
+//! use uav_relay::serial::{Nb, Pair, SerialLink, byte_time};
+//! use uav_relay::{Event, Identity, Instant, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
+//! use embedded_hal_nb::{nb, serial};
+//!
+//! #[derive(Default)]
+//! struct Uart {
+//!     sent: Vec<u8>,
+//! }
+//!
+//! impl serial::ErrorType for Uart {
+//!     type Error = serial::ErrorKind;
+//! }
+//!
+//! impl serial::Read<u8> for Uart {
+//!     fn read(&mut self) -> nb::Result<u8, Self::Error> {
+//!         Err(nb::Error::WouldBlock) // nobody there
+//!     }
+//! }
+//!
+//! impl serial::Write<u8> for Uart {
+//!     fn write(&mut self, byte: u8) -> nb::Result<(), Self::Error> {
+//!         self.sent.push(byte);
+//!         Ok(())
+//!     }
+//!     fn flush(&mut self) -> nb::Result<(), Self::Error> {
+//!         Ok(())
+//!     }
+//! }
+//!
+//! let mission = Mission::try_new(MissionConfig {
+//!     relays: 2,
+//!     distance_m: 1000.0,
+//!     min_separation_m: 4.0,
+//!     tx_power_w: 80.0,
+//!     common: Profile { altitude_m: 20.0, power_w: 1.0 },
+//!     channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?,
+//!     interferer: Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 },
+//!     tolerance: 1e-4,
+//! })?;
+//! let identity = Identity { network: 7, index: 1 };
+//! let mut now = Instant::ZERO; // a firmware reads its clock
+//! let mut relay = Relay::new(mission, identity, Settings::default(), 1, now)?;
+//! let link = || SerialLink::new(Nb(Uart::default()), byte_time(115_200));
+//! let mut ports = Pair::new(link(), link());
+//!
+//! while now < Instant::from_millis(100) {
+//!     let wake = ports.poll(now, &mut relay);
+//!     while let Some(event) = relay.poll_event() {
+//!         if event == Event::SetpointChanged {
+//!             // hand relay.setpoint() to the autopilot
+//!         }
+//!     }
+//!     // Sleep until `wake` or the next byte.
+//!     now = wake.expect("a relay with a neighbour always has a timer");
+//! }
+//! assert_eq!(ports.downstream.port_mut().0.sent.last(), Some(&0), "a whole sweep has left");
+//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! ```
+
+pub mod link;
+pub mod port;
+pub mod stats;
+
+use embedded_hal::digital::OutputPin;
+
+pub use link::{NoPin, READ_LIMIT, SerialLink, byte_time};
+pub use port::{Fault, Io, Nb, SerialPort};
+pub use stats::SerialStats;
+
+use crate::relay::{Port, Relay, Transmit};
+use crate::time::Instant;
+use crate::wire::frame::MAX_FRAME;
+use link::Link;
+
+/// Two serial ports, one to each neighbour, full duplex unless a link has a pin.
+#[derive(Debug)]
+pub struct Pair<U, D, UPin = NoPin, DPin = NoPin> {
+    /// The link toward the transmitter.
+    pub upstream: SerialLink<U, UPin>,
+    /// The link toward the receiver.
+    pub downstream: SerialLink<D, DPin>,
+}
+
+impl<U, D, UPin, DPin> Pair<U, D, UPin, DPin>
+where
+    U: SerialPort,
+    D: SerialPort,
+    UPin: OutputPin,
+    DPin: OutputPin,
+{
+    /// Two links for a relay whose settings say [`Wiring::Pair`](crate::Wiring::Pair).
+    pub const fn new(upstream: SerialLink<U, UPin>, downstream: SerialLink<D, DPin>) -> Self {
+        Self {
+            upstream,
+            downstream,
+        }
+    }
+
+    /// Moves what can be moved now, and says when to be called again at the latest, always later than `now`.
+    ///
+    /// Work: at most [`READ_LIMIT`] bytes a port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the
+    /// frames the relay then has.
+    pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
+        poll(
+            now,
+            relay,
+            &mut [
+                (Port::Upstream, &mut self.upstream),
+                (Port::Downstream, &mut self.downstream),
+            ],
+        )
+    }
+}
+
+/// One serial port to a channel that all neighbours hear: a radio modem, or a half-duplex bus with a driver-enable pin.
+///
+/// Whose turn it is on the channel is the modem's to find out; this crate only keeps relays from repeating in step.
+#[derive(Debug)]
+pub struct Shared<P, Pin = NoPin> {
+    /// The link to the channel.
+    pub channel: SerialLink<P, Pin>,
+}
+
+impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
+    /// A link for a relay whose settings say [`Wiring::Shared`](crate::Wiring::Shared).
+    pub const fn new(channel: SerialLink<P, Pin>) -> Self {
+        Self { channel }
+    }
+
+    /// Moves what can be moved now, and says when to be called again at the latest, always later than `now`.
+    ///
+    /// Work: at most [`READ_LIMIT`] bytes through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the frames
+    /// that fit.
+    pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
+        poll(now, relay, &mut [(Port::Shared, &mut self.channel)])
+    }
+}
+
+/// One round over all links.
+fn poll(now: Instant, relay: &mut Relay, links: &mut [(Port, &mut dyn Link)]) -> Option<Instant> {
+    for (port, link) in &mut *links {
+        link.receive(now, *port, relay);
+    }
+    if relay.poll_timeout().is_some_and(|at| at <= now) {
+        relay.handle_timeout(now);
+    }
+    let mut frame = [0; MAX_FRAME];
+    // A link without room must not hold up the other one, so what is for it is counted and gone.
+    while links.iter().any(|(_, link)| link.has_room())
+        && let Some(Transmit { port, len }) = relay.poll_transmit(now, &mut frame)
+    {
+        let frame = frame.get(..len).unwrap_or_default();
+        match links.iter_mut().find(|(at, _)| *at == port) {
+            Some((_, link)) => link.queue(now, frame),
+            None => {
+                if let Some((_, link)) = links.first_mut() {
+                    link.unrouted();
+                }
+            }
+        }
+    }
+    for (_, link) in &mut *links {
+        link.transmit(now);
+    }
+    links
+        .iter()
+        .filter_map(|(_, link)| link.wake(now))
+        .chain(relay.poll_timeout())
+        .min()
+}
