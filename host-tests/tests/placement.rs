@@ -5,6 +5,7 @@
     clippy::panic,
     clippy::indexing_slicing,
     clippy::float_cmp,
+    clippy::cast_possible_truncation,
     missing_docs
 )]
 
@@ -133,7 +134,7 @@ fn reaches_agree_with_the_reference() {
             mission.relay_gain(profile.power_w).value()
         });
         let target = if rng.random_bool(0.33) {
-            gain * (1.0 + rng.random_range(-3..=3) as f64 * log_uniform(&mut rng, 1e-9, 1e-3))
+            gain * (1.0 + f64::from(rng.random_range(-3..=3)) * log_uniform(&mut rng, 1e-9, 1e-3))
         } else {
             gain * log_uniform(&mut rng, 1e-3, 1e5)
         } as f32;
@@ -361,16 +362,17 @@ fn relays_keep_their_separation_even_where_it_costs_sir() {
     assert!(binding >= 4, "the separation was meant to bind");
 }
 
+fn close(ours: f64, theirs: f64, what: &str) {
+    assert!(
+        (ours / theirs - 1.0).abs() < 3e-6,
+        "{what}: {ours} against {theirs}"
+    );
+}
+
 /// The cases of the paper's errata and of the public reference, one by one.
 #[test]
-fn reference_cases_hold() {
+fn reference_cases_of_one_hop_hold() {
     let mut checked = 0;
-    let close = |ours: f64, theirs: f64, what: &str| {
-        assert!(
-            (ours / theirs - 1.0).abs() < 3e-6,
-            "{what}: {ours} against {theirs}"
-        );
-    };
     for case in cases::of("far_first").unwrap() {
         let (mission, _) = of_link(&case.link(1), 1e-4).unwrap();
         let hop = Hop::new(
@@ -420,6 +422,12 @@ fn reference_cases_hold() {
         close(f64::from(ours), case.value().unwrap(), &case.id);
         checked += 1;
     }
+    assert!(checked >= 10, "{checked} cases");
+}
+
+#[test]
+fn reference_cases_of_a_chain_hold() {
+    let mut checked = 0;
     for case in cases::of("chain_far").unwrap() {
         let n = case.relays().unwrap();
         let link = Link {
@@ -466,7 +474,7 @@ fn reference_cases_hold() {
         );
         checked += 1;
     }
-    assert!(checked >= 17, "{checked} cases");
+    assert!(checked >= 8, "{checked} cases");
 }
 
 #[test]

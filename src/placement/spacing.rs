@@ -156,8 +156,8 @@ mod tests {
             y_m: 0.0,
         };
         let config = MissionConfig {
-            interferer,
             distance_m,
+            interferer,
             ..paper(1)
         };
         let mission = Mission::try_new(config).unwrap();

@@ -19,7 +19,6 @@ use uav_relay::{Mission, Schedule};
 /// as good as it can be.
 #[derive(Parser, Debug)]
 #[command(name = "chain", bin_name = "cargo chain", disable_version_flag = true)]
-#[expect(clippy::struct_excessive_bools, reason = "switches of a command line")]
 struct Options {
     /// Scenario file (TOML); without it the paper's multi-hop scenario
     #[arg(long, value_name = "FILE")]
@@ -126,10 +125,10 @@ struct Failure {
 }
 
 impl Failure {
-    fn input(line: impl ToString) -> Self {
+    fn input(line: impl Into<String>) -> Self {
         Self {
             status: 2,
-            line: line.to_string(),
+            line: line.into(),
         }
     }
 }
@@ -190,7 +189,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         return Err(Failure::input(line));
     }
     let scenario = match &options.scenario {
-        Some(file) => Scenario::load(file).map_err(Failure::input)?,
+        Some(file) => Scenario::load(file).map_err(|error| Failure::input(error.to_string()))?,
         None => Scenario::default(),
     };
     for index in scenario
@@ -234,7 +233,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         duplicate: options.duplicate,
         reorder: options.reorder,
     };
-    let chain = Chain::new(setup).map_err(Failure::input)?;
+    let chain = Chain::new(setup).map_err(|error| Failure::input(error.to_string()))?;
     let outcome = watch(chain);
     let report = ChainReport::new(&method, &mission, &outcome, options.seed);
     if let Some(file) = &options.svg {
@@ -317,7 +316,7 @@ fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
     let text = if options.json {
         serde_json::to_string(report)
             .map(|json| json + "\n")
-            .map_err(Failure::input)?
+            .map_err(|error| Failure::input(error.to_string()))?
     } else {
         report.table()
     };
