@@ -1,7 +1,7 @@
 //! The mission: everything the relays agree on before flight, validated once.
 
 use crate::channel::Channel;
-use crate::wire::crc::Crc32c;
+use crate::gain::Gain;
 
 /// The most relays a mission may have; addresses on the wire are 12 bits wide.
 pub const MAX_RELAYS: u16 = 1000;
@@ -105,46 +105,6 @@ impl core::fmt::Display for MissionError {
 }
 
 impl core::error::Error for MissionError {}
-
-/// A ratio of powers and path losses as the sum of two f32, so that a target next to it keeps its full distance from it.
-///
-/// A target gamma is compared with a gain A through gamma - A; with A rounded to one f32 that difference would be wrong
-/// by up to 6e-8 A, which is what makes the printed closed forms lose digits near gamma = A.
-#[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Gain {
-    hi: f32,
-    lo: f32,
-}
-
-impl Gain {
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "the remainder goes into `lo`"
-    )]
-    const fn new(value: f64) -> Self {
-        let hi = value as f32;
-        Self {
-            hi,
-            lo: (value - hi as f64) as f32,
-        }
-    }
-
-    /// The gain, rounded to f32.
-    pub const fn value(&self) -> f32 {
-        self.hi
-    }
-
-    /// `target` / gain, rounded.
-    pub const fn ratio(&self, target: f32) -> f32 {
-        target / self.hi
-    }
-
-    /// `target` / gain - 1, relative error below 2e-7 even where the two are next to each other.
-    pub const fn excess(&self, target: f32) -> f32 {
-        ((target - self.hi) - self.lo) / self.hi
-    }
-}
 
 /// A validated mission, with what is derived from it once.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -299,31 +259,6 @@ impl Mission {
         };
         (distance_m - behind * step).max(0.0)
     }
-
-    /// A 16-bit digest of every parameter, by which relays tell whether they fly the same mission.
-    pub fn digest(&self) -> u16 {
-        let c = &self.config;
-        let mut crc = Crc32c::new();
-        crc.update(&c.relays.to_le_bytes());
-        for number in [
-            c.distance_m,
-            c.min_separation_m,
-            c.tx_power_w,
-            c.common.altitude_m,
-            c.common.power_w,
-            c.interferer.power_w,
-            c.interferer.x_m,
-            c.interferer.y_m,
-            c.tolerance,
-        ] {
-            crc.update(&number.to_le_bytes());
-        }
-        for number in [c.channel.mu_los(), c.channel.mu_nlos(), c.channel.eta()] {
-            crc.update(&number.to_le_bytes());
-        }
-        let [a, b, ..] = crc.finish().to_le_bytes();
-        u16::from_le_bytes([a, b])
-    }
 }
 
 /// Whether `value` is a number in [`least`, `most`].
@@ -421,44 +356,5 @@ pub(crate) mod tests {
             Err(MissionError::TooManyForDistance)
         );
         assert!(Mission::try_new(paper(250)).is_ok());
-    }
-
-    #[test]
-    fn the_digest_tells_missions_apart() {
-        let digest = |change: fn(&mut MissionConfig)| {
-            let mut config = paper(8);
-            change(&mut config);
-            Mission::try_new(config).unwrap().digest()
-        };
-        let same = digest(|_| ());
-        assert_eq!(same, digest(|_| ()));
-        assert_ne!(same, digest(|c| c.relays = 9));
-        assert_ne!(
-            same,
-            digest(|c| c.interferer.y_m = c.interferer.y_m.next_up())
-        );
-        assert_ne!(same, digest(|c| c.tolerance = 2e-4));
-    }
-
-    #[test]
-    fn excess_keeps_its_digits_next_to_the_gain() {
-        // 1/3 is not an f32: one f32 of gain would leave half the digits of the excess wrong.
-        let mission = Mission::try_new(MissionConfig {
-            tx_power_w: 1.0,
-            interferer: Interferer {
-                power_w: 3.0,
-                x_m: 0.0,
-                y_m: 0.0,
-            },
-            ..paper(1)
-        })
-        .unwrap();
-        let mut target = 1.0_f32 / 3.0;
-        for _ in 0..40 {
-            let exact = f64::from(target) * 3.0 - 1.0;
-            let error = (f64::from(mission.tx_gain().excess(target)) - exact).abs();
-            assert!(error <= 2e-7 * exact.abs(), "{target}: {error}");
-            target = target.next_up();
-        }
     }
 }

@@ -4,7 +4,8 @@
 //! All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
 //! `host-tests/tests/placement.rs`.
 
-use crate::mission::{Gain, Mission, Profile};
+use crate::gain::Gain;
+use crate::mission::{Mission, Profile};
 
 /// A place in the vertical plane through transmitter and receiver.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]

@@ -11,6 +11,7 @@
 use host_tests::brief::of_link;
 use host_tests::reference::Link;
 use uav_relay::wire::deframe::Deframer;
+use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::{
@@ -291,7 +292,7 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
 #[test]
 fn a_foreign_a_misaddressed_and_a_misdirected_frame_are_counted_and_nothing_else() {
     let beat = Message::Heartbeat {
-        mission: mission(3).digest(),
+        mission: digest(&mission(3)),
         answer: true,
     };
     let mut relay = relay(mission(3), 2);
@@ -326,7 +327,7 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
         1,
         2,
         &Message::Heartbeat {
-            mission: mission(2).digest(),
+            mission: digest(&mission(2)),
             answer: false,
         },
     );

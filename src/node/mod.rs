@@ -22,6 +22,7 @@ pub mod timers;
 use crate::mission::{Mission, Profile};
 use crate::sir::Placement;
 use crate::time::{Duration, Instant};
+use crate::wire::digest::digest;
 use crate::wire::message::Message;
 
 use align::{Align, Next, Phase};
@@ -113,7 +114,7 @@ impl Node {
             | 1;
         let mut node = Self {
             mission,
-            digest: mission.digest(),
+            digest: digest(&mission),
             profile,
             settings,
             index: identity.index,

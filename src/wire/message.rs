@@ -42,7 +42,7 @@ pub enum Message {
 pub struct Sweep {
     /// Number of the sweep, wrapping.
     pub number: u16,
-    /// [`crate::mission::Mission::digest`] of the sender.
+    /// [`super::digest::digest`] of the sender.
     pub mission: u16,
     /// The targets.
     pub ladder: Ladder,
@@ -57,7 +57,7 @@ pub struct Sweep {
 pub struct Answer {
     /// Number of the sweep.
     pub number: u16,
-    /// [`crate::mission::Mission::digest`] of the sender.
+    /// [`super::digest::digest`] of the sender.
     pub mission: u16,
     /// What became of the targets.
     pub verdict: Verdict,
