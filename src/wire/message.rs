@@ -160,19 +160,14 @@ impl Message {
                     growth,
                     altitude_m: sweep.profile.altitude_m.into(),
                     power_w: sweep.profile.power_w.into(),
-                    reaches: sweep.reaches.iter().map(|&reach| reach.into()).collect(),
+                    reaches: each(&sweep.reaches),
                 }
             }
             Self::Verdict(answer) => Body::Verdict {
                 number: answer.number.to_le_bytes(),
                 mission: answer.mission.to_le_bytes(),
                 commit: answer.verdict.commit,
-                slacks: answer
-                    .verdict
-                    .slacks
-                    .iter()
-                    .map(|&slack| slack.into())
-                    .collect(),
+                slacks: each(&answer.verdict.slacks),
             },
             Self::Busy { sweep } => Body::Busy {
                 number: sweep.to_le_bytes(),
@@ -256,7 +251,7 @@ impl Message {
 
 /// The numbers, if all are within [`least`, `FARTHEST_M`].
 fn in_range(reals: &Reals, least: f32) -> Result<PerTarget, MessageError> {
-    let numbers: PerTarget = reals.iter().map(|&real| real.into()).collect();
+    let numbers: PerTarget = each(reals);
     if numbers
         .iter()
         .all(|number| (least..=FARTHEST_M).contains(number))
@@ -265,4 +260,13 @@ fn in_range(reals: &Reals, least: f32) -> Result<PerTarget, MessageError> {
     } else {
         Err(MessageError::Value)
     }
+}
+
+/// Every item converted. Pushed one by one: to collect into a heapless vector leaves a panic in the image.
+fn each<A: Copy + Into<B>, B>(items: &heapless::Vec<A, TARGETS>) -> heapless::Vec<B, TARGETS> {
+    let mut converted = heapless::Vec::new();
+    for &item in items {
+        _ = converted.push(item.into());
+    }
+    converted
 }
