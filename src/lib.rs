@@ -9,6 +9,7 @@ pub mod node;
 pub mod placement;
 pub mod pointing;
 pub mod relay;
+mod root;
 pub mod serial;
 pub mod sir;
 pub mod time;

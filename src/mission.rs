@@ -2,6 +2,7 @@
 
 use crate::channel::Channel;
 use crate::gain::Gain;
+use crate::root::sqrt;
 
 /// The most relays a mission may have; addresses on the wire are 12 bits wide.
 pub const MAX_RELAYS: u16 = 1000;
@@ -241,7 +242,7 @@ impl Mission {
     /// The least step in x between neighbours whose altitudes differ by `climb_m`, m: what keeps the separation asked for.
     pub(crate) fn least_step(&self, climb_m: f32) -> f32 {
         let apart = self.config.min_separation_m;
-        libm::sqrtf((apart * apart - climb_m * climb_m).max(0.0))
+        sqrt(apart * apart - climb_m * climb_m)
     }
 
     /// The farthest place toward Rx that leaves relays `index` + 1 to N room to stand `min_separation_m` apart, m.

@@ -6,6 +6,7 @@
 //! from the six bytes with the same f32 operations, hence to the same bits.
 
 use super::PerTarget;
+use crate::root::sqrt;
 
 /// Targets in a full ladder.
 pub const TARGETS: usize = 16;
@@ -76,7 +77,7 @@ impl Ladder {
 
     fn centred(centre: f32, gap: u8, growth: u8) -> Self {
         Self {
-            anchor: centre / libm::sqrtf(1.0 + gap_value(gap)),
+            anchor: centre / sqrt(1.0 + gap_value(gap)),
             gap,
             growth,
         }
@@ -158,7 +159,7 @@ fn half_span(gap: u8, growth: u8) -> f32 {
 }
 
 fn geometric_mean(low: f32, high: f32) -> f32 {
-    libm::sqrtf(low) * libm::sqrtf(high)
+    sqrt(low) * sqrt(high)
 }
 
 /// The gap of which `gaps` lead from `low` to `high`.

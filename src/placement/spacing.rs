@@ -26,10 +26,11 @@
 
 use super::PerTarget;
 use crate::mission::{Mission, Profile};
+use crate::root::sqrt;
 use crate::sir::{Sender, square};
 
-/// Above this the interferer outshines any hop longer than a millionth of its own distance; keeps f32 finite.
-const MOST_RATIO: f32 = 1e12;
+/// No hop is short enough for a target this far above its gain, and every term of f stays finite below it.
+const MOST_RATIO: f32 = 1e18;
 
 /// One hop toward Rx, ready to be evaluated for many targets.
 ///
@@ -81,13 +82,16 @@ impl Hop {
         if room < self.least_step {
             return None;
         }
-        let ratio = self.sender.gain.ratio(target).min(MOST_RATIO);
+        let ratio = self.sender.gain.ratio(target);
+        if !(ratio <= MOST_RATIO) {
+            return None;
+        }
         let u = self.interferer_x_m - from_m;
         // f(end) as the SIR's own two terms: expanded, they would cancel right next to the interferer.
         if square(u - room) + self.aside_squared >= ratio * (square(room) + self.climb_squared) {
             return Some(self.end_m);
         }
-        let e = self.sender.gain.excess(target).min(MOST_RATIO);
+        let e = self.sender.gain.excess(target);
         let h = self.base - e * self.climb_squared;
         let c = square(u) + h;
         let ahead = u >= 0.0;
@@ -98,7 +102,7 @@ impl Hop {
         if discriminant < 0.0 && c < 0.0 {
             return None;
         }
-        let r = libm::sqrtf(discriminant.max(0.0));
+        let r = sqrt(discriminant);
         let d = if ahead { c / (u + r) } else { (r - u) / e };
         if !(d >= self.least_step) {
             return None;
@@ -139,7 +143,7 @@ impl Hop {
 /// stays smooth in the target for the search that looks for its root.
 pub fn receiver_reach(mission: &Mission, profile: Profile, target: f32) -> Option<f32> {
     let squared = mission.receiver_gain(profile.power_w) / target - square(profile.altitude_m);
-    (squared >= 0.0).then(|| libm::sqrtf(squared).min(1e9))
+    (squared >= 0.0).then(|| sqrt(squared).min(1e9))
 }
 
 #[cfg(test)]

@@ -1,0 +1,250 @@
+//! What the calls of a relay cost on a Cortex-M4F, in instructions and bytes of stack; run by `cargo cost` in QEMU.
+//!
+//! QEMU with `-icount shift=10` lets 1024 ns pass with every instruction and counts SysTick at 168 MHz on this machine, so
+//! the counter tells instructions. They are exact and the same in every run; cycles they are not. Results go out by
+//! semihosting, which traps on a board without a debugger: this image is not one to flash.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    println!("This one runs on the target: cargo cost");
+}
+
+#[cfg(target_os = "none")]
+mod target {
+    use core::hint::black_box;
+
+    use cortex_m::peripheral::SYST;
+    use cortex_m_semihosting::{debug, hprintln};
+    use panic_halt as _;
+    use stm32f4xx_hal as _;
+    use uav_relay::channel::{AirGround, Channel};
+    use uav_relay::placement::spacing::Hop;
+    use uav_relay::sir::Sender;
+    use uav_relay::wire::deframe::Deframer;
+    use uav_relay::wire::frame::{self, MAX_FRAME};
+    use uav_relay::{
+        FrameBuf, Identity, Instant, Interferer, Mission, MissionConfig, Phase, Port, Profile,
+        Relay, Settings,
+    };
+
+    /// 2 GHz, excess losses of 0.1 dB and 21 dB as factors.
+    const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
+        Ok(channel) => channel,
+        Err(_) => panic!("a channel parameter is out of range"),
+    };
+
+    const fn mission(relays: u16) -> Mission {
+        Mission::new(MissionConfig {
+            relays,
+            distance_m: 1000.0,
+            min_separation_m: 4.0,
+            tx_power_w: 80.0,
+            common: Profile {
+                altitude_m: 20.0,
+                power_w: 1.0,
+            },
+            channel: CHANNEL,
+            interferer: Interferer {
+                power_w: 80.0,
+                x_m: 500.0,
+                y_m: 400.0,
+            },
+            tolerance: 1e-4,
+        })
+    }
+
+    const MISSION: Mission = mission(8);
+
+    /// SysTick's largest value.
+    const TOP: u32 = 0x00FF_FFFF;
+
+    /// Ticks of SysTick in `work`.
+    fn ticks<T>(work: impl FnOnce() -> T) -> u32 {
+        let before = SYST::get_current();
+        black_box(work());
+        before.wrapping_sub(SYST::get_current()) & TOP
+    }
+
+    /// Instructions of `work`, at most 97 000; those of the measurement itself are taken off.
+    fn instructions<T>(work: impl FnOnce() -> T) -> u32 {
+        let empty = ticks(|| ());
+        // 1024 ns at 168 MHz are 172.032 ticks.
+        (ticks(work).saturating_sub(empty) * 1000 + 86_016) / 172_032
+    }
+
+    fn relay(index: u16, settings: Settings, of: Mission) -> Relay {
+        let identity = Identity { network: 1, index };
+        match Relay::new(of, identity, settings, 1, Instant::ZERO) {
+            Ok(relay) => relay,
+            Err(_) => {
+                debug::exit(debug::EXIT_FAILURE);
+                loop {}
+            }
+        }
+    }
+
+    /// What `relay` sends next, if anything.
+    fn sends(relay: &mut Relay, now: Instant) -> Option<(FrameBuf, usize)> {
+        let mut frame: FrameBuf = [0; MAX_FRAME];
+        let transmit = relay.poll_transmit(now, &mut frame)?;
+        Some((frame, transmit.len))
+    }
+
+    fn reach() {
+        let common = MISSION.config().common;
+        let middle = Hop::new(
+            &MISSION,
+            Sender::relay(&MISSION, common),
+            4,
+            common.altitude_m,
+        );
+        let mut most = 0;
+        for from in [100.0_f32, 400.0, 499.9, 500.1, 600.0, 900.0] {
+            for target in [0.005_f32, 0.0125, 1.0, 5.0, 40.0] {
+                let (hop, target, from) = (black_box(&middle), black_box(target), black_box(from));
+                most = most.max(instructions(|| hop.reach(target, from)));
+            }
+        }
+        hprintln!("reach {}", most);
+    }
+
+    /// A chain of eight by the bracket alone, so that every kind of message comes by.
+    fn chain() {
+        let settings = Settings {
+            predict: false,
+            ..Settings::default()
+        };
+        let mut now = Instant::ZERO;
+        let mut head = relay(1, settings, MISSION);
+        let mut middle = relay(2, settings, mission(3));
+        let mut tail = relay(8, settings, MISSION);
+        // A tail of two and a middle of three of the same length of link take the head's frames, readdressed.
+        black_box((&mut middle, &mut tail));
+        now = head.poll_timeout().unwrap_or(now);
+        let begin = instructions(|| head.handle_timeout(now));
+        hprintln!("begin_sweep {}", begin);
+    }
+
+    /// A full sweep through a middle relay, and through the tail of a chain of three; the verdict on its way back.
+    fn sweep() {
+        const THREE: Mission = mission(3);
+        let settings = Settings {
+            predict: false,
+            ..Settings::default()
+        };
+        let mut head = relay(1, settings, THREE);
+        let mut middle = relay(2, settings, THREE);
+        let mut tail = relay(3, settings, THREE);
+        let now = head.poll_timeout().unwrap_or(Instant::ZERO);
+        head.handle_timeout(now);
+        let (mut through, mut at_tail, mut back, mut next) = (0, 0, 0, 0);
+        let mut longest = 0;
+        while head.phase() == Phase::Waiting {
+            let Some((frame, len)) = sends(&mut head, now) else {
+                break;
+            };
+            longest = longest.max(len);
+            let bytes = frame.get(..len).unwrap_or_default();
+            through = through.max(instructions(|| {
+                middle.handle_bytes(now, Port::Upstream, bytes);
+                let mut out: FrameBuf = [0; MAX_FRAME];
+                black_box(middle.poll_transmit(now, &mut out));
+                black_box(&out);
+            }));
+            // Once more, out of the measured path: the frame itself.
+            let mut again = relay(2, settings, THREE);
+            again.handle_bytes(now, Port::Upstream, bytes);
+            let Some((frame, len)) = sends(&mut again, now) else {
+                break;
+            };
+            let bytes = frame.get(..len).unwrap_or_default();
+            let mut answer: FrameBuf = [0; MAX_FRAME];
+            let mut answered = None;
+            at_tail = at_tail.max(instructions(|| {
+                tail.handle_bytes(now, Port::Upstream, bytes);
+                answered = tail.poll_transmit(now, &mut answer);
+            }));
+            let Some(transmit) = answered else { break };
+            let bytes = answer.get(..transmit.len).unwrap_or_default();
+            let mut onward: FrameBuf = [0; MAX_FRAME];
+            let mut passed = None;
+            back = back.max(instructions(|| {
+                middle.handle_bytes(now, Port::Downstream, bytes);
+                passed = middle.poll_transmit(now, &mut onward);
+            }));
+            let Some(transmit) = passed else { break };
+            let bytes = onward.get(..transmit.len).unwrap_or_default();
+            next = next.max(instructions(|| {
+                head.handle_bytes(now, Port::Downstream, bytes)
+            }));
+        }
+        hprintln!("sweep_bytes {}", longest);
+        hprintln!("sweep {}", through);
+        hprintln!("sweep_at_tail {}", at_tail);
+        hprintln!("verdict {}", back);
+        hprintln!("verdict_at_head {}", next);
+        hprintln!("settled {}", u32::from(head.phase() == Phase::Holding));
+    }
+
+    /// A full frame through the deframer and the checks.
+    fn deframe() {
+        let settings = Settings {
+            predict: false,
+            ..Settings::default()
+        };
+        let mut head = relay(1, settings, MISSION);
+        let now = head.poll_timeout().unwrap_or(Instant::ZERO);
+        head.handle_timeout(now);
+        let Some((frame, len)) = sends(&mut head, now) else {
+            return;
+        };
+        let bytes = black_box(frame.get(..len).unwrap_or_default());
+        let mut deframer = Deframer::new();
+        let cost = instructions(|| {
+            let mut sound = false;
+            for &byte in bytes {
+                if let Some(Ok(plain)) = deframer.push(byte) {
+                    sound = frame::open(plain).is_ok();
+                }
+            }
+            sound
+        });
+        hprintln!("frame {}", cost);
+    }
+
+    /// The largest portion of the head's prediction, and how many it takes for a hundred relays.
+    fn predict() {
+        const HUNDRED: Mission = mission(100);
+        let mut head = relay(1, Settings::default(), HUNDRED);
+        let (mut most, mut portions) = (0, 0);
+        while head.phase() == Phase::Planning {
+            let now = head.poll_timeout().unwrap_or(Instant::ZERO);
+            most = most.max(instructions(|| head.handle_timeout(now)));
+            portions += 1;
+        }
+        hprintln!("predict {}", most);
+        hprintln!("predict_portions {}", portions);
+    }
+
+    #[cortex_m_rt::entry]
+    fn main() -> ! {
+        if let Some(mut peripherals) = cortex_m::Peripherals::take() {
+            peripherals
+                .SYST
+                .set_clock_source(cortex_m::peripheral::syst::SystClkSource::Core);
+            peripherals.SYST.set_reload(TOP);
+            peripherals.SYST.clear_current();
+            peripherals.SYST.enable_counter();
+        }
+        hprintln!("size_of_relay {}", size_of::<Relay>());
+        reach();
+        chain();
+        deframe();
+        sweep();
+        predict();
+        hprintln!("done 1");
+        debug::exit(debug::EXIT_SUCCESS);
+        loop {}
+    }
+}
