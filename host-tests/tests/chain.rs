@@ -373,6 +373,7 @@ fn a_silent_relay_is_noticed_by_both_neighbours_within_the_stated_time() {
         let killed = Instant::from_millis(at);
         let mut setup = Setup::new(paper(5));
         setup.kills = vec![(3, killed)];
+        setup.deadline = Instant::from_millis(at + 60_000);
         let outcome = run(setup).unwrap();
         assert_eq!(outcome.ending, Ending::Broken);
         let mut noticed: Vec<_> = outcome

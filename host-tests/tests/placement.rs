@@ -307,6 +307,29 @@ fn mixed_chains_meet_what_they_agree_on() {
     );
 }
 
+/// With altitudes of their own these relays meet 37 743 and miss 31 292. The bracket once swung between the two for ever.
+#[test]
+fn a_target_that_is_met_counts_though_a_lower_one_is_missed() {
+    let mut rng = ChaCha8Rng::seed_from_u64(124);
+    let style = Style {
+        relays: 2..=50,
+        chain: Chain::Own,
+    };
+    let link = (0..=667)
+        .map(|_| random::link(&mut rng, &style))
+        .last()
+        .unwrap();
+    let link = as_relays_know_it(&link);
+    assert!(link.feasible(31_291.979).is_none() && link.feasible(37_742.727).is_some());
+    let (mission, own) = of_link(&link, 1e-4).unwrap();
+    let agreed = solve(&mission, &own).unwrap();
+    let reached = link.chain_sir(&xs(&places(&mission, &own, agreed.target)));
+    assert!(
+        agreed.target > 37_000.0 && reached > 37_000.0,
+        "{agreed:?} reaches {reached}"
+    );
+}
+
 #[test]
 fn power_alone_may_differ_and_the_optimum_is_still_found() {
     let mut solved = 0;
