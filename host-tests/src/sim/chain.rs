@@ -110,7 +110,7 @@ struct Member {
     /// Its lines: toward Tx (or to all), toward Rx.
     lines: [Line; 2],
     killed: Option<Instant>,
-    /// The earliest wake-up that is in the queue, so that it is not put there twice.
+    /// The wake-up in the queue that counts: the earliest one. Any other is void.
     wake: Option<Instant>,
 }
 
@@ -316,6 +316,10 @@ impl Chain {
                 member.relay.handle_bytes(now, port, second);
             }
             Happening::Wake => {
+                // An earlier wake-up has taken the place of this one: what is left of it must not multiply.
+                if member.wake != Some(now) {
+                    return;
+                }
                 member.wake = None;
                 member.relay.handle_timeout(now);
             }
