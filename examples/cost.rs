@@ -109,23 +109,6 @@ mod target {
         hprintln!("reach {}", most);
     }
 
-    /// A chain of eight by the bracket alone, so that every kind of message comes by.
-    fn chain() {
-        let settings = Settings {
-            predict: false,
-            ..Settings::default()
-        };
-        let mut now = Instant::ZERO;
-        let mut head = relay(1, settings, MISSION);
-        let mut middle = relay(2, settings, mission(3));
-        let mut tail = relay(8, settings, MISSION);
-        // A tail of two and a middle of three of the same length of link take the head's frames, readdressed.
-        black_box((&mut middle, &mut tail));
-        now = head.poll_timeout().unwrap_or(now);
-        let begin = instructions(|| head.handle_timeout(now));
-        hprintln!("begin_sweep {}", begin);
-    }
-
     /// A full sweep through a middle relay, and through the tail of a chain of three; the verdict on its way back.
     fn sweep() {
         const THREE: Mission = mission(3);
@@ -137,7 +120,7 @@ mod target {
         let mut middle = relay(2, settings, THREE);
         let mut tail = relay(3, settings, THREE);
         let now = head.poll_timeout().unwrap_or(Instant::ZERO);
-        head.handle_timeout(now);
+        let begin = instructions(|| head.handle_timeout(now));
         let (mut through, mut at_tail, mut back, mut next) = (0, 0, 0, 0);
         let mut longest = 0;
         while head.phase() == Phase::Waiting {
@@ -179,12 +162,78 @@ mod target {
                 head.handle_bytes(now, Port::Downstream, bytes)
             }));
         }
+        hprintln!("begin_sweep {}", begin);
         hprintln!("sweep_bytes {}", longest);
         hprintln!("sweep {}", through);
         hprintln!("sweep_at_tail {}", at_tail);
         hprintln!("verdict {}", back);
         hprintln!("verdict_at_head {}", next);
         hprintln!("settled {}", u32::from(head.phase() == Phase::Holding));
+    }
+
+    /// Bytes of stack that the calls of a relay use, at most: the stack below is painted, and the paint looked for.
+    fn stack() {
+        const TWO: Mission = mission(2);
+        let mut head = relay(1, Settings::default(), TWO);
+        let mut tail = relay(2, Settings::default(), TWO);
+        let used = used_stack(|| {
+            let mut now = Instant::ZERO;
+            while head.phase() == Phase::Planning {
+                now = head.poll_timeout().unwrap_or(now);
+                head.handle_timeout(now);
+            }
+            exchange(&mut head, &mut tail, Port::Upstream, now);
+            exchange(&mut tail, &mut head, Port::Downstream, now);
+        });
+        hprintln!("stack {}", used);
+        hprintln!(
+            "agreed {}",
+            u32::from(head.setpoint().is_some() && tail.setpoint().is_some())
+        );
+    }
+
+    /// Hands over what one relay has to say.
+    fn exchange(from: &mut Relay, to: &mut Relay, at: Port, now: Instant) {
+        let mut frame: FrameBuf = [0; MAX_FRAME];
+        while let Some(transmit) = from.poll_transmit(now, &mut frame) {
+            to.handle_bytes(now, at, frame.get(..transmit.len).unwrap_or_default());
+        }
+    }
+
+    /// Words that are painted: more than any call uses.
+    const PAINTED: usize = 1024;
+
+    /// What untouched stack looks like.
+    const PAINT: u32 = 0xC0FF_EE11;
+
+    /// Bytes of stack that `work` uses below this frame.
+    #[inline(never)]
+    fn used_stack(work: impl FnOnce()) -> u32 {
+        paint();
+        work();
+        look()
+    }
+
+    /// Paints the stack that the next call will use, by using it.
+    #[inline(never)]
+    fn paint() {
+        let mut words = [0_u32; PAINTED];
+        for word in &mut words {
+            *word = black_box(PAINT);
+        }
+        black_box(&words);
+    }
+
+    /// How much of the paint is gone, in bytes. The array is laid where that of `paint` was, and not written.
+    #[inline(never)]
+    fn look() -> u32 {
+        let words = core::mem::MaybeUninit::<[u32; PAINTED]>::uninit();
+        let first = black_box(words.as_ptr().cast::<u32>());
+        let untouched = (0..PAINTED)
+            // SAFETY: inside the array; that it may hold anything is the point, and volatile reads take it as it is.
+            .take_while(|at| unsafe { first.add(*at).read_volatile() } == PAINT)
+            .count();
+        u32::try_from(4 * (PAINTED - untouched)).unwrap_or(u32::MAX)
     }
 
     /// A full frame through the deframer and the checks.
@@ -239,10 +288,10 @@ mod target {
         }
         hprintln!("size_of_relay {}", size_of::<Relay>());
         reach();
-        chain();
         deframe();
         sweep();
         predict();
+        stack();
         hprintln!("done 1");
         debug::exit(debug::EXIT_SUCCESS);
         loop {}

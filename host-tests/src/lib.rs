@@ -2,9 +2,11 @@
 
 pub mod brief;
 pub mod cases;
+pub mod firmware;
 pub mod random;
 pub mod reference;
 pub mod report;
 pub mod scenario;
 pub mod sim;
+pub mod stack;
 pub mod svg;

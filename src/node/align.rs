@@ -206,7 +206,7 @@ impl Align {
             return Next::Forward;
         }
         let verdict = Verdict::reach(mission, profile, &self.ladder, &self.reaches);
-        self.conclude(mission, index, profile, verdict)
+        self.conclude(profile, verdict)
     }
 
     /// A sweep from upstream.
@@ -240,7 +240,6 @@ impl Align {
     pub(crate) fn on_verdict(
         &mut self,
         mission: &Mission,
-        index: u16,
         profile: Profile,
         answer: Answer,
     ) -> Next {
@@ -253,20 +252,19 @@ impl Align {
         };
         let fits = slacks.len() <= self.reaches.len() && answer.verdict.commit.is_none_or(met);
         if self.phase == Phase::Waiting && answer.number == self.number && fits {
-            self.conclude(mission, index, profile, answer.verdict)
+            match self.conclude(profile, answer.verdict) {
+                // The head has its next targets, and somebody to send them to.
+                Next::Work => self.begin_sweep(mission, profile),
+                next => next,
+            }
         } else {
             Next::Stale
         }
     }
 
-    /// The verdict on the current sweep is known.
-    fn conclude(
-        &mut self,
-        mission: &Mission,
-        index: u16,
-        profile: Profile,
-        verdict: Verdict,
-    ) -> Next {
+    /// The verdict on the current sweep is known. `Next::Work` at the head, if it has to try other targets: a chain of one
+    /// takes them one a call, since each sweep is over at once.
+    fn conclude(&mut self, profile: Profile, verdict: Verdict) -> Next {
         self.verdict = verdict;
         if let Some(commit) = self.verdict.commit
             && let Some(&x_m) = self.reaches.get(usize::from(commit))
@@ -286,12 +284,7 @@ impl Align {
         if search.advance(&self.verdict.slacks).is_err() {
             return self.give_up();
         }
-        if index < mission.relays() {
-            self.begin_sweep(mission, profile)
-        } else {
-            // A chain of one: each sweep is over at once, so they are taken one a call.
-            Next::Work
-        }
+        Next::Work
     }
 
     /// What to send downstream, while an answer is awaited, by a relay that holds `profile`.

@@ -190,9 +190,7 @@ impl Node {
                 self.proceed(now, next);
             }
             (Side::Downstream, Message::Verdict(answer)) => {
-                let next = self
-                    .align
-                    .on_verdict(&self.mission, self.index, self.profile, answer);
+                let next = self.align.on_verdict(&self.mission, self.profile, answer);
                 self.proceed(now, next);
             }
             (_, Message::Heartbeat { answer, .. }) => {

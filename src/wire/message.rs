@@ -85,42 +85,24 @@ impl core::fmt::Display for MessageError {
 
 impl core::error::Error for MessageError {}
 
-/// An f32 as its four little-endian bytes, which is postcard's f32; a u32 would be a varint of up to five.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-struct Real([u8; 4]);
-
-impl From<f32> for Real {
-    fn from(value: f32) -> Self {
-        Self(value.to_le_bytes())
-    }
-}
-
-impl From<Real> for f32 {
-    fn from(real: Real) -> Self {
-        Self::from_le_bytes(real.0)
-    }
-}
-
-type Reals = heapless::Vec<Real, TARGETS>;
-
 /// The wire form; the order of variants and fields is the format.
 #[derive(Serialize, Deserialize)]
 enum Body {
     Sweep {
         number: [u8; 2],
         mission: [u8; 2],
-        anchor: Real,
+        anchor: f32,
         gap: u8,
         growth: u8,
-        altitude_m: Real,
-        power_w: Real,
-        reaches: Reals,
+        altitude_m: f32,
+        power_w: f32,
+        reaches: PerTarget,
     },
     Verdict {
         number: [u8; 2],
         mission: [u8; 2],
         commit: Option<u8>,
-        slacks: Reals,
+        slacks: PerTarget,
     },
     Busy {
         number: [u8; 2],
@@ -155,19 +137,19 @@ impl Message {
                 Body::Sweep {
                     number: sweep.number.to_le_bytes(),
                     mission: sweep.mission.to_le_bytes(),
-                    anchor: anchor.into(),
+                    anchor,
                     gap,
                     growth,
-                    altitude_m: sweep.profile.altitude_m.into(),
-                    power_w: sweep.profile.power_w.into(),
-                    reaches: each(&sweep.reaches),
+                    altitude_m: sweep.profile.altitude_m,
+                    power_w: sweep.profile.power_w,
+                    reaches: sweep.reaches.clone(),
                 }
             }
             Self::Verdict(answer) => Body::Verdict {
                 number: answer.number.to_le_bytes(),
                 mission: answer.mission.to_le_bytes(),
                 commit: answer.verdict.commit,
-                slacks: each(&answer.verdict.slacks),
+                slacks: answer.verdict.slacks.clone(),
             },
             Self::Busy { sweep } => Body::Busy {
                 number: sweep.to_le_bytes(),
@@ -204,13 +186,12 @@ impl Message {
                 power_w,
                 reaches,
             } => {
-                let ladder =
-                    Ladder::from_parts(anchor.into(), gap, growth).ok_or(MessageError::Value)?;
+                let ladder = Ladder::from_parts(anchor, gap, growth).ok_or(MessageError::Value)?;
                 let profile = Profile {
-                    altitude_m: altitude_m.into(),
-                    power_w: power_w.into(),
+                    altitude_m,
+                    power_w,
                 };
-                let reaches = in_range(&reaches, 0.0)?;
+                let reaches = in_range(reaches, 0.0)?;
                 if !profile.is_valid() || reaches.len() > ladder.len() {
                     return Err(MessageError::Value);
                 }
@@ -228,7 +209,7 @@ impl Message {
                 commit,
                 slacks,
             } => {
-                let slacks = in_range(&slacks, -FARTHEST_M)?;
+                let slacks = in_range(slacks, -FARTHEST_M)?;
                 if commit.is_some_and(|target| usize::from(target) >= TARGETS) {
                     return Err(MessageError::Value);
                 }
@@ -250,8 +231,7 @@ impl Message {
 }
 
 /// The numbers, if all are within [`least`, `FARTHEST_M`].
-fn in_range(reals: &Reals, least: f32) -> Result<PerTarget, MessageError> {
-    let numbers: PerTarget = each(reals);
+fn in_range(numbers: PerTarget, least: f32) -> Result<PerTarget, MessageError> {
     if numbers
         .iter()
         .all(|number| (least..=FARTHEST_M).contains(number))
@@ -260,13 +240,4 @@ fn in_range(reals: &Reals, least: f32) -> Result<PerTarget, MessageError> {
     } else {
         Err(MessageError::Value)
     }
-}
-
-/// Every item converted. Pushed one by one: to collect into a heapless vector leaves a panic in the image.
-fn each<A: Copy + Into<B>, B>(items: &heapless::Vec<A, TARGETS>) -> heapless::Vec<B, TARGETS> {
-    let mut converted = heapless::Vec::new();
-    for &item in items {
-        _ = converted.push(item.into());
-    }
-    converted
 }

@@ -3,6 +3,8 @@
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
 
+use host_tests::firmware::{MISSING, QEMU};
+
 /// The target the firmware is built for.
 const TARGET: &str = "thumbv7em-none-eabihf";
 
@@ -145,7 +147,29 @@ fn prepare() -> Result<(), String> {
             }
         }
     }
-    Ok(())
+    prepare_emulator()
+}
+
+/// The emulator that runs the firmware is Debian's. Only root can add it, so for anybody else this says what to type.
+fn prepare_emulator() -> Result<(), String> {
+    if succeeds(QEMU, &["--version"]) {
+        return Ok(());
+    }
+    let install = ["install", "--yes", "--no-install-recommends", QEMU];
+    println!("ci: adding {QEMU}: apt-get {}", install.join(" "));
+    let apt_get = |arguments: &[&str]| {
+        Command::new("apt-get")
+            .args(arguments)
+            .env("DEBIAN_FRONTEND", "noninteractive")
+            .status()
+            .is_ok_and(|status| status.success())
+    };
+    // What apt knows may be older than what there is to fetch.
+    if apt_get(&install) || (apt_get(&["update"]) && apt_get(&install)) {
+        Ok(())
+    } else {
+        Err(MISSING.into())
+    }
 }
 
 /// rustc names the folder of a target whether it is there or not.

@@ -1,0 +1,72 @@
+//! A relay on a Linux companion computer, over real ttys: USB adapters, the UART of a header, telemetry radios.
+//!
+//! ```text
+//! cargo run --release --example linux_companion -- --index 2 --of 3 --upstream /dev/ttyUSB0 --downstream /dev/ttyUSB1
+//! cargo run --release --example linux_companion -- --index 2 --of 3 --shared /dev/ttyUSB0      # one radio for all
+//! cargo run --release --example linux_companion -- --help
+//! ```
+//! The first relay needs no `--upstream`, the last one no `--downstream`. All relays of a chain are given the same `--of`,
+//! `--baud`, `--network` and mission; a neighbour that was given another mission is reported.
+//!
+//! Every event is one line on standard output; an f32 also as its bits. To make this program yours, hand the setpoint to
+//! your autopilot in `report.rs`. It ends with status 0 at Ctrl-C or SIGTERM, 1 when a tty fails (let systemd start it again),
+//! 2 when the options are wrong.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | `options.rs` | the command line, checked |
+//! | `tty.rs` | a tty that never blocks, as a `SerialPort` |
+//! | `ports.rs` | the ttys of either wiring, and sleep until one of them or a timer needs the relay |
+//! | `relay.rs` | the loop |
+//! | `report.rs` | the lines it prints |
+//!
+//! It runs on other kinds of Unix too; on a Mac the ttys are called `/dev/cu.*`.
+#![cfg_attr(unix, forbid(unsafe_code))]
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(unix)]
+mod options;
+#[cfg(unix)]
+mod ports;
+#[cfg(unix)]
+mod relay;
+#[cfg(unix)]
+mod report;
+#[cfg(unix)]
+mod tty;
+
+#[cfg(unix)]
+fn main() -> std::process::ExitCode {
+    use std::process::ExitCode;
+
+    let plan = match options::read() {
+        Ok(plan) => plan,
+        Err(code) => return code,
+    };
+    match relay::fly(&plan) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(line) => {
+            eprintln!("{line}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(not(any(unix, target_os = "none")))]
+fn main() {
+    println!("This example needs Linux or another Unix.");
+}
+
+#[cfg(target_os = "none")]
+use panic_halt as _;
+#[cfg(target_os = "none")]
+use stm32f4xx_hal as _;
+
+/// There are no ttys on the target: `stm32f405` is the example for it.
+#[cfg(target_os = "none")]
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    loop {
+        cortex_m::asm::wfi();
+    }
+}

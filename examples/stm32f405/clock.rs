@@ -1,0 +1,94 @@
+//! Time since the start, and sleep until it is time or something has come in.
+
+use core::cell::Cell;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use cortex_m::asm;
+use cortex_m::interrupt::{Mutex, free};
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{SCB, SYST};
+use cortex_m_rt::exception;
+use uav_relay::Instant;
+
+/// `SysTick` cycles in a microsecond at 16 MHz, and in the millisecond of its period.
+const MICRO: u32 = 16;
+const TICK: u32 = 1_000 * MICRO;
+
+/// Milliseconds since the start: 64 bits, so they do not overflow.
+static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
+/// Whether something has come in since the main loop slept last.
+static INPUT: AtomicBool = AtomicBool::new(false);
+
+/// Time since the start.
+pub(crate) struct Clock {
+    last: Instant,
+}
+
+impl Clock {
+    /// Starts the millisecond interrupt.
+    pub(crate) fn start(mut tick: SYST) -> Self {
+        tick.set_clock_source(SystClkSource::Core);
+        tick.set_reload(TICK - 1);
+        tick.clear_current();
+        tick.enable_counter();
+        tick.enable_interrupt();
+        Self {
+            last: Instant::ZERO,
+        }
+    }
+
+    /// Microseconds since the start; never less than before.
+    pub(crate) fn now(&mut self) -> Instant {
+        self.last = self.last.max(Instant::from_micros(micros()));
+        self.last
+    }
+
+    /// Sleeps until `wake`, or until something comes in.
+    pub(crate) fn sleep(&mut self, wake: Option<Instant>) {
+        while wake.is_none_or(|wake| self.now() < wake) {
+            // An interrupt that comes after the look at INPUT stays pending, and `wfi` returns for it.
+            let input = free(|_| {
+                let input = INPUT.swap(false, Ordering::Relaxed);
+                if !input {
+                    asm::wfi();
+                }
+                input
+            });
+            if input {
+                return;
+            }
+        }
+    }
+}
+
+/// Has the main loop look at its ports.
+pub(crate) fn wake() {
+    INPUT.store(true, Ordering::Relaxed);
+}
+
+/// Microseconds since the start.
+pub(crate) fn micros() -> u64 {
+    let (ticks, count) = free(|cs| {
+        let ticks = TICKS.borrow(cs).get();
+        let count = SYST::get_current();
+        if SCB::is_pendst_pending() {
+            // The period has ended, and its interrupt waits for this section to do so.
+            (ticks.wrapping_add(1), SYST::get_current())
+        } else {
+            (ticks, count)
+        }
+    });
+    // The counter runs down from TICK - 1 and begins a period at 0.
+    let cycles = TICK.wrapping_sub(count) % TICK;
+    ticks
+        .wrapping_mul(1_000)
+        .wrapping_add(u64::from(cycles / MICRO))
+}
+
+#[exception]
+fn SysTick() {
+    free(|cs| {
+        let ticks = TICKS.borrow(cs);
+        ticks.set(ticks.get().wrapping_add(1));
+    });
+}

@@ -1,0 +1,20 @@
+//! What `log.rs` is without `--features defmt`: nothing.
+
+use uav_relay::serial::SerialStats;
+use uav_relay::{Event, Relay};
+
+use super::config::{Config, ConfigError};
+
+pub(crate) const fn asked() -> bool {
+    false
+}
+
+pub(crate) const fn begins(_: &Config) {}
+
+pub(crate) const fn refused(_: ConfigError) {}
+
+pub(crate) const fn event(_: Event, _: &Relay) {}
+
+pub(crate) const fn counters(_: &Relay) {}
+
+pub(crate) const fn link_counters(_: &SerialStats) {}

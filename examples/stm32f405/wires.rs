@@ -1,0 +1,60 @@
+//! The board with a serial port to each neighbour.
+//!
+//! | what | where |
+//! | --- | --- |
+//! | toward the transmitter | USART2: TX PA2, RX PA3 |
+//! | toward the receiver | USART3: TX PB10, RX PB11 |
+//! | log, with `--features defmt` | UART4: TX PC10, RX PC11 |
+//! | clock | HSI, 16 MHz, no PLL; `SysTick` every millisecond |
+
+use core::cell::RefCell;
+
+use cortex_m::interrupt::Mutex;
+use stm32f4xx_hal::pac::{self, Interrupt, USART2, USART3, interrupt};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Config;
+use stm32f4xx_hal::serial::Serial;
+
+use super::clock::Clock;
+use super::port::{self, OUTGOING, Port, Queues, Slot};
+
+static UPSTREAM: Slot<USART2> = Mutex::new(RefCell::new(None));
+static DOWNSTREAM: Slot<USART3> = Mutex::new(RefCell::new(None));
+static UPSTREAM_QUEUES: Mutex<RefCell<Queues<OUTGOING>>> = Queues::new();
+static DOWNSTREAM_QUEUES: Mutex<RefCell<Queues<OUTGOING>>> = Queues::new();
+
+/// Sets the board up, once only: its clock, and the ports toward transmitter and receiver.
+pub(crate) fn start() -> Option<(Clock, Port, Port)> {
+    let chip = pac::Peripherals::take()?;
+    let core = cortex_m::Peripherals::take()?;
+    let mut rcc = chip.RCC.freeze(Config::hsi());
+    let a = chip.GPIOA.split(&mut rcc);
+    let b = chip.GPIOB.split(&mut rcc);
+    let clock = Clock::start(core.SYST);
+    #[cfg(feature = "defmt")]
+    {
+        let c = chip.GPIOC.split(&mut rcc);
+        let uart = Serial::new(chip.UART4, (c.pc10, c.pc11), port::config(), &mut rcc);
+        super::log::start(uart.ok()?);
+    }
+    let upstream = Serial::new(chip.USART2, (a.pa2, a.pa3), port::config(), &mut rcc).ok()?;
+    let downstream = Serial::new(chip.USART3, (b.pb10, b.pb11), port::config(), &mut rcc).ok()?;
+    let upstream = port::open(upstream, Interrupt::USART2, &UPSTREAM, &UPSTREAM_QUEUES);
+    let downstream = port::open(
+        downstream,
+        Interrupt::USART3,
+        &DOWNSTREAM,
+        &DOWNSTREAM_QUEUES,
+    );
+    Some((clock, upstream, downstream))
+}
+
+#[interrupt]
+fn USART2() {
+    port::serve(&UPSTREAM, &UPSTREAM_QUEUES);
+}
+
+#[interrupt]
+fn USART3() {
+    port::serve(&DOWNSTREAM, &DOWNSTREAM_QUEUES);
+}

@@ -1,0 +1,46 @@
+//! The board with one serial port, to a radio that every relay in range hears.
+//!
+//! | what | where |
+//! | --- | --- |
+//! | radio, or transceiver of a bus | USART2: TX PA2, RX PA3 |
+//! | its driver-enable pin, if it has one | PA1: high while this relay sends |
+//! | log, with `--features defmt` | UART4: TX PC10, RX PC11 |
+//! | clock | HSI, 16 MHz, no PLL; `SysTick` every millisecond |
+
+use core::cell::RefCell;
+
+use cortex_m::interrupt::Mutex;
+use stm32f4xx_hal::gpio::{Output, PA1};
+use stm32f4xx_hal::pac::{self, Interrupt, USART2, interrupt};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Config;
+use stm32f4xx_hal::serial::Serial;
+
+use super::clock::Clock;
+use super::port::{self, OUTGOING, Port, Queues, Slot};
+
+static RADIO: Slot<USART2> = Mutex::new(RefCell::new(None));
+static RADIO_QUEUES: Mutex<RefCell<Queues<OUTGOING>>> = Queues::new();
+
+/// Sets the board up, once only: its clock, the port to the radio, and the pin that is high while it sends.
+pub(crate) fn start() -> Option<(Clock, Port, PA1<Output>)> {
+    let chip = pac::Peripherals::take()?;
+    let core = cortex_m::Peripherals::take()?;
+    let mut rcc = chip.RCC.freeze(Config::hsi());
+    let a = chip.GPIOA.split(&mut rcc);
+    let clock = Clock::start(core.SYST);
+    #[cfg(feature = "defmt")]
+    {
+        let c = chip.GPIOC.split(&mut rcc);
+        let uart = Serial::new(chip.UART4, (c.pc10, c.pc11), port::config(), &mut rcc);
+        super::log::start(uart.ok()?);
+    }
+    let radio = Serial::new(chip.USART2, (a.pa2, a.pa3), port::config(), &mut rcc).ok()?;
+    let radio = port::open(radio, Interrupt::USART2, &RADIO, &RADIO_QUEUES);
+    Some((clock, radio, a.pa1.into_push_pull_output()))
+}
+
+#[interrupt]
+fn USART2() {
+    port::serve(&RADIO, &RADIO_QUEUES);
+}

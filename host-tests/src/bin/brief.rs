@@ -1,0 +1,102 @@
+//! `cargo brief`: what is written into one drone before it flies, from a scenario.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use host_tests::firmware::block::Flight;
+use host_tests::firmware::config::{ADDRESS, LEN};
+use host_tests::scenario::Scenario;
+
+/// Writes the configuration block of one relay: which one it is, and the mission it flies.
+#[derive(Parser, Debug)]
+#[command(name = "brief", bin_name = "cargo brief", disable_version_flag = true)]
+struct Options {
+    /// Scenario file (TOML); without it the paper's multi-hop scenario
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Number of relays, 1 to 1000
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    uavs: u16,
+    /// Which of them this drone is, 1 (next to the transmitter) to N
+    #[arg(long, value_name = "I", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    index: u16,
+    /// Number of the network, 0 to 65535; frames of any other are ignored
+    #[arg(long, value_name = "W", default_value_t = 1)]
+    network: u16,
+    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
+    #[arg(long, value_name = "T", default_value_t = 1e-4)]
+    tolerance: f64,
+    /// File to write the block to
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+fn main() -> ExitCode {
+    let options = match Options::try_parse() {
+        Ok(options) => options,
+        Err(error) => return usage(&error),
+    };
+    match run(&options) {
+        Ok(line) => {
+            println!("{line}");
+            ExitCode::SUCCESS
+        }
+        Err(line) => {
+            eprintln!("{line}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Help as it is; of an error only the line that says what is wrong.
+fn usage(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        print!("{error}");
+        return ExitCode::SUCCESS;
+    }
+    let text = error.to_string();
+    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
+    let mut wrong = lines.next().unwrap_or("wrong options").to_owned();
+    // Options that are missing are listed below the first line.
+    if wrong.ends_with(':') {
+        for missing in lines.take_while(|line| line.starts_with("  ")) {
+            wrong.push(' ');
+            wrong.push_str(missing.trim());
+        }
+    }
+    eprintln!("{}", wrong.trim_start_matches("error: "));
+    ExitCode::from(2)
+}
+
+fn run(options: &Options) -> Result<String, String> {
+    let Options {
+        uavs,
+        index,
+        network,
+        ..
+    } = *options;
+    if index > uavs {
+        return Err(format!("--index {index}: must be within 1 to {uavs}"));
+    }
+    let scenario = match &options.scenario {
+        Some(file) => Scenario::load(file).map_err(|error| error.to_string())?,
+        None => Scenario::default(),
+    };
+    let name = options
+        .scenario
+        .as_ref()
+        .map_or("default scenario".into(), |file| file.to_string_lossy());
+    let flight = Flight::new(&scenario, uavs, options.tolerance, network)
+        .map_err(|refusal| format!("{name}: {refusal}"))?;
+    let block = flight
+        .block(index)
+        .map_err(|error| format!("{name}: {error}"))?;
+    let file = &options.out;
+    std::fs::write(file, block)
+        .map_err(|error| format!("{}: --out cannot be written: {error}", file.display()))?;
+    Ok(format!(
+        "{}: relay {index} of {uavs}, network {network}; {LEN} bytes for {ADDRESS:#010x}",
+        file.display()
+    ))
+}

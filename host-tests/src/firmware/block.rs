@@ -1,0 +1,118 @@
+//! From a scenario to the block that is written into one drone.
+
+use std::fmt;
+
+use uav_relay::{Identity, Mission, Profile};
+
+use super::config::{Block, ChannelNumbers, Config, ConfigError, read, write};
+use crate::brief::{self, Refusal};
+use crate::scenario::{AirGround, ChannelSpec, Scenario};
+
+/// Why there is no block.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum BlockError {
+    /// The scenario is no mission.
+    Refused(Refusal),
+    /// The drone would refuse the block.
+    Config(ConfigError),
+    /// The drone would read another mission than was meant.
+    Changed,
+}
+
+impl fmt::Display for BlockError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Refused(refusal) => refusal.fmt(f),
+            Self::Config(ConfigError::Index) => {
+                f.write_str("index must be within 1 to the number of relays")
+            }
+            Self::Config(ConfigError::Profile) => {
+                f.write_str("altitude or power of that relay is out of range")
+            }
+            Self::Config(ConfigError::Mission(error)) => error.fmt(f),
+            Self::Config(ConfigError::Channel(error)) => error.fmt(f),
+            Self::Config(_) | Self::Changed => f.write_str("the block does not say the mission"),
+        }
+    }
+}
+
+impl std::error::Error for BlockError {}
+
+/// What the drones of one flight have in common.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    mission: Mission,
+    numbers: ChannelNumbers,
+    own: Vec<(u16, Profile)>,
+    network: u16,
+}
+
+impl Flight {
+    /// The flight of `uavs` relays in `scenario`, on network `network`.
+    ///
+    /// # Errors
+    /// [`Refusal`] where the scenario is no mission.
+    pub fn new(
+        scenario: &Scenario,
+        uavs: u16,
+        tolerance: f64,
+        network: u16,
+    ) -> Result<Self, Refusal> {
+        let (mission, own) = brief::mission(scenario, uavs, tolerance)?;
+        Ok(Self {
+            mission,
+            numbers: channel_numbers(&scenario.channel),
+            own,
+            network,
+        })
+    }
+
+    /// The mission.
+    pub const fn mission(&self) -> &Mission {
+        &self.mission
+    }
+
+    /// What single relays hold of their own, by index from 1.
+    pub fn profiles(&self) -> &[(u16, Profile)] {
+        &self.own
+    }
+
+    /// The block of relay `index`, read back to be sure.
+    ///
+    /// # Errors
+    /// [`BlockError`] where the drone would refuse it.
+    pub fn block(&self, index: u16) -> Result<Block, BlockError> {
+        let own = self.own.iter().find(|(of, _)| *of == index);
+        let config = Config {
+            identity: Identity {
+                network: self.network,
+                index,
+            },
+            mission: self.mission,
+            profile: own.map_or(self.mission.config().common, |(_, profile)| *profile),
+        };
+        let block = write(&config, &self.numbers);
+        match read(&block) {
+            Ok(read) if read == config => Ok(block),
+            Ok(_) => Err(BlockError::Changed),
+            Err(error) => Err(BlockError::Config(error)),
+        }
+    }
+}
+
+/// Decibels as factors, by the very function by which [`uav_relay::Channel::from_db`] has them, so that the drone's channel
+/// is the scenario's to the bit.
+fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
+    let factor = |db: f64| libm::pow(10.0, db / 10.0);
+    ChannelNumbers {
+        carrier_hz: spec.carrier_hz,
+        excess_los: factor(spec.excess_loss_los_db),
+        excess_nlos: factor(spec.excess_loss_nlos_db),
+        los_weight: match spec.air_ground {
+            AirGround::Los => 1.0,
+            AirGround::Nlos => 0.0,
+            AirGround::Weight(weight) => weight,
+        },
+    }
+}

@@ -1,0 +1,49 @@
+//! The image that is flashed, built by cargo into a folder of its own, so that a cargo that waits for this one is not waited for.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The target the firmware is built for.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The profile that what is flashed is built with.
+pub const PROFILE: &str = "firmware";
+
+/// Builds `examples`, with the log, and says in which folder they are.
+///
+/// # Errors
+/// What cargo has to say, if it fails.
+pub fn build(examples: &[&str]) -> Result<PathBuf, String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .ok_or("the workspace is not where it was when this was built")?;
+    let folder = std::env::var_os("CARGO_TARGET_DIR")
+        .map_or_else(|| root.join("target"), PathBuf::from)
+        .join("emulated");
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(cargo);
+    command
+        .current_dir(root)
+        .args(["build", "--locked", "--package", "uav-relay"])
+        .args(["--profile", PROFILE, "--target", TARGET])
+        .args(["--features", "defmt", "--target-dir"])
+        .arg(&folder);
+    for example in examples {
+        command.args(["--example", example]);
+    }
+    // Flags for the host's compiler are none for the target's, and the tests read the log at the level of `.cargo/config.toml`.
+    for variable in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "DEFMT_LOG"] {
+        command.env_remove(variable);
+    }
+    let output = command
+        .output()
+        .map_err(|error| format!("cargo cannot be run: {error}"))?;
+    if output.status.success() {
+        Ok(folder.join(TARGET).join(PROFILE).join("examples"))
+    } else {
+        Err(format!(
+            "the firmware cannot be built (for a missing target, type: rustup target add {TARGET})\n{}",
+            String::from_utf8_lossy(&output.stderr)
+        ))
+    }
+}

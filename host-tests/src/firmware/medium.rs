@@ -1,0 +1,124 @@
+//! What happens to a frame between two drones, and when it arrives: bytes in, bytes out, and no clock of its own.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::time::{Duration, Instant};
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use uav_relay::wire::frame::MAX_FRAME;
+
+use super::emulator::SPEED;
+use crate::sim::faults::{Faults, Injected};
+use crate::sim::link::LinkSpec;
+
+/// Any byte stream that goes on for so long without a delimiter is passed on as it is.
+const LONGEST: usize = 2 * MAX_FRAME;
+
+/// Bytes on their way.
+#[derive(Clone, PartialEq, Eq, Debug)]
+struct Flying {
+    at: Instant,
+    order: u64,
+    receiver: usize,
+    bytes: Vec<u8>,
+}
+
+impl Ord for Flying {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        (self.at, self.order).cmp(&(other.at, other.order))
+    }
+}
+
+impl PartialOrd for Flying {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// The space between the drones. Senders and receivers are numbered by whoever owns it.
+#[derive(Debug)]
+pub struct Medium {
+    link: LinkSpec,
+    faults: Faults,
+    rng: ChaCha8Rng,
+    injected: Injected,
+    flying: BinaryHeap<Reverse<Flying>>,
+    order: u64,
+    /// What has come from each sender since its last delimiter, and until when its line is busy.
+    lines: Vec<(Vec<u8>, Instant)>,
+}
+
+impl Medium {
+    /// A medium among `senders`, with `link` as the drones' own clocks see it.
+    pub fn new(senders: usize, link: LinkSpec, faults: Faults, seed: u64, now: Instant) -> Self {
+        Self {
+            link,
+            faults,
+            rng: ChaCha8Rng::seed_from_u64(seed),
+            injected: Injected::default(),
+            flying: BinaryHeap::new(),
+            order: 0,
+            lines: vec![(Vec::new(), now); senders],
+        }
+    }
+
+    /// Takes in what `sender` sends; each whole frame goes to every one of `receivers`, with faults of its own.
+    pub fn send(&mut self, now: Instant, sender: usize, bytes: &[u8], receivers: &[usize]) {
+        for &byte in bytes {
+            let Some((frame, _)) = self.lines.get_mut(sender) else {
+                return;
+            };
+            frame.push(byte);
+            if byte == 0 || frame.len() >= LONGEST {
+                let frame = std::mem::take(frame);
+                self.put(now, sender, &frame, receivers);
+            }
+        }
+    }
+
+    fn put(&mut self, now: Instant, sender: usize, frame: &[u8], receivers: &[usize]) {
+        let Some((_, free)) = self.lines.get_mut(sender) else {
+            return;
+        };
+        *free = now.max(*free) + wall(self.link.line_time(frame.len()));
+        let arrives = *free + wall(self.link.latency);
+        for &receiver in receivers {
+            let arrivals = self.faults.inject(frame, &mut self.rng, &mut self.injected);
+            for arrival in arrivals {
+                let late = u32::try_from(arrival.late).unwrap_or(u32::MAX);
+                self.flying.push(Reverse(Flying {
+                    at: arrives + wall(self.link.hop_time()).saturating_mul(late),
+                    order: self.order,
+                    receiver,
+                    bytes: arrival.bytes,
+                }));
+                self.order += 1;
+            }
+        }
+    }
+
+    /// The next bytes that have arrived by `now`, and at whom.
+    pub fn receive(&mut self, now: Instant) -> Option<(usize, Vec<u8>)> {
+        if self.next()? > now {
+            return None;
+        }
+        let Reverse(flying) = self.flying.pop()?;
+        Some((flying.receiver, flying.bytes))
+    }
+
+    /// When the next bytes arrive.
+    pub fn next(&self) -> Option<Instant> {
+        self.flying.peek().map(|Reverse(flying)| flying.at)
+    }
+
+    /// What has been done to frames.
+    pub const fn injected(&self) -> Injected {
+        self.injected
+    }
+}
+
+/// A span of a drone's clock as one of the wall clock.
+fn wall(span: uav_relay::Duration) -> Duration {
+    Duration::from_micros(span.as_micros()).div_f64(SPEED)
+}

@@ -1,0 +1,28 @@
+//! The firmware on the ground: its configuration, its image, and drones emulated by QEMU that run it.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | [`config`] | the configuration block, byte by byte; the firmware's own file |
+//! | [`block`] | from a scenario to the block of one drone |
+//! | [`image`] | the image, built by cargo |
+//! | [`emulator`] | one emulated drone: a process, and a socket for each serial port |
+//! | [`medium`] | what happens to frames between drones, and when they arrive |
+//! | [`network`] | who hears whom: threads that carry bytes between sockets |
+
+pub mod block;
+#[path = "../../../examples/stm32f405/config.rs"]
+pub mod config;
+#[cfg(unix)]
+pub mod emulator;
+pub mod image;
+#[cfg(unix)]
+pub mod medium;
+#[cfg(unix)]
+pub mod network;
+
+/// The emulator.
+pub const QEMU: &str = "qemu-system-arm";
+
+/// What to type where it is missing.
+pub const MISSING: &str =
+    "qemu-system-arm is missing; type: sudo apt-get install --yes qemu-system-arm";

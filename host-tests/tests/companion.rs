@@ -1,0 +1,256 @@
+//! `examples/linux_companion` as processes on pseudo-terminals, against the simulated chain.
+#![cfg(target_os = "linux")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    missing_docs
+)]
+
+#[path = "companion/binary.rs"]
+mod binary;
+#[path = "companion/ending.rs"]
+mod ending;
+#[path = "companion/idle.rs"]
+mod idle;
+#[path = "companion/medium.rs"]
+mod medium;
+#[path = "companion/options.rs"]
+mod options;
+#[path = "companion/process.rs"]
+mod process;
+#[path = "companion/pty.rs"]
+mod pty;
+
+use std::time::{Duration, Instant};
+
+use host_tests::brief;
+use host_tests::scenario::{Interference, Scenario, Source};
+use host_tests::sim::chain::{self, Ending, Setup};
+use medium::{Medium, Noise, QUIET};
+use process::{Ended, Relay};
+use pty::Pty;
+use rustix::process::Signal;
+
+/// Bits of x, altitude and target of every relay, as the simulated chain has them.
+fn simulated(scenario: &Scenario, relays: u16) -> Vec<[u32; 3]> {
+    let (mission, _) = brief::mission(scenario, relays, 1e-4).unwrap();
+    let outcome = chain::run(Setup::new(mission)).unwrap();
+    assert_eq!(outcome.ending, Ending::Settled);
+    let ends = outcome.relays.iter().map(|relay| {
+        let place = relay.setpoint.unwrap();
+        [place.x_m, place.altitude_m, relay.target.unwrap()].map(f32::to_bits)
+    });
+    ends.collect()
+}
+
+/// Relays 1 to N and the N - 1 wires between them.
+struct Chain {
+    wires: Vec<Medium>,
+    relays: Vec<Relay>,
+    options: Vec<String>,
+}
+
+impl Chain {
+    fn start(relays: usize, noise: Noise, options: &[&str]) -> Self {
+        let wire = |index: usize| Noise {
+            seed: noise.seed * 100 + u64::try_from(index).unwrap(),
+            ..noise
+        };
+        let mut chain = Self {
+            wires: (1..relays)
+                .map(|index| Medium::new(2, wire(index)))
+                .collect(),
+            relays: Vec::new(),
+            options: options.iter().map(ToString::to_string).collect(),
+        };
+        chain.relays = (1..=relays).map(|index| chain.relay(index)).collect();
+        chain
+    }
+
+    /// Switches relay `index` on.
+    fn relay(&self, index: usize) -> Relay {
+        let (number, of) = (index.to_string(), (self.wires.len() + 1).to_string());
+        let mut arguments = vec!["--index", &number, "--of", &of];
+        if index > 1 {
+            arguments.extend(["--upstream", self.wires[index - 2].tty(1)]);
+        }
+        if let Some(wire) = self.wires.get(index - 1) {
+            arguments.extend(["--downstream", wire.tty(0)]);
+        }
+        arguments.extend(self.options.iter().map(String::as_str));
+        Relay::start(&arguments)
+    }
+
+    fn settled(&mut self) -> Vec<[u32; 3]> {
+        self.relays.iter_mut().map(Relay::settled).collect()
+    }
+}
+
+#[test]
+fn three_processes_settle_where_the_simulated_chain_does() {
+    let mut chain = Chain::start(3, QUIET, &[]);
+    assert_eq!(chain.settled(), simulated(&Scenario::default(), 3));
+    for relay in chain.relays {
+        relay.signal(Signal::TERM);
+        let Ended {
+            status,
+            stdout,
+            stderr,
+        } = relay.end();
+        assert_eq!((status, stderr), (Some(0), Vec::new()));
+        let last = stdout.last().unwrap();
+        assert!(last.contains("stopped: "), "{last}");
+    }
+}
+
+#[test]
+fn every_option_of_the_mission_reaches_the_relays() {
+    let scenario = Scenario {
+        distance_m: 2345.6,
+        altitude_m: 33.3,
+        min_separation_m: 7.5,
+        tx_w: 12.25,
+        uav_w: 0.7,
+        interference: Interference::Sources(vec![Source {
+            power_w: 55.5,
+            x_m: 987.6,
+            y_m: -321.0,
+        }]),
+        ..Scenario::default()
+    };
+    let options = [
+        "--distance",
+        "2345.6",
+        "--altitude",
+        "33.3",
+        "--min-separation",
+        "7.5",
+        "--tx-power",
+        "12.25",
+        "--uav-power",
+        "0.7",
+        "--interferer",
+        "55.5,987.6,-321",
+        "--baud",
+        "57600",
+        "--network",
+        "4711",
+    ];
+    let mut chain = Chain::start(4, QUIET, &options);
+    for relay in &mut chain.relays {
+        assert!(relay.line("started: ").contains("network 4711, "));
+    }
+    let expected = simulated(&scenario, 4);
+    assert_eq!(chain.settled(), expected);
+    assert_ne!(expected, simulated(&Scenario::default(), 4));
+}
+
+#[test]
+fn the_tty_is_set_to_the_speed_asked_for() {
+    let pty = Pty::new();
+    let path = pty.path().to_str().unwrap();
+    // The last one is none of the usual.
+    for baud in [1_200, 57_600, 115_200, 250_000] {
+        let text = baud.to_string();
+        let mut relay = Relay::start(&[
+            "--index",
+            "1",
+            "--of",
+            "2",
+            "--downstream",
+            path,
+            "--baud",
+            &text,
+        ]);
+        relay.line("started: ");
+        assert_eq!(pty.baud(), baud);
+    }
+}
+
+#[test]
+fn over_wires_that_lose_and_change_bytes_they_settle_at_the_same_places() {
+    let expected = simulated(&Scenario::default(), 3);
+    let mut faults = [0; 2];
+    for seed in 1..=4 {
+        let mut chain = Chain::start(3, Noise::bad(seed), &[]);
+        assert_eq!(chain.settled(), expected, "seed {seed}");
+        chain.wires.iter().for_each(|wire| wire.count(&mut faults));
+    }
+    let [lost, corrupted] = faults;
+    println!("{lost} bytes lost, {corrupted} changed");
+    assert!(lost > 0 && corrupted > 0, "{lost}, {corrupted}");
+}
+
+#[test]
+fn on_one_shared_channel_they_settle_at_the_same_places() {
+    let expected = simulated(&Scenario::default(), 3);
+    let mut faults = [0; 2];
+    for noise in [QUIET, Noise::bad(5), Noise::bad(6), Noise::bad(7)] {
+        let channel = Medium::new(3, noise);
+        let start = |index: usize| {
+            let number = index.to_string();
+            Relay::start(&[
+                "--index",
+                &number,
+                "--of",
+                "3",
+                "--shared",
+                channel.tty(index - 1),
+            ])
+        };
+        let mut relays: Vec<Relay> = (1..=3).map(start).collect();
+        let settled: Vec<_> = relays.iter_mut().map(Relay::settled).collect();
+        assert_eq!(settled, expected, "{noise:?}");
+        channel.count(&mut faults);
+    }
+    let [lost, corrupted] = faults;
+    println!("{lost} bytes lost, {corrupted} changed");
+    assert!(lost > 0 && corrupted > 0, "{lost}, {corrupted}");
+}
+
+#[test]
+fn a_killed_process_is_noticed_by_both_neighbours_and_so_is_its_return() {
+    let mut chain = Chain::start(3, QUIET, &["--quiet-ms", "400", "--lost-ms", "1200"]);
+    let settled = chain.settled();
+    let killed = Instant::now();
+    // A relay that is dropped is killed.
+    drop(chain.relays.remove(1));
+    chain.relays[0].line("lost: no sign of life from relay 2 downstream");
+    let first = killed.elapsed();
+    chain.relays[1].line("lost: no sign of life from relay 2 upstream");
+    let took = killed.elapsed();
+    println!(
+        "noticed after {} and {} ms",
+        first.as_millis(),
+        took.as_millis()
+    );
+    assert!(took < Duration::from_secs(5), "{took:?}");
+
+    let mut again = chain.relay(2);
+    chain.relays[0].line("back: relay 2 downstream");
+    chain.relays[1].line("back: relay 2 upstream");
+    // Who was away gets its place with the next agreement, which begins when the head is switched on again.
+    assert!(!again.has_said("setpoint"));
+    drop(chain.relays.remove(0));
+    let mut head = chain.relay(1);
+    assert_eq!([head.settled(), again.settled()], settled[..2]);
+}
+
+#[test]
+fn neighbours_with_different_missions_say_so() {
+    let wire = Medium::new(2, QUIET);
+    let mut first = Relay::start(&["--index", "1", "--of", "2", "--downstream", wire.tty(0)]);
+    let altitude = ["--altitude", "21"];
+    let mut second = Relay::start(
+        &[
+            &["--index", "2", "--of", "2", "--upstream", wire.tty(1)][..],
+            &altitude,
+        ]
+        .concat(),
+    );
+    second.line("mismatch: relay 1 upstream flies another mission than 0x");
+    assert!(!second.has_said("setpoint") && !first.has_said("setpoint"));
+}

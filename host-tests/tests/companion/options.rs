@@ -1,0 +1,129 @@
+//! Wrong options: one line, status 2.
+
+use crate::process::{Ended, Relay};
+
+/// What the later ones of [`WRONG`] are added to.
+const GOOD: &[&str] = &[
+    "--index",
+    "2",
+    "--of",
+    "3",
+    "--upstream",
+    "a",
+    "--downstream",
+    "b",
+];
+
+/// Options, and what the line must have in it.
+const WRONG: &[(&[&str], &[&str])] = &[
+    (
+        &["--index", "0", "--of", "3"],
+        &["--index", "'0'", "1..=1000"],
+    ),
+    (
+        &["--index", "-1", "--of", "3"],
+        &["--index", "'-1'", "1..=1000"],
+    ),
+    (
+        &["--index", "1", "--of", "1001"],
+        &["--of", "'1001'", "1..=1000"],
+    ),
+    (&["--index", "4", "--of", "3"], &["--index 4", "1 to 3"]),
+    (&["--index", "2"], &["--of", "not provided"]),
+    (&[], &["--index", "--of", "not provided"]),
+    (
+        &["--index", "2", "--of", "3", "--upstream", "a"],
+        &["--downstream", "relay 3"],
+    ),
+    (
+        &["--index", "2", "--of", "3", "--downstream", "a"],
+        &["--upstream", "relay 1"],
+    ),
+    (
+        &["--index", "2", "--of", "2"],
+        &["--upstream", "relay 1", "--shared"],
+    ),
+    (&["--shared", "x"], &["--shared x", "without --upstream"]),
+    (&["--baud", "1199"], &["--baud", "'1199'", "1200..=4000000"]),
+    (&["--network", "65536"], &["--network", "'65536'", "65535"]),
+    (&["--quiet-ms", "0"], &["--quiet-ms", "'0'", "1..=3600000"]),
+    (
+        &["--lost-ms", "5000"],
+        &["--lost-ms 5000", "5001 to 3600000"],
+    ),
+    (
+        &["--distance", "0.5"],
+        &["--distance", "'0.5'", "1.0 to 1000000.0"],
+    ),
+    (
+        &["--distance", "NaN"],
+        &["--distance", "'NaN'", "1.0 to 1000000.0"],
+    ),
+    (
+        &["--altitude", "-20"],
+        &["--altitude", "'-20'", "0.1 to 100000.0"],
+    ),
+    (
+        &["--tx-power", "0"],
+        &["--tx-power", "'0'", "1e-6 to 1000000.0"],
+    ),
+    (
+        &["--uav-power", "inf"],
+        &["--uav-power", "'inf'", "1e-6 to 1000000.0"],
+    ),
+    (
+        &["--min-separation", "-1"],
+        &["--min-separation", "'-1'", "0.0 to 100000.0"],
+    ),
+    (
+        &["--min-separation", "501"],
+        &["--min-separation 501", "--distance 1000", "--of 3"],
+    ),
+    (
+        &["--interferer", "80,500"],
+        &["--interferer", "'80,500'", "P,X,Y"],
+    ),
+    (
+        &["--interferer", "-1,5,4"],
+        &["--interferer", "'-1,5,4'", "P ", "1e-6 to 1000000000.0"],
+    ),
+    (
+        &["--interferer", "80,x,4"],
+        &[
+            "--interferer",
+            "'80,x,4'",
+            "X ",
+            "-10000000.0 to 10000000.0",
+        ],
+    ),
+    (&["--nonsense"], &["--nonsense"]),
+];
+
+#[test]
+fn wrong_options_are_named_with_their_value_and_range() {
+    for &(arguments, parts) in WRONG {
+        let alone = arguments.is_empty() || arguments[0] == "--index";
+        let all = if alone {
+            arguments.to_vec()
+        } else {
+            [GOOD, arguments].concat()
+        };
+        let Ended {
+            status,
+            stdout,
+            stderr,
+        } = Relay::start(&all).end();
+        assert_eq!(status, Some(2), "{all:?}: {stderr:?}");
+        assert!(
+            stdout.is_empty() && stderr.len() == 1,
+            "{all:?}: {stderr:?}"
+        );
+        for part in parts {
+            assert!(
+                stderr[0].contains(part),
+                "{all:?}: {part} not in {}",
+                stderr[0]
+            );
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! A relay as a process: its lines, its end, its use of the processor. It is killed when dropped.
+
+use std::fmt::Write as _;
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use crate::binary::companion;
+
+/// How long anything may take that should be done in a moment: this machine may be busy.
+pub(crate) const LIMIT: Duration = Duration::from_secs(30);
+
+#[derive(Debug)]
+pub(crate) struct Relay {
+    child: Child,
+    lines: Receiver<String>,
+    errors: Receiver<String>,
+    seen: Vec<String>,
+    name: String,
+}
+
+/// Status and lines of a relay that has ended.
+#[derive(Debug)]
+pub(crate) struct Ended {
+    /// None: a signal.
+    pub(crate) status: Option<i32>,
+    pub(crate) stdout: Vec<String>,
+    pub(crate) stderr: Vec<String>,
+}
+
+fn lines_of(pipe: impl Read + Send + 'static) -> Receiver<String> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        for line in BufReader::new(pipe).lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
+impl Relay {
+    pub(crate) fn start(arguments: &[&str]) -> Self {
+        let mut child = Command::new(companion())
+            .args(arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        Self {
+            lines: lines_of(child.stdout.take().unwrap()),
+            errors: lines_of(child.stderr.take().unwrap()),
+            child,
+            seen: Vec::new(),
+            name: arguments.join(" "),
+        }
+    }
+
+    /// The next line with `part` in it, after the one that was returned last.
+    pub(crate) fn line(&mut self, part: &str) -> String {
+        let end = Instant::now() + LIMIT;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            let Ok(line) = self.lines.recv_timeout(left) else {
+                let mut story = format!("{}: no `{part}`", self.name);
+                for line in self.seen.drain(..).chain(self.errors.try_iter()) {
+                    write!(story, "\n{line}").unwrap();
+                }
+                panic!("{story}");
+            };
+            self.seen.push(line.clone());
+            if line.contains(part) {
+                return line;
+            }
+        }
+    }
+
+    /// Whether a line that has come so far has `part` in it.
+    pub(crate) fn has_said(&mut self, part: &str) -> bool {
+        self.seen.extend(self.lines.try_iter());
+        self.seen.iter().any(|line| line.contains(part))
+    }
+
+    /// Bits of x, altitude and target, once the relay has them.
+    pub(crate) fn settled(&mut self) -> [u32; 3] {
+        let setpoint = bits(&self.line("setpoint: "));
+        let target = bits(&self.line("converged: "));
+        [setpoint[0], setpoint[1], target[0]]
+    }
+
+    pub(crate) fn signal(&self, signal: Signal) {
+        kill_process(self.pid(), signal).unwrap();
+    }
+
+    fn pid(&self) -> Pid {
+        Pid::from_child(&self.child)
+    }
+
+    /// Waits for its end.
+    pub(crate) fn end(mut self) -> Ended {
+        let end = Instant::now() + LIMIT;
+        let status = loop {
+            match self.child.try_wait().unwrap() {
+                Some(status) => break status,
+                None if Instant::now() > end => panic!("{}: does not end", self.name),
+                None => std::thread::sleep(Duration::from_millis(2)),
+            }
+        };
+        let mut stdout = std::mem::take(&mut self.seen);
+        stdout.extend(self.lines.iter());
+        Ended {
+            status: status.code(),
+            stdout,
+            stderr: self.errors.iter().collect(),
+        }
+    }
+
+    /// Processor time and how often it went to sleep, so far.
+    pub(crate) fn cost(&self) -> (Duration, u64) {
+        let file = |name| std::fs::read_to_string(format!("/proc/{}/{name}", self.child.id()));
+        let stat = file("stat").unwrap();
+        // Fields 14 and 15; the name, field 2, is in parentheses and may hold anything.
+        let fields: Vec<&str> = stat[stat.rfind(')').unwrap() + 2..].split(' ').collect();
+        let ticks: u64 = fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap();
+        let millis = ticks * 1_000 / rustix::param::clock_ticks_per_second();
+        let status = file("status").unwrap();
+        let sleeps = status
+            .lines()
+            .find_map(|line| line.strip_prefix("voluntary_ctxt_switches:"));
+        let sleeps = sleeps.unwrap().trim().parse().unwrap();
+        (Duration::from_millis(millis), sleeps)
+    }
+}
+
+impl Drop for Relay {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The numbers in a line that stand there as bits.
+fn bits(line: &str) -> Vec<u32> {
+    let mut parts = line.split("(0x");
+    parts.next();
+    parts
+        .map(|part| u32::from_str_radix(&part[..8], 16).unwrap())
+        .collect()
+}

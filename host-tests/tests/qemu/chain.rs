@@ -1,0 +1,84 @@
+//! Chains of emulated drones with a wire to each neighbour, held against the simulated chain.
+
+use host_tests::firmware::block::Flight;
+use host_tests::scenario::Scenario;
+use host_tests::sim::chain::{Ending, Setup, run};
+use host_tests::sim::faults::Faults;
+
+use crate::fleet::{Fleet, Image};
+
+/// Everything at once, as a bad day has it.
+pub(crate) const BAD_DAY: Faults = Faults {
+    loss: 0.3,
+    corrupt: 0.15,
+    duplicate: 0.1,
+    reorder: 0.1,
+};
+
+pub(crate) fn paper(uavs: u16) -> Flight {
+    Flight::new(&Scenario::default(), uavs, 1e-4, 7).unwrap()
+}
+
+/// Where the simulated chain settles, to the bit.
+pub(crate) fn simulated(flight: &Flight) -> Vec<(u32, u32)> {
+    let mut setup = Setup::new(*flight.mission());
+    setup.profiles = flight.profiles().to_vec();
+    let outcome = run(setup).unwrap();
+    assert_eq!(outcome.ending, Ending::Settled);
+    outcome
+        .relays
+        .iter()
+        .map(|relay| {
+            let place = relay.setpoint.unwrap();
+            (place.x_m.to_bits(), place.altitude_m.to_bits())
+        })
+        .collect()
+}
+
+#[test]
+fn five_settle_where_the_simulated_chain_does() {
+    let flight = paper(5);
+    let mut fleet = Fleet::of(Image::Wires, &flight, Faults::default(), 1);
+    assert_eq!(fleet.places(), simulated(&flight));
+    for drone in 1..=5 {
+        assert_eq!(
+            fleet.of_drone(drone).next().unwrap().text,
+            format!("relay {drone} of 5, network 7")
+        );
+        let counters = fleet.counters(drone);
+        for name in ["crc", "truncated", "malformed", "misaddressed"] {
+            assert_eq!(counters.counter(name), Some(0), "{}", counters.text);
+        }
+    }
+}
+
+#[test]
+fn five_settle_there_through_a_bad_day() {
+    let flight = paper(5);
+    let expected = simulated(&flight);
+    for seed in 1..=3 {
+        let mut fleet = Fleet::of(Image::Wires, &flight, BAD_DAY, seed);
+        assert_eq!(fleet.places(), expected, "seed {seed}");
+        let injected = fleet.injected();
+        let damaged: u64 = (1..=5)
+            .map(|drone| {
+                let counters = fleet.counters(drone);
+                let of = |name| counters.counter(name).unwrap();
+                of("crc") + of("truncated") + of("oversized")
+            })
+            .sum();
+        println!("seed {seed}: {injected:?}, {damaged} damaged frames refused");
+        assert!(injected.lost > 0 && injected.corrupted > 0, "{injected:?}");
+        assert!(damaged > 0, "no drone has met a damaged frame");
+    }
+}
+
+#[test]
+#[ignore = "on demand: a chain of 20"]
+fn twenty_settle_where_the_simulated_chain_does() {
+    let flight = paper(20);
+    let mut fleet = Fleet::of(Image::Wires, &flight, Faults::default(), 1);
+    assert_eq!(fleet.places(), simulated(&flight));
+    let mut fleet = Fleet::of(Image::Wires, &flight, BAD_DAY, 1);
+    assert_eq!(fleet.places(), simulated(&flight));
+}

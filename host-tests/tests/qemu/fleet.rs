@@ -1,0 +1,192 @@
+//! Emulated drones that fly one mission, and what their logs have said so far.
+
+use std::io::Write as _;
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use defmt_decoder::Table;
+use host_tests::firmware::block::Flight;
+use host_tests::firmware::emulator::Emulator;
+use host_tests::firmware::image;
+use host_tests::firmware::medium::Medium;
+use host_tests::firmware::network::{self, Network};
+use host_tests::sim::faults::{Faults, Injected};
+use host_tests::sim::link::LinkSpec;
+
+use crate::log::{self, Line};
+
+/// How long anything may take before a test gives up.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+
+/// And for each drone of the fleet, since all share this machine.
+const PATIENCE_A_DRONE: Duration = Duration::from_secs(10);
+
+/// What is flashed: the two variants.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Image {
+    Wires,
+    Radio,
+}
+
+impl Image {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Wires => "stm32f405",
+            Self::Radio => "stm32f405_radio",
+        }
+    }
+}
+
+/// The image of an example; all are built once for all tests.
+pub(crate) fn image(example: &str) -> PathBuf {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let names = [Image::Wires.name(), Image::Radio.name(), "golden"];
+        image::build(&names).unwrap_or_else(|error| panic!("{error}"))
+    });
+    folder.join(example)
+}
+
+/// The strings of the log of an image.
+fn table(which: Image) -> &'static Table {
+    static TABLES: [OnceLock<Table>; 2] = [OnceLock::new(), OnceLock::new()];
+    TABLES[which as usize].get_or_init(|| log::table(&image(which.name())))
+}
+
+/// The drones of a flight, switched on.
+pub(crate) struct Fleet {
+    // Dropped in this order: without drones the threads of the network and of the logs come to their ends.
+    drones: Vec<Emulator>,
+    network: Network,
+    consoles: Vec<UnixStream>,
+    new: Receiver<Line>,
+    pub(crate) lines: Vec<Line>,
+    _folder: tempfile::TempDir,
+}
+
+impl Fleet {
+    /// Switches on one drone for each block, on `image`, with a medium of `faults` and `seed`.
+    pub(crate) fn start(which: Image, blocks: &[Vec<u8>], faults: Faults, seed: u64) -> Self {
+        let (file, table) = (image(which.name()), table(which));
+        let folder = tempfile::Builder::new().prefix("fleet").tempdir().unwrap();
+        let (lines, new) = channel();
+        let (mut drones, mut consoles, mut ports) = (Vec::new(), Vec::new(), Vec::new());
+        for (drone, block) in (1..).zip(blocks) {
+            let (emulator, [usart2, usart3, console]) =
+                Emulator::start(&file, block, folder.path(), &format!("drone{drone}"))
+                    .unwrap_or_else(|error| panic!("{error}"));
+            drones.push(emulator);
+            ports.push(usart2);
+            if which == Image::Wires {
+                ports.push(usart3);
+            }
+            consoles.push(console.try_clone().unwrap());
+            let lines = lines.clone();
+            std::thread::spawn(move || log::listen(console, drone, table, &lines));
+        }
+        let hearers = match which {
+            Image::Wires => network::chain(blocks.len()),
+            Image::Radio => network::radio(blocks.len(), 2),
+        };
+        let medium = Medium::new(
+            ports.len(),
+            LinkSpec::default(),
+            faults,
+            seed,
+            Instant::now(),
+        );
+        Self {
+            drones,
+            network: Network::connect(ports, hearers, medium).unwrap(),
+            consoles,
+            new,
+            lines: Vec::new(),
+            _folder: folder,
+        }
+    }
+
+    /// Switches on every drone of `flight`.
+    pub(crate) fn of(which: Image, flight: &Flight, faults: Faults, seed: u64) -> Self {
+        let blocks: Vec<Vec<u8>> = (1..=flight.mission().relays())
+            .map(|index| flight.block(index).unwrap().to_vec())
+            .collect();
+        Self::start(which, &blocks, faults, seed)
+    }
+
+    /// Reads logs until `done` says so of all lines so far; in time, or the test fails with all that was logged.
+    pub(crate) fn wait(&mut self, what: &str, mut done: impl FnMut(&[Line]) -> bool) {
+        let started = Instant::now();
+        let drones = u32::try_from(self.drones.len()).unwrap();
+        let patience = PATIENCE + drones * PATIENCE_A_DRONE;
+        while !done(&self.lines) {
+            let left = patience.saturating_sub(started.elapsed());
+            match self.new.recv_timeout(left) {
+                Ok(line) => {
+                    assert_ne!(line.text, "MALFORMED", "{line:?}");
+                    self.lines.push(line);
+                }
+                Err(_) => self.give_up(what),
+            }
+        }
+    }
+
+    fn give_up(&mut self, what: &str) -> ! {
+        for line in &self.lines {
+            println!("{:2} {:>10} us  {}", line.drone, line.at, line.text);
+        }
+        for (drone, emulator) in (1..).zip(&mut self.drones) {
+            let running = emulator.is_running();
+            println!("drone {drone}: running {running} {}", emulator.complaint());
+        }
+        println!("injected: {:?}", self.network.injected());
+        panic!("no {what} in time");
+    }
+
+    /// The lines of one drone.
+    pub(crate) fn of_drone(&self, drone: u16) -> impl Iterator<Item = &Line> {
+        self.lines.iter().filter(move |line| line.drone == drone)
+    }
+
+    /// Waits until every drone has been told where to fly, and gives the bits of those places.
+    pub(crate) fn places(&mut self) -> Vec<(u32, u32)> {
+        let drones = u16::try_from(self.drones.len()).unwrap();
+        let last = |lines: &[Line], drone| {
+            let mut lines = lines.iter().rev().filter(|line| line.drone == drone);
+            lines.find_map(Line::setpoint)
+        };
+        self.wait("setpoint of every drone", |lines| {
+            (1..=drones).all(|drone| last(lines, drone).is_some())
+        });
+        (1..=drones)
+            .map(|drone| last(&self.lines, drone).unwrap())
+            .collect()
+    }
+
+    /// Asks a drone for its counters, and waits for them.
+    pub(crate) fn counters(&mut self, drone: u16) -> Line {
+        let before = self.lines.len();
+        self.consoles[usize::from(drone) - 1]
+            .write_all(b"s")
+            .unwrap();
+        let answer = |lines: &[Line]| {
+            let mut new = lines[before..].iter();
+            new.find(|line| line.drone == drone && line.text.starts_with("counters"))
+                .cloned()
+        };
+        self.wait("counters", |lines| answer(lines).is_some());
+        answer(&self.lines).unwrap()
+    }
+
+    /// Switches a drone off.
+    pub(crate) fn kill(&mut self, drone: u16) {
+        self.drones[usize::from(drone) - 1].kill();
+    }
+
+    /// What the medium has done to frames.
+    pub(crate) fn injected(&self) -> Injected {
+        self.network.injected()
+    }
+}

@@ -1,0 +1,93 @@
+//! The golden vectors on the target: what the crate makes of a frame is the same on thumb and on this machine.
+
+use std::io::{Read as _, Write as _};
+
+use host_tests::firmware::config::LEN;
+use host_tests::firmware::emulator::Emulator;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Deserialize;
+
+use crate::fleet::{PATIENCE, image};
+
+#[path = "../../../examples/golden/answer.rs"]
+#[expect(unreachable_pub, reason = "as in the image")]
+mod answer;
+
+#[derive(Deserialize)]
+struct Vectors {
+    frames: Vec<Frame>,
+}
+
+#[derive(Deserialize)]
+struct Frame {
+    name: String,
+    wire: String,
+}
+
+fn bytes(hex: &str) -> Vec<u8> {
+    (0..hex.len() / 2)
+        .map(|at| u8::from_str_radix(&hex[2 * at..2 * at + 2], 16).unwrap())
+        .collect()
+}
+
+/// What this machine answers, one answer to each frame of `heard`.
+fn here(heard: &[u8]) -> Vec<Vec<u8>> {
+    let mut answerer = answer::Answerer::new();
+    let mut answers = vec![Vec::new()];
+    for &byte in heard {
+        let mut said: Vec<u8> = Vec::new();
+        answerer.hear(byte, |answer| said.extend(answer));
+        answers.last_mut().unwrap().extend(said);
+        if byte == 0 {
+            answers.push(Vec::new());
+        }
+    }
+    answers
+}
+
+#[test]
+fn the_target_makes_of_every_vector_what_this_machine_does() {
+    let vectors: Vectors = serde_json::from_str(include_str!("../data/vectors.json")).unwrap();
+    assert!(vectors.frames.len() >= 20);
+    let mut heard = Vec::new();
+    for vector in &vectors.frames {
+        let wire = bytes(&vector.wire);
+        assert!(here(&wire)[0].starts_with(&wire), "{}", vector.name);
+        heard.extend(wire);
+    }
+    // And what it refuses, for whatever reason: a thousand frames with up to three bytes changed.
+    let seed = host_tests::random::seed(31);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for _ in 0..1_000 {
+        let vector = &vectors.frames[rng.random_range(0..vectors.frames.len())];
+        let mut wire = bytes(&vector.wire);
+        for _ in 0..rng.random_range(1..=3) {
+            let at = rng.random_range(0..wire.len() - 1);
+            wire[at] ^= rng.random_range(1..=u8::MAX);
+        }
+        heard.extend(wire);
+    }
+    let expected = here(&heard).concat();
+    for refusal in [&b"2\0"[..], b"4\0"] {
+        let times = expected.windows(2).filter(|two| *two == refusal).count();
+        assert!(times > 10, "{times} times {refusal:?}");
+    }
+
+    let folder = tempfile::Builder::new().prefix("golden").tempdir().unwrap();
+    let (_drone, [mut port, _, _]) =
+        Emulator::start(&image("golden"), &[0; LEN], folder.path(), "golden")
+            .unwrap_or_else(|error| panic!("{error}"));
+    port.set_read_timeout(Some(PATIENCE)).unwrap();
+    let mut ready = [0; answer::READY.len()];
+    port.read_exact(&mut ready).unwrap();
+    assert_eq!(ready, answer::READY);
+    let mut out = port.try_clone().unwrap();
+    let sender = std::thread::spawn(move || out.write_all(&heard));
+    let mut answers = vec![0; expected.len()];
+    let all = port.read_exact(&mut answers);
+    sender.join().unwrap().unwrap();
+    let at = answers.iter().zip(&expected).position(|(a, b)| a != b);
+    assert_eq!(at, None, "the first byte that differs, of seed {seed}");
+    all.unwrap();
+}

@@ -1,0 +1,97 @@
+//! The log of a drone: defmt frames from its UART, decoded by the strings in the ELF.
+
+use std::io::Read as _;
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::sync::mpsc::Sender;
+
+use defmt_decoder::{DecodeError, Table};
+
+/// One line of a log.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Line {
+    /// Which drone logged it, 1 to N.
+    pub(crate) drone: u16,
+    /// When, by the drone's own clock, in microseconds.
+    pub(crate) at: u64,
+    pub(crate) text: String,
+}
+
+impl Line {
+    /// What the line says behind `label`.
+    pub(crate) fn after(&self, label: &str) -> Option<&str> {
+        self.text
+            .split_once(label)
+            .map(|(_, rest)| rest.trim_start())
+    }
+
+    /// The bits that the line gives in parentheses behind `label`.
+    fn bits(&self, label: &str) -> Option<u32> {
+        let (_, rest) = self.after(label)?.split_once("(0x")?;
+        u32::from_str_radix(rest.split_once(')')?.0, 16).ok()
+    }
+
+    /// The bits of x and altitude, if this is a setpoint.
+    pub(crate) fn setpoint(&self) -> Option<(u32, u32)> {
+        self.text
+            .starts_with("setpoint")
+            .then(|| (self.bits(" x ").unwrap(), self.bits(" altitude ").unwrap()))
+    }
+
+    /// The counter `name` of a line that lists them.
+    pub(crate) fn counter(&self, name: &str) -> Option<u64> {
+        let rest = self.after(&format!(" {name}: "))?;
+        let end = rest.find(|c: char| !c.is_ascii_digit())?;
+        rest[..end].parse().ok()
+    }
+}
+
+/// The strings of an image.
+pub(crate) fn table(image: &Path) -> Table {
+    let elf = std::fs::read(image).unwrap();
+    Table::parse(&elf)
+        .unwrap()
+        .expect("an image with a defmt table")
+}
+
+/// Decodes until the drone is switched off. What does not decode becomes a line too, so that no test overlooks it.
+pub(crate) fn listen(
+    mut port: UnixStream,
+    drone: u16,
+    table: &'static Table,
+    lines: &Sender<Line>,
+) {
+    let mut decoder = table.new_stream_decoder();
+    let mut buffer = [0; 1024];
+    while let Ok(count @ 1..) = port.read(&mut buffer) {
+        decoder.received(&buffer[..count]);
+        loop {
+            let line = match decoder.decode() {
+                Ok(frame) => {
+                    let at = frame.display_timestamp().unwrap().to_string();
+                    Line {
+                        drone,
+                        at: micros(&at),
+                        text: frame.display_message().to_string(),
+                    }
+                }
+                Err(DecodeError::UnexpectedEof) => break,
+                Err(DecodeError::Malformed) => Line {
+                    drone,
+                    at: 0,
+                    text: "MALFORMED".into(),
+                },
+            };
+            if lines.send(line).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// Seconds with six decimals, as microseconds.
+fn micros(text: &str) -> u64 {
+    let (seconds, fraction) = text.trim().split_once('.').unwrap();
+    assert_eq!(fraction.len(), 6, "{text}");
+    seconds.parse::<u64>().unwrap() * 1_000_000 + fraction.parse::<u64>().unwrap()
+}

@@ -1,0 +1,110 @@
+//! Drones that fall silent, and drones that were never told what to fly.
+
+use std::time::Instant;
+
+use host_tests::firmware::config::LEN;
+use host_tests::firmware::emulator::SPEED;
+use host_tests::sim::faults::Faults;
+use uav_relay::Settings;
+
+use crate::chain::{paper, simulated};
+use crate::fleet::{Fleet, Image};
+use crate::log::Line;
+
+/// From one look at the clock to the next, and into the log, in microseconds.
+const SLACK: u64 = 20_000;
+
+/// Both neighbours notice in the time that the settings promise. The emulated clock is a fast one, so it is not the wall
+/// clock that counts: the neighbours are asked for the time just before the drone between them is switched off. What
+/// passes between the question and that, by the wall clock, is allowed for.
+#[test]
+fn both_neighbours_notice_a_drone_that_is_switched_off() {
+    let flight = paper(5);
+    let mut fleet = Fleet::of(Image::Wires, &flight, Faults::default(), 1);
+    assert_eq!(fleet.places(), simulated(&flight));
+    let question = Instant::now();
+    let asked = [2, 4].map(|drone| fleet.counters(drone).at);
+    let before = fleet.lines.len();
+    fleet.kill(3);
+    let until_killed = question.elapsed().mul_f64(SPEED).as_micros();
+    let slack = SLACK + u64::try_from(until_killed).unwrap();
+    let sides = [
+        (2, "event NeighbourLost(Downstream)", asked[0]),
+        (4, "event NeighbourLost(Upstream)", asked[1]),
+    ];
+    let noticed = |lines: &[Line], (drone, text, _): &(u16, &str, u64)| {
+        let mut new = lines[before..].iter();
+        new.find(|line| line.drone == *drone && line.text == *text)
+            .map(|line| line.at)
+    };
+    fleet.wait("two neighbours that notice", |lines| {
+        sides.iter().all(|side| noticed(lines, side).is_some())
+    });
+    let Settings { lost, quiet, .. } = Settings::default();
+    for side in &sides {
+        let took = noticed(&fleet.lines, side).unwrap() - side.2;
+        println!(
+            "drone {} noticed after {took} us of its own clock, give or take {slack}",
+            side.0
+        );
+        assert!(took <= lost.as_micros() + slack, "{took} us");
+        // What was heard last is older than the question, but not by more than a quiet link allows.
+        assert!(
+            took + quiet.as_micros() + SLACK >= lost.as_micros(),
+            "{took} us"
+        );
+    }
+    // They hold their places, and the others hear nothing of it.
+    assert_eq!(fleet.places(), simulated(&flight));
+    for drone in [1, 5] {
+        let mut lost = fleet
+            .of_drone(drone)
+            .filter(|line| line.text.contains("Lost"));
+        assert_eq!(lost.next(), None);
+    }
+}
+
+#[test]
+fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
+    let flight = paper(3);
+    let good = flight.block(2).unwrap().to_vec();
+    let mut damaged = good.clone();
+    damaged[20] ^= 1;
+    let mut other_version = good.clone();
+    other_version[4] = 9;
+    let blocks = [
+        vec![0xFF; LEN],
+        vec![0; LEN],
+        damaged,
+        other_version,
+        with(&good, 8, &4_u16.to_le_bytes()),
+        with(&good, 16, &0.5_f32.to_le_bytes()),
+        with(&good, 36, &f32::NAN.to_le_bytes()),
+        with(&good, 60, &1.0_f64.to_le_bytes()),
+    ];
+    let words = [
+        "no configuration: the block is blank",
+        "no configuration: the block is blank",
+        "configuration refused: damaged, the CRC does not match",
+        "configuration refused: version or length",
+        "configuration refused: index",
+        "configuration refused: mission, Distance",
+        "configuration refused: own altitude or power",
+        "configuration refused: channel, Carrier",
+    ];
+    let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
+    fleet.wait("word from every drone", |lines| lines.len() >= words.len());
+    for (drone, word) in (1..).zip(words) {
+        let texts: Vec<&str> = fleet.of_drone(drone).map(|line| &line.text[..]).collect();
+        assert_eq!(texts, [word], "drone {drone}");
+    }
+}
+
+/// `block` with `bytes` at `at`, and the CRC that belongs to it.
+fn with(block: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
+    let mut block = block.to_vec();
+    block[at..at + bytes.len()].copy_from_slice(bytes);
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&block[..LEN - 4]);
+    block[LEN - 4..].copy_from_slice(&crc.to_le_bytes());
+    block
+}
