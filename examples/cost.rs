@@ -75,13 +75,11 @@ mod target {
 
     fn relay(index: u16, settings: Settings, of: Mission) -> Relay {
         let identity = Identity { network: 1, index };
-        match Relay::new(of, identity, settings, 1, Instant::ZERO) {
-            Ok(relay) => relay,
-            Err(_) => {
-                debug::exit(debug::EXIT_FAILURE);
-                loop {}
-            }
+        if let Ok(relay) = Relay::new(of, identity, settings, 1, Instant::ZERO) {
+            return relay;
         }
+        debug::exit(debug::EXIT_FAILURE);
+        stop()
     }
 
     /// What `relay` sends next, if anything.
@@ -119,8 +117,11 @@ mod target {
         let mut head = relay(1, settings, THREE);
         let mut middle = relay(2, settings, THREE);
         let mut tail = relay(3, settings, THREE);
-        let now = head.poll_timeout().unwrap_or(Instant::ZERO);
-        let begin = instructions(|| head.handle_timeout(now));
+        let (mut now, mut begin) = (Instant::ZERO, 0);
+        while head.phase() == Phase::Planning {
+            now = head.poll_timeout().unwrap_or(now);
+            begin = begin.max(instructions(|| head.handle_timeout(now)));
+        }
         let (mut through, mut at_tail, mut back, mut next) = (0, 0, 0, 0);
         let mut longest = 0;
         while head.phase() == Phase::Waiting {
@@ -159,8 +160,12 @@ mod target {
             let Some(transmit) = passed else { break };
             let bytes = onward.get(..transmit.len).unwrap_or_default();
             next = next.max(instructions(|| {
-                head.handle_bytes(now, Port::Downstream, bytes)
+                head.handle_bytes(now, Port::Downstream, bytes);
             }));
+            if head.phase() == Phase::Answered {
+                now = head.poll_timeout().unwrap_or(now);
+                begin = begin.max(instructions(|| head.handle_timeout(now)));
+            }
         }
         hprintln!("begin_sweep {}", begin);
         hprintln!("sweep_bytes {}", longest);
@@ -243,8 +248,11 @@ mod target {
             ..Settings::default()
         };
         let mut head = relay(1, settings, MISSION);
-        let now = head.poll_timeout().unwrap_or(Instant::ZERO);
-        head.handle_timeout(now);
+        let mut now = Instant::ZERO;
+        while head.phase() == Phase::Planning {
+            now = head.poll_timeout().unwrap_or(now);
+            head.handle_timeout(now);
+        }
         let Some((frame, len)) = sends(&mut head, now) else {
             return;
         };
@@ -294,6 +302,13 @@ mod target {
         stack();
         hprintln!("done 1");
         debug::exit(debug::EXIT_SUCCESS);
-        loop {}
+        stop()
+    }
+
+    /// Where the program ends should QEMU not take its leave.
+    fn stop() -> ! {
+        loop {
+            cortex_m::asm::wfi();
+        }
     }
 }

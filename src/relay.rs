@@ -139,11 +139,13 @@ impl Relay {
     }
 
     /// Handles what is due by `now`. Bounded by 256 reaches, at the head while it predicts; next to nothing otherwise.
+    #[inline(never)] // as `poll_transmit`
     pub fn handle_timeout(&mut self, now: Instant) {
         self.node.handle_timeout(now);
     }
 
     /// Writes the next frame to be sent into `frame`, if there is one.
+    #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
         let (side, message) = self.node.poll_message(now)?;
         let sender = self.node.index();

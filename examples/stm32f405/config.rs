@@ -123,6 +123,7 @@ impl ChannelNumbers {
 ///
 /// # Errors
 /// [`ConfigError`] says what is wrong, and of a number which one.
+#[inline(never)] // its stack is given back before the relay needs some
 pub fn read(block: &Block) -> Result<Config, ConfigError> {
     if block.iter().all(|&byte| byte == 0xFF) || block.iter().all(|&byte| byte == 0) {
         return Err(ConfigError::Blank);

@@ -9,9 +9,6 @@ use super::{board, config, log};
 
 /// What the links of both variants have in common.
 pub(crate) trait Links {
-    /// How the relay is connected by them.
-    const WIRING: Wiring;
-
     /// Moves bytes between the ports and the relay, and says when to be called again.
     fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant>;
 
@@ -20,8 +17,6 @@ pub(crate) trait Links {
 }
 
 impl<U: SerialPort, D: SerialPort> Links for Pair<U, D> {
-    const WIRING: Wiring = Wiring::Pair;
-
     fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
         Self::poll(self, now, relay)
     }
@@ -33,8 +28,6 @@ impl<U: SerialPort, D: SerialPort> Links for Pair<U, D> {
 }
 
 impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
-    const WIRING: Wiring = Wiring::Shared;
-
     fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
         Self::poll(self, now, relay)
     }
@@ -44,34 +37,12 @@ impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
     }
 }
 
-/// Flies for good, or sleeps for good where there is no configuration to fly by.
-pub(crate) fn fly<L: Links>(mut clock: Clock, mut links: L) -> ! {
-    let config = match config::read(&board::block()) {
-        Ok(config) => config,
-        Err(error) => {
-            log::refused(error);
-            board::stop();
-        }
-    };
-    let settings = Settings {
-        wiring: L::WIRING,
-        profile: Some(config.profile),
-        ..Settings::default()
-    };
-    let relay = Relay::new(
-        config.mission,
-        config.identity,
-        settings,
-        board::seed(),
-        clock.now(),
-    );
-    // What could be refused here has been checked with the configuration.
-    let Ok(mut relay) = relay else { board::stop() };
-    log::begins(&config);
+/// Flies for good.
+pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, relay: &mut Relay) -> ! {
     loop {
-        let wake = links.poll(clock.now(), &mut relay);
+        let wake = links.poll(clock.now(), relay);
         while let Some(event) = relay.poll_event() {
-            log::event(event, &relay);
+            log::event(event, relay);
             if event == Event::SetpointChanged
                 && let Some(place) = relay.setpoint()
             {
@@ -79,11 +50,48 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, mut links: L) -> ! {
             }
         }
         if log::asked() {
-            log::counters(&relay);
+            log::counters(relay);
             links.log_counters();
         }
         clock.sleep(wake);
     }
+}
+
+/// The relay by its configuration; `None` where there is none to fly by.
+///
+/// This and [`switch_on`] are functions of their own so that the stack they need is given back.
+#[inline(never)]
+pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> {
+    match config::read(&board::block()) {
+        Ok(config) => {
+            log::begins(&config);
+            switch_on(&config, wiring, now)
+        }
+        Err(error) => {
+            log::refused(error);
+            None
+        }
+    }
+}
+
+/// The relay, in a place of its own in RAM: the stack would have to hold it, and the copy it is made from.
+#[inline(never)]
+fn switch_on(config: &config::Config, wiring: Wiring, now: Instant) -> Option<&'static mut Relay> {
+    let settings = Settings {
+        profile: Some(config.profile),
+        wiring,
+        ..Settings::default()
+    };
+    // What could be refused here has been checked with the configuration.
+    let relay = Relay::new(
+        config.mission,
+        config.identity,
+        settings,
+        board::seed(),
+        now,
+    )
+    .ok()?;
+    cortex_m::singleton!(RELAY: Relay = relay)
 }
 
 /// Replace this by what your autopilot wants to hear: `place.x_m` metres from the transmitter toward the receiver, at

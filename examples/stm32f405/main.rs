@@ -44,18 +44,36 @@ mod wires;
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
+    use uav_relay::Wiring;
+
+    let Some((mut clock, links)) = connect() else {
+        board::stop()
+    };
+    // Without a configuration to fly by a drone sleeps for good.
+    let Some(relay) = drone::begin(Wiring::Pair, clock.now()) else {
+        board::stop()
+    };
+    drone::fly(clock, links, relay)
+}
+
+/// The links, in a place of their own in RAM; a function of its own, so that the stack it needs is given back.
+#[cfg(target_os = "none")]
+#[inline(never)]
+fn connect() -> Option<(clock::Clock, &'static mut Links)> {
     use uav_relay::serial::{Pair, SerialLink, byte_time};
 
-    let Some((clock, upstream, downstream)) = wires::start() else {
-        board::stop();
-    };
+    let (clock, upstream, downstream) = wires::start()?;
     let byte_time = byte_time(port::BAUD);
-    let links = Pair::new(
-        SerialLink::new(upstream, byte_time),
-        SerialLink::new(downstream, byte_time),
-    );
-    drone::fly(clock, links)
+    let links = cortex_m::singleton!(
+        LINKS: Links =
+            Pair::new(SerialLink::new(upstream, byte_time), SerialLink::new(downstream, byte_time))
+    )?;
+    Some((clock, links))
 }
+
+/// A port to each neighbour.
+#[cfg(target_os = "none")]
+type Links = uav_relay::serial::Pair<port::Port, port::Port>;
 
 #[cfg(not(target_os = "none"))]
 fn main() {

@@ -32,15 +32,35 @@ mod radio;
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
+    use uav_relay::Wiring;
+
+    let Some((mut clock, channel)) = connect() else {
+        board::stop()
+    };
+    // Without a configuration to fly by a drone sleeps for good.
+    let Some(relay) = drone::begin(Wiring::Shared, clock.now()) else {
+        board::stop()
+    };
+    drone::fly(clock, channel, relay)
+}
+
+/// The link, in a place of its own in RAM; a function of its own, so that the stack it needs is given back.
+#[cfg(target_os = "none")]
+#[inline(never)]
+fn connect() -> Option<(clock::Clock, &'static mut Channel)> {
     use uav_relay::serial::{SerialLink, Shared, byte_time};
 
-    let Some((clock, channel, driver_enable)) = radio::start() else {
-        board::stop();
-    };
+    let (clock, channel, driver_enable) = radio::start()?;
     let byte_time = byte_time(port::BAUD);
-    let link = SerialLink::half_duplex(channel, byte_time, driver_enable);
-    drone::fly(clock, Shared::new(link))
+    let channel = cortex_m::singleton!(
+        CHANNEL: Channel = Shared::new(SerialLink::half_duplex(channel, byte_time, driver_enable))
+    )?;
+    Some((clock, channel))
 }
+
+/// One port to a radio, with its driver-enable pin.
+#[cfg(target_os = "none")]
+type Channel = uav_relay::serial::Shared<port::Port, radio::DriverEnable>;
 
 #[cfg(not(target_os = "none"))]
 fn main() {

@@ -22,8 +22,11 @@ use super::port::{self, OUTGOING, Port, Queues, Slot};
 static RADIO: Slot<USART2> = Mutex::new(RefCell::new(None));
 static RADIO_QUEUES: Mutex<RefCell<Queues<OUTGOING>>> = Queues::new();
 
+/// High while this relay sends.
+pub(crate) type DriverEnable = PA1<Output>;
+
 /// Sets the board up, once only: its clock, the port to the radio, and the pin that is high while it sends.
-pub(crate) fn start() -> Option<(Clock, Port, PA1<Output>)> {
+pub(crate) fn start() -> Option<(Clock, Port, DriverEnable)> {
     let chip = pac::Peripherals::take()?;
     let core = cortex_m::Peripherals::take()?;
     let mut rcc = chip.RCC.freeze(Config::hsi());

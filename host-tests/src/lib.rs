@@ -10,3 +10,4 @@ pub mod scenario;
 pub mod sim;
 pub mod stack;
 pub mod svg;
+pub mod toolchain;

@@ -10,7 +10,7 @@
 //! | `Infeasible` (head) | - | - | stale | - |
 //!
 //! The tail gives the verdict itself and skips `Waiting`. The head, instead of handing a verdict without a commit back,
-//! begins the next sweep. A sweep whose number is just behind the current one is stale wherever it comes. The setpoint is
+//! begins the next sweep when its work is due. A sweep whose number is just behind the current one is stale wherever it comes. The setpoint is
 //! touched by a commit alone, so a relay holds its place through everything else.
 
 use super::settings::Settings;
@@ -74,7 +74,7 @@ const STRAGGLERS: u16 = 64;
 /// What the head has beyond every other relay.
 #[derive(Clone, Debug)]
 enum Head {
-    /// Not the head.
+    /// Not the head, or nothing begun yet.
     No,
     Predicting(Planner),
     Searching(Search),
@@ -96,10 +96,11 @@ pub(crate) struct Align {
 }
 
 impl Align {
-    pub(crate) const fn new() -> Self {
+    /// A relay that has just been switched on. The head numbers its sweeps from `number` on, and has work to do.
+    pub(crate) const fn new(head: bool, number: u16) -> Self {
         Self {
-            phase: Phase::Idle,
-            number: 0,
+            phase: if head { Phase::Planning } else { Phase::Idle },
+            number,
             ladder: Ladder::single(1.0),
             reaches: PerTarget::new(),
             verdict: Verdict {
@@ -113,15 +114,9 @@ impl Align {
         }
     }
 
-    /// Makes this relay the head and starts. Sweeps are numbered from `number` on.
-    pub(crate) fn start(
-        &mut self,
-        mission: &Mission,
-        profile: Profile,
-        settings: &Settings,
-        number: u16,
-    ) -> Next {
-        self.number = number;
+    /// What the head begins with: its prediction, if it may, or the search itself.
+    #[inline(never)] // a planner is built here once; its stack is not for every call of `work`
+    fn begin(&mut self, mission: &Mission, profile: Profile, settings: &Settings) -> Next {
         let head = if settings.predict && settings.schedule == Schedule::Bracketed {
             Planner::new(mission, profile, settings.schedule).map(Head::Predicting)
         } else {
@@ -130,7 +125,6 @@ impl Align {
         match head {
             Ok(head) => {
                 self.head = head;
-                self.phase = Phase::Planning;
                 Next::Work
             }
             Err(Infeasible) => self.give_up(),
@@ -143,7 +137,15 @@ impl Align {
     }
 
     /// Goes on with the head's computation: at most 16 hops of 16 reaches.
-    pub(crate) fn work(&mut self, mission: &Mission, profile: Profile) -> Next {
+    pub(crate) fn work(
+        &mut self,
+        mission: &Mission,
+        profile: Profile,
+        settings: &Settings,
+    ) -> Next {
+        if matches!(self.head, Head::No) {
+            return self.begin(mission, profile, settings);
+        }
         if let Head::Predicting(planner) = &mut self.head {
             // The head knows its own profile; of the others it can only assume what the mission has in common.
             let profile_of = |index| {
@@ -237,12 +239,7 @@ impl Align {
     }
 
     /// A verdict from downstream.
-    pub(crate) fn on_verdict(
-        &mut self,
-        mission: &Mission,
-        profile: Profile,
-        answer: Answer,
-    ) -> Next {
+    pub(crate) fn on_verdict(&mut self, profile: Profile, answer: Answer) -> Next {
         let slacks = &answer.verdict.slacks;
         // What is committed must be met, by a target that this relay has a place for.
         let met = |target: u8| {
@@ -252,18 +249,13 @@ impl Align {
         };
         let fits = slacks.len() <= self.reaches.len() && answer.verdict.commit.is_none_or(met);
         if self.phase == Phase::Waiting && answer.number == self.number && fits {
-            match self.conclude(profile, answer.verdict) {
-                // The head has its next targets, and somebody to send them to.
-                Next::Work => self.begin_sweep(mission, profile),
-                next => next,
-            }
+            self.conclude(profile, answer.verdict)
         } else {
             Next::Stale
         }
     }
 
-    /// The verdict on the current sweep is known. `Next::Work` at the head, if it has to try other targets: a chain of one
-    /// takes them one a call, since each sweep is over at once.
+    /// The verdict on the current sweep is known. `Next::Work` at the head, if it has to try other targets.
     fn conclude(&mut self, profile: Profile, verdict: Verdict) -> Next {
         self.verdict = verdict;
         if let Some(commit) = self.verdict.commit

@@ -112,13 +112,15 @@ impl Node {
             .wrapping_mul(0x9E37_79B1)
             .wrapping_add(u32::from(identity.index))
             | 1;
+        let [a, b, ..] = random.to_le_bytes();
+        let low = u16::from_le_bytes([a, b]);
         let mut node = Self {
             mission,
             digest: digest(&mission),
             profile,
             settings,
             index: identity.index,
-            align: Align::new(),
+            align: Align::new(identity.index == 1, low),
             timers: Timers::new(),
             upstream: link(identity.index > 1),
             downstream: link(identity.index < relays),
@@ -135,11 +137,7 @@ impl Node {
             }
         }
         if identity.index == 1 {
-            let [a, b, ..] = random.to_le_bytes();
-            let next = node
-                .align
-                .start(&mission, profile, &settings, u16::from_le_bytes([a, b]));
-            node.proceed(now, next);
+            node.timers.set(Timer::Work, now + PAUSE);
         }
         node
     }
@@ -163,6 +161,7 @@ impl Node {
     }
 
     /// A message from the neighbour at `side`, intact and addressed to this relay. Bounded by 16 reaches.
+    #[inline(never)]
     pub(crate) fn handle_message(&mut self, now: Instant, side: Side, message: Message) {
         let quiet = self.settings.quiet;
         let Some(link) = self.link(side) else { return };
@@ -190,7 +189,7 @@ impl Node {
                 self.proceed(now, next);
             }
             (Side::Downstream, Message::Verdict(answer)) => {
-                let next = self.align.on_verdict(&self.mission, self.profile, answer);
+                let next = self.align.on_verdict(self.profile, answer);
                 self.proceed(now, next);
             }
             (_, Message::Heartbeat { answer, .. }) => {
@@ -213,7 +212,10 @@ impl Node {
         match next {
             Next::Nothing => {}
             Next::Stale => bump(&mut self.stats.stale),
-            Next::Work => self.timers.set(Timer::Work, now + PAUSE),
+            Next::Work => {
+                self.timers.stop(Timer::Repeat);
+                self.timers.set(Timer::Work, now + PAUSE);
+            }
             Next::Forward => {
                 self.sweep_due = true;
                 self.busy_due = false;
@@ -253,7 +255,7 @@ impl Node {
         while let Some(timer) = self.timers.expired(now) {
             match timer {
                 Timer::Work => {
-                    let next = self.align.work(&self.mission, self.profile);
+                    let next = self.align.work(&self.mission, self.profile, &self.settings);
                     self.proceed(now, next);
                 }
                 Timer::Repeat => {

@@ -70,6 +70,7 @@ impl Planner {
     ///
     /// # Errors
     /// [`Infeasible`] when no target is left to try.
+    #[inline(never)] // what it needs of the stack is given back before a sweep is begun
     pub fn step(
         &mut self,
         mission: &Mission,

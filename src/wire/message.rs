@@ -169,6 +169,7 @@ impl Message {
     /// # Errors
     /// [`MessageError::Encoding`] if it is not one message in its shortest form and nothing else, [`MessageError::Value`] for
     /// a number that is not finite or outside its range.
+    #[inline(never)]
     pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
         let (body, rest): (Body, _) =
             postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)?;

@@ -4,6 +4,7 @@ use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
 
 use host_tests::firmware::{MISSING, QEMU};
+use host_tests::toolchain::llvm_tool;
 
 /// The target the firmware is built for.
 const TARGET: &str = "thumbv7em-none-eabihf";
@@ -56,7 +57,7 @@ fn steps() -> Vec<Step> {
             "cargo build --release --target thumbv7em-none-eabihf --examples --locked",
         ),
         step(
-            "firmware, defmt",
+            "firmware with its log",
             "cargo build -p uav-relay --release --target thumbv7em-none-eabihf --examples --features defmt --locked",
         ),
     ];
@@ -65,6 +66,7 @@ fn steps() -> Vec<Step> {
             step.environment = &[("RUSTDOCFLAGS", "-D warnings")];
         }
     }
+    steps.push(step("cost, and no panic", "cargo cost"));
     for (name, features) in [("oldest compiler", ""), ("oldest compiler, defmt", "defmt")] {
         let mut arguments = vec![
             "run",
@@ -98,7 +100,7 @@ fn succeeds(program: &str, arguments: &[&str]) -> bool {
 
 /// Adds what a step needs and the machine lacks, or says what to type.
 fn prepare() -> Result<(), String> {
-    let needed: [(&str, &[&str], &[&str]); 4] = [
+    let needed: [(&str, &[&str], &[&str]); 5] = [
         (
             "rustfmt",
             &["cargo", "fmt", "--version"],
@@ -113,6 +115,11 @@ fn prepare() -> Result<(), String> {
             TARGET,
             &["rustc", "--print", "target-libdir", "--target", TARGET],
             &["target", "add", TARGET],
+        ),
+        (
+            "llvm-tools",
+            &["llvm-objdump"],
+            &["component", "add", "llvm-tools"],
         ),
         (
             "the oldest compiler",
@@ -130,6 +137,7 @@ fn prepare() -> Result<(), String> {
     for (what, check, add) in needed {
         let there = match check {
             ["rustc", arguments @ ..] => target_is_there(arguments),
+            ["llvm-objdump"] => llvm_tool("llvm-objdump").is_some(),
             [program, arguments @ ..] => succeeds(program, arguments),
             [] => true,
         };

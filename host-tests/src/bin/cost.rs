@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Output};
 
 use host_tests::stack::Calls;
+use host_tests::toolchain::llvm_tool;
 use object::{Object as _, ObjectSection as _, SectionFlags};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
@@ -152,7 +153,7 @@ fn of_the_counting_image() -> Result<Vec<Row>, String> {
             None,
         ),
         row(
-            "a full verdict at the head, to the next sweep",
+            "a full verdict at the head",
             "instructions",
             figure("verdict_at_head")?,
             None,
@@ -236,7 +237,9 @@ fn sizes(elf: &Path) -> Result<(u64, u64), String> {
 /// The deepest stack of the thread, from the entry that `Reset` calls, and of an interrupt on top of it: its frame with the FPU's registers is 104 bytes.
 fn stack(elf: &Path) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
-    let output = run(Command::new(tool("llvm-objdump")?)
+    let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
+    let objdump = llvm_tool("llvm-objdump").ok_or(missing)?;
+    let output = run(Command::new(objdump)
         .args(["-d", "--no-show-raw-insn"])
         .arg(elf))?;
     let bytes = std::fs::read(elf).map_err(|error| error.to_string())?;
@@ -266,23 +269,6 @@ fn stack(elf: &Path) -> Result<(u64, u64), String> {
         handler = deepest(name)?.0.max(handler);
     }
     Ok((thread, EXCEPTION_FRAME + handler))
-}
-
-/// A tool of the component llvm-tools.
-fn tool(name: &str) -> Result<PathBuf, String> {
-    let output = run(Command::new("rustc").args(["--print", "target-libdir"]))?;
-    let lib = PathBuf::from(String::from_utf8_lossy(&output.stdout).trim());
-    let path = lib
-        .parent()
-        .map(|lib| lib.join("bin").join(name))
-        .unwrap_or_default();
-    if path.exists() {
-        Ok(path)
-    } else {
-        Err(format!(
-            "{name} is missing; type: rustup component add llvm-tools"
-        ))
-    }
 }
 
 /// Links the relay image with a panic handler that cannot be linked; and, as a control, one that does panic.
