@@ -59,8 +59,14 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 #[cfg(not(prove_no_panic))]
 use panic_halt as _;
 
-/// The frames of the log.
+// The linker script that comes with defmt sorts the strings of the log, and is wanted only where there is a log: named like
+// a library, it is found where defmt's build put it.
 #[cfg(feature = "defmt")]
+#[link(name = "defmt.x", kind = "dylib", modifiers = "+verbatim")]
+unsafe extern "C" {}
+
+/// The frames of the log, where they are this program's.
+#[cfg(all(feature = "defmt", not(feature = "rtt")))]
 mod defmt_frames {
     use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -68,11 +74,6 @@ mod defmt_frames {
     use cortex_m::register::primask;
 
     use crate::log;
-
-    // The linker script that comes with defmt sorts the strings of the log, and is wanted only where there is a log: named
-    // like a library, it is found where defmt's build put it.
-    #[link(name = "defmt.x", kind = "dylib", modifiers = "+verbatim")]
-    unsafe extern "C" {}
 
     #[defmt::global_logger]
     struct Logger;

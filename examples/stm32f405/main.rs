@@ -21,6 +21,7 @@
 //! | `port.rs` | a serial port that an interrupt serves |
 //! | `clock.rs` | time and sleep |
 //! | `log.rs`, `silent.rs` | the log with `--features defmt`, and without |
+//! | `sink_uart.rs`, `sink_rtt.rs` | where it goes: a spare UART, or the debug probe with `--features rtt` |
 //! | `board.rs` | everything unsafe |
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

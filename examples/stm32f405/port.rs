@@ -82,7 +82,7 @@ impl<const OUT: usize> Port<OUT> {
     }
 
     /// How many bytes `write` would take now.
-    #[cfg(feature = "defmt")]
+    #[cfg(all(feature = "defmt", not(feature = "rtt")))]
     pub(crate) fn room(&self) -> usize {
         self.with(|queues| OUT.saturating_sub(queues.outgoing.len()))
             .unwrap_or(0)

@@ -31,7 +31,7 @@ pub(crate) fn start() -> Option<(Clock, Port, Port)> {
     let a = chip.GPIOA.split(&mut rcc);
     let b = chip.GPIOB.split(&mut rcc);
     let clock = Clock::start(core.SYST);
-    #[cfg(feature = "defmt")]
+    #[cfg(all(feature = "defmt", not(feature = "rtt")))]
     {
         let c = chip.GPIOC.split(&mut rcc);
         let uart = Serial::new(chip.UART4, (c.pc10, c.pc11), port::config(), &mut rcc);

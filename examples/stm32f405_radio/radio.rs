@@ -32,7 +32,7 @@ pub(crate) fn start() -> Option<(Clock, Port, DriverEnable)> {
     let mut rcc = chip.RCC.freeze(Config::hsi());
     let a = chip.GPIOA.split(&mut rcc);
     let clock = Clock::start(core.SYST);
-    #[cfg(feature = "defmt")]
+    #[cfg(all(feature = "defmt", not(feature = "rtt")))]
     {
         let c = chip.GPIOC.split(&mut rcc);
         let uart = Serial::new(chip.UART4, (c.pc10, c.pc11), port::config(), &mut rcc);

@@ -5,13 +5,13 @@
 //! | `Idle` | reach, hand on: `Waiting` | - | stale | - |
 //! | `Planning` (head) | - | - | stale | solve on; then begin a sweep: `Waiting` |
 //! | `Waiting` | reach, hand on | say busy | no commit: hand back, `Answered`; commit: take the place, hand back, `Holding` | - |
-//! | `Answered` | reach, hand on: `Waiting` | hand the verdict back again | stale | - |
+//! | `Answered` | reach, hand on: `Waiting` | hand the verdict back again | stale | (head) begin a sweep: `Waiting` |
 //! | `Holding` | reach, hand on: `Waiting` | hand the verdict back again | stale | - |
 //! | `Infeasible` (head) | - | - | stale | - |
 //!
-//! The tail gives the verdict itself and skips `Waiting`. The head, instead of handing a verdict without a commit back,
-//! begins the next sweep when its work is due. A sweep whose number is just behind the current one is stale wherever it comes. The setpoint is
-//! touched by a commit alone, so a relay holds its place through everything else.
+//! The tail gives the verdict itself and skips `Waiting`. The head has nobody to hand a verdict back to: without a commit it
+//! has work to do. A sweep whose number is just behind the current one is stale wherever it comes. The setpoint is touched
+//! by a commit alone, so a relay holds its place through everything else.
 
 use super::settings::Settings;
 use crate::mission::{Mission, Profile};

@@ -2,7 +2,7 @@
 //!
 //! Its Hamming distance is 6 for the lengths used here, where the older CRC-32 has 5. A table of 256 words takes 1 KiB of
 //! flash and half a dozen instructions a byte; one of 16 words saves most of that, but takes two thousand instructions more for
-//! a full sweep, which is above its budget. `crc_agrees_with_a_published_one` in `host-tests/tests/wire/random.rs` holds it
+//! a full sweep, which is above its budget. `crc_agrees_with_a_published_one` in `host-tests/tests/wire.rs` holds it
 //! against the `crc` crate.
 
 /// The reversed generator polynomial.

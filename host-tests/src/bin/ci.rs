@@ -60,6 +60,10 @@ fn steps() -> Vec<Step> {
             "firmware with its log",
             "cargo build -p uav-relay --release --target thumbv7em-none-eabihf --examples --features defmt --locked",
         ),
+        step(
+            "firmware with its log by the probe",
+            "cargo build -p uav-relay --release --target thumbv7em-none-eabihf --examples --features rtt --locked",
+        ),
     ];
     for step in &mut steps {
         if step.name == "documentation" {
