@@ -6,7 +6,7 @@ use serde::Serialize;
 use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Mission, Placement, Profile};
 
-use crate::sim::chain::{Ending, Outcome};
+use crate::sim::outcome::{Ending, Outcome};
 
 /// One relay at its place.
 #[derive(Clone, PartialEq, Debug, Serialize)]

@@ -11,8 +11,10 @@
 use host_tests::brief::{as_relays_know_it, of_link};
 use host_tests::random::{self, Chain as Kind, Style};
 use host_tests::reference::Link;
-use host_tests::sim::chain::{Ending, Outcome, Setup, on_shared_channel, run};
+use host_tests::sim::chain::run;
 use host_tests::sim::faults::Faults;
+use host_tests::sim::outcome::{Ending, Outcome};
+use host_tests::sim::setup::Setup;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::plan;
@@ -57,7 +59,7 @@ fn reached(link: &Link, outcome: &Outcome) -> f64 {
 
 fn bits(outcome: &Outcome) -> Vec<(u32, u32)> {
     let place =
-        |relay: &host_tests::sim::chain::RelayEnd| relay.setpoint.expect("the chain has settled");
+        |relay: &host_tests::sim::outcome::RelayEnd| relay.setpoint.expect("the chain has settled");
     outcome
         .relays
         .iter()
@@ -302,7 +304,7 @@ fn the_same_seed_gives_the_same_run() {
 #[test]
 fn one_shared_channel_does_as_well_as_two_wires() {
     let wires = bits(&settle(Setup::new(paper(8))));
-    let outcome = settle(on_shared_channel(paper(8)));
+    let outcome = settle(Setup::on_shared_channel(paper(8)));
     assert_eq!(bits(&outcome), wires);
     assert_eq!(outcome.messages, 14);
     assert!(
@@ -310,7 +312,7 @@ fn one_shared_channel_does_as_well_as_two_wires() {
         "nobody overheard anything"
     );
     for seed in 1..=50 {
-        let mut setup = on_shared_channel(paper(8));
+        let mut setup = Setup::on_shared_channel(paper(8));
         setup.faults = BAD_DAY;
         setup.seed = seed;
         assert_eq!(bits(&settle(setup)), wires, "seed {seed}");

@@ -28,7 +28,9 @@ use std::time::{Duration, Instant};
 
 use host_tests::brief;
 use host_tests::scenario::{Interference, Scenario, Source};
-use host_tests::sim::chain::{self, Ending, Setup};
+use host_tests::sim::chain;
+use host_tests::sim::outcome::Ending;
+use host_tests::sim::setup::Setup;
 use medium::{Medium, Noise, QUIET};
 use process::{Ended, Relay};
 use pty::Pty;

@@ -3,105 +3,16 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::node::settings::SetupError;
-use uav_relay::{
-    Event, FrameBuf, Identity, Instant, Mission, Phase, Placement, Port, Profile, Relay, Settings,
-    Side, Stats, Wiring,
-};
+use uav_relay::{Event, FrameBuf, Identity, Instant, Phase, Port, Relay, Settings, Side};
 
-use super::faults::{Faults, Injected};
-use super::link::{Line, LinkSpec};
+use super::faults::Injected;
+use super::link::Line;
+use super::outcome::{Ending, Outcome, RelayEnd};
 use super::queue::{Happening, Queue};
+use super::setup::Setup;
 
 /// After this many happenings the run is given up: some minutes of computing.
 const MOST_HAPPENINGS: u64 = 400_000_000;
-
-/// What to run.
-#[derive(Clone, Debug)]
-pub struct Setup {
-    /// The mission of every relay.
-    pub mission: Mission,
-    /// What relays hold of their own, by index from 1.
-    pub profiles: Vec<(u16, Profile)>,
-    /// What every relay is set to; `hop_time` and `profile` are filled in.
-    pub settings: Settings,
-    /// The links.
-    pub link: LinkSpec,
-    /// What happens to frames on them.
-    pub faults: Faults,
-    /// Relays that go silent: index from 1, and when.
-    pub kills: Vec<(u16, Instant)>,
-    /// Seed of every random draw.
-    pub seed: u64,
-    /// The run ends at this time at the latest.
-    pub deadline: Instant,
-}
-
-impl Setup {
-    /// A faultless run of `mission` with the default settings, links and seed 1.
-    pub fn new(mission: Mission) -> Self {
-        Self {
-            mission,
-            profiles: Vec::new(),
-            settings: Settings::default(),
-            link: LinkSpec::default(),
-            faults: Faults::default(),
-            kills: Vec::new(),
-            seed: 1,
-            deadline: Instant::from_millis(1_000 * 3_600 * 24 * 30),
-        }
-    }
-}
-
-/// How a run ended.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Ending {
-    /// Every relay holds its place, for the same target.
-    Settled,
-    /// The head found that no target can be met.
-    Infeasible,
-    /// Relays went silent, and every neighbour of theirs has noticed.
-    Broken,
-    /// The deadline, or the limit on the work of a run.
-    OutOfTime,
-}
-
-/// One relay when the run has ended.
-#[derive(Clone, Debug)]
-pub struct RelayEnd {
-    /// Where it was told to fly, if anywhere.
-    pub setpoint: Option<Placement>,
-    /// The target it holds that place for.
-    pub target: Option<f32>,
-    /// What it brought along.
-    pub profile: Profile,
-    /// Its counters.
-    pub stats: Stats,
-    /// When it went silent, if it did.
-    pub killed: Option<Instant>,
-}
-
-/// What came of a run.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// How it ended.
-    pub ending: Ending,
-    /// The relays, from the head.
-    pub relays: Vec<RelayEnd>,
-    /// Forward passes along the chain.
-    pub sweeps: u32,
-    /// Frames put on any link.
-    pub messages: u64,
-    /// Bytes put on any link.
-    pub bytes: u64,
-    /// When the run ended.
-    pub ended: Instant,
-    /// What was done to frames.
-    pub injected: Injected,
-    /// Who noticed whose silence: index from 1 of the one that noticed, the side, and when.
-    pub noticed: Vec<(u16, Side, Instant)>,
-    /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.
-    pub unsafe_setpoints: u64,
-}
 
 /// One relay in the run.
 #[derive(Debug)]
@@ -428,11 +339,4 @@ impl Chain {
 /// [`SetupError`] where a profile or setting is refused by the relay.
 pub fn run(setup: Setup) -> Result<Outcome, SetupError> {
     Chain::new(setup).map(Chain::run)
-}
-
-/// A setup on one shared channel.
-pub fn on_shared_channel(mission: Mission) -> Setup {
-    let mut setup = Setup::new(mission);
-    setup.settings.wiring = Wiring::Shared;
-    setup
 }

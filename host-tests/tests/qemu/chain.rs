@@ -2,8 +2,10 @@
 
 use host_tests::firmware::block::Flight;
 use host_tests::scenario::Scenario;
-use host_tests::sim::chain::{Ending, Setup, run};
+use host_tests::sim::chain::run;
 use host_tests::sim::faults::Faults;
+use host_tests::sim::outcome::Ending;
+use host_tests::sim::setup::Setup;
 
 use crate::fleet::{Fleet, Image};
 
