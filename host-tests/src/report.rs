@@ -272,19 +272,25 @@ fn seconds(at: uav_relay::Instant) -> f64 {
     at.as_micros() as f64 / 1e6
 }
 
+/// Who noticed the relays that really went silent; over a bad link a living one may be missed for a while as well.
 fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
-    outcome
+    let noticed = outcome
         .noticed
         .iter()
-        .map(|&(by, side, at)| SilenceReport {
+        .map(|(&(by, side), &at)| SilenceReport {
             silent: match side {
                 uav_relay::Side::Upstream => by.saturating_sub(1),
                 uav_relay::Side::Downstream => by.saturating_add(1),
             },
             noticed_by: by,
             at_s: seconds(at),
-        })
-        .collect()
+        });
+    let killed = |index: u16| {
+        let at = usize::from(index).checked_sub(1);
+        at.and_then(|at| outcome.relays.get(at))
+            .is_some_and(|relay| relay.killed.is_some())
+    };
+    noticed.filter(|silence| killed(silence.silent)).collect()
 }
 
 fn error(outcome: &Outcome) -> Option<String> {

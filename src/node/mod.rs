@@ -33,7 +33,7 @@ use stats::{Stats, bump};
 use timers::{Timer, Timers};
 
 /// One of the two neighbours of a relay, or the link to it.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {
     /// Toward the transmitter.

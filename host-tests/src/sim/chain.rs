@@ -1,5 +1,7 @@
 //! The relays, connected, run until they hold their places.
 
+use std::collections::BTreeMap;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::node::settings::SetupError;
@@ -89,7 +91,7 @@ impl Chain {
                 bytes: 0,
                 ended: Instant::ZERO,
                 injected: Injected::default(),
-                noticed: Vec::new(),
+                noticed: BTreeMap::new(),
                 unsafe_setpoints: 0,
             },
             now: Instant::ZERO,
@@ -185,13 +187,8 @@ impl Chain {
             let Some(member) = self.members.get(by) else {
                 return true;
             };
-            let alive = member.killed.is_none();
-            !alive
-                || self
-                    .outcome
-                    .noticed
-                    .iter()
-                    .any(|&(index, at, _)| usize::from(index) == by + 1 && at == side)
+            let key = (u16::try_from(by + 1).unwrap_or(u16::MAX), side);
+            member.killed.is_some() || self.outcome.noticed.contains_key(&key)
         };
         self.members
             .iter()
@@ -251,16 +248,14 @@ impl Chain {
         let Some(member) = self.members.get_mut(index) else {
             return;
         };
+        let by = u16::try_from(index + 1).unwrap_or(u16::MAX);
         while let Some(event) = member.relay.poll_event() {
             match event {
                 Event::NeighbourLost(side) => {
-                    let by = u16::try_from(index + 1).unwrap_or(u16::MAX);
-                    self.outcome.noticed.push((by, side, now));
+                    self.outcome.noticed.insert((by, side), now);
                 }
                 Event::NeighbourBack(side) => {
-                    self.outcome
-                        .noticed
-                        .retain(|&(by, at, _)| (usize::from(by), at) != (index + 1, side));
+                    self.outcome.noticed.remove(&(by, side));
                 }
                 Event::Converged => self.holding += 1,
                 _ => {}

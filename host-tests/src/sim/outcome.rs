@@ -1,5 +1,7 @@
 //! What came of a simulated chain.
 
+use std::collections::BTreeMap;
+
 use uav_relay::{Instant, Placement, Profile, Side, Stats};
 
 use super::faults::Injected;
@@ -49,8 +51,8 @@ pub struct Outcome {
     pub ended: Instant,
     /// What was done to frames.
     pub injected: Injected,
-    /// Who noticed whose silence: index from 1 of the one that noticed, the side, and when.
-    pub noticed: Vec<(u16, Side, Instant)>,
+    /// Who misses whom: by the index from 1 of the one that noticed and the side, since when.
+    pub noticed: BTreeMap<(u16, Side), Instant>,
     /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.
     pub unsafe_setpoints: u64,
 }
