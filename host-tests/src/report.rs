@@ -103,13 +103,15 @@ pub fn db(linear: f64) -> f64 {
 
 /// The SIR of every hop, from the transmitter's to the receiver's, for relays that stand at `places`.
 ///
-/// By the formulas of the crate, as a relay works them out.
+/// By the formulas of the crate, as a relay works them out; at most the largest f32, where two places all but coincide.
 pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let mut sender = Sender::transmitter(mission);
     let mut from_m = 0.0;
     let mut sirs = Vec::with_capacity(places.len() + 1);
     for (place, profile) in places {
-        sirs.push(f64::from(sender.sir_at(mission, from_m, *place)));
+        sirs.push(f64::from(
+            sender.sir_at(mission, from_m, *place).min(f32::MAX),
+        ));
         sender = Sender::relay(mission, *profile);
         from_m = place.x_m;
     }

@@ -85,6 +85,8 @@ pub(crate) struct Node {
     sweep_due: bool,
     verdict_due: bool,
     busy_due: bool,
+    /// How often the current sweep has been sent again since anything was heard of it.
+    unheard: u8,
     pending: Pending,
     pub(crate) stats: Stats,
     random: u32,
@@ -127,6 +129,7 @@ impl Node {
             sweep_due: false,
             verdict_due: false,
             busy_due: false,
+            unheard: 0,
             pending: Pending::default(),
             stats: Stats::default(),
             random,
@@ -199,7 +202,14 @@ impl Node {
                     link.signs.answer = true;
                 }
             }
-            (Side::Downstream, Message::Busy { .. }) => {}
+            (Side::Downstream, Message::Busy { sweep }) => {
+                if self.align.phase() == Phase::Waiting && sweep == self.align.number() {
+                    // It has arrived: what is missing is the answer, and that may take its time.
+                    self.unheard = 0;
+                    let patience = self.patience();
+                    self.timers.set(Timer::Repeat, now + patience);
+                }
+            }
             (Side::Upstream, Message::Verdict(_) | Message::Busy { .. })
             | (Side::Downstream, Message::Sweep(_)) => {
                 bump(&mut self.stats.misdirected);
@@ -217,6 +227,7 @@ impl Node {
                 self.timers.set(Timer::Work, now + PAUSE);
             }
             Next::Forward => {
+                self.unheard = 0;
                 self.sweep_due = true;
                 self.busy_due = false;
                 // An answer to the sweep before would be stale.
@@ -261,6 +272,7 @@ impl Node {
                 Timer::Repeat => {
                     if self.align.phase() == Phase::Waiting {
                         bump(&mut self.stats.repeats);
+                        self.unheard = self.unheard.saturating_add(1);
                         self.sweep_due = true;
                     }
                 }
@@ -324,16 +336,19 @@ impl Node {
 
     /// How long the verdict on a sweep sent now may take: there and back over every hop that is left, and two to spare.
     ///
-    /// The relay next to a lost frame runs out of patience first, so one loss costs one repetition. A random eighth keeps
-    /// relays on a shared channel from repeating in step.
+    /// The relay next to a lost frame runs out of patience first, so one loss costs one repetition. From then on it is
+    /// known that frames get lost here, and the sweep is repeated sooner, first after four hops' time and then after twice
+    /// as long each, until a neighbour says that it has arrived. A random eighth keeps relays on a shared channel from
+    /// repeating in step.
     fn patience(&mut self) -> Duration {
         let hops = u32::from(self.mission.relays().saturating_sub(self.index));
-        let patience = self.settings.hop_time.times(2 * hops + 2);
-        Duration::from_micros(
-            patience
-                .as_micros()
-                .saturating_add(u64::from(self.draw()) % (patience.as_micros() / 8 + 1)),
-        )
+        let answer = 2 * hops + 2;
+        let hops = match self.unheard {
+            0 => answer,
+            again => answer.min(2 << u32::from(again).min(16)),
+        };
+        let patience = self.settings.hop_time.times(hops).as_micros();
+        Duration::from_micros(patience.saturating_add(u64::from(self.draw()) % (patience / 8 + 1)))
     }
 
     /// A xorshift generator (Marsaglia 2003, 13-17-5): only timing depends on it, never a placement.
