@@ -6,7 +6,7 @@
 
 /// The square root of `x`, within one unit in the last place of an f32; 0 for anything below the smallest normal f32.
 ///
-/// `x` from there to the largest f32; 16 instructions. `roots_are_within_one_unit_in_the_last_place` asserts the accuracy
+/// `x` from there to the largest f32; 18 instructions on a Cortex-M4F. `roots_are_within_one_unit_in_the_last_place` asserts the accuracy
 /// for every mantissa: a factor of 4 changes nothing but the exponent of the result, so two octaves stand for all.
 pub(crate) fn sqrt(x: f32) -> f32 {
     if !(x >= f32::MIN_POSITIVE) {
