@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::node::settings::SetupError;
-use uav_relay::{Event, FrameBuf, Identity, Instant, Phase, Port, Relay, Settings, Side};
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{Event, Identity, Instant, Phase, Port, Relay, Settings, Side};
 
 use super::faults::Injected;
 use super::link::Line;
@@ -238,7 +239,7 @@ impl Chain {
     /// Takes out what the relay has to say, and when it wants to be called again.
     fn drain(&mut self, index: usize) {
         let now = self.now;
-        let mut frame: FrameBuf = [0; _];
+        let mut frame = [0; MAX_FRAME];
         while let Some(member) = self.members.get_mut(index)
             && let Some(transmit) = member.relay.poll_transmit(now, &mut frame)
         {
