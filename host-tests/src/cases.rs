@@ -5,6 +5,22 @@ use serde_json::Value;
 
 use crate::reference::{Link, Station};
 
+/// The optimum (linear SIR) of the default scenario by number of relays, from the same program, to nine digits.
+pub const OPTIMA: [(u16, f64); 12] = [
+    (1, 1.490_121_51),
+    (2, 1.616_583_02),
+    (3, 1.747_031_29),
+    (4, 1.881_667_00),
+    (5, 2.020_675_28),
+    (8, 2.465_535_75),
+    (10, 2.786_622_55),
+    (16, 3.875_573_20),
+    (20, 4.710_644_20),
+    (32, 7.756_114_78),
+    (50, 13.859_132_9),
+    (100, 40.441_345_0),
+];
+
 /// The scenario of a case, SI units; the field names of the file are kept.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Params {

@@ -9,6 +9,7 @@
 )]
 
 use host_tests::brief::{as_relays_know_it, of_link};
+use host_tests::cases::OPTIMA;
 use host_tests::random::{self, Chain as Kind, Style};
 use host_tests::reference::Link;
 use host_tests::sim::chain::run;
@@ -19,22 +20,6 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::plan;
 use uav_relay::{Duration, Instant, Mission, Profile, Schedule, Side};
-
-/// The optimum of the default scenario by number of relays, from a program that shares nothing with this one.
-const OPTIMA: [(u16, f64); 12] = [
-    (1, 1.490_121_51),
-    (2, 1.616_583_02),
-    (3, 1.747_031_29),
-    (4, 1.881_667_00),
-    (5, 2.020_675_28),
-    (8, 2.465_535_75),
-    (10, 2.786_622_55),
-    (16, 3.875_573_20),
-    (20, 4.710_644_20),
-    (32, 7.756_114_78),
-    (50, 13.859_132_9),
-    (100, 40.441_345_0),
-];
 
 /// Everything at once, as a bad day has it.
 const BAD_DAY: Faults = Faults {

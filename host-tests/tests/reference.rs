@@ -17,22 +17,6 @@ mod degenerate;
 #[path = "reference/random.rs"]
 mod random;
 
-/// Optimum of the paper's scenario by number of relays.
-const OPTIMA: [(usize, f64); 12] = [
-    (1, 1.490_121_51),
-    (2, 1.616_583_02),
-    (3, 1.747_031_29),
-    (4, 1.881_667_00),
-    (5, 2.020_675_28),
-    (8, 2.465_535_75),
-    (10, 2.786_622_55),
-    (16, 3.875_573_20),
-    (20, 4.710_644_20),
-    (32, 7.756_114_78),
-    (50, 13.859_132_9),
-    (100, 40.441_345_0),
-];
-
 fn close(got: f64, want: f64, rtol: f64, what: &str) {
     let near = (got - want).abs() <= rtol * want.abs();
     assert!(
@@ -233,7 +217,8 @@ fn optima_match_the_file_and_the_table() {
             &case.id,
         );
     }
-    for (n, want) in OPTIMA {
+    for (n, want) in cases::OPTIMA {
+        let n = usize::from(n);
         close(
             Link::paper(n).optimum().unwrap(),
             want,

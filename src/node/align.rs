@@ -160,7 +160,7 @@ impl Align {
                 Ok(None) => return Next::Work,
                 Ok(Some(agreed)) => {
                     Search::new(mission, profile, Schedule::Bracketed).map(|mut search| {
-                        search.expect(agreed.ladder);
+                        search.begin_with(agreed.ladder);
                         search
                     })
                 }

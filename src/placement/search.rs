@@ -121,7 +121,7 @@ impl Search {
     }
 
     /// Tries `ladder` next instead: the one by which the head, having solved the chain beforehand, expects a commit.
-    pub(crate) fn expect(&mut self, ladder: Ladder) {
+    pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.ladder = ladder;
     }
 
