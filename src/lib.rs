@@ -3,6 +3,7 @@
 #![doc = include_str!("tour.md")]
 
 pub mod channel;
+pub mod field;
 pub mod gain;
 pub mod mission;
 pub mod node;

@@ -16,6 +16,9 @@
 //!
 //! X = D with Y = 0 (2.5 %) puts the interferer on Rx: the SIR of every chain is 0 and there is no optimum.
 
+pub mod beta;
+pub mod joint;
+
 use std::ops::RangeInclusive;
 
 use rand::{Rng, RngExt};

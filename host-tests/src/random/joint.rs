@@ -1,0 +1,123 @@
+//! Random scenarios of the joint problem, in which relays choose their altitudes within a band.
+//!
+//! | quantity | distribution |
+//! | --- | --- |
+//! | D | log-uniform, 100 m to 10 km |
+//! | N | half uniform, half log-uniform over the range asked for |
+//! | X | 80 % uniform in [0, D]; 10 % within 0.05 D of an end, either side; 5 % each in [-D, 0] and [D, 2 D] |
+//! | Y | 70 % log-uniform 0.003 D to 0.1 D; else log-uniform 0.1 D to D |
+//! | lowest altitude | log-uniform 0.005 D to 0.05 D |
+//! | highest altitude | log-uniform from twice the lowest to 0.5 D |
+//! | relay power | log-uniform 0.1 W to 10 W, all relays alike |
+//! | Tx power | 80 % log-uniform 0.3 to 10 times a relay's; else 10 to 100 times |
+//! | interferer power | log-uniform 1 to 300 times a relay's |
+//! | channel | 50 % the paper's (2 GHz) with eta = `mu_los`; else `mu_los` = 1, `mu_nlos` log-uniform 1 to 100, eta log-uniform from 1 to the lesser of 10 and `mu_nlos` |
+//! | least separation | half 0; else log-uniform 0.01 to 0.1 times D / (N + 1) |
+//!
+//! Weighted toward scenarios in which altitudes of their own help: Tx is seldom so loud that hop 1 does not matter, and the
+//! interferer is often close to the axis. In about a third the best chain is more than 1 % better than the best common altitude.
+
+use std::ops::RangeInclusive;
+
+use rand::{Rng, RngExt};
+
+use super::log_uniform;
+use crate::reference::joint::Band;
+use crate::reference::{Link, Station};
+
+/// A link and the band of its relays, which stand at the band's lowest altitude in the link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// The link.
+    pub link: Link,
+    /// The band.
+    pub band: Band,
+}
+
+/// Draws one scenario; the distribution is in the module's table. `relays` within 1 to 1000.
+pub fn scenario(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
+    let d = log_uniform(rng, 100.0, 1e4);
+    let n = count(rng, relays);
+    let (mu_los, mu_nlos, eta) = channel(rng);
+    let relay_w = log_uniform(rng, 0.1, 10.0);
+    let tx_w = relay_w
+        * if rng.random_bool(0.8) {
+            log_uniform(rng, 0.3, 10.0)
+        } else {
+            log_uniform(rng, 10.0, 100.0)
+        };
+    let interferer_w = relay_w * log_uniform(rng, 1.0, 300.0);
+    let least_m = d * log_uniform(rng, 0.005, 0.05);
+    let relay = Station {
+        altitude_m: least_m,
+        power_w: relay_w,
+    };
+    let min_separation_m = if rng.random() {
+        0.0
+    } else {
+        d / (f64::from(n) + 1.0) * log_uniform(rng, 0.01, 0.1)
+    };
+    let link = Link {
+        distance_m: d,
+        min_separation_m,
+        tx_w,
+        interferer_w,
+        x_i: d * along(rng),
+        y_i: d * aside(rng),
+        mu_los,
+        mu_nlos,
+        eta,
+        relays: (0..n).map(|_| relay).collect(),
+    };
+    let most_m = log_uniform(rng, 2.0 * least_m, 0.5 * d);
+    let band = Band { least_m, most_m };
+    Scenario { link, band }
+}
+
+/// How many relays.
+fn count(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> u32 {
+    if rng.random() {
+        return rng.random_range(relays.clone());
+    }
+    let (fewest, most) = (*relays.start(), *relays.end());
+    let draw = log_uniform(rng, f64::from(fewest), f64::from(most) + 0.999);
+    relays
+        .clone()
+        .rev()
+        .find(|&n| f64::from(n) <= draw)
+        .unwrap_or(fewest)
+}
+
+/// X as a share of D.
+fn along(rng: &mut impl Rng) -> f64 {
+    match rng.random_range(0..40) {
+        0..32 => rng.random_range(0.0..=1.0),
+        32..36 => {
+            let end = if rng.random() { 0.0 } else { 1.0 };
+            end + rng.random_range(-0.05..=0.05)
+        }
+        36..38 => rng.random_range(-1.0..=0.0),
+        _ => rng.random_range(1.0..=2.0),
+    }
+}
+
+/// Y as a share of D.
+fn aside(rng: &mut impl Rng) -> f64 {
+    if rng.random_bool(0.7) {
+        log_uniform(rng, 0.003, 0.1)
+    } else {
+        log_uniform(rng, 0.1, 1.0)
+    }
+}
+
+/// `mu_los`, `mu_nlos` and eta.
+fn channel(rng: &mut impl Rng) -> (f64, f64, f64) {
+    if rng.random() {
+        let Link {
+            mu_los, mu_nlos, ..
+        } = Link::paper(0);
+        return (mu_los, mu_nlos, mu_los);
+    }
+    let mu_nlos = log_uniform(rng, 1.0, 100.0);
+    (1.0, mu_nlos, log_uniform(rng, 1.0, mu_nlos.min(10.0)))
+}

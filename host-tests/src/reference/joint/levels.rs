@@ -1,0 +1,212 @@
+//! The best chain whose relays fly at given levels: exact for those levels, whatever the interferer.
+//!
+//! For a target, the places each relay can reach at each of its levels are a union of intervals (see `reference::sets`): a
+//! sender at another level matters only through its nearest place, which is the least advance away or at the end of an
+//! interval, and either way the receiver's places solve a quadratic inequality. The target is bisected. Quadratics are solved
+//! here, unlike in the rest of the reference, for speed: what comes out is judged by its SIR alone.
+
+use super::plane::Pair;
+use super::scene::Scene;
+
+type Interval = (f64, f64);
+
+/// Reachable places of one relay: a level and its sorted, disjoint intervals, for every level.
+type Reach = Vec<(f64, Vec<Interval>)>;
+
+/// Where each relay may be.
+#[derive(Debug, Clone)]
+pub(super) struct Slot {
+    /// Its altitudes.
+    pub(super) levels: Vec<f64>,
+    /// Its places along Tx-Rx, both ends included.
+    pub(super) window: Interval,
+}
+
+/// The best chain, one slot per relay, to `tolerance` in ln SIR; `None` if no chain reaches `floor`, a ln SIR.
+pub(super) fn best_chain(
+    scene: &Scene,
+    slots: &[Slot],
+    floor: f64,
+    tolerance: f64,
+) -> Option<Vec<Pair>> {
+    let mut best = chain(scene, slots, floor)?;
+    let mut low = scene.worst(&best).max(floor);
+    let mut high = scene.ceiling();
+    let mut stride = 0.02;
+    while high - low > tolerance {
+        // Strides that double find the bracket; most calls start just below the optimum.
+        let middle = low.midpoint(high).min(low + stride);
+        match chain(scene, slots, middle) {
+            Some(found) => {
+                low = middle.max(scene.worst(&found));
+                best = found;
+                stride *= 2.0;
+            }
+            None => high = middle,
+        }
+    }
+    Some(best)
+}
+
+/// A chain that meets a target, ln SIR.
+fn chain(scene: &Scene, slots: &[Slot], target: f64) -> Option<Vec<Pair>> {
+    let mut reaches: Vec<Reach> = Vec::with_capacity(slots.len());
+    for (slot, &constant) in slots.iter().zip(&scene.hops) {
+        let ease = (constant - target).exp();
+        let reach = |&level: &f64| {
+            let hop = Landing {
+                scene,
+                ease,
+                level,
+                window: slot.window,
+            };
+            let mut pieces = Vec::new();
+            match reaches.last() {
+                None => hop.after_place(Pair::default(), 0.0, &mut pieces),
+                Some(last) => {
+                    for (from_level, set) in last {
+                        hop.after_level(*from_level, set, &mut pieces);
+                    }
+                }
+            }
+            (level, merge(pieces))
+        };
+        let reach: Reach = slot.levels.iter().map(reach).collect();
+        if reach.iter().all(|(_, set)| set.is_empty()) {
+            return None;
+        }
+        reaches.push(reach);
+    }
+    trace_back(scene, &reaches, target)
+}
+
+/// The last relay nearest to Rx, then each relay nearest to its successor.
+fn trace_back(scene: &Scene, reaches: &[Reach], target: f64) -> Option<Vec<Pair>> {
+    let mut next = Pair::new(1.0, 0.0);
+    let mut places = Vec::with_capacity(reaches.len());
+    for reach in reaches.iter().rev() {
+        let is_last = places.is_empty();
+        let candidates = reach.iter().filter_map(|(level, set)| {
+            let advance = if is_last {
+                0.0
+            } else {
+                least_advance(scene, next.h - level)
+            };
+            last_at_or_before(set, next.x - advance).map(|x| Pair::new(x, *level))
+        });
+        let distance = |place: &Pair| (next - *place).dot(next - *place);
+        let place = candidates.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        if is_last && scene.last - distance(&place).ln() < target {
+            return None;
+        }
+        places.push(place);
+        next = place;
+    }
+    places.reverse();
+    Some(places)
+}
+
+/// How far past its sender a relay must be for the least separation, `rise` above or below it.
+pub(super) fn least_advance(scene: &Scene, rise: f64) -> f64 {
+    (scene.apart * scene.apart - rise * rise).max(0.0).sqrt()
+}
+
+/// A relay at one level that a hop is to reach: (sender to relay)^2 <= `ease` (relay to interferer)^2.
+struct Landing<'a> {
+    scene: &'a Scene,
+    ease: f64,
+    level: f64,
+    window: Interval,
+}
+
+impl Landing<'_> {
+    /// Places at least `advance` past one sender.
+    fn after_place(&self, from: Pair, advance: f64, pieces: &mut Vec<Interval>) {
+        let (ahead, rise) = (self.scene.interferer.x - from.x, self.level - from.h);
+        let rest = self.scene.aside_2 + self.level * self.level;
+        not_positive(
+            1.0 - self.ease,
+            self.ease * ahead,
+            rise * rise - self.ease * (ahead * ahead + rest),
+            (
+                (from.x + advance).max(self.window.0) - from.x,
+                self.window.1 - from.x,
+            ),
+            |(start, end)| pieces.push((from.x + start, from.x + end)),
+        );
+    }
+
+    /// Places reached from a whole set of one level.
+    fn after_level(&self, level: f64, set: &[Interval], pieces: &mut Vec<Interval>) {
+        let rise = self.level - level;
+        let advance = least_advance(self.scene, rise);
+        let rest = self.scene.aside_2 + self.level * self.level;
+        let x_i = self.scene.interferer.x;
+        for &(start, end) in set {
+            // The sender just the least advance behind.
+            not_positive(
+                -self.ease,
+                0.0,
+                advance * advance + rise * rise - self.ease * rest,
+                (
+                    (start + advance).max(self.window.0) - x_i,
+                    (end + advance).min(self.window.1) - x_i,
+                ),
+                |(start, end)| pieces.push((x_i + start, x_i + end)),
+            );
+            self.after_place(Pair::new(end, level), advance, pieces);
+        }
+    }
+}
+
+/// Calls `found` with the one or two intervals of `within` where a z^2 + 2 b z + c <= 0.
+fn not_positive(a: f64, b: f64, c: f64, within: Interval, mut found: impl FnMut(Interval)) {
+    let (low, high) = within;
+    if !(low <= high) {
+        return;
+    }
+    let discriminant = b * b - a * c;
+    if discriminant < 0.0 {
+        if c <= 0.0 && a <= 0.0 {
+            found(within);
+        }
+        return;
+    }
+    // The root of larger size first, for its digits; infinite where the inequality is linear.
+    let sum = -(b + discriminant.sqrt().copysign(b));
+    let (far, near) = (sum / a, if sum == 0.0 { 0.0 } else { c / sum });
+    let (first, second) = (far.min(near), far.max(near));
+    let mut clip = |start: f64, end: f64| {
+        let (start, end) = (start.max(low), end.min(high));
+        if start <= end {
+            found((start, end));
+        }
+    };
+    if a >= 0.0 {
+        clip(first, second);
+    } else {
+        clip(f64::NEG_INFINITY, first);
+        clip(second, f64::INFINITY);
+    }
+}
+
+/// Sorts intervals and joins those that touch.
+fn merge(mut pieces: Vec<Interval>) -> Vec<Interval> {
+    pieces.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let mut merged: Vec<Interval> = Vec::with_capacity(4);
+    for (start, end) in pieces {
+        match merged.last_mut() {
+            Some(last) if start <= last.1 => last.1 = last.1.max(end),
+            _ => merged.push((start, end)),
+        }
+    }
+    merged
+}
+
+/// The last place of `set` that is not beyond `limit`.
+fn last_at_or_before(set: &[Interval], limit: f64) -> Option<f64> {
+    set.iter()
+        .rev()
+        .find(|piece| piece.0 <= limit)
+        .map(|piece| piece.1.min(limit))
+}

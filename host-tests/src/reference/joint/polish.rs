@@ -1,0 +1,250 @@
+//! From a fair chain to the local optimum near it: a primal-dual interior-point method that stays feasible.
+//!
+//! Places and target are the unknowns, the target is maximised, every [`Limit`] stays > 0. A Newton step costs O(N); where the
+//! Lagrangian is not convex, a multiple of the identity is added until it is.
+
+use super::plane::{Block, Pair, Square, solve};
+use super::scene::{Limit, Scene};
+
+/// The last weight of the barrier: the target ends below the local optimum by this times the number of limits.
+const LAST_WEIGHT: f64 = 1e-12;
+
+/// The least error of the optimality conditions that rounding lets through.
+const LEAST_ERROR: f64 = 1e-10;
+
+/// Newton steps after which the polishing gives up; 30 to 100 are usual.
+const STEPS: u32 = 400;
+
+/// Share of the way to the nearest limit that one step may go.
+const NEARLY: f64 = 0.995;
+
+/// A chain with its target and the multipliers of its limits.
+struct Iterate {
+    places: Vec<Pair>,
+    target: f64,
+    limits: Vec<Limit>,
+    duals: Vec<f64>,
+}
+
+/// The chain at the local optimum that is reached from `start`, which must be strictly within all limits; `None` if it is not.
+///
+/// `slack` > 0 is how far below the SIR of `start` the target begins, and how strong the barrier does: a larger slack forgets
+/// more of `start`.
+pub(super) fn polish(scene: &Scene, start: &[Pair], slack: f64) -> Option<Vec<Pair>> {
+    let target = scene.worst(start) - slack;
+    let limits = scene.limits(start, target);
+    if limits.is_empty() || !limits.iter().all(|limit| limit.value > 0.0) {
+        return None;
+    }
+    let mut weight = slack / limits.len() as f64;
+    let duals = limits.iter().map(|limit| weight / limit.value).collect();
+    let mut at = Iterate {
+        places: start.to_vec(),
+        target,
+        limits,
+        duals,
+    };
+    for _ in 0..STEPS {
+        if at.error(weight) < weight.max(LEAST_ERROR) {
+            if weight <= LAST_WEIGHT {
+                break;
+            }
+            weight = (0.1 * weight).max(LAST_WEIGHT);
+        }
+        if !at.step(scene, weight) {
+            if weight <= LAST_WEIGHT {
+                break;
+            }
+            // Rounding hides what is left to gain at this weight.
+            weight = (0.1 * weight).max(LAST_WEIGHT);
+        }
+    }
+    Some(at.places)
+}
+
+/// A change of places and target.
+struct Direction {
+    steps: Vec<Pair>,
+    raise: f64,
+}
+
+impl Direction {
+    /// The step of a relay and of the one before it.
+    fn of(&self, relay: usize) -> (Pair, Pair) {
+        let step = |i: usize| self.steps.get(i).copied();
+        let before = relay.checked_sub(1).and_then(step);
+        (step(relay).unwrap_or_default(), before.unwrap_or_default())
+    }
+}
+
+impl Iterate {
+    /// The largest violation of the optimality conditions at a barrier's weight.
+    fn error(&self, weight: f64) -> f64 {
+        let mut slopes = vec![Pair::default(); self.places.len()];
+        let (mut target, mut worst) = (1.0, 0.0_f64);
+        for (limit, &dual) in self.limits.iter().zip(&self.duals) {
+            add(&mut slopes, limit.relay, limit.own * dual);
+            if let Some(before) = limit.relay.checked_sub(1) {
+                add(&mut slopes, before, limit.before * dual);
+            }
+            target += limit.target * dual;
+            worst = worst.max((limit.value * dual - weight).abs());
+        }
+        let slopes = slopes.iter().map(|slope| slope.x.abs().max(slope.h.abs()));
+        slopes.fold(worst.max(target.abs()), f64::max)
+    }
+
+    /// One damped Newton step; `false` when nothing is gained by it.
+    ///
+    /// It follows an arc: the limits bend, and a straight step along a narrow valley would soon run into its wall.
+    fn step(&mut self, scene: &Scene, weight: f64) -> bool {
+        let Some((damping, line)) = self.direction(weight) else {
+            return false;
+        };
+        let changes = self.changes(&line);
+        let bends = self.bends(&line);
+        let Some(arc) = self.damped_direction(weight, damping, Some(&bends)) else {
+            return false;
+        };
+        let slopes = self.limits.iter().zip(&changes);
+        let gain = line.raise
+            + slopes
+                .map(|(limit, change)| weight * change / limit.value)
+                .sum::<f64>();
+        let merit = self.merit(weight);
+        let mut share = 1.0;
+        while share > 1e-10 {
+            let (straight, bent) = (share * (1.0 - share), share * share);
+            let moves = self.places.iter().zip(line.steps.iter().zip(&arc.steps));
+            let places: Vec<Pair> = moves
+                .map(|(&place, (&line, &arc))| place + line * straight + arc * bent)
+                .collect();
+            let target = self.target + line.raise * straight + arc.raise * bent;
+            let limits = scene.limits(&places, target);
+            let mut pairs = limits.iter().zip(&self.limits);
+            if pairs.all(|(new, old)| new.value > (1.0 - NEARLY) * old.value) {
+                let next = Self {
+                    places,
+                    target,
+                    limits,
+                    duals: Vec::new(),
+                };
+                if next.merit(weight) >= merit + 1e-4 * share * gain - 1e-14 {
+                    let duals = self.next_duals(&changes, &next.limits, weight);
+                    *self = Self { duals, ..next };
+                    return true;
+                }
+            }
+            share *= 0.5;
+        }
+        false
+    }
+
+    /// The change of every limit along a direction, to first order.
+    fn changes(&self, along: &Direction) -> Vec<f64> {
+        self.limits
+            .iter()
+            .map(|limit| {
+                let (own, before) = along.of(limit.relay);
+                limit.own.dot(own) + limit.before.dot(before) + limit.target * along.raise
+            })
+            .collect()
+    }
+
+    /// What the second order adds to that.
+    fn bends(&self, along: &Direction) -> Vec<f64> {
+        self.limits
+            .iter()
+            .map(|limit| {
+                let (own, before) = along.of(limit.relay);
+                let across = limit.bend_across.apply(before);
+                0.5 * own.dot(limit.bend_own.apply(own)) + own.dot(across)
+                    - 0.5 * before.dot(across)
+            })
+            .collect()
+    }
+
+    /// The target plus the barrier: what a step must raise.
+    fn merit(&self, weight: f64) -> f64 {
+        let barrier: f64 = self.limits.iter().map(|limit| limit.value.ln()).sum();
+        self.target + weight * barrier
+    }
+
+    /// The Newton direction, and the damping that it needed.
+    fn direction(&self, weight: f64) -> Option<(f64, Direction)> {
+        let dampings = std::iter::once(0.0).chain((0..30).map(|i| 1e-6 * 8_f64.powi(i)));
+        dampings
+            .map(|damping| (damping, self.damped_direction(weight, damping, None)))
+            .find_map(|(damping, found)| Some((damping, found?)))
+    }
+
+    /// The Newton direction with `damping` on the diagonal, and with limits that lie higher by `bends`.
+    fn damped_direction(
+        &self,
+        weight: f64,
+        damping: f64,
+        bends: Option<&[f64]>,
+    ) -> Option<Direction> {
+        let fresh = Block {
+            own: Square::diagonal(damping),
+            ..Block::default()
+        };
+        let mut blocks = vec![fresh; self.places.len()];
+        let (mut corner, mut corner_right) = (0.0, 1.0);
+        let bends = bends
+            .unwrap_or_default()
+            .iter()
+            .chain(std::iter::repeat(&0.0));
+        for ((limit, &dual), bend) in self.limits.iter().zip(&self.duals).zip(bends) {
+            let stiff = dual / limit.value;
+            let push = weight / limit.value - stiff * bend;
+            if let Some(block) = blocks.get_mut(limit.relay) {
+                block.own =
+                    block.own + Square::outer(limit.own, limit.own) * stiff - limit.bend_own * dual;
+                block.before = block.before + Square::outer(limit.own, limit.before) * stiff
+                    - limit.bend_across * dual;
+                block.common = block.common + limit.own * (limit.target * stiff);
+                block.right = block.right + limit.own * push;
+            }
+            let before = limit.relay.checked_sub(1);
+            if let Some(block) = before.and_then(|i| blocks.get_mut(i)) {
+                block.own = block.own
+                    + Square::outer(limit.before, limit.before) * stiff
+                    + limit.bend_across * dual;
+                block.common = block.common + limit.before * (limit.target * stiff);
+                block.right = block.right + limit.before * push;
+            }
+            corner += limit.target * limit.target * stiff;
+            corner_right += limit.target * push;
+        }
+        let (steps, raise) = solve(&blocks, corner, corner_right)?;
+        Some(Direction { steps, raise })
+    }
+
+    /// The multipliers after a step: Newton's, kept > 0 and near `weight` / value.
+    fn next_duals(&self, changes: &[f64], limits: &[Limit], weight: f64) -> Vec<f64> {
+        let old = self.limits.iter().zip(&self.duals).zip(changes);
+        let steps: Vec<f64> = old
+            .map(|((limit, dual), change)| (weight - dual * change) / limit.value - dual)
+            .collect();
+        let room = self.duals.iter().zip(&steps);
+        let share = room
+            .filter(|&(_, &step)| step < 0.0)
+            .map(|(dual, step)| -NEARLY * dual / step)
+            .fold(1.0, f64::min);
+        let moved = self.duals.iter().zip(&steps);
+        moved
+            .zip(limits)
+            .map(|((dual, step), limit)| {
+                let middle = weight / limit.value;
+                (dual + share * step).clamp(1e-8 * middle, 1e8 * middle)
+            })
+            .collect()
+    }
+}
+
+fn add(slopes: &mut [Pair], relay: usize, slope: Pair) {
+    if let Some(sum) = slopes.get_mut(relay) {
+        *sum = *sum + slope;
+    }
+}

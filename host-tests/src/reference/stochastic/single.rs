@@ -1,0 +1,101 @@
+//! One relay: the paper's Algorithm 3, as printed and as it should be, and its optimum by brute force.
+
+use super::StochasticLink;
+
+/// Where one relay ends up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Single {
+    /// Its place, metres.
+    pub x_m: f64,
+    /// The lesser of the target and the first hop's expected SIR there, linear.
+    pub sir: f64,
+    /// Targets tried.
+    pub iterations: usize,
+}
+
+impl StochasticLink {
+    /// Algorithm 3 as printed: it stops at the first target that the first hop meets, else takes the best seen.
+    ///
+    /// The second hop's targets fall from its largest value in steps of `step`; `None` unless there is exactly one relay.
+    pub fn algorithm3_printed(&self, step: f64) -> Option<Single> {
+        self.descend(step, |here, _, gamma| (here.sir >= gamma).then_some(here))
+    }
+
+    /// Algorithm 3 put right: it goes on while a lower target could still be better than the best seen.
+    ///
+    /// Between the two steps around the optimum this prefers the place where the first hop is the weaker one, so for a
+    /// constant Upsilon its place may be one step off the printed one's, with an SIR at least as high.
+    pub fn algorithm3(&self, step: f64) -> Option<Single> {
+        self.descend(step, |_, best, gamma| {
+            (best.sir >= gamma - step).then_some(best)
+        })
+    }
+
+    /// Lowers the target until `end`, given the place at hand, the best one and the target, names where to stay.
+    fn descend(
+        &self,
+        step: f64,
+        end: impl Fn(Single, Single, f64) -> Option<Single>,
+    ) -> Option<Single> {
+        let [_] = self.relays.as_slice() else {
+            return None;
+        };
+        let mut gamma = self.ceiling();
+        let mut best: Option<Single> = None;
+        let mut iterations = 1;
+        while gamma > 0.0 {
+            if let Some(&[x_m]) = self.backward(gamma).as_deref() {
+                let here = Single {
+                    x_m,
+                    sir: self.hop_sirs(&[x_m]).first()?.min(gamma),
+                    iterations,
+                };
+                let leader = best.filter(|best| best.sir >= here.sir).unwrap_or(here);
+                best = Some(leader);
+                if let Some(end) = end(here, leader, gamma) {
+                    return Some(Single { iterations, ..end });
+                }
+                if x_m <= 0.0 {
+                    break;
+                }
+            }
+            gamma -= step;
+            iterations += 1;
+        }
+        best.map(|best| Single { iterations, ..best })
+    }
+
+    /// The best expected SIR of one relay over all places, by a grid of `points` per piece of the table of Upsilon,
+    /// refined four times around the best place; `None` unless there is exactly one relay.
+    pub fn single_optimum(&self, points: u32) -> Option<(f64, f64)> {
+        let [_] = self.relays.as_slice() else {
+            return None;
+        };
+        let d = self.distance_m;
+        let mut ends: Vec<f64> = self.upsilon.iter().map(|(x, _)| x.clamp(0.0, d)).collect();
+        ends.extend([0.0, d]);
+        ends.sort_by(f64::total_cmp);
+        let mut best = (0.0, 0.0);
+        for piece in ends.windows(2) {
+            let &[mut low, mut high] = piece else {
+                continue;
+            };
+            let mut here = (low, 0.0);
+            for _ in 0..5 {
+                let step = (high - low) / f64::from(points);
+                for k in 0..=points {
+                    let x = low + step * f64::from(k);
+                    let sir = self.chain_sir(&[x]);
+                    if sir > here.1 {
+                        here = (x, sir);
+                    }
+                }
+                (low, high) = (f64::max(here.0 - step, low), f64::min(here.0 + step, high));
+            }
+            if here.1 > best.1 {
+                best = here;
+            }
+        }
+        Some(best)
+    }
+}

@@ -1,0 +1,231 @@
+//! The f64 judge of chains under stochastic interference, judged itself: by values of a separate program, and by methods
+//! of its own that must agree.
+
+use host_tests::random::{log_uniform, seed};
+use host_tests::reference::stochastic::StochasticLink;
+use host_tests::reference::{Link, Station};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::off;
+
+/// The Upsilon of the program's chains, 1/W: 0.8 of `p_u` U / (eta h^2) with the paper's channel and 20 m.
+const UPSILON: f64 = 2_301_379.773_574_951;
+
+/// The paper's multi-hop scenario under the same interference everywhere.
+fn paper(n: usize) -> StochasticLink {
+    let link = Link::paper(n);
+    StochasticLink {
+        distance_m: link.distance_m,
+        tx_w: link.tx_w,
+        mu_los: link.mu_los,
+        eta: link.eta,
+        upsilon: vec![(0.0, UPSILON)],
+        relays: link.relays,
+    }
+}
+
+/// One relay at 10 m on 100 m, 10 W against 1 W, all path-loss factors 1.
+fn short(upsilon: Vec<(f64, f64)>) -> StochasticLink {
+    StochasticLink {
+        distance_m: 100.0,
+        tx_w: 10.0,
+        mu_los: 1.0,
+        eta: 1.0,
+        upsilon,
+        relays: vec![Station {
+            altitude_m: 10.0,
+            power_w: 1.0,
+        }],
+    }
+}
+
+/// Places from `first` on, `step` apart.
+fn evenly(got: &[f64], first: f64, step: f64) {
+    for (k, got) in (0..).zip(got) {
+        let want = first + step * f64::from(k);
+        assert!(off(*got, want) < 1e-7, "relay {k}: {got} against {want}");
+    }
+}
+
+#[test]
+fn algorithm_4_takes_the_steps_of_a_separate_program() {
+    let twenty = paper(20).algorithm4(0.1).unwrap();
+    assert!(off(twenty.gamma, 0.2) < 1e-12);
+    assert_eq!((twenty.iterations, twenty.places.len()), (7, 20));
+    evenly(&twenty.places, 205.358_983_848_622_42, 40.0);
+
+    let fifty = paper(50).algorithm4(0.1).unwrap();
+    assert!(off(fifty.gamma, 0.8) < 1e-12);
+    assert_eq!((fifty.iterations, fifty.places.len()), (1, 50));
+    evenly(&fifty.places, 20.0, 20.0);
+
+    // More relays than the distance has room for at full reach: some end up above Tx, and the chain is none the worse.
+    let hundred = paper(100).algorithm4(0.1).unwrap();
+    assert_eq!((hundred.iterations, hundred.places[0]), (1, 0.0));
+    // The optimum of eight, 0.09117, is below the step: nothing is found.
+    assert_eq!(paper(8).algorithm4(0.1), None);
+    assert!(off(paper(8).algorithm4(1e-4).unwrap().gamma, 0.091_17) < 2e-3);
+}
+
+#[test]
+fn the_fewest_relays_are_those_of_a_separate_program() {
+    let low = paper(1).fewest(0.2, 100).unwrap();
+    assert_eq!(low.iterations, 17);
+    evenly(&low.places, 325.358_983_848_622_4, 40.0);
+    let high = paper(1).fewest(0.79, 100).unwrap();
+    assert_eq!(high.iterations, 42);
+    evenly(&high.places, 172.576_271_298_479_2, 20.126_184_217_065);
+    // Where only shortening any hop helps, 12 do.
+    let link = StochasticLink {
+        distance_m: 105.0,
+        tx_w: 1.0,
+        ..short(vec![(0.0, 100.0)])
+    };
+    assert_eq!(link.fewest(1.0, 100).unwrap().iterations, 12);
+    assert_eq!(link.fewest(1.0, 11), None);
+}
+
+#[test]
+fn algorithm_3_takes_the_steps_of_a_separate_program() {
+    let link = short(vec![(0.0, 4.0)]);
+    let printed = link.algorithm3_printed(1e-4).unwrap();
+    assert!(off(printed.x_m, 77.297_916_056_347_92) < 1e-6);
+    assert!(off(printed.sir, 0.006_499_999_999_999_889_5) < 1e-6);
+    assert_eq!(printed.iterations, 336);
+    // Put right it may end a step earlier, never lower.
+    let right = link.algorithm3(1e-4).unwrap();
+    let (_, optimum) = link.single_optimum(1000).unwrap();
+    assert!(right.sir >= printed.sir && right.sir <= optimum * (1.0 + 1e-12));
+    assert!(optimum - right.sir <= 1e-4);
+}
+
+#[test]
+fn the_first_target_that_is_met_is_not_the_best() {
+    // Quiet from 90 m on, loud before.
+    let link = short(vec![(0.0, 0.1), (90.0 - 1e-9, 0.1), (90.0, 100.0)]);
+    let printed = link.algorithm3_printed(1e-5).unwrap();
+    assert!((printed.sir - 0.009_98).abs() < 1e-5, "{printed:?}");
+    let right = link.algorithm3(1e-5).unwrap();
+    assert!((right.sir - 0.121_95).abs() < 1e-5, "{right:?}");
+    let (x, optimum) = link.single_optimum(1000).unwrap();
+    assert!((x - 90.0).abs() < 1e-6 && off(optimum, 1000.0 / 8200.0) < 1e-9);
+    assert!(off(link.backward_best(2000), optimum) < 1e-3);
+}
+
+/// A chain of alike relays under the same interference everywhere.
+fn random_chain(rng: &mut ChaCha8Rng) -> StochasticLink {
+    let distance_m = log_uniform(rng, 10.0, 1e5);
+    let station = Station {
+        altitude_m: (log_uniform(rng, 0.002, 0.2) * distance_m).clamp(1.0, 5000.0),
+        power_w: log_uniform(rng, 0.01, 100.0),
+    };
+    let mu_los = log_uniform(rng, 1.0, 1e4);
+    StochasticLink {
+        distance_m,
+        tx_w: log_uniform(rng, 0.1, 1e3),
+        mu_los,
+        eta: mu_los * log_uniform(rng, 1.0, 20.0),
+        upsilon: vec![(0.0, log_uniform(rng, 1e-3, 1e12))],
+        relays: vec![station; rng.random_range(1..20)],
+    }
+}
+
+#[test]
+fn under_constant_interference_all_optima_are_one() {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed(1));
+    let mut capped = 0;
+    for _ in 0..150 {
+        let link = random_chain(&mut rng);
+        let closed = link.iid_optimum().unwrap();
+        let ceiling = link.ceiling();
+        let found = link.backward_best(400);
+        assert!(off(found, closed) < 1e-6, "{link:?}: {found:e} {closed:e}");
+        // A fixed step is never better, and at most itself worse.
+        let step = closed * 0.01;
+        if ceiling / step < 1e5 {
+            let fixed = link.algorithm4(step).unwrap();
+            assert!(fixed.gamma <= closed * (1.0 + 1e-9), "{link:?}");
+            assert!(fixed.gamma >= closed - step * (1.0 + 1e-6), "{link:?}");
+            assert!(link.chain_sir(&fixed.places) >= fixed.gamma * (1.0 - 1e-9));
+        }
+        if link.relays.len() == 1 {
+            let (_, best) = link.single_optimum(200).unwrap();
+            assert!(off(best, closed) < 1e-6, "{link:?}");
+        }
+        capped += u32::from(
+            off(
+                closed,
+                ceiling.min(ceiling * link.tx_w / link.relays[0].power_w),
+            ) < 1e-12,
+        );
+    }
+    println!("{capped} of 150 at the ceiling");
+    assert!(capped > 0, "the ceiling was never reached");
+}
+
+#[test]
+fn one_relay_in_any_field_is_found_by_going_backward() {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed(2));
+    for _ in 0..100 {
+        let mut link = random_chain(&mut rng);
+        link.relays.truncate(1);
+        let d = link.distance_m;
+        let knots = rng.random_range(2..8_u8);
+        link.upsilon = (0..knots)
+            .map(|k| {
+                let x = d * f64::from(k) / f64::from(knots - 1);
+                (x, log_uniform(&mut rng, 1e3, 1e5))
+            })
+            .collect();
+        assert_eq!(link.iid_optimum(), None);
+        let (x, best) = link.single_optimum(500).unwrap();
+        assert!(off(link.chain_sir(&[x]), best) < 1e-12);
+        let backward = link.backward_best(2000);
+        assert!(
+            backward <= best * (1.0 + 1e-6),
+            "{link:?}: {backward:e} {best:e}"
+        );
+        assert!(
+            backward >= best * (1.0 - 1e-3),
+            "{link:?}: {backward:e} {best:e}"
+        );
+        let stepped = link.algorithm3(link.ceiling() * 1e-4).unwrap();
+        assert!(
+            best - stepped.sir <= link.ceiling() * 1e-4,
+            "{link:?}: {stepped:?} {best:e}"
+        );
+    }
+}
+
+#[test]
+fn expected_sirs_follow_power_over_distance_and_upsilon() {
+    let link = StochasticLink {
+        distance_m: 100.0,
+        tx_w: 8.0,
+        mu_los: 2.0,
+        eta: 4.0,
+        upsilon: vec![(0.0, 1.0), (100.0, 11.0)],
+        relays: vec![
+            Station {
+                altitude_m: 3.0,
+                power_w: 10.0,
+            },
+            Station {
+                altitude_m: 6.0,
+                power_w: 13.0,
+            },
+        ],
+    };
+    assert_eq!(link.upsilon_at(-5.0), 1.0);
+    assert_eq!(link.upsilon_at(105.0), 11.0);
+    // 8 W over 4 (40^2 + 3^2), 10 W over 2 (10^2 + 3^2), 13 W over 4 (50^2 + 6^2); Upsilon 5, 6 and 11.
+    let want = [40.0 / 6436.0, 60.0 / 218.0, 143.0 / 10144.0];
+    let got = link.hop_sirs(&[40.0, 50.0]);
+    assert_eq!(got.len(), 3);
+    for (got, want) in got.iter().zip(want) {
+        assert!(off(*got, want) < 1e-14, "{got} {want}");
+    }
+    assert_eq!(link.chain_sir(&[40.0, 50.0]), got[0]);
+    assert!(link.hop_sirs(&[40.0]).is_empty() && link.chain_sir(&[40.0]) == 0.0);
+}

@@ -1,0 +1,142 @@
+//! How good an estimate is, in hundreds of seeds: its error, and whether its own standard error holds.
+
+use host_tests::random::seed;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use uav_relay::field::beta_upsilon;
+use uav_relay::field::estimate::{Estimate, Estimator, MIN_SAMPLES};
+
+use super::off;
+use host_tests::random::beta::beta_w;
+
+const SEEDS: u64 = 100;
+
+const I_MAX_W: f32 = 3.476_175_5e-7;
+
+/// What came of one pair of shapes.
+#[derive(Default, Debug)]
+struct Found {
+    /// Estimates that were made.
+    made: u32,
+    /// Those within 5 % of the truth.
+    close: u32,
+    /// Those within two of their standard errors of the truth.
+    covered: u32,
+    worst: f64,
+    /// The largest standard error, as a part of the estimate.
+    widest: f64,
+}
+
+fn estimate(alpha: f64, beta: f64, samples: u32, seed: u64) -> Option<Estimate> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut estimator = Estimator::new(I_MAX_W);
+    for _ in 0..samples {
+        estimator.push(beta_w(&mut rng, alpha, beta, I_MAX_W));
+    }
+    assert_eq!(estimator.accepted() + estimator.rejected(), samples);
+    estimator.estimate()
+}
+
+/// Estimates from `samples` samples each, in [`SEEDS`] seeds.
+fn found(alpha: f64, beta: f64, samples: u32, first: u64) -> Found {
+    let truth = beta_upsilon(alpha, beta, f64::from(I_MAX_W)).unwrap_or(f64::INFINITY);
+    let mut found = Found::default();
+    // Every pair of shapes gets samples of its own.
+    let first = first.wrapping_mul(1_000_003) ^ alpha.to_bits() ^ beta.to_bits().rotate_left(32);
+    for k in 0..SEEDS {
+        let Some(estimate) = estimate(alpha, beta, samples, first.wrapping_add(k)) else {
+            continue;
+        };
+        let upsilon = f64::from(estimate.upsilon_per_w);
+        let error = f64::from(estimate.standard_error_per_w);
+        found.made += 1;
+        found.close += u32::from(off(upsilon, truth) <= 0.05);
+        found.covered += u32::from((upsilon - truth).abs() <= 2.0 * error);
+        found.worst = found.worst.max(off(upsilon, truth));
+        found.widest = found.widest.max(error / upsilon);
+    }
+    println!(
+        "alpha {alpha}, beta {beta}, {samples} samples: {} made, {} within 5 %, worst {:.2} %, widest error {:.2} %, covered {}",
+        found.made,
+        found.close,
+        100.0 * found.worst,
+        100.0 * found.widest,
+        found.covered,
+    );
+    found
+}
+
+/// Each alpha with a small, a middling and a large beta.
+fn grid(alphas: [f64; 3]) -> [(f64, f64); 9] {
+    std::array::from_fn(|k| (alphas[k / 3], [0.5, 3.0, 20.0][k % 3]))
+}
+
+#[test]
+fn ten_thousand_samples_give_upsilon_within_five_percent() {
+    let first = seed(1);
+    let mut covered = 0;
+    let pairs = grid([3.0, 6.0, 20.0]);
+    for (alpha, beta) in pairs {
+        let found = found(alpha, beta, 10_000, first);
+        assert!(found.close >= 99, "{alpha} {beta}: {found:?}");
+        assert!(found.covered >= 90, "{alpha} {beta}: {found:?}");
+        // Nor is the standard error a way out: it stays small where the estimate is good.
+        assert!(found.widest < 0.015, "{alpha} {beta}: {found:?}");
+        covered += found.covered;
+    }
+    println!("covered: {covered} of {}", 100 * pairs.len());
+}
+
+#[test]
+fn the_standard_error_holds() {
+    let first = seed(2);
+    let mut covered = 0;
+    let pairs = grid([1.5, 2.0, 2.5]);
+    for (alpha, beta) in pairs {
+        let found = found(alpha, beta, 10_000, first);
+        assert!(
+            found.made == 100 && found.covered >= 90,
+            "{alpha} {beta}: {found:?}"
+        );
+        assert!(found.widest < 0.06, "{alpha} {beta}: {found:?}");
+        covered += found.covered;
+    }
+    println!("covered: {covered} of {}", 100 * pairs.len());
+}
+
+#[test]
+fn it_holds_for_few_samples_too() {
+    let first = seed(3);
+    let (mut made, mut covered) = (0, 0);
+    for samples in [MIN_SAMPLES, 1_000] {
+        for alpha in [1.2, 1.5, 2.0, 4.0, 20.0] {
+            for beta in [0.5, 3.0, 20.0] {
+                let found = found(alpha, beta, samples, first);
+                // Next to alpha = 1 an estimate is made where chance made alpha large: it misleads, but rarely.
+                assert!(
+                    found.made - found.covered <= 10,
+                    "{alpha} {beta}: {found:?}"
+                );
+                made += found.made;
+                covered += found.covered;
+                assert!(
+                    found.made == 100 || alpha < 4.0,
+                    "{alpha} {beta}: {found:?}"
+                );
+            }
+        }
+    }
+    println!("covered: {covered} of {made}");
+    assert!(f64::from(covered) >= 0.94 * f64::from(made));
+}
+
+#[test]
+fn where_upsilon_is_infinite_there_is_hardly_ever_an_estimate() {
+    let first = seed(4);
+    for (alpha, most) in [(0.5, 0), (0.9, 0), (1.0, 8)] {
+        for beta in [0.5, 20.0] {
+            let made = found(alpha, beta, 4_000, first).made;
+            assert!(made <= most, "{alpha} {beta}: {made}");
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! Interference that is known by its distribution alone: how much 1 W of signal is worth against it, place by place.
+//!
+//! With the interference power I(x) a random variable, the expected SIR at x is the received signal power times
+//! Upsilon(x) = E[1 / I(x)], in 1/W: the one thing about the distribution that a plan needs. A [`Field`] is a table of it
+//! along x. Where I / `I_max` has a Beta distribution there is a closed form, [`beta_upsilon`]; where nothing is known but
+//! measurements, [`estimate::Estimator`] fits one.
+
+pub mod estimate;
+
+/// The most points a field may have.
+pub const MAX_POINTS: usize = 1024;
+
+/// The smallest and largest Upsilon of a field, 1/W: interference between 1e9 W and 1e-32 W, far outside what is measured.
+const UPSILON: (f32, f32) = (1e-9, 1e32);
+
+/// Upsilon at one place.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FieldPoint {
+    /// Place along the line from Tx (0) to Rx (D), m: -1e7 to 1e7.
+    pub x_m: f32,
+    /// Upsilon = E[1/I] there, 1/W: 1e-9 to 1e32.
+    pub upsilon_per_w: f32,
+}
+
+/// Why a table of points is no field.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum FieldError {
+    /// There is no point, or more than [`MAX_POINTS`].
+    Points,
+    /// The `x_m` of a point is not within -1e7 to 1e7.
+    Place,
+    /// The `x_m` of a point is not above that of the point before it.
+    Order,
+    /// The `upsilon_per_w` of a point is not within 1e-9 to 1e32.
+    Upsilon,
+}
+
+impl core::fmt::Display for FieldError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Points => "a field must have 1 to 1024 points",
+            Self::Place => "x_m must be within -1e7 to 1e7",
+            Self::Order => "x_m must rise from point to point",
+            Self::Upsilon => "upsilon_per_w must be within 1e-9 to 1e32",
+        })
+    }
+}
+
+impl core::error::Error for FieldError {}
+
+/// Upsilon along x: straight lines between the points of a checked table, and held beyond its ends.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Field {
+    points: &'static [FieldPoint],
+    smallest: f32,
+    largest: f32,
+}
+
+impl Field {
+    /// Checks every point. Usable in a constant, where [`Field::new`] turns a mistake into a failed build.
+    ///
+    /// Work: a few comparisons for each point.
+    ///
+    /// # Errors
+    /// [`FieldError`] names what is outside its range, for the first point where something is.
+    pub const fn try_new(points: &'static [FieldPoint]) -> Result<Self, FieldError> {
+        if points.is_empty() || points.len() > MAX_POINTS {
+            return Err(FieldError::Points);
+        }
+        let (mut smallest, mut largest) = (f32::MAX, 0.0);
+        let mut before = f32::NEG_INFINITY;
+        let mut rest = points;
+        while let [point, after @ ..] = rest {
+            if !(point.x_m >= -1e7 && point.x_m <= 1e7) {
+                return Err(FieldError::Place);
+            }
+            if !(point.x_m > before) {
+                return Err(FieldError::Order);
+            }
+            let upsilon = point.upsilon_per_w;
+            if !is_upsilon(upsilon) {
+                return Err(FieldError::Upsilon);
+            }
+            if upsilon < smallest {
+                smallest = upsilon;
+            }
+            if upsilon > largest {
+                largest = upsilon;
+            }
+            before = point.x_m;
+            rest = after;
+        }
+        Ok(Self {
+            points,
+            smallest,
+            largest,
+        })
+    }
+
+    /// As [`Field::try_new`], for a field that is a constant of the firmware.
+    ///
+    /// # Panics
+    /// On a table that is no field: in a `const` that is a failed build, which is what this is for. For numbers that are
+    /// only known at run time use [`Field::try_new`].
+    #[expect(
+        clippy::panic,
+        reason = "in a constant this fails the build, as documented"
+    )]
+    pub const fn new(points: &'static [FieldPoint]) -> Self {
+        match Self::try_new(points) {
+            Ok(field) => field,
+            Err(FieldError::Points) => panic!("a field must have 1 to 1024 points"),
+            Err(FieldError::Place) => panic!("x_m must be within -1e7 to 1e7"),
+            Err(FieldError::Order) => panic!("x_m must rise from point to point"),
+            Err(FieldError::Upsilon) => panic!("upsilon_per_w must be within 1e-9 to 1e32"),
+        }
+    }
+
+    /// The points as they were given.
+    pub const fn points(&self) -> &'static [FieldPoint] {
+        self.points
+    }
+
+    /// The smallest Upsilon anywhere, 1/W: where the interference is worst.
+    pub const fn smallest(&self) -> f32 {
+        self.smallest
+    }
+
+    /// The largest Upsilon anywhere, 1/W.
+    pub const fn largest(&self) -> f32 {
+        self.largest
+    }
+
+    /// Whether Upsilon is the same everywhere: the paper's i.i.d. interference.
+    pub const fn is_constant(&self) -> bool {
+        !(self.smallest < self.largest)
+    }
+
+    /// Upsilon at `x_m`, 1/W, relative error below 4e-7 of the straight line between the two points around it.
+    ///
+    /// Any `x_m` has one: the nearest end's beyond the ends, and the first point's for NaN. It is never outside the range
+    /// of the two points. Work: at most eleven comparisons of a binary search, three divisions. The accuracy is asserted by
+    /// `interpolation_agrees_with_f64_and_stays_between_its_neighbours` in `host-tests/tests/field/table.rs`.
+    pub const fn upsilon(&self, x_m: f32) -> f32 {
+        let mut around = self.points;
+        while around.len() > 2 {
+            let middle = around.len() / 2;
+            let (Some((_, after)), Some((before, _))) = (
+                around.split_at_checked(middle),
+                around.split_at_checked(middle + 1),
+            ) else {
+                break;
+            };
+            around = match after {
+                [pivot, ..] if pivot.x_m <= x_m => after,
+                _ => before,
+            };
+        }
+        match around {
+            [left, right] if left.x_m < x_m && x_m < right.x_m => between(*left, *right, x_m),
+            [_, right] if right.x_m <= x_m => right.upsilon_per_w,
+            [end, ..] => end.upsilon_per_w,
+            // No field is empty.
+            [] => self.smallest,
+        }
+    }
+}
+
+/// The line from `left` to `right` at `x_m` between them.
+const fn between(left: FieldPoint, right: FieldPoint, x_m: f32) -> f32 {
+    let (a, b) = (left.upsilon_per_w, right.upsilon_per_w);
+    let step = right.x_m - left.x_m;
+    // Two weights, so that only numbers above zero are added: a + (b - a) t would lose a small b next to a large a.
+    let upsilon = a * ((right.x_m - x_m) / step) + b * ((x_m - left.x_m) / step);
+    upsilon.max(a.min(b)).min(a.max(b))
+}
+
+/// Whether a field may have this Upsilon.
+pub(crate) const fn is_upsilon(upsilon_per_w: f32) -> bool {
+    upsilon_per_w >= UPSILON.0 && upsilon_per_w <= UPSILON.1
+}
+
+/// Upsilon = E[1/I] in 1/W where I / `i_max_w` has a Beta distribution with the shapes `alpha` and `beta`.
+///
+/// (alpha + beta - 1) / ((alpha - 1) `I_max`); printed without `I_max`, for I as a part of it. `i_max_w` in W. `None` unless
+/// alpha > 1 (E[1/I] is infinite otherwise), beta > 0, `i_max_w` > 0, and all three and the result are finite.
+/// In f64, since next to alpha = 1 an f32 of alpha would already be off; meant for constants, where it costs nothing.
+/// Accuracy: `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
+pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
+    let shapes = alpha > 1.0 && alpha.is_finite() && beta > 0.0 && beta.is_finite();
+    if !(shapes && i_max_w > 0.0 && i_max_w.is_finite()) {
+        return None;
+    }
+    let upsilon = ((alpha - 1.0) + beta) / (alpha - 1.0) / i_max_w;
+    if upsilon.is_finite() {
+        Some(upsilon)
+    } else {
+        None
+    }
+}
+
+impl FieldPoint {
+    /// The point at `x_m` metres of a field whose I / `i_max_w` has a Beta distribution there; `None` where
+    /// [`beta_upsilon`] has nothing. Constant work.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a field refuses what does not fit"
+    )]
+    pub const fn from_beta(x_m: f32, alpha: f64, beta: f64, i_max_w: f64) -> Option<Self> {
+        match beta_upsilon(alpha, beta, i_max_w) {
+            Some(upsilon) => Some(Self {
+                x_m,
+                upsilon_per_w: upsilon as f32,
+            }),
+            None => None,
+        }
+    }
+}
