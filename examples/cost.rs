@@ -19,13 +19,17 @@ mod target {
     use panic_halt as _;
     use stm32f4xx_hal as _;
     use uav_relay::channel::{AirGround, Channel};
+    use uav_relay::field::estimate::Estimator;
+    use uav_relay::placement::levels::Levels;
+    use uav_relay::placement::local::{Beside, Hops, Search};
     use uav_relay::placement::spacing::Hop;
+    use uav_relay::placement::wave::{Rungs, Wave};
     use uav_relay::sir::Sender;
     use uav_relay::wire::deframe::Deframer;
     use uav_relay::wire::frame::{self, MAX_FRAME};
     use uav_relay::{
-        FrameBuf, Identity, Instant, Interferer, Mission, MissionConfig, Phase, Port, Profile,
-        Relay, Settings,
+        Adjust, Band, Field, FieldPoint, FrameBuf, Identity, Instant, Interference, Interferer,
+        Local, Method, Mission, MissionConfig, Phase, Placement, Port, Profile, Relay, Settings,
     };
 
     /// 2 GHz, excess losses of 0.1 dB and 21 dB as factors.
@@ -45,16 +49,58 @@ mod target {
                 power_w: 1.0,
             },
             channel: CHANNEL,
-            interferer: Interferer {
+            band: Band::at(20.0),
+            interference: Interference::Source(Interferer {
                 power_w: 80.0,
                 x_m: 500.0,
                 y_m: 400.0,
-            },
+            }),
             tolerance: 1e-4,
         })
     }
 
     const MISSION: Mission = mission(8);
+
+    const INTERFERER: Interferer = Interferer {
+        power_w: 80.0,
+        x_m: 500.0,
+        y_m: 150.0,
+    };
+
+    /// As the others, with altitudes to choose from.
+    const HIGH: Mission = Mission::new(MissionConfig {
+        band: Band {
+            least_m: 20.0,
+            most_m: 300.0,
+        },
+        interference: Interference::Source(INTERFERER),
+        ..*mission(3).config()
+    });
+
+    const POINTS: [FieldPoint; 4] = [
+        FieldPoint {
+            x_m: 0.0,
+            upsilon_per_w: 2.0e6,
+        },
+        FieldPoint {
+            x_m: 300.0,
+            upsilon_per_w: 5.0e6,
+        },
+        FieldPoint {
+            x_m: 600.0,
+            upsilon_per_w: 1.1e6,
+        },
+        FieldPoint {
+            x_m: 1000.0,
+            upsilon_per_w: 3.0e6,
+        },
+    ];
+
+    /// As the others, in a field that is not the same everywhere.
+    const UNEVEN: Mission = Mission::new(MissionConfig {
+        interference: Interference::Field(Field::new(&POINTS)),
+        ..*mission(3).config()
+    });
 
     /// SysTick's largest value.
     const TOP: u32 = 0x00FF_FFFF;
@@ -93,9 +139,11 @@ mod target {
         let common = MISSION.config().common;
         let middle = Hop::new(
             &MISSION,
+            &INTERFERER,
             Sender::relay(&MISSION, common),
             4,
             common.altitude_m,
+            0.0,
         );
         let mut most = 0;
         for from in [100.0_f32, 400.0, 499.9, 500.1, 600.0, 900.0] {
@@ -270,6 +318,178 @@ mod target {
         hprintln!("frame {}", cost);
     }
 
+    /// A chain of three that settles on its own terms, and what its calls cost.
+    struct Flight {
+        relays: [Relay; 3],
+        /// The costliest call, and the longest frame.
+        most: u32,
+        longest: usize,
+    }
+
+    impl Flight {
+        fn new(mission: Mission, settings: Settings) -> Self {
+            Self {
+                relays: [1, 2, 3].map(|index| relay(index, settings, mission)),
+                most: 0,
+                longest: 0,
+            }
+        }
+
+        /// Delivers what relay `at` has to say.
+        fn drain(&mut self, at: usize, now: Instant) {
+            let mut frame: FrameBuf = [0; MAX_FRAME];
+            loop {
+                let Some(sender) = self.relays.get_mut(at) else {
+                    return;
+                };
+                let mut sent = None;
+                let cost = instructions(|| sent = sender.poll_transmit(now, &mut frame));
+                self.most = self.most.max(cost);
+                let Some(transmit) = sent else { return };
+                self.longest = self.longest.max(transmit.len);
+                let (to, port) = match transmit.port {
+                    Port::Upstream => (at.wrapping_sub(1), Port::Downstream),
+                    _ => (at + 1, Port::Upstream),
+                };
+                let bytes = frame.get(..transmit.len).unwrap_or_default();
+                if let Some(receiver) = self.relays.get_mut(to) {
+                    let cost = instructions(|| receiver.handle_bytes(now, port, bytes));
+                    self.most = self.most.max(cost);
+                }
+            }
+        }
+
+        /// Until all hold their places, or for `turns` turns.
+        fn settle(&mut self, turns: u32) -> bool {
+            let mut now = Instant::ZERO;
+            for _ in 0..turns {
+                // Twice, so that what a relay says in return is heard.
+                for at in [0, 1, 2, 1, 0] {
+                    self.drain(at, now);
+                }
+                if self
+                    .relays
+                    .iter()
+                    .all(|relay| relay.phase() == Phase::Holding)
+                {
+                    return true;
+                }
+                let Some(next) = self.relays.iter().filter_map(Relay::poll_timeout).min() else {
+                    continue;
+                };
+                now = next;
+                for relay in &mut self.relays {
+                    if relay.poll_timeout().is_some_and(|at| at <= now) {
+                        let cost = instructions(|| relay.handle_timeout(now));
+                        self.most = self.most.max(cost);
+                    }
+                }
+            }
+            false
+        }
+    }
+
+    #[inline(never)]
+    fn methods() {
+        let settings = Settings {
+            predict: false,
+            ..Settings::default()
+        };
+        let mut climb = Flight::new(
+            HIGH,
+            Settings {
+                method: Method::Altitude,
+                ..settings
+            },
+        );
+        hprintln!("altitude_settled {}", u32::from(climb.settle(20_000)));
+        hprintln!("altitude {}", climb.most);
+        hprintln!("wave_bytes {}", climb.longest);
+        let mut survey = Flight::new(
+            HIGH,
+            Settings {
+                method: Method::Altitude,
+                ..Settings::default()
+            },
+        );
+        hprintln!("survey_settled {}", u32::from(survey.settle(20_000)));
+        hprintln!("survey {}", survey.most);
+        let adjust = Adjust {
+            rounds: 2,
+            ..Adjust::default()
+        };
+        let mut turns = Flight::new(
+            HIGH,
+            Settings {
+                method: Method::Adjust(adjust),
+                ..settings
+            },
+        );
+        hprintln!("adjust_settled {}", u32::from(turns.settle(20_000)));
+        hprintln!("adjust {}", turns.most);
+        let mut field = Flight::new(UNEVEN, Settings::default());
+        hprintln!("field_settled {}", u32::from(field.settle(20_000)));
+        hprintln!("field {}", field.most);
+    }
+
+    /// A wave of sixteen levels and four targets, and a tube, through a middle relay; the local search of Algorithm 2.
+    fn shares() {
+        let common = HIGH.config().common;
+        let band = HIGH.config().band;
+        let mut wave = Wave::new(&HIGH);
+        for (name, levels, count) in [
+            ("wave_16", Levels::even(band, 16), 4),
+            ("tube", Levels::tube(100.0, 20.0), 7),
+            ("wave_64", Levels::even(band, 64), 1),
+        ] {
+            wave.begin(&HIGH, Rungs::new(0.7, 0.1, count), levels);
+            while !wave.step(&HIGH, &INTERFERER, 1, 64) {}
+            wave.hand_over(&HIGH, common.power_w);
+            let (mut all, mut done) = (0, false);
+            while !done {
+                all += instructions(|| done = wave.step(&HIGH, &INTERFERER, 2, 96));
+            }
+            hprintln!("{} {}", name, all);
+        }
+        hprintln!("size_of_wave {}", size_of::<Wave>());
+        let place = |x_m, altitude_m| Placement { x_m, altitude_m };
+        let beside = |place| Beside {
+            place,
+            apart_m: 4.0,
+        };
+        let gain = HIGH.relay_gain(1.0);
+        let (before, after) = (place(250.0, 100.0), place(320.0, 110.0));
+        let hops = Hops::new(
+            &HIGH,
+            &INTERFERER,
+            beside(before),
+            gain,
+            1.0,
+            Some(beside(after)),
+        );
+        let hops = black_box(hops);
+        let at = black_box(place(280.0, 104.0));
+        hprintln!(
+            "evaluation {}",
+            instructions(|| black_box(&hops).worse(black_box(at)))
+        );
+        let mut search = Search::new(Local::Fine, hops, at, 10.0, (20.0, 300.0));
+        let (mut all, mut over) = (0, false);
+        while !over {
+            all += instructions(|| over = search.step(240).is_ready());
+        }
+        hprintln!("search {}", all);
+        hprintln!("size_of_search {}", size_of::<Search>());
+        let mut estimator = Estimator::new(1e-6);
+        let mut push = 0;
+        for at in 1..=1000_u16 {
+            let power_w = black_box(1e-9 * f32::from(at));
+            push = push.max(instructions(|| estimator.push(power_w)));
+        }
+        hprintln!("sample {}", push);
+        hprintln!("estimate {}", instructions(|| estimator.estimate()));
+    }
+
     /// The largest portion of the head's prediction, and how many it takes for a hundred relays.
     fn predict() {
         const HUNDRED: Mission = mission(100);
@@ -299,6 +519,8 @@ mod target {
         deframe();
         sweep();
         predict();
+        shares();
+        methods();
         stack();
         hprintln!("done 1");
         debug::exit(debug::EXIT_SUCCESS);

@@ -5,7 +5,7 @@
 
 use uav_relay::channel::{AirGround, Channel};
 use uav_relay::placement::plan::silent_place;
-use uav_relay::{Interferer, Mission, MissionConfig, Profile};
+use uav_relay::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
 /// 2 GHz, excess losses of 0.1 dB and 21 dB as factors. A number out of range fails the build.
 const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
@@ -23,11 +23,12 @@ const MISSION: Mission = Mission::new(MissionConfig {
         power_w: 1.0,
     },
     channel: CHANNEL,
-    interferer: Interferer {
+    band: Band::at(20.0),
+    interference: Interference::Source(Interferer {
         power_w: 80.0,
         x_m: 500.0,
         y_m: 400.0,
-    },
+    }),
     tolerance: 1e-4,
 });
 

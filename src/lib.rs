@@ -17,12 +17,15 @@ pub mod time;
 pub mod wire;
 
 pub use channel::Channel;
-pub use mission::{Interferer, Mission, MissionConfig, Profile};
+pub use field::{Field, FieldPoint};
+pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfig, Profile};
 pub use node::Side;
-pub use node::align::Phase;
 pub use node::event::Event;
-pub use node::settings::{Identity, Settings, Wiring};
+pub use node::exchange::Phase;
+pub use node::sample::Sample;
+pub use node::settings::{Adjust, Identity, Measure, Method, Settings, Wiring};
 pub use node::stats::Stats;
+pub use placement::local::Local;
 pub use placement::search::Schedule;
 pub use relay::{Port, Relay, Transmit};
 pub use sir::Placement;

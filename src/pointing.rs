@@ -53,9 +53,9 @@ impl Bearing {
     }
 
     /// The bearing of the mission's interferer, which is on the ground, for a relay at `from`; to turn a null toward it.
-    /// `None` if the relay stands on it.
+    /// `None` if the relay stands on it, or the interference has no place.
     pub fn to_interferer(from: Placement, mission: &Mission) -> Option<Self> {
-        let interferer = mission.interferer();
+        let interferer = mission.interferer()?;
         Self::new(interferer.x_m - from.x_m, interferer.y_m, -from.altitude_m)
     }
 }

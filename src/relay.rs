@@ -1,8 +1,10 @@
 //! The facade a firmware uses: bytes in, bytes and setpoints out, and no input or output of its own.
 
+use crate::field::estimate::Estimate;
 use crate::mission::{Mission, Profile};
-use crate::node::align::Phase;
 use crate::node::event::Event;
+use crate::node::exchange::Phase;
+use crate::node::sample::Sample;
 use crate::node::settings::{Identity, Settings, SetupError, Wiring, check};
 use crate::node::stats::{Stats, bump};
 use crate::node::{Node, Side};
@@ -44,12 +46,12 @@ pub struct Transmit {
 ///   [`poll_transmit`](Self::poll_transmit) until it gives `None`, then [`poll_event`](Self::poll_event) until `None`,
 ///   then sleep until [`poll_timeout`](Self::poll_timeout) or the next byte.
 /// - Once drained, `poll_timeout` is `None` or later than `now`: the loop cannot spin.
-/// - *Setpoints* are finite, inside [0, D], at the altitude the relay holds, and at least the mission's separation from
-///   those of its neighbours for the same sweep. There is none before the first agreement, and nothing but a new agreement
-///   moves it.
+/// - *Setpoints* are finite, inside [0, D], at the altitude the relay holds or one of the mission's band, and at least the
+///   mission's separation from those of its neighbours for the same pass. There is none before the first agreement, and
+///   nothing moves it but a new agreement or the relay's own turn in Algorithm 2.
 ///
 /// ```
-/// use uav_relay::{Channel, Identity, Instant, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
+/// use uav_relay::{Band, Channel, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
 /// use uav_relay::channel::AirGround;
 ///
 /// let mission = Mission::try_new(MissionConfig {
@@ -59,7 +61,8 @@ pub struct Transmit {
 ///     tx_power_w: 80.0,
 ///     common: Profile { altitude_m: 20.0, power_w: 1.0 },
 ///     channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?,
-///     interferer: Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 },
+///     band: Band::at(20.0),
+///     interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
 ///     tolerance: 1e-4,
 /// })?;
 /// let identity = Identity { network: 7, index: 1 };
@@ -84,7 +87,7 @@ pub struct Relay {
 }
 
 impl Relay {
-    /// A relay that has just been switched on at `now`; relay 1 begins by itself.
+    /// A relay that has just been switched on at `now`; relay 1 (in a field relay N) begins by itself.
     ///
     /// `seed` should differ from relay to relay and from one start to the next (a chip's number, a noisy ADC); only the timing of
     /// repetitions and the numbering of sweeps depend on it, never a placement.
@@ -110,7 +113,8 @@ impl Relay {
 
     /// Takes in bytes received at `port`, however they are cut.
     ///
-    /// A dozen instructions a byte, and for each whole frame its CRC, its decoding and at most 16 reaches.
+    /// A dozen instructions a byte, and for each whole frame its CRC, its decoding and at most 16 reaches: what takes longer is
+    /// left to [`handle_timeout`](Self::handle_timeout).
     pub fn handle_bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
         let shared = self.wiring == Wiring::Shared;
         if shared != (port == Port::Shared) {
@@ -138,17 +142,32 @@ impl Relay {
         }
     }
 
-    /// Handles what is due by `now`. Bounded by 256 reaches, at the head while it predicts; next to nothing otherwise.
+    /// Handles what is due by `now`. Bounded by one portion of a computation: 256 reaches while the leader predicts, 320 hops
+    /// of a wave, 622 places of Algorithm 2; next to nothing otherwise.
     #[inline(never)] // as `poll_transmit`
     pub fn handle_timeout(&mut self, now: Instant) {
         self.node.handle_timeout(now);
     }
 
+    /// Takes one measurement of the interference, where `Settings::measure` asks for them.
+    ///
+    /// Constant work. What is no use is counted as [`Stats::samples_refused`].
+    pub fn handle_sample(&mut self, sample: Sample) {
+        self.node.handle_sample(sample);
+    }
+
+    /// Has the chain agree again, from the beginning of its method: in a closed loop, once it has measured where it stands.
+    ///
+    /// Only the leader (relay 1; in a field relay N) has something to begin; with any other relay nothing happens.
+    pub fn restart(&mut self, now: Instant) {
+        self.node.restart(now);
+    }
+
     /// Writes the next frame to be sent into `frame`, if there is one.
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
-        let (side, message) = self.node.poll_message(now)?;
         let sender = self.node.index();
+        let (side, message) = self.node.poll_message(now)?;
         let header = Header {
             network: self.network,
             sender,
@@ -204,7 +223,22 @@ impl Relay {
         self.node.mission()
     }
 
-    /// What the relay holds.
+    /// What the measurements at this place say so far, and `None` before they say anything.
+    pub fn estimate(&self) -> Option<Estimate> {
+        self.node.meter().estimate()
+    }
+
+    /// Upsilon that this relay uses instead of the agreed field's, 1/W, once it has measured enough.
+    pub fn measured_per_w(&self) -> Option<f32> {
+        self.node.meter().published()
+    }
+
+    /// While Algorithm 2 goes on, at the leader: rounds that are over, and the SIR (linear) of the chain after the last.
+    pub fn rounds(&self) -> Option<(u16, f32)> {
+        self.node.rounds()
+    }
+
+    /// What the relay holds; its altitude is the one chosen last.
     pub fn profile(&self) -> Profile {
         self.node.profile()
     }
@@ -241,7 +275,7 @@ fn receive(node: &mut Node, network: u16, now: Instant, port: Port, plain: &[u8]
     match Message::decode(body) {
         Ok(message) => {
             bump(&mut node.stats.received);
-            node.handle_message(now, side, message);
+            node.handle_message(now, side, &message);
         }
         Err(_) => bump(&mut node.stats.malformed),
     }

@@ -17,7 +17,22 @@ pub struct Placement {
     pub altitude_m: f32,
 }
 
-/// A node that feeds a hop: where it stands and what its power is worth against the interferer's.
+/// How little is heard of the interference at `at`, as a relay there sees it: the one term in which kinds of it differ.
+///
+/// (X - x)^2 + Y^2 + h^2 in m^2 for an interferer; Upsilon(x) / `Upsilon_max`, 0 to 1, in a field. The SIR of a hop into
+/// that place is the sender's gain times this, over the squared length of the hop.
+pub fn quiet(mission: &Mission, at: Placement) -> f32 {
+    match mission.interferer() {
+        Some(interferer) => {
+            square(interferer.x_m - at.x_m) + square(interferer.y_m) + square(at.altitude_m)
+        }
+        None => mission
+            .field()
+            .map_or(1.0, |field| field.upsilon(at.x_m) / field.largest()),
+    }
+}
+
+/// A node that feeds a hop: where it stands and what its power is worth against the interference.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sender {
@@ -45,14 +60,12 @@ impl Sender {
     /// SIR at a relay at `to`, fed by this node standing at `from_m` along x; infinite when both share one place.
     ///
     /// With s = X - x0: A ((s - d)^2 + Y^2 + h^2) / (d^2 + (h - h0)^2), which is the paper's `SIR_1` for h0 = 0 and A =
-    /// `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`).
+    /// `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`). In a field it is the expected SIR,
+    /// p Upsilon(x) / (eta d^2) and p Upsilon(x) / (`mu_los` d^2).
     pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
-        let interferer = mission.interferer();
         let step = to.x_m - from_m;
         let climb = to.altitude_m - self.altitude_m;
-        let to_interferer =
-            square(interferer.x_m - to.x_m) + square(interferer.y_m) + square(to.altitude_m);
-        self.gain.value() * to_interferer / (square(step) + square(climb))
+        self.gain.value() * quiet(mission, to) / (square(step) + square(climb))
     }
 }
 
@@ -65,9 +78,12 @@ pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
 /// The largest SIR that a relay at `altitude_m` can have on the first hop, over all x in [0, D].
 ///
 /// At x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`). For X < 0 `SIR_1` has its maximum at the other
-/// stationary point, (q - sqrt(q^2 + 4 X^2 h^2)) / 2X with q = X^2 + Y^2, written here without cancellation.
+/// stationary point, (q - sqrt(q^2 + 4 X^2 h^2)) / 2X with q = X^2 + Y^2, written here without cancellation. In a field
+/// it is a bound: the quietest place right above the transmitter.
 pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
-    let interferer = mission.interferer();
+    let Some(interferer) = mission.interferer() else {
+        return mission.tx_gain().value() / square(altitude_m);
+    };
     let x_m = if interferer.x_m < 0.0 {
         let q = square(interferer.x_m) + square(interferer.y_m);
         let twice_area = 2.0 * interferer.x_m * altitude_m;
@@ -87,7 +103,7 @@ pub(crate) const fn square(x: f32) -> f32 {
 mod tests {
     use super::{Placement, Sender, first_hop_ceiling};
     use crate::mission::tests::paper;
-    use crate::mission::{Interferer, Mission, MissionConfig};
+    use crate::mission::{Interference, Interferer, Mission, MissionConfig};
 
     #[test]
     fn the_ceiling_of_the_first_hop_is_never_below_what_a_scan_finds() {
@@ -103,7 +119,7 @@ mod tests {
                 y_m,
             };
             let mission = Mission::try_new(MissionConfig {
-                interferer,
+                interference: Interference::Source(interferer),
                 ..paper(1)
             })
             .unwrap();

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use uav_relay::channel::AirGround;
 use uav_relay::mission::MissionError;
 use uav_relay::serial::byte_time;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
-    Channel, Duration, Identity, Interferer, Mission, MissionConfig, Profile, Settings, Wiring,
+    Adjust, Band, Channel, Duration, Field, FieldPoint, Identity, Interference, Interferer,
+    Mission, MissionConfig, Profile, Settings, Wiring,
 };
 
 /// A frame's way through two kernels and two USB adapters, and the computing: an adapter alone may wait 16 ms.
@@ -53,6 +54,13 @@ struct Options {
     /// Altitude of every relay, m, 0.1 to 1e5
     #[arg(long, value_name = "M", default_value_t = 20.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.1, 1e5))]
     altitude: f32,
+    /// Altitudes to choose from, m, 0.1 to 1e5, --altitude among them; without it that alone
+    #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
+    band: Option<Band>,
+    /// How the places are found; with --field, only by `align`. What counts is what the first relay is given, with --field the
+    /// last one
+    #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
+    method: Method,
     /// Power of the transmitter, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", default_value_t = 80.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 1e6))]
     tx_power: f32,
@@ -62,9 +70,23 @@ struct Options {
     /// Interferer: power (W, 1e-6 to 1e9), place along and beside the line to the receiver (m, -1e7 to 1e7)
     #[arg(long, value_name = "P,X,Y", default_value = "80,500,400", allow_hyphen_values = true, value_parser = interferer)]
     interferer: Interferer,
+    /// In place of --interferer, a field: Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32) along the line to the receiver
+    /// (m, -1e7 to 1e7), X rising
+    #[arg(long, value_name = "X:UPSILON,X:UPSILON,..", conflicts_with = "interferer", allow_hyphen_values = true, value_parser = field)]
+    field: Option<Field>,
     /// Least distance between two relays, m, 0 to 1e5
     #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 1e5))]
     min_separation: f32,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Method {
+    /// Algorithm 1, in a field Algorithm 4
+    Align,
+    /// Joint distance and altitude
+    Altitude,
+    /// Algorithm 1, then Algorithm 2
+    Adjust,
 }
 
 /// The ttys of either wiring, each with its option's name; none where there is no neighbour.
@@ -126,9 +148,21 @@ fn plan(options: &Options) -> Result<Plan, String> {
             options.quiet_ms + 1
         ));
     }
+    if options.field.is_some() && options.method != Method::Align {
+        let method = options.method.to_possible_value();
+        return Err(format!(
+            "--method {}: must be align with --field",
+            method.as_ref().map_or("", |method| method.get_name())
+        ));
+    }
     let ttys = ttys(options)?;
     let frame = u32::try_from(MAX_FRAME).unwrap_or(u32::MAX);
     let settings = Settings {
+        method: match options.method {
+            Method::Align => uav_relay::Method::Align,
+            Method::Altitude => uav_relay::Method::Altitude,
+            Method::Adjust => uav_relay::Method::Adjust(Adjust::default()),
+        },
         wiring: match ttys {
             Ttys::Pair { .. } => Wiring::Pair,
             Ttys::Shared(_) => Wiring::Shared,
@@ -198,7 +232,11 @@ fn mission(options: &Options) -> Result<Mission, String> {
             power_w: options.uav_power,
         },
         channel,
-        interferer: options.interferer,
+        band: options.band.unwrap_or(Band::at(options.altitude)),
+        interference: options.field.map_or(
+            Interference::Source(options.interferer),
+            Interference::Field,
+        ),
         tolerance: 1e-4,
     };
     Mission::try_new(config).map_err(|error| match error {
@@ -206,6 +244,13 @@ fn mission(options: &Options) -> Result<Mission, String> {
             "--min-separation {}: must be at most --distance {} / (--of {} - 1)",
             options.min_separation, options.distance, options.of
         ),
+        MissionError::Band => {
+            let Band { least_m, most_m } = config.band;
+            format!(
+                "--band {least_m},{most_m}: must be from LEAST to MOST, with --altitude {} among them",
+                options.altitude
+            )
+        }
         other => other.to_string(),
     })
 }
@@ -217,16 +262,43 @@ fn number(text: &str, least: f32, most: f32) -> Result<f32, String> {
         .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
 }
 
+/// One of several numbers.
+fn named(name: &str, text: &str, least: f32, most: f32) -> Result<f32, String> {
+    number(text, least, most).map_err(|error| format!("{name} {error}"))
+}
+
 fn interferer(text: &str) -> Result<Interferer, String> {
     let [power, x, y] = text.split(',').collect::<Vec<_>>()[..] else {
         return Err("must be three numbers: P,X,Y".to_owned());
-    };
-    let named = |name: &str, text, least, most| {
-        number(text, least, most).map_err(|error| format!("{name} {error}"))
     };
     Ok(Interferer {
         power_w: named("P", power, 1e-6, 1e9)?,
         x_m: named("X", x, -1e7, 1e7)?,
         y_m: named("Y", y, -1e7, 1e7)?,
     })
+}
+
+fn band(text: &str) -> Result<Band, String> {
+    let (least, most) = text
+        .split_once(',')
+        .ok_or("must be two numbers: LEAST,MOST")?;
+    Ok(Band {
+        least_m: named("LEAST", least, 0.1, 1e5)?,
+        most_m: named("MOST", most, 0.1, 1e5)?,
+    })
+}
+
+/// The mission wants its field for as long as the program runs.
+fn field(text: &str) -> Result<Field, String> {
+    let point = |text: &str| {
+        let (x, upsilon) = text
+            .split_once(':')
+            .ok_or("must be points: X:UPSILON,X:UPSILON,..")?;
+        Ok(FieldPoint {
+            x_m: named("X", x, -1e7, 1e7)?,
+            upsilon_per_w: named("UPSILON", upsilon, 1e-9, 1e32)?,
+        })
+    };
+    let points: Result<Vec<FieldPoint>, String> = text.split(',').map(point).collect();
+    Field::try_new(points?.leak()).map_err(|error| error.to_string())
 }

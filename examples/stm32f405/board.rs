@@ -8,11 +8,11 @@ use stm32f4xx_hal::pac::Interrupt;
 
 use super::config::{self, Block};
 
-/// The configuration block, as it stands in the flash.
-pub(crate) fn block() -> Block {
+/// The configuration block, where it stands in the flash.
+pub(crate) fn block() -> &'static Block {
     // SAFETY: a part of the flash, which is always readable, and which nothing writes while the program runs; bytes need
     // no alignment.
-    unsafe { read_volatile(config::ADDRESS as *const Block) }
+    unsafe { &*(config::ADDRESS as *const Block) }
 }
 
 /// Lets an interrupt through. Called once its driver is in place.

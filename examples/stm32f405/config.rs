@@ -11,7 +11,8 @@
 //! | 8 | u16 | index: which relay this is, 1 (next to the transmitter) to N |
 //! | 10 | u16 | network: frames of any other are ignored |
 //! | 12 | u16 | relays N |
-//! | 14 | u16 | 0, for a later version |
+//! | 14 | u8 | method: 0 align, 1 altitude, 2 adjust |
+//! | 15 | u8 | 1 if this relay keeps to its altitude when altitudes are chosen, else 0 |
 //! | 16 | f32 | distance, m |
 //! | 20 | f32 | least separation, m |
 //! | 24 | f32 | power of the transmitter, W |
@@ -19,22 +20,35 @@
 //! | 32 | f32 | power that the relays have in common, W |
 //! | 36 | f32 | altitude of this relay, m |
 //! | 40 | f32 | power of this relay, W |
-//! | 44 | f32 | power of the interferer, W |
-//! | 48 | f32 | x of the interferer, m |
-//! | 52 | f32 | y of the interferer, m |
+//! | 44 | f32 | power of the interferer, W; 0 in a field |
+//! | 48 | f32 | x of the interferer, m; 0 in a field |
+//! | 52 | f32 | y of the interferer, m; 0 in a field |
 //! | 56 | f32 | tolerance |
 //! | 60 | f64 | carrier, Hz |
 //! | 68 | f64 | excess loss with line of sight, as a factor |
 //! | 76 | f64 | excess loss without, as a factor |
 //! | 84 | f64 | weight of line of sight between drone and ground, 0 to 1 |
-//! | 92 | u32 | CRC-32C of bytes 0 to 91 |
+//! | 92 | f32 | lowest altitude of the band, m |
+//! | 96 | f32 | highest altitude of the band, m |
+//! | 100 | f32 | adjust: how far a relay may go up or down in one turn, m; 0 with another method |
+//! | 104 | u16 | adjust: rounds at most, 1 to 65535; 0 with another method |
+//! | 106 | u16 | points of the field, 1 to [`MAX_POINTS`]; 0 where there is an interferer |
+//! | 108 | f32 | the most interference that may be measured, W; 0 without samples |
+//! | 112 | u32 | samples to take at a place; 0 where nothing is measured |
+//! | 116 + 8 k | f32 | x of point k of the field, counted from 0, m; 0 behind the last one |
+//! | 120 + 8 k | f32 | Upsilon of point k, 1/W; 0 behind the last one |
+//! | 244 | u32 | CRC-32C of bytes 0 to 243 |
 //!
-//! The ranges are those of [`MissionConfig`], [`Channel::new`] and [`Profile`].
+//! The ranges are those of [`MissionConfig`], [`Channel::new`], [`Profile`], [`Adjust`], [`Measure`] and [`Field`].
 
 use uav_relay::channel::{AirGround, Channel, ChannelError};
+use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
 use uav_relay::wire::crc::Crc32c;
-use uav_relay::{Identity, Interferer, Mission, MissionConfig, Profile};
+use uav_relay::{
+    Adjust, Band, Field, FieldPoint, Identity, Interference, Interferer, Local, Measure, Method,
+    Mission, MissionConfig, Profile,
+};
 
 /// Where the block begins: the last sector of the flash of an STM32F405.
 pub const ADDRESS: u32 = 0x080E_0000;
@@ -43,19 +57,31 @@ pub const ADDRESS: u32 = 0x080E_0000;
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// The version of the table above.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 
 /// Bytes of a block.
-pub const LEN: usize = 96;
+pub const LEN: usize = 248;
+
+/// Points of a field that a block has room for.
+pub const MAX_POINTS: usize = 16;
 
 /// Bytes that the check sequence covers.
 const CHECKED: usize = LEN - 4;
 
 /// [`LEN`] as the block states it.
-const LEN_FIELD: u16 = 96;
+const LEN_FIELD: u16 = 248;
 
 /// A block as it is stored.
 pub type Block = [u8; LEN];
+
+/// Where the field of a mission is kept.
+pub type Room = [FieldPoint; MAX_POINTS];
+
+/// Room for a field that is not known yet.
+pub const EMPTY: Room = [FieldPoint {
+    x_m: 0.0,
+    upsilon_per_w: 0.0,
+}; MAX_POINTS];
 
 /// What the block says, checked.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -66,6 +92,12 @@ pub struct Config {
     pub mission: Mission,
     /// What this relay brings along.
     pub profile: Profile,
+    /// Whether it keeps to that altitude when altitudes are chosen.
+    pub hold_altitude: bool,
+    /// What the leader has the chain do.
+    pub method: Method,
+    /// Whether and how the interference is measured.
+    pub measure: Option<Measure>,
 }
 
 /// What is wrong with a block.
@@ -79,12 +111,26 @@ pub enum ConfigError {
     Version,
     /// The CRC does not match: it was cut short or damaged.
     Crc,
-    /// A byte that must be 0 is not.
-    Reserved,
     /// The index is not within 1 to N.
     Index,
     /// The altitude or the power of this relay is out of range.
     Profile,
+    /// What says whether the altitude is kept is neither 0 nor 1.
+    Hold,
+    /// The method is unknown, or chooses altitudes in a field.
+    Method,
+    /// Rounds or altitudes of adjust are out of range, or not 0 with another method.
+    Adjust,
+    /// What is said of measuring is out of range, or not 0 without samples.
+    Measure,
+    /// There is a field, and the interferer is not 0.
+    Interferer,
+    /// There are more points than a block has room for.
+    Points,
+    /// What is behind the last point is not 0.
+    Unused,
+    /// This number of the field is out of range.
+    Field(FieldError),
     /// This number of the channel is out of range.
     Channel(ChannelError),
     /// This number of the mission is out of range.
@@ -119,12 +165,14 @@ impl ChannelNumbers {
     }
 }
 
-/// Reads a block; whatever its bytes, it is a configuration or an error.
+/// Reads a block; whatever its bytes, it is a configuration or an error. A field goes into `room`.
+///
+/// What it gives a relay takes: nothing is left to be refused.
 ///
 /// # Errors
 /// [`ConfigError`] says what is wrong, and of a number which one.
 #[inline(never)] // its stack is given back before the relay needs some
-pub fn read(block: &Block) -> Result<Config, ConfigError> {
+pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigError> {
     if block.iter().all(|&byte| byte == 0xFF) || block.iter().all(|&byte| byte == 0) {
         return Err(ConfigError::Blank);
     }
@@ -142,9 +190,7 @@ pub fn read(block: &Block) -> Result<Config, ConfigError> {
     let index = rest.u16();
     let network = rest.u16();
     let relays = rest.u16();
-    if rest.u16() != 0 {
-        return Err(ConfigError::Reserved);
-    }
+    let [method, hold] = rest.take();
     let distance_m = rest.f32();
     let min_separation_m = rest.f32();
     let tx_power_w = rest.f32();
@@ -162,6 +208,14 @@ pub fn read(block: &Block) -> Result<Config, ConfigError> {
         excess_nlos: rest.f64(),
         los_weight: rest.f64(),
     };
+    let band = Band {
+        least_m: rest.f32(),
+        most_m: rest.f32(),
+    };
+    let method = rest.method(method)?;
+    let points = rest.u16();
+    let measure = rest.measure()?;
+    let interference = rest.interference(points, interferer, room)?;
     let channel = numbers.channel().map_err(ConfigError::Channel)?;
     let mission = Mission::try_new(MissionConfig {
         relays,
@@ -169,8 +223,9 @@ pub fn read(block: &Block) -> Result<Config, ConfigError> {
         min_separation_m,
         tx_power_w,
         common,
+        band,
         channel,
-        interferer,
+        interference,
         tolerance,
     })
     .map_err(ConfigError::Mission)?;
@@ -180,17 +235,45 @@ pub fn read(block: &Block) -> Result<Config, ConfigError> {
     if !profile.is_valid() {
         return Err(ConfigError::Profile);
     }
+    if hold > 1 {
+        return Err(ConfigError::Hold);
+    }
+    if method != Method::Align && points > 0 {
+        return Err(ConfigError::Method);
+    }
     Ok(Config {
         identity: Identity { network, index },
         mission,
         profile,
+        hold_altitude: hold == 1,
+        method,
+        measure,
     })
 }
 
 /// Writes the block that says `config`; `numbers` are those its channel was made of.
+///
+/// There is no place in it for a grid in adjust, or for points that are too many: what is read of it is something else then.
 #[cfg(not(target_os = "none"))]
 pub fn write(config: &Config, numbers: &ChannelNumbers) -> Block {
     let mission = config.mission.config();
+    let source = config.mission.interferer().copied().unwrap_or(Interferer {
+        power_w: 0.0,
+        x_m: 0.0,
+        y_m: 0.0,
+    });
+    let points = match &mission.interference {
+        Interference::Source(_) => &[][..],
+        Interference::Field(field) => field.points(),
+    };
+    let (method, rounds, explore_m) = match config.method {
+        Method::Align => (0, 0, 0.0),
+        Method::Altitude => (1, 0, 0.0),
+        Method::Adjust(adjust) => (2, adjust.rounds, adjust.explore_m),
+    };
+    let (i_max_w, samples) = config
+        .measure
+        .map_or((0.0, 0), |measure| (measure.i_max_w, measure.samples));
     let mut bytes = Vec::with_capacity(LEN);
     bytes.extend(MAGIC);
     for number in [
@@ -199,10 +282,10 @@ pub fn write(config: &Config, numbers: &ChannelNumbers) -> Block {
         config.identity.index,
         config.identity.network,
         mission.relays,
-        0,
     ] {
         bytes.extend(number.to_le_bytes());
     }
+    bytes.extend([method, u8::from(config.hold_altitude)]);
     for number in [
         mission.distance_m,
         mission.min_separation_m,
@@ -211,9 +294,9 @@ pub fn write(config: &Config, numbers: &ChannelNumbers) -> Block {
         mission.common.power_w,
         config.profile.altitude_m,
         config.profile.power_w,
-        mission.interferer.power_w,
-        mission.interferer.x_m,
-        mission.interferer.y_m,
+        source.power_w,
+        source.x_m,
+        source.y_m,
         mission.tolerance,
     ] {
         bytes.extend(number.to_le_bytes());
@@ -226,6 +309,19 @@ pub fn write(config: &Config, numbers: &ChannelNumbers) -> Block {
     ] {
         bytes.extend(number.to_le_bytes());
     }
+    for number in [mission.band.least_m, mission.band.most_m, explore_m] {
+        bytes.extend(number.to_le_bytes());
+    }
+    for number in [rounds, u16::try_from(points.len()).unwrap_or(u16::MAX)] {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes.extend(i_max_w.to_le_bytes());
+    bytes.extend(samples.to_le_bytes());
+    for point in points {
+        bytes.extend(point.x_m.to_le_bytes());
+        bytes.extend(point.upsilon_per_w.to_le_bytes());
+    }
+    bytes.resize(CHECKED, 0);
     let check = crc(&bytes);
     bytes.extend(check.to_le_bytes());
     let mut block = [0; LEN];
@@ -257,6 +353,10 @@ impl Reader<'_> {
         u16::from_le_bytes(self.take())
     }
 
+    fn u32(&mut self) -> u32 {
+        u32::from_le_bytes(self.take())
+    }
+
     fn f32(&mut self) -> f32 {
         f32::from_le_bytes(self.take())
     }
@@ -270,5 +370,68 @@ impl Reader<'_> {
             altitude_m: self.f32(),
             power_w: self.f32(),
         }
+    }
+    /// The method of this number; what adjust needs is 0 for the others.
+    fn method(&mut self, number: u8) -> Result<Method, ConfigError> {
+        let explore_m = self.f32();
+        let rounds = self.u16();
+        let unused = explore_m.to_bits() == 0 && rounds == 0;
+        match number {
+            0 if unused => Ok(Method::Align),
+            1 if unused => Ok(Method::Altitude),
+            2 if rounds > 0 && (0.0..=1e5).contains(&explore_m) => Ok(Method::Adjust(Adjust {
+                rounds,
+                explore_m,
+                local: Local::Fine,
+            })),
+            0..=2 => Err(ConfigError::Adjust),
+            _ => Err(ConfigError::Method),
+        }
+    }
+
+    fn measure(&mut self) -> Result<Option<Measure>, ConfigError> {
+        let i_max_w = self.f32();
+        match self.u32() {
+            0 if i_max_w.to_bits() == 0 => Ok(None),
+            samples @ 100..=1_000_000 if (1e-30..=1e6).contains(&i_max_w) => {
+                Ok(Some(Measure { i_max_w, samples }))
+            }
+            _ => Err(ConfigError::Measure),
+        }
+    }
+
+    /// The field of `count` points, or `interferer` if there are none.
+    fn interference(
+        &mut self,
+        count: u16,
+        interferer: Interferer,
+        room: &'static mut Room,
+    ) -> Result<Interference, ConfigError> {
+        for place in &mut *room {
+            *place = FieldPoint {
+                x_m: self.f32(),
+                upsilon_per_w: self.f32(),
+            };
+        }
+        let room: &'static Room = room;
+        let (points, unused) = room
+            .split_at_checked(count.into())
+            .ok_or(ConfigError::Points)?;
+        let is_zero = |numbers: &[f32]| numbers.iter().all(|number| number.to_bits() == 0);
+        if !unused
+            .iter()
+            .all(|point| is_zero(&[point.x_m, point.upsilon_per_w]))
+        {
+            return Err(ConfigError::Unused);
+        }
+        if points.is_empty() {
+            return Ok(Interference::Source(interferer));
+        }
+        let Interferer { power_w, x_m, y_m } = interferer;
+        if !is_zero(&[power_w, x_m, y_m]) {
+            return Err(ConfigError::Interferer);
+        }
+        let field = Field::try_new(points).map_err(ConfigError::Field)?;
+        Ok(Interference::Field(field))
     }
 }

@@ -1,8 +1,9 @@
 //! The drone, whatever its links are: it reads its configuration, runs its relay, and flies where that says.
 
 use embedded_hal::digital::OutputPin;
+use uav_relay::node::settings::SetupError;
 use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
-use uav_relay::{Event, Instant, Placement, Relay, Settings, Wiring};
+use uav_relay::{Event, Instant, Placement, Relay, Sample, Settings, Wiring};
 
 use super::clock::Clock;
 use super::{board, config, log};
@@ -40,6 +41,9 @@ impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
 /// Flies for good.
 pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, relay: &mut Relay) -> ! {
     loop {
+        while let Some(sample) = measured() {
+            relay.handle_sample(sample);
+        }
         let wake = links.poll(clock.now(), relay);
         while let Some(event) = relay.poll_event() {
             log::event(event, relay);
@@ -62,7 +66,8 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, relay: &mut Relay) 
 /// This and [`switch_on`] are functions of their own so that the stack they need is given back.
 #[inline(never)]
 pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> {
-    match config::read(&board::block()) {
+    let field = cortex_m::singleton!(FIELD: config::Room = config::EMPTY)?;
+    match config::read(board::block(), field) {
         Ok(config) => {
             log::begins(&config);
             switch_on(&config, wiring, now)
@@ -74,24 +79,28 @@ pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> 
     }
 }
 
-/// The relay, in a place of its own in RAM: the stack would have to hold it, and the copy it is made from.
+/// The relay, in a place of its own in RAM: the stack would have to hold it, and the copy it is made from. What
+/// [`Relay::new`] gives is kept whole, since to take it apart on the way would be one more copy.
 #[inline(never)]
 fn switch_on(config: &config::Config, wiring: Wiring, now: Instant) -> Option<&'static mut Relay> {
     let settings = Settings {
         profile: Some(config.profile),
+        hold_altitude: config.hold_altitude,
+        method: config.method,
+        measure: config.measure,
         wiring,
         ..Settings::default()
     };
     // What could be refused here has been checked with the configuration.
-    let relay = Relay::new(
+    cortex_m::singleton!(RELAY: Result<Relay, SetupError> = Relay::new(
         config.mission,
         config.identity,
         settings,
         board::seed(),
         now,
-    )
-    .ok()?;
-    cortex_m::singleton!(RELAY: Relay = relay)
+    ))?
+    .as_mut()
+    .ok()
 }
 
 /// Replace this by what your autopilot wants to hear: `place.x_m` metres from the transmitter toward the receiver, at
@@ -101,4 +110,10 @@ fn fly_to(place: Placement) {
     // The control of the proof that no panic is reachable: with this one the image must not link.
     #[cfg(panic_on_purpose)]
     assert!(place.x_m < 1e6, "put there on purpose");
+}
+
+/// Replace this by what your receiver has measured since it was asked last, if the configuration has the relay measure.
+/// Once that says enough, `Relay::restart` at the leader has the chain agree again.
+const fn measured() -> Option<Sample> {
+    None
 }

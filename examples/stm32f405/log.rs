@@ -30,9 +30,26 @@ pub(crate) fn refused(error: ConfigError) {
         ConfigError::Magic => defmt::error!("configuration refused: no block"),
         ConfigError::Version => defmt::error!("configuration refused: version or length"),
         ConfigError::Crc => defmt::error!("configuration refused: damaged, the CRC does not match"),
-        ConfigError::Reserved => defmt::error!("configuration refused: byte 14 or 15 is not 0"),
         ConfigError::Index => defmt::error!("configuration refused: index"),
         ConfigError::Profile => defmt::error!("configuration refused: own altitude or power"),
+        ConfigError::Hold => defmt::error!("configuration refused: byte 15 is neither 0 nor 1"),
+        ConfigError::Method => {
+            defmt::error!("configuration refused: method unknown, or not for a field");
+        }
+        ConfigError::Adjust => {
+            defmt::error!("configuration refused: rounds or altitudes of adjust");
+        }
+        ConfigError::Measure => {
+            defmt::error!("configuration refused: samples or most interference");
+        }
+        ConfigError::Interferer => {
+            defmt::error!("configuration refused: interferer and field at once");
+        }
+        ConfigError::Points => defmt::error!("configuration refused: too many points of the field"),
+        ConfigError::Unused => {
+            defmt::error!("configuration refused: bytes behind the last point are not 0");
+        }
+        ConfigError::Field(error) => defmt::error!("configuration refused: field, {}", error),
         ConfigError::Channel(error) => defmt::error!("configuration refused: channel, {}", error),
         ConfigError::Mission(error) => defmt::error!("configuration refused: mission, {}", error),
     }

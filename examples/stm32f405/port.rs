@@ -19,7 +19,7 @@ pub(crate) const BAUD: u32 = 115_200;
 /// Received bytes that can wait for the main loop: 11 ms of them at full speed.
 const RECEIVED: usize = 128;
 
-/// Bytes that can wait to leave: all that a link has waiting, so that the main loop can sleep meanwhile.
+/// Bytes that can wait to leave: the longest frame, so that the main loop can sleep meanwhile.
 pub(crate) const OUTGOING: usize = 256;
 
 /// Bytes between the interrupt and the main loop, and room for `OUT` on their way out.

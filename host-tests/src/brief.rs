@@ -3,9 +3,11 @@
 use std::fmt;
 
 use uav_relay::channel::{AirGround, ChannelError};
+use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
-use uav_relay::{Channel, Interferer, Mission, MissionConfig, Profile};
+use uav_relay::{Band, Channel, Field, FieldPoint, Interferer, Mission, MissionConfig, Profile};
 
+use crate::reference::stochastic::StochasticLink;
 use crate::reference::{Link, Station};
 use crate::scenario::{self, Interference, Scenario, Source};
 
@@ -21,6 +23,8 @@ pub enum Refusal {
     Mission(MissionError),
     /// The channel refuses a parameter.
     Channel(ChannelError),
+    /// The field refuses its points.
+    Field(FieldError),
 }
 
 impl fmt::Display for Refusal {
@@ -30,6 +34,7 @@ impl fmt::Display for Refusal {
             Self::NoRoom => f.write_str("no placement: (relays - 1) x geometry.min_separation_m is above geometry.distance_m"),
             Self::Mission(error) => error.fmt(f),
             Self::Channel(error) => error.fmt(f),
+            Self::Field(error) => write!(f, "field: {error}"),
         }
     }
 }
@@ -45,16 +50,18 @@ pub fn mission(
     uavs: u16,
     tolerance: f64,
 ) -> Result<(Mission, Vec<(u16, Profile)>), Refusal> {
-    let source = match &scenario.interference {
+    let interference = match &scenario.interference {
         Interference::Sources(sources) => match sources.as_slice() {
-            [source] => source,
+            [source] => uav_relay::Interference::Source(interferer(source)),
             _ => {
                 return Err(Refusal::NotYet(
                     "several [[interferer]] in one scenario are",
                 ));
             }
         },
-        Interference::Field(_) => return Err(Refusal::NotYet("a [field] of interference is")),
+        Interference::Field(spec) => {
+            uav_relay::Interference::Field(field(spec).map_err(Refusal::Field)?)
+        }
     };
     let common = Profile {
         altitude_m: narrow(scenario.altitude_m),
@@ -66,8 +73,12 @@ pub fn mission(
         min_separation_m: narrow(scenario.min_separation_m),
         tx_power_w: narrow(scenario.tx_w),
         common,
+        band: Band {
+            least_m: narrow(scenario.altitude_min_m),
+            most_m: narrow(scenario.altitude_max_m),
+        },
         channel: channel(scenario).map_err(Refusal::Channel)?,
-        interferer: interferer(source),
+        interference,
         tolerance: narrow(tolerance),
     };
     let mission = Mission::try_new(config).map_err(|error| match error {
@@ -91,6 +102,75 @@ pub fn mission(
         })
         .collect();
     Ok((mission, profiles))
+}
+
+/// The relays that hold an altitude of their own, by index from 1.
+pub fn held(scenario: &Scenario, uavs: u16) -> Vec<u16> {
+    scenario
+        .relays
+        .iter()
+        .filter(|(index, own)| **index <= uavs && own.altitude_m.is_some())
+        .map(|(index, _)| *index)
+        .collect()
+}
+
+/// The mission with the Upsilon it has at Rx everywhere: all that relays may know before they have measured.
+#[must_use]
+pub fn told_of_an_even_field(mission: &Mission) -> Mission {
+    let config = mission.config();
+    let uav_relay::Interference::Field(field) = config.interference else {
+        return *mission;
+    };
+    let point = FieldPoint {
+        x_m: 0.0,
+        upsilon_per_w: field.upsilon(config.distance_m),
+    };
+    Field::try_new(vec![point].leak())
+        .ok()
+        .and_then(|field| {
+            let interference = uav_relay::Interference::Field(field);
+            Mission::try_new(MissionConfig {
+                interference,
+                ..*config
+            })
+            .ok()
+        })
+        .unwrap_or(*mission)
+}
+
+/// The shapes of the distribution of I / `i_max_w` at `x_m`: alpha interpolated, and beta so that Upsilon is.
+pub fn shapes(spec: &scenario::Field, x_m: f64) -> (f64, f64) {
+    let of = |point: &scenario::BetaPoint| {
+        let upsilon = (point.alpha + point.beta - 1.0) / (point.alpha - 1.0);
+        (point.alpha, upsilon)
+    };
+    let after = spec.beta.partition_point(|point| point.x_m <= x_m);
+    let (left, right) = (
+        after.checked_sub(1).and_then(|at| spec.beta.get(at)),
+        spec.beta.get(after),
+    );
+    let (alpha, upsilon) = match (left, right) {
+        (Some(left), Some(right)) => {
+            let part = (x_m - left.x_m) / (right.x_m - left.x_m);
+            let ((a, u), (b, v)) = (of(left), of(right));
+            (a + (b - a) * part, u + (v - u) * part)
+        }
+        (Some(end), None) | (None, Some(end)) => of(end),
+        (None, None) => (2.0, 2.0),
+    };
+    (alpha, (upsilon - 1.0) * (alpha - 1.0))
+}
+
+/// Upsilon at the points of `spec`. A field lives as long as the program: a relay's is part of its image.
+fn field(spec: &scenario::Field) -> Result<Field, FieldError> {
+    let points: Option<Vec<FieldPoint>> = spec
+        .beta
+        .iter()
+        .map(|point| {
+            FieldPoint::from_beta(narrow(point.x_m), point.alpha, point.beta, spec.i_max_w)
+        })
+        .collect();
+    Field::try_new(points.ok_or(FieldError::Upsilon)?.leak())
 }
 
 fn channel(scenario: &Scenario) -> Result<Channel, ChannelError> {
@@ -129,11 +209,9 @@ fn narrow(value: f64) -> f32 {
 ///
 /// The relays of a link may differ: the first one's profile is what the mission has in common.
 pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
-    // At this carrier the wave number is 1, and the excess factors are the path-loss factors themselves.
-    let carrier_hz = 299_792_458.0 / (4.0 * std::f64::consts::PI);
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
     let channel = Channel::new(
-        carrier_hz,
+        UNIT_CARRIER_HZ,
         link.mu_los,
         link.mu_nlos,
         AirGround::Weighted(weight.clamp(0.0, 1.0)),
@@ -150,12 +228,13 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
         min_separation_m: narrow(link.min_separation_m),
         tx_power_w: narrow(link.tx_w),
         common,
+        band: Band::at(common.altitude_m),
         channel,
-        interferer: Interferer {
+        interference: uav_relay::Interference::Source(Interferer {
             power_w: narrow(link.interferer_w),
             x_m: narrow(link.x_i),
             y_m: narrow(link.y_i),
-        },
+        }),
         tolerance: narrow(tolerance),
     };
     let own = (1..)
@@ -163,6 +242,47 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
         .filter(|(_, profile)| *profile != common);
     Some((Mission::try_new(config).ok()?, own.collect()))
 }
+
+/// The mission of a reference link in a field, whose relays are alike; `None` where a relay would refuse its numbers.
+pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Option<Mission> {
+    let relay = link.relays.first()?;
+    let points: Vec<FieldPoint> = link
+        .upsilon
+        .iter()
+        .map(|&(x, upsilon)| FieldPoint {
+            x_m: narrow(x),
+            upsilon_per_w: narrow(upsilon),
+        })
+        .collect();
+    // Nothing hears over the ground here: any factor above both others lets eta be a mixture.
+    let mu_nlos = 2.0 * link.eta.max(link.mu_los);
+    let weight = (mu_nlos - link.eta) / (mu_nlos - link.mu_los);
+    let common = Profile {
+        altitude_m: narrow(relay.altitude_m),
+        power_w: narrow(relay.power_w),
+    };
+    let config = MissionConfig {
+        relays: u16::try_from(link.relays.len()).ok()?,
+        distance_m: narrow(link.distance_m),
+        min_separation_m,
+        tx_power_w: narrow(link.tx_w),
+        common,
+        band: Band::at(common.altitude_m),
+        channel: Channel::new(
+            UNIT_CARRIER_HZ,
+            link.mu_los,
+            mu_nlos,
+            AirGround::Weighted(weight.clamp(0.0, 1.0)),
+        )
+        .ok()?,
+        interference: uav_relay::Interference::Field(Field::try_new(points.leak()).ok()?),
+        tolerance: 1e-4,
+    };
+    Mission::try_new(config).ok()
+}
+
+/// At this carrier the wave number is 1, and the excess factors are the path-loss factors themselves.
+const UNIT_CARRIER_HZ: f64 = 299_792_458.0 / (4.0 * std::f64::consts::PI);
 
 /// `link` with every number rounded to the f32 that a relay is given, so that only a relay's arithmetic is judged.
 pub fn as_relays_know_it(link: &Link) -> Link {

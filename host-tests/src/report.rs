@@ -3,8 +3,9 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use uav_relay::placement::promise::is_most;
 use uav_relay::sir::{Sender, at_receiver};
-use uav_relay::{Mission, Placement, Profile};
+use uav_relay::{Interference, Mission, Placement, Profile};
 
 use crate::sim::outcome::{Ending, Outcome};
 
@@ -71,6 +72,12 @@ pub struct ChainReport {
     /// The target the relays agreed on, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<f64>,
+    /// In a field: whether no chain of equals can have a higher target. False means that it is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub promised: Option<bool>,
+    /// SIR of the chain before Algorithm 2 and after each of its rounds, linear.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rounds: Vec<f64>,
     /// The relays that have a place, from the transmitter on.
     pub relays: Vec<RelayReport>,
     /// SIR at the receiver, linear.
@@ -144,6 +151,15 @@ impl ChainReport {
             .collect();
         let rx_sir = sirs.last().copied();
         let injected = outcome.injected;
+        let target = outcome.relays.first().and_then(|head| head.target);
+        let promised = match (mission.interference(), target, places.first()) {
+            (Interference::Field(_), Some(target), Some((head, _))) => {
+                let common = mission.config().common;
+                let equals = places.iter().all(|(_, profile)| *profile == common);
+                Some(equals && is_most(mission, target, head.x_m))
+            }
+            _ => None,
+        };
         Self {
             method: method.to_owned(),
             uavs: mission.relays(),
@@ -151,11 +167,9 @@ impl ChainReport {
             best_sir: (outcome.ending == Ending::Infeasible).then_some(0.0),
             sir: worst,
             sir_db: worst.map(db),
-            target: outcome
-                .relays
-                .first()
-                .and_then(|head| head.target)
-                .map(f64::from),
+            target: target.map(f64::from),
+            promised,
+            rounds: outcome.rounds.iter().copied().map(f64::from).collect(),
             relays,
             rx_sir,
             rx_sir_db: rx_sir.map(db),
@@ -189,6 +203,8 @@ impl ChainReport {
             sir: None,
             sir_db: None,
             target: None,
+            promised: None,
+            rounds: Vec::new(),
             relays: Vec::new(),
             rx_sir: None,
             rx_sir_db: None,
@@ -237,6 +253,25 @@ impl ChainReport {
                 text,
                 "worst hop: SIR {sir:.6} ({sir_db:.3} dB) with {} relays by `{}`",
                 self.uavs, self.method
+            );
+        }
+        match self.promised {
+            Some(true) => {
+                _ = writeln!(text, "no chain of equals can have more in this field");
+            }
+            Some(false) => {
+                _ = writeln!(
+                    text,
+                    "this field is uneven: that no chain can have more is not certain"
+                );
+            }
+            None => {}
+        }
+        if let (Some(first), Some(last)) = (self.rounds.first(), self.rounds.last()) {
+            _ = writeln!(
+                text,
+                "Algorithm 2: {} rounds, from SIR {first:.6} to {last:.6}",
+                self.rounds.len() - 1
             );
         }
         _ = writeln!(

@@ -21,14 +21,6 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::plan;
 use uav_relay::{Duration, Instant, Mission, Profile, Schedule, Side};
 
-/// Everything at once, as a bad day has it.
-const BAD_DAY: Faults = Faults {
-    loss: 0.3,
-    corrupt: 0.15,
-    duplicate: 0.1,
-    reorder: 0.1,
-};
-
 fn paper(relays: u16) -> Mission {
     of_link(&Link::paper(usize::from(relays)), 1e-4).unwrap().0
 }
@@ -40,21 +32,6 @@ fn reached(link: &Link, outcome: &Outcome) -> f64 {
         .map(|relay| f64::from(relay.setpoint.unwrap().x_m))
         .collect();
     link.chain_sir(&x)
-}
-
-fn bits(outcome: &Outcome) -> Vec<(u32, u32)> {
-    let place =
-        |relay: &host_tests::sim::outcome::RelayEnd| relay.setpoint.expect("the chain has settled");
-    outcome
-        .relays
-        .iter()
-        .map(|relay| {
-            (
-                place(relay).x_m.to_bits(),
-                place(relay).altitude_m.to_bits(),
-            )
-        })
-        .collect()
 }
 
 fn settle(setup: Setup) -> Outcome {
@@ -197,7 +174,7 @@ fn faults_change_nothing_but_the_time_it_takes() {
             settle(setup)
         };
         if predict {
-            assert_eq!(bits(&quiet), bits(&undisturbed));
+            assert_eq!(quiet.bits(), undisturbed.bits());
         }
         let first = random::seed(1);
         let mut slowest = Instant::ZERO;
@@ -205,10 +182,10 @@ fn faults_change_nothing_but_the_time_it_takes() {
         for seed in first..first + 1_000 {
             let mut setup = Setup::new(paper(8));
             setup.settings.predict = predict;
-            setup.faults = BAD_DAY;
+            setup.faults = Faults::BAD_DAY;
             setup.seed = seed;
             let outcome = settle(setup);
-            assert_eq!(bits(&outcome), bits(&quiet), "seed {seed}");
+            assert_eq!(outcome.bits(), quiet.bits(), "seed {seed}");
             let done = outcome.injected;
             injected = [
                 injected[0] + done.lost,
@@ -242,7 +219,7 @@ fn faults_change_nothing_but_the_time_it_takes() {
 
 #[test]
 fn each_fault_alone_and_at_its_worst_changes_nothing() {
-    let quiet = bits(&settle(Setup::new(paper(5))));
+    let quiet = settle(Setup::new(paper(5))).bits();
     let none = Faults::default();
     for faults in [
         Faults { loss: 0.9, ..none },
@@ -269,7 +246,7 @@ fn each_fault_alone_and_at_its_worst_changes_nothing() {
             let mut setup = Setup::new(paper(5));
             setup.faults = faults;
             setup.seed = seed;
-            assert_eq!(bits(&settle(setup)), quiet, "seed {seed} of {faults:?}");
+            assert_eq!(settle(setup).bits(), quiet, "seed {seed} of {faults:?}");
         }
     }
 }
@@ -278,7 +255,7 @@ fn each_fault_alone_and_at_its_worst_changes_nothing() {
 fn the_same_seed_gives_the_same_run() {
     let go = |seed| {
         let mut setup = Setup::new(paper(6));
-        setup.faults = BAD_DAY;
+        setup.faults = Faults::BAD_DAY;
         setup.seed = seed;
         format!("{:?}", settle(setup))
     };
@@ -288,9 +265,9 @@ fn the_same_seed_gives_the_same_run() {
 
 #[test]
 fn one_shared_channel_does_as_well_as_two_wires() {
-    let wires = bits(&settle(Setup::new(paper(8))));
+    let wires = settle(Setup::new(paper(8))).bits();
     let outcome = settle(Setup::on_shared_channel(paper(8)));
-    assert_eq!(bits(&outcome), wires);
+    assert_eq!(outcome.bits(), wires);
     assert_eq!(outcome.messages, 14);
     assert!(
         outcome.relays.iter().any(|relay| relay.stats.overheard > 0),
@@ -298,9 +275,9 @@ fn one_shared_channel_does_as_well_as_two_wires() {
     );
     for seed in 1..=50 {
         let mut setup = Setup::on_shared_channel(paper(8));
-        setup.faults = BAD_DAY;
+        setup.faults = Faults::BAD_DAY;
         setup.seed = seed;
-        assert_eq!(bits(&settle(setup)), wires, "seed {seed}");
+        assert_eq!(settle(setup).bits(), wires, "seed {seed}");
     }
 }
 
@@ -351,10 +328,10 @@ fn a_mixed_chain_is_solved_as_it_is() {
         assert!((-1e-6..=2e-4).contains(&short), "{short}");
         assert!(outcome.sweeps > 1, "the prediction cannot have been right");
         assert!(outcome.sweeps <= 7, "{} sweeps", outcome.sweeps);
-        setup.faults = BAD_DAY;
+        setup.faults = Faults::BAD_DAY;
         for seed in 1..=20 {
             setup.seed = seed;
-            assert_eq!(bits(&settle(setup.clone())), bits(&outcome), "seed {seed}");
+            assert_eq!(settle(setup.clone()).bits(), outcome.bits(), "seed {seed}");
         }
     }
 }
@@ -387,7 +364,7 @@ fn a_silent_relay_is_noticed_by_both_neighbours_within_the_stated_time() {
 #[test]
 fn neighbours_that_live_are_not_lost_over_an_hour_of_bad_days() {
     let mut setup = Setup::new(paper(4));
-    setup.faults = BAD_DAY;
+    setup.faults = Faults::BAD_DAY;
     // Nobody dies before the end of the hour, so the run goes on until then.
     setup.kills = vec![(4, Instant::from_millis(3_600_000))];
     let outcome = run(setup).unwrap();

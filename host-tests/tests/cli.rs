@@ -165,15 +165,140 @@ fn wrong_options_are_named_with_their_value_and_range() {
     }
 }
 
+/// A scenario of the repository.
+fn example(name: &str) -> String {
+    format!("{}/../examples/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
 #[test]
-fn methods_to_come_say_so() {
-    for method in ["adjust", "altitude", "stochastic", "stochastic-step"] {
+fn a_method_says_what_scenario_it_needs() {
+    for method in ["stochastic", "stochastic-step"] {
         let (status, line) = refusal(&["--method", method]);
         assert_eq!(status, 2);
+        assert!(line.contains(method) && line.contains("[field]"), "{line}");
+    }
+    for method in ["align", "align-step", "adjust", "altitude"] {
+        let (status, line) = refusal(&["--scenario", &example("field.toml"), "--method", method]);
+        assert_eq!(status, 2);
         assert!(
-            line.contains(method) && line.contains("not there yet"),
+            line.contains(method) && line.contains("[[interferer]]"),
             "{line}"
         );
+    }
+    let (status, line) = refusal(&["--closed-loop", "2"]);
+    assert_eq!(status, 2);
+    assert!(line.contains("--closed-loop"), "{line}");
+    for (option, value) in [
+        ("--rounds", "0"),
+        ("--explore", "-1"),
+        ("--grid", "41"),
+        ("--grid", "1x5"),
+        ("--closed-loop", "101"),
+    ] {
+        let (status, line) = refusal(&["--method", "adjust", option, value]);
+        assert_eq!(status, 2);
+        assert!(line.contains(option), "{line}");
+    }
+}
+
+/// What is asked of `altitude` and `adjust`, through the tool itself.
+#[test]
+fn the_joint_figures_hold() {
+    let file = example("altitudes.toml");
+    for (uavs, least, best) in [
+        ("2", 0.881_45, 0.881_533_9),
+        ("5", 1.047_36, 1.047_463_5),
+        ("8", 1.235_66, 1.235_783_8),
+        ("50", 6.497_73, 6.498_377_7),
+    ] {
+        let report = json(&["--scenario", &file, "--uavs", uavs, "--method", "altitude"]);
+        let sir = report["sir"].as_f64().unwrap();
+        assert!(sir >= least && sir <= best * (1.0 + 1e-6), "{uavs}: {sir}");
+        assert!(report["sweeps"].as_u64().unwrap() <= 17, "{report}");
+        let heights = report["relays"].as_array().unwrap().iter();
+        assert!(
+            heights
+                .map(|relay| relay["h_m"].as_f64().unwrap())
+                .all(|h| (20.0..=300.0).contains(&h))
+        );
+    }
+    let report = json(&["--scenario", &file, "--uavs", "50", "--method", "adjust"]);
+    let rounds: Vec<f64> = report["rounds"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|sir| sir.as_f64().unwrap())
+        .collect();
+    assert_eq!(rounds.len(), 501);
+    assert!(rounds.windows(2).all(|pair| pair[1] >= pair[0]));
+    assert!(report["sir"].as_f64().unwrap() >= 6.40, "{}", report["sir"]);
+    let grid = json(&[
+        "--scenario",
+        &file,
+        "--uavs",
+        "50",
+        "--method",
+        "adjust",
+        "--grid",
+        "41x21",
+    ]);
+    let gain = grid["sir"].as_f64().unwrap() / rounds[0];
+    assert!((gain - 1.0).abs() < 1e-6, "{gain}");
+}
+
+#[test]
+fn a_field_is_flown_by_what_was_agreed_or_by_what_is_measured() {
+    let file = example("field.toml");
+    let agreed = json(&["--scenario", &file, "--method", "stochastic"]);
+    assert_eq!(agreed["sweeps"].as_u64(), Some(1));
+    assert!(agreed["promised"].is_boolean());
+    let sir = agreed["sir"].as_f64().unwrap();
+    let step = json(&[
+        "--scenario",
+        &file,
+        "--method",
+        "stochastic-step",
+        "--epsilon",
+        "0.01",
+    ]);
+    assert!(step["sweeps"].as_u64().unwrap() > 10);
+    assert!(sir >= step["sir"].as_f64().unwrap() - 0.01);
+    let measured = |rounds: &str| {
+        let report = json(&[
+            "--scenario",
+            &file,
+            "--method",
+            "stochastic",
+            "--closed-loop",
+            rounds,
+        ]);
+        report["sir"].as_f64().unwrap()
+    };
+    assert!(measured("6") > 0.97 * sir, "{} {sir}", measured("6"));
+}
+
+/// With one interferer `adjust` and `altitude` draw the chain they choose; a field is drawn without an interferer.
+#[test]
+fn every_method_can_be_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    for (scenario, method) in [
+        ("altitudes.toml", "altitude"),
+        ("altitudes.toml", "adjust"),
+        ("field.toml", "stochastic"),
+    ] {
+        let file = folder.path().join(format!("{method}.svg"));
+        let path = file.to_str().unwrap();
+        json(&[
+            "--scenario",
+            &example(scenario),
+            "--method",
+            method,
+            "--svg",
+            path,
+        ]);
+        let svg = std::fs::read_to_string(&file).unwrap();
+        roxmltree::Document::parse(&svg).unwrap();
+        assert!(svg.contains(method) && !svg.contains("NaN"));
     }
 }
 

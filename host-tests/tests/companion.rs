@@ -27,7 +27,7 @@ mod pty;
 use std::time::{Duration, Instant};
 
 use host_tests::brief;
-use host_tests::scenario::{Interference, Scenario, Source};
+use host_tests::scenario::{BetaPoint, Field, Interference, Scenario, Source};
 use host_tests::sim::chain;
 use host_tests::sim::outcome::Ending;
 use host_tests::sim::setup::Setup;
@@ -35,11 +35,18 @@ use medium::{Medium, Noise, QUIET};
 use process::{Ended, Relay};
 use pty::Pty;
 use rustix::process::Signal;
+use uav_relay::{Adjust, Method};
 
 /// Bits of x, altitude and target of every relay, as the simulated chain has them.
 fn simulated(scenario: &Scenario, relays: u16) -> Vec<[u32; 3]> {
+    simulated_by(Method::Align, scenario, relays)
+}
+
+fn simulated_by(method: Method, scenario: &Scenario, relays: u16) -> Vec<[u32; 3]> {
     let (mission, _) = brief::mission(scenario, relays, 1e-4).unwrap();
-    let outcome = chain::run(Setup::new(mission)).unwrap();
+    let mut setup = Setup::new(mission);
+    setup.settings.method = method;
+    let outcome = chain::run(setup).unwrap();
     assert_eq!(outcome.ending, Ending::Settled);
     let ends = outcome.relays.iter().map(|relay| {
         let place = relay.setpoint.unwrap();
@@ -113,6 +120,8 @@ fn every_option_of_the_mission_reaches_the_relays() {
     let scenario = Scenario {
         distance_m: 2345.6,
         altitude_m: 33.3,
+        altitude_min_m: 22.2,
+        altitude_max_m: 44.4,
         min_separation_m: 7.5,
         tx_w: 12.25,
         uav_w: 0.7,
@@ -128,6 +137,8 @@ fn every_option_of_the_mission_reaches_the_relays() {
         "2345.6",
         "--altitude",
         "33.3",
+        "--band",
+        "22.2,44.4",
         "--min-separation",
         "7.5",
         "--tx-power",
@@ -148,6 +159,54 @@ fn every_option_of_the_mission_reaches_the_relays() {
     let expected = simulated(&scenario, 4);
     assert_eq!(chain.settled(), expected);
     assert_ne!(expected, simulated(&Scenario::default(), 4));
+}
+
+/// They are switched on higher up than is good for them.
+#[test]
+fn three_processes_choose_the_altitudes_of_the_simulated_chain() {
+    let scenario = Scenario {
+        altitude_m: 60.0,
+        altitude_max_m: 300.0,
+        interference: Interference::Sources(vec![Source {
+            power_w: 80.0,
+            x_m: 500.0,
+            y_m: 150.0,
+        }]),
+        ..Scenario::default()
+    };
+    let given = ["--altitude", "60", "--band", "20,300"];
+    let options = [&given[..], &["--interferer", "80,500,150", "--method"]].concat();
+    let adjust = Method::Adjust(Adjust::default());
+    for (name, method) in [("altitude", Method::Altitude), ("adjust", adjust)] {
+        let expected = simulated_by(method, &scenario, 3);
+        let before = 60.0_f32.to_bits();
+        assert!(expected.iter().all(|[_, altitude, _]| *altitude != before));
+        let mut chain = Chain::start(3, QUIET, &[&options[..], &[name]].concat());
+        for (relay, expected) in chain.relays.iter_mut().zip(expected) {
+            relay.settles_at(expected);
+        }
+    }
+}
+
+#[test]
+fn three_processes_in_a_field_settle_where_the_simulated_chain_does() {
+    // With alpha = 2 Upsilon is (1 + beta) / I_max.
+    let beta = [(-50.0, 1.5), (400.0, 1.0), (1000.0, 3.0)];
+    let beta = beta.map(|(x_m, beta)| BetaPoint {
+        x_m,
+        alpha: 2.0,
+        beta,
+    });
+    let scenario = Scenario {
+        interference: Interference::Field(Field {
+            i_max_w: 1e-6,
+            beta: beta.to_vec(),
+        }),
+        ..Scenario::default()
+    };
+    let options = ["--field", "-50:2.5e6,400:2e6,1000:4e6"];
+    let mut chain = Chain::start(3, QUIET, &options);
+    assert_eq!(chain.settled(), simulated(&scenario, 3));
 }
 
 #[test]

@@ -138,7 +138,14 @@ fn reaches_agree_with_the_reference() {
         } else {
             gain * log_uniform(&mut rng, 1e-3, 1e5)
         } as f32;
-        let hop = Hop::new(&mission, sender, index, profile.altitude_m);
+        let hop = Hop::new(
+            &mission,
+            mission.interferer().unwrap(),
+            sender,
+            index,
+            profile.altitude_m,
+            0.0,
+        );
         let ours = hop.reach(target, from);
         let k = usize::from(index);
         let exact = |target: f64| link.farthest(k, f64::from(from), target);
@@ -400,9 +407,11 @@ fn reference_cases_of_one_hop_hold() {
         let (mission, _) = of_link(&case.link(1), 1e-4).unwrap();
         let hop = Hop::new(
             &mission,
+            mission.interferer().unwrap(),
             Sender::transmitter(&mission),
             1,
             mission.config().common.altitude_m,
+            0.0,
         );
         let ours = hop.reach(case.arg("gamma").unwrap() as f32, 0.0);
         match case.part("d1") {
@@ -416,9 +425,11 @@ fn reference_cases_of_one_hop_hold() {
         let common = mission.config().common;
         let hop = Hop::new(
             &mission,
+            mission.interferer().unwrap(),
             Sender::relay(&mission, common),
             2,
             common.altitude_m,
+            0.0,
         );
         let from = case.arg("s").unwrap();
         let reach = hop

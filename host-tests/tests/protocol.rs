@@ -15,8 +15,8 @@ use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::{
-    Duration, Event, FrameBuf, Identity, Instant, Mission, MissionConfig, Phase, Port, Relay,
-    Settings, Side,
+    Duration, Event, FrameBuf, Identity, Instant, Interference, Interferer, Mission, MissionConfig,
+    Phase, Port, Relay, Settings, Side,
 };
 
 const NETWORK: u16 = 9;
@@ -40,7 +40,7 @@ fn relay(mission: Mission, index: u16) -> Relay {
 }
 
 /// Frames a relay wants to send now: where to, the message, the bytes.
-fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message, Vec<u8>)> {
+fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message<'static>, Vec<u8>)> {
     let mut buffer: FrameBuf = [0; MAX_FRAME];
     let mut sent = Vec::new();
     while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
@@ -48,7 +48,7 @@ fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message, Vec<u8>)> {
         let mut deframer = Deframer::new();
         let message = bytes.iter().find_map(|&byte| {
             let plain = deframer.push(byte)?.unwrap().to_vec();
-            Some(frame::decode(&plain).unwrap().1)
+            Some(frame::decode(plain.leak()).unwrap().1)
         });
         sent.push((transmit.port, message.expect("a whole frame"), bytes));
         assert!(sent.len() < 16, "the relay never stops sending");
@@ -183,7 +183,7 @@ fn a_straggler_is_ignored_and_a_rebooted_head_is_not() {
             .find_map(|&byte| {
                 deframer
                     .push(byte)
-                    .map(|plain| frame::decode(plain.unwrap()).unwrap().1)
+                    .map(|plain| frame::decode(plain.unwrap().to_vec().leak()).unwrap().1)
             })
             .unwrap()
     }) else {
@@ -273,7 +273,10 @@ fn a_relay_rebooted_while_the_chain_waits_takes_up_where_it_left() {
 #[test]
 fn relays_of_different_missions_ignore_each_other_and_say_so() {
     let mut other = *mission(2).config();
-    other.interferer.y_m += 1.0;
+    other.interference = Interference::Source(Interferer {
+        y_m: 401.0,
+        ..*mission(2).interferer().unwrap()
+    });
     let (mut head, mut tail) = (
         relay(mission(2), 1),
         relay(Mission::try_new(MissionConfig { ..other }).unwrap(), 2),

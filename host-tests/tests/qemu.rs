@@ -21,6 +21,8 @@ mod fleet;
 mod golden;
 #[path = "qemu/log.rs"]
 mod log;
+#[path = "qemu/methods.rs"]
+mod methods;
 #[path = "qemu/radio.rs"]
 mod radio;
 #[path = "qemu/silence.rs"]

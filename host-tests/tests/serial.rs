@@ -58,7 +58,7 @@ fn an_end_that_never_reads_neither_blocks_nor_starves_the_other_link() {
             Node::new(kind, relay(3, 2, Wiring::Pair), &[deaf, up], &none),
             Node::new(kind, relay(3, 3, Wiring::Pair), &[down, last], &none),
         ];
-        let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(60_000));
+        let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(300_000));
         assert_eq!(nobody.waiting(), 3, "{kind:?}: the wire is full");
         assert!(has_lost(&nodes[0], Side::Upstream), "{kind:?}");
         assert!(!has_lost(&nodes[0], Side::Downstream), "{kind:?}");
@@ -70,7 +70,11 @@ fn an_end_that_never_reads_neither_blocks_nor_starves_the_other_link() {
         );
         assert_eq!(stats[1], SerialStats::default(), "{kind:?}");
         // 128 byte times between attempts at the deaf end, and a little for the other one.
-        assert!(nodes[0].polls < 7_000, "{kind:?}: {} polls", nodes[0].polls);
+        assert!(
+            nodes[0].polls < 35_000,
+            "{kind:?}: {} polls",
+            nodes[0].polls
+        );
         // Nothing is lost in between: sent is what was dropped, and what is in the wire and the link.
         let sent = nodes[0].relay.stats().sent;
         assert!(sent > stats[0].dropped + 2, "{kind:?}: {sent}");

@@ -36,10 +36,14 @@ mod random;
 mod receive;
 #[path = "wire/reject.rs"]
 mod reject;
+#[path = "wire/sequence.rs"]
+mod sequence;
 #[path = "wire/strategies.rs"]
 mod strategies;
 #[path = "wire/stream.rs"]
 mod stream;
+#[path = "wire/wave.rs"]
+mod wave;
 
 /// `cases` cases from the seed in `SEED`; a failure prints its shrunk input and leaves no file behind.
 fn config(cases: u32) -> Config {

@@ -3,7 +3,12 @@
 //! | file | one idea |
 //! | --- | --- |
 //! | [`settings`] | who the relay is and how it behaves, checked once |
-//! | [`align`] | Algorithm 1: the state table of a sweep |
+//! | [`exchange`] | the state table of a pass and what comes back of it |
+//! | `share` | a relay's share of every algorithm: sweeps, waves of altitude levels, turns |
+//! | `lead` | what the leader has beyond that: which pass comes next |
+//! | `align` | a sweep of Algorithms 1 and 4 |
+//! | `adjust` | a turn of Algorithm 2 |
+//! | [`sample`] | the interference that a relay measures |
 //! | [`liveness`] | when a neighbour counts as lost |
 //! | [`timers`] | every timer, in one table |
 //! | [`event`] | what the firmware is told |
@@ -12,23 +17,30 @@
 //! `Node` connects them. It answers messages by setting flags, and builds what it sends from its state when asked to, so
 //! nothing queues up and a message sent twice is harmless.
 
-pub mod align;
+mod adjust;
+mod align;
 pub mod event;
+pub mod exchange;
+mod lead;
 pub mod liveness;
+pub mod sample;
 pub mod settings;
+mod share;
 pub mod stats;
 pub mod timers;
 
-use crate::mission::{Mission, Profile};
+use crate::mission::{Heading, Mission, Profile};
 use crate::sir::Placement;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::digest;
 use crate::wire::message::Message;
 
-use align::{Align, Next, Phase};
 use event::{Event, Pending};
+use exchange::{Next, Phase};
 use liveness::{Neighbour, Silence};
+use sample::{Meter, Sample};
 use settings::{Identity, Settings};
+use share::{ADJUST, ALTITUDE, Own, Share};
 use stats::{Stats, bump};
 use timers::{Timer, Timers};
 
@@ -54,7 +66,11 @@ impl Side {
 /// How long the head rests between two portions of a computation, so that a caller's loop gets its turn.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// What waits to be sent to one neighbour, apart from sweeps and verdicts.
+/// How many times longer than a sweep a pass may take on which relays compute: its frames are more than twice as long, and
+/// a relay's share of it takes up to thirty portions.
+const SLOW: u32 = 4;
+
+/// What waits to be sent to one neighbour, apart from passes and what comes back of them.
 #[derive(Clone, Copy, Debug, Default)]
 struct Signs {
     /// A heartbeat that asks for one in return.
@@ -75,17 +91,17 @@ struct Link {
 pub(crate) struct Node {
     mission: Mission,
     digest: u16,
-    profile: Profile,
     settings: Settings,
     index: u16,
-    align: Align,
+    share: Share,
+    meter: Meter,
     timers: Timers,
     upstream: Option<Link>,
     downstream: Option<Link>,
-    sweep_due: bool,
-    verdict_due: bool,
+    onward_due: bool,
+    back_due: bool,
     busy_due: bool,
-    /// How often the current sweep has been sent again since anything was heard of it.
+    /// How often the current pass has been sent again since anything was heard of it.
     unheard: u8,
     pending: Pending,
     pub(crate) stats: Stats,
@@ -108,6 +124,7 @@ impl Node {
                 signs: Signs::default(),
             })
         };
+        let leader = identity.index == mission.leader();
         let profile = settings.profile.unwrap_or(mission.config().common);
         // Any odd multiplier keeps distinct seeds distinct; the generator must not start at zero.
         let random = seed
@@ -119,15 +136,15 @@ impl Node {
         let mut node = Self {
             mission,
             digest: digest(&mission),
-            profile,
             settings,
             index: identity.index,
-            align: Align::new(identity.index == 1, low),
+            share: Share::new(&mission, leader, low, profile),
+            meter: Meter::new(settings.measure),
             timers: Timers::new(),
             upstream: link(identity.index > 1),
             downstream: link(identity.index < relays),
-            sweep_due: false,
-            verdict_due: false,
+            onward_due: false,
+            back_due: false,
             busy_due: false,
             unheard: 0,
             pending: Pending::default(),
@@ -139,7 +156,7 @@ impl Node {
                 node.timers.set(side.timer(), now + settings.quiet);
             }
         }
-        if identity.index == 1 {
+        if leader {
             node.timers.set(Timer::Work, now + PAUSE);
         }
         node
@@ -163,9 +180,37 @@ impl Node {
         }
     }
 
+    /// The side that a pass goes to.
+    fn onward(&self) -> Side {
+        match self.mission.heading() {
+            Heading::TowardRx => Side::Downstream,
+            Heading::TowardTx => Side::Upstream,
+        }
+    }
+
+    /// The side that a pass comes from.
+    fn backward(&self) -> Side {
+        match self.mission.heading() {
+            Heading::TowardRx => Side::Upstream,
+            Heading::TowardTx => Side::Downstream,
+        }
+    }
+
+    /// The relay's share, and what it needs to know of the relay.
+    fn parts(&mut self) -> (&mut Share, Own<'_>) {
+        let own = Own {
+            mission: &self.mission,
+            settings: &self.settings,
+            digest: self.digest,
+            index: self.index,
+            measured_per_w: self.meter.published(),
+        };
+        (&mut self.share, own)
+    }
+
     /// A message from the neighbour at `side`, intact and addressed to this relay. Bounded by 16 reaches.
     #[inline(never)]
-    pub(crate) fn handle_message(&mut self, now: Instant, side: Side, message: Message) {
+    pub(crate) fn handle_message(&mut self, now: Instant, side: Side, message: &Message<'_>) {
         let quiet = self.settings.quiet;
         let Some(link) = self.link(side) else { return };
         let back = link.neighbour.heard(now);
@@ -173,10 +218,14 @@ impl Node {
         if back {
             self.pending.raise(Event::NeighbourBack(side));
         }
-        let digest = match &message {
+        let digest = match message {
             Message::Sweep(sweep) => Some(sweep.mission),
             Message::Verdict(answer) => Some(answer.mission),
             Message::Heartbeat { mission, .. } => Some(*mission),
+            Message::Wave(wave) => Some(wave.mission),
+            Message::Trace(trace) => Some(trace.mission),
+            Message::Token(token) => Some(token.mission),
+            Message::Moved(moved) => Some(moved.mission),
             Message::Busy { .. } => None,
         };
         if digest.is_some_and(|digest| digest != self.digest) {
@@ -184,55 +233,67 @@ impl Node {
             self.pending.raise(Event::MissionMismatch(side));
             return;
         }
-        match (side, message) {
-            (Side::Upstream, Message::Sweep(sweep)) => {
-                let next = self
-                    .align
-                    .on_sweep(&self.mission, self.index, self.profile, &sweep);
-                self.proceed(now, next);
-            }
-            (Side::Downstream, Message::Verdict(answer)) => {
-                let next = self.align.on_verdict(self.profile, answer);
-                self.proceed(now, next);
-            }
-            (_, Message::Heartbeat { answer, .. }) => {
+        let wanted = match message {
+            Message::Heartbeat { answer, .. } => {
                 if let Some(link) = self.link(side)
-                    && answer
+                    && *answer
                 {
                     link.signs.answer = true;
                 }
+                return;
             }
-            (Side::Downstream, Message::Busy { sweep }) => {
-                if self.align.phase() == Phase::Waiting && sweep == self.align.number() {
+            Message::Sweep(_) | Message::Wave(_) | Message::Token(_) => self.backward(),
+            _ => self.onward(),
+        };
+        if side != wanted {
+            bump(&mut self.stats.misdirected);
+            return;
+        }
+        let (share, own) = self.parts();
+        let next = match message {
+            Message::Sweep(sweep) => share.on_sweep(own, sweep),
+            Message::Verdict(answer) => share.on_verdict(own, answer),
+            Message::Wave(wave) if ALTITUDE => share.on_wave(own, wave),
+            Message::Trace(trace) if ALTITUDE => share.on_trace(own, *trace),
+            Message::Token(token) if ADJUST => share.on_token(own, token),
+            Message::Moved(moved) if ADJUST => share.on_moved(own, moved),
+            Message::Busy { sweep } => {
+                if self.share.phase() == Phase::Waiting && *sweep == self.share.number() {
                     // It has arrived: what is missing is the answer, and that may take its time.
                     self.unheard = 0;
                     let patience = self.patience();
                     self.timers.set(Timer::Repeat, now + patience);
                 }
+                return;
             }
-            (Side::Upstream, Message::Verdict(_) | Message::Busy { .. })
-            | (Side::Downstream, Message::Sweep(_)) => {
-                bump(&mut self.stats.misdirected);
-            }
-        }
+            _ => return,
+        };
+        self.proceed(now, next);
     }
 
-    /// Does what the alignment asks for.
+    /// Does what the relay's share asks for.
     fn proceed(&mut self, now: Instant, next: Next) {
+        let mut moved = false;
         match next {
-            Next::Nothing => {}
             Next::Stale => bump(&mut self.stats.stale),
-            Next::Work => {
+            Next::Work { moved: to } => {
+                moved = to;
+                // What there was to say of the pass before would be stale.
+                self.onward_due = false;
+                self.back_due = false;
+                self.busy_due = false;
                 self.timers.stop(Timer::Repeat);
                 self.timers.set(Timer::Work, now + PAUSE);
             }
-            Next::Forward => {
+            Next::Forward { moved: to } => {
+                moved = to;
                 self.unheard = 0;
-                self.sweep_due = true;
+                self.onward_due = true;
                 self.busy_due = false;
-                // An answer to the sweep before would be stale.
-                self.verdict_due = false;
+                // An answer to the pass before would be stale.
+                self.back_due = false;
                 self.timers.stop(Timer::Repeat);
+                self.timers.stop(Timer::Work);
             }
             Next::Busy => {
                 bump(&mut self.stats.repeated);
@@ -240,15 +301,17 @@ impl Node {
             }
             Next::Repeat => {
                 bump(&mut self.stats.repeated);
-                self.verdict_due = true;
+                self.back_due = true;
             }
-            Next::Answer { committed } => {
-                self.sweep_due = false;
+            Next::Answer { moved: to, agreed } => {
+                moved = to;
+                self.onward_due = false;
                 self.busy_due = false;
                 self.timers.stop(Timer::Repeat);
-                self.verdict_due = self.upstream.is_some();
-                if committed {
-                    self.pending.raise(Event::SetpointChanged);
+                self.timers.stop(Timer::Work);
+                let back = self.backward();
+                self.back_due = self.link(back).is_some();
+                if agreed {
                     self.pending.raise(Event::Converged);
                 }
             }
@@ -257,28 +320,50 @@ impl Node {
                 self.pending.raise(Event::Infeasible);
             }
         }
-        self.stats.sweeps = self.align.sweeps();
+        if moved {
+            self.pending.raise(Event::SetpointChanged);
+            // What is measured from now on is measured elsewhere.
+            self.meter.restart();
+        }
+        self.stats.sweeps = self.share.sweeps();
     }
 
     /// Handles every timer that has run out by `now`. Each is stopped first and set again only to a later time, so four
-    /// rounds at most; the work is bounded by 16 hops of 16 reaches.
+    /// rounds at most; the work is that of one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         while let Some(timer) = self.timers.expired(now) {
             match timer {
                 Timer::Work => {
-                    let next = self.align.work(&self.mission, self.profile, &self.settings);
+                    let (share, own) = self.parts();
+                    let next = share.work(own);
                     self.proceed(now, next);
                 }
                 Timer::Repeat => {
-                    if self.align.phase() == Phase::Waiting {
+                    if self.share.phase() == Phase::Waiting {
                         bump(&mut self.stats.repeats);
                         self.unheard = self.unheard.saturating_add(1);
-                        self.sweep_due = true;
+                        self.onward_due = true;
                     }
                 }
                 Timer::Upstream => self.silence(now, Side::Upstream),
                 Timer::Downstream => self.silence(now, Side::Downstream),
             }
+        }
+    }
+
+    /// One measurement, by a relay that measures.
+    pub(crate) fn handle_sample(&mut self, sample: Sample) {
+        let at = self.share.setpoint().filter(|_| self.index == 1);
+        if !self.meter.take(&self.mission, at, sample) {
+            bump(&mut self.stats.samples_refused);
+        }
+    }
+
+    /// The leader begins again, at `now`; nobody else has anything to begin.
+    pub(crate) fn restart(&mut self, now: Instant) {
+        if self.index == self.mission.leader() {
+            self.share.restart();
+            self.proceed(now, Next::Work { moved: false });
         }
     }
 
@@ -294,26 +379,21 @@ impl Node {
     }
 
     /// The next message to send, and to which neighbour. Call until there is none.
-    pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, Message)> {
-        if core::mem::take(&mut self.sweep_due)
-            && let Some(sweep) = self.align.sweep(self.digest, self.profile)
-        {
+    pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, Message<'_>)> {
+        let (onward, backward) = (self.onward(), self.backward());
+        if core::mem::take(&mut self.onward_due) && self.share.phase() == Phase::Waiting {
             let patience = self.patience();
             self.timers.set(Timer::Repeat, now + patience);
-            return Some((Side::Downstream, Message::Sweep(sweep)));
+            let (share, own) = self.parts();
+            return share.onward(own).map(|message| (onward, message));
         }
-        if core::mem::take(&mut self.verdict_due)
-            && let Some(answer) = self.align.answer(self.digest)
-        {
-            return Some((Side::Upstream, Message::Verdict(answer)));
+        if core::mem::take(&mut self.back_due) && self.share.has_answer() {
+            let (share, own) = self.parts();
+            return share.back(own).map(|message| (backward, message));
         }
         if core::mem::take(&mut self.busy_due) {
-            return Some((
-                Side::Upstream,
-                Message::Busy {
-                    sweep: self.align.number(),
-                },
-            ));
+            let sweep = self.share.number();
+            return Some((backward, Message::Busy { sweep }));
         }
         let mission = self.digest;
         for side in [Side::Upstream, Side::Downstream] {
@@ -322,27 +402,29 @@ impl Node {
             };
             let Signs { ask, answer } = core::mem::take(&mut link.signs);
             if ask || answer {
-                return Some((
-                    side,
-                    Message::Heartbeat {
-                        mission,
-                        answer: ask,
-                    },
-                ));
+                let heartbeat = Message::Heartbeat {
+                    mission,
+                    answer: ask,
+                };
+                return Some((side, heartbeat));
             }
         }
         None
     }
 
-    /// How long the verdict on a sweep sent now may take: there and back over every hop that is left, and two to spare.
+    /// How long what comes back of a pass sent now may take: there and back over every hop that is left, and two to spare;
+    /// [`SLOW`] times as long where relays compute on the way.
     ///
     /// The relay next to a lost frame runs out of patience first, so one loss costs one repetition. From then on it is
-    /// known that frames get lost here, and the sweep is repeated sooner, first after four hops' time and then after twice
+    /// known that frames get lost here, and the pass is repeated sooner, first after four hops' time and then after twice
     /// as long each, until a neighbour says that it has arrived. A random eighth keeps relays on a shared channel from
     /// repeating in step.
     fn patience(&mut self) -> Duration {
-        let hops = u32::from(self.mission.relays().saturating_sub(self.index));
-        let answer = 2 * hops + 2;
+        let hops = u32::from(match self.mission.heading() {
+            Heading::TowardRx => self.mission.relays().saturating_sub(self.index),
+            Heading::TowardTx => self.index.saturating_sub(1),
+        });
+        let answer = (2 * hops + 2) * if self.share.is_slow() { SLOW } else { 1 };
         let hops = match self.unheard {
             0 => answer,
             again => answer.min(2 << u32::from(again).min(16)),
@@ -370,15 +452,15 @@ impl Node {
     }
 
     pub(crate) fn setpoint(&self) -> Option<Placement> {
-        self.align.setpoint()
+        self.share.setpoint()
     }
 
     pub(crate) fn target(&self) -> Option<f32> {
-        self.align.target()
+        self.share.target()
     }
 
     pub(crate) fn phase(&self) -> Phase {
-        self.align.phase()
+        self.share.phase()
     }
 
     pub(crate) fn mission(&self) -> &Mission {
@@ -390,6 +472,14 @@ impl Node {
     }
 
     pub(crate) fn profile(&self) -> Profile {
-        self.profile
+        self.share.profile()
+    }
+
+    pub(crate) fn rounds(&self) -> Option<(u16, f32)> {
+        self.share.rounds()
+    }
+
+    pub(crate) fn meter(&self) -> &Meter {
+        &self.meter
     }
 }

@@ -1,6 +1,7 @@
 //! Who a relay is and how it behaves, checked once when it is switched on.
 
 use crate::mission::{Mission, Profile};
+use crate::placement::local::Local;
 use crate::placement::search::Schedule;
 use crate::time::Duration;
 
@@ -25,19 +26,72 @@ pub enum Wiring {
     Shared,
 }
 
+/// What the leader has the chain do.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Method {
+    /// The best places at the altitudes held: Algorithm 1, in a field Algorithm 4.
+    #[default]
+    Align,
+    /// Algorithm 1, and then the best altitudes with it, within the mission's band. Not in a field.
+    Altitude,
+    /// Algorithm 1, and then Algorithm 2. Not in a field.
+    Adjust(Adjust),
+}
+
+/// How Algorithm 2 goes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Adjust {
+    /// Rounds at most: the paper's `Iter_max`. It ends sooner when a whole round moves nobody.
+    pub rounds: u16,
+    /// How far a relay may go up or down in one turn, m: 0 to 1e5; the paper's `epsilon_h`.
+    pub explore_m: f32,
+    /// How it looks for a better place.
+    pub local: Local,
+}
+
+impl Default for Adjust {
+    /// Five hundred rounds of 10 m, from coarse to fine.
+    fn default() -> Self {
+        Self {
+            rounds: 500,
+            explore_m: 10.0,
+            local: Local::Fine,
+        }
+    }
+}
+
+/// How a relay measures the interference, for a closed loop.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Measure {
+    /// The most interference power that may be received, W: 1e-30 to 1e6. Samples above it are left out.
+    pub i_max_w: f32,
+    /// Samples to take at a place before what they say is used, 100 to 1 000 000.
+    pub samples: u32,
+}
+
 /// What a firmware may choose.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
     /// What this relay holds, if not what the mission has in common.
     pub profile: Option<Profile>,
-    /// Which targets the head tries; the others follow.
+    /// Whether it keeps to the altitude of that when altitudes are chosen.
+    pub hold_altitude: bool,
+    /// What the leader (relay 1; in a field relay N) has the chain do; the others follow.
+    pub method: Method,
+    /// In a field: whether and how this relay measures it, to use what it measured instead of what was agreed.
+    pub measure: Option<Measure>,
+    /// Which targets the leader tries; the others follow.
     pub schedule: Schedule,
-    /// Whether the head first solves the chain from the mission, with the bracketed schedule: one round trip if it is right.
+    /// Whether the leader first solves the chain from the mission, with the bracketed schedule: one round trip if it is right.
     pub predict: bool,
     /// Two links or one channel.
     pub wiring: Wiring,
-    /// The longest that a full frame takes from one relay's `poll_transmit` to the next one's, its computing included; above 0.
+    /// The longest that a sweep (100 bytes) takes from one relay's `poll_transmit` to the next one's, its computing included;
+    /// above 0. For messages that take longer it is multiplied.
     pub hop_time: Duration,
     /// After this long without a frame from a neighbour it is asked for a sign of life; above 0.
     pub quiet: Duration,
@@ -50,6 +104,9 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             profile: None,
+            hold_altitude: false,
+            method: Method::Align,
+            measure: None,
             schedule: Schedule::Bracketed,
             predict: true,
             wiring: Wiring::Pair,
@@ -71,6 +128,12 @@ pub enum SetupError {
     Profile,
     /// The step of the fixed-step schedule is not a number above 0.
     Step,
+    /// `method` chooses altitudes, which it can not in a field, or the crate was built without the feature for it.
+    Method,
+    /// `method.explore_m` is not within 0 to 1e5, or its grid has fewer than 2 columns or rows.
+    Adjust,
+    /// `measure.i_max_w` is not within 1e-30 to 1e6, or `measure.samples` not within 100 to 1 000 000.
+    Measure,
     /// `hop_time` is zero.
     HopTime,
     /// `quiet` is zero, or `lost` not above it.
@@ -85,6 +148,11 @@ impl core::fmt::Display for SetupError {
                 "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6"
             }
             Self::Step => "the fixed step must be above 0",
+            Self::Method => "method must be Align in a field, or without the feature for it",
+            Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
+            Self::Measure => {
+                "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000"
+            }
             Self::HopTime => "hop_time must be above 0",
             Self::Silence => "quiet must be above 0 and lost above quiet",
         })
@@ -109,6 +177,31 @@ pub(crate) fn check(
         && !(step > 0.0 && step.is_finite())
     {
         return Err(SetupError::Step);
+    }
+    let able = match settings.method {
+        Method::Align => true,
+        Method::Altitude => cfg!(feature = "altitude") && mission.interferer().is_some(),
+        Method::Adjust(_) => cfg!(feature = "adjust") && mission.interferer().is_some(),
+    };
+    if !able {
+        return Err(SetupError::Method);
+    }
+    if let Method::Adjust(Adjust {
+        explore_m, local, ..
+    }) = settings.method
+    {
+        let grid = match local {
+            Local::Fine => true,
+            Local::Grid { columns, rows } => columns >= 2 && rows >= 2,
+        };
+        if !((0.0..=1e5).contains(&explore_m) && grid) {
+            return Err(SetupError::Adjust);
+        }
+    }
+    if let Some(Measure { i_max_w, samples }) = settings.measure
+        && !((1e-30..=1e6).contains(&i_max_w) && (100..=1_000_000).contains(&samples))
+    {
+        return Err(SetupError::Measure);
     }
     if settings.hop_time.as_micros() == 0 {
         return Err(SetupError::HopTime);

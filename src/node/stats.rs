@@ -31,12 +31,14 @@ pub struct Stats {
     pub foreign: u32,
     /// Intact frames from a node that is no neighbour, or for another node on a link that only this one should hear.
     pub misaddressed: u32,
-    /// Messages from the wrong side: a sweep from downstream, a verdict from upstream.
+    /// Messages from the wrong side: a pass from where it should go, what comes back of it from where it came from.
     pub misdirected: u32,
     /// Messages of another mission.
     pub mission: u32,
-    /// Messages of a sweep that is over.
+    /// Messages of a pass that is over.
     pub stale: u32,
+    /// Samples of the interference that were no use: not a number, out of range, or without anything to measure for.
+    pub samples_refused: u32,
 }
 
 impl Stats {

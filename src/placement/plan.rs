@@ -4,12 +4,11 @@
 //! bit. The head predicts with it, a relay that must keep silent finds its own place with it, and so does a planner.
 
 use super::PerTarget;
-use super::ladder::{Ladder, TARGETS};
+use super::ladder::Ladder;
+use super::pass::{self, Behind, origins};
 use super::search::{Infeasible, Schedule, Search};
-use super::spacing::Hop;
-use super::verdict::Verdict;
 use crate::mission::{Mission, Profile};
-use crate::sir::{Placement, Sender};
+use crate::sir::Placement;
 
 /// A target the whole chain meets, as the ladder and the place in it that the tail would commit.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -33,23 +32,23 @@ pub struct Planner {
     reaches: PerTarget,
     /// The relay whose reaches come next, 1 to N.
     index: u16,
-    sender: Sender,
+    behind: Option<Behind>,
     sweeps: u32,
 }
 
 impl Planner {
-    /// Starts to solve `mission`, whose head holds `head`.
+    /// Starts to solve `mission`, whose leader holds `leader`.
     ///
     /// # Errors
     /// [`Infeasible`] where the receiver can have no SIR at all.
-    pub fn new(mission: &Mission, head: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
-        let search = Search::new(mission, head, schedule)?;
+    pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
+        let search = Search::new(mission, leader, schedule)?;
         let mut planner = Self {
             search,
             targets: PerTarget::new(),
             reaches: PerTarget::new(),
-            index: 1,
-            sender: Sender::transmitter(mission),
+            index: mission.leader(),
+            behind: None,
             sweeps: 0,
         };
         planner.start_sweep(mission);
@@ -58,9 +57,9 @@ impl Planner {
 
     fn start_sweep(&mut self, mission: &Mission) {
         self.targets = self.search.ladder().targets();
-        self.reaches = origins();
-        self.index = 1;
-        self.sender = Sender::transmitter(mission);
+        self.reaches = origins(mission);
+        self.index = mission.leader();
+        self.behind = None;
         self.sweeps = self.sweeps.saturating_add(1);
     }
 
@@ -79,16 +78,26 @@ impl Planner {
     ) -> Result<Option<Agreed>, Infeasible> {
         for _ in 0..hops {
             let profile = profile_of(self.index);
-            let hop = Hop::new(mission, self.sender, self.index, profile.altitude_m);
             let mut reaches = PerTarget::new();
-            hop.extend(&self.targets, &self.reaches, &mut reaches);
+            pass::extend(
+                mission,
+                self.behind,
+                self.index,
+                profile,
+                &self.targets,
+                &self.reaches,
+                &mut reaches,
+            );
             self.reaches = reaches;
-            if self.index < mission.relays() {
-                self.sender = Sender::relay(mission, profile);
-                self.index += 1;
+            if let Some(next) = mission.after(self.index) {
+                self.behind = Some(Behind {
+                    profile,
+                    measured_per_w: None,
+                });
+                self.index = next;
                 continue;
             }
-            let verdict = Verdict::reach(mission, profile, self.search.ladder(), &self.reaches);
+            let verdict = pass::close(mission, profile, None, *self.search.ladder(), &self.reaches);
             if let Some(commit) = verdict.commit
                 && let Some(&target) = self.targets.get(usize::from(commit))
             {
@@ -115,7 +124,7 @@ pub fn solve(
     schedule: Schedule,
     profile_of: impl Fn(u16) -> Profile,
 ) -> Result<Agreed, Infeasible> {
-    let mut planner = Planner::new(mission, profile_of(1), schedule)?;
+    let mut planner = Planner::new(mission, profile_of(mission.leader()), schedule)?;
     loop {
         if let Some(agreed) = planner.step(mission, &profile_of, u16::MAX)? {
             return Ok(agreed);
@@ -123,25 +132,35 @@ pub fn solve(
     }
 }
 
-/// Where relay `index` stands when the chain takes `target`: the farthest place that meets it on every hop up to there.
+/// Where relay `index` stands when the chain takes `target`: as far on the way as every hop up to there lets it.
 ///
-/// `None` when a hop cannot meet the target. `index` reaches' worth of work.
+/// `None` when a hop cannot meet the target. At most N reaches' worth of work.
 pub fn place(
     mission: &Mission,
     target: f32,
     index: u16,
     profile_of: impl Fn(u16) -> Profile,
 ) -> Option<Placement> {
-    let mut sender = Sender::transmitter(mission);
-    let mut x_m = 0.0;
-    let mut altitude_m = 0.0;
-    for at in 1..=index {
+    let mut at = mission.leader();
+    let mut behind = None;
+    let mut from = origins(mission);
+    loop {
         let profile = profile_of(at);
-        x_m = Hop::new(mission, sender, at, profile.altitude_m).reach(target, x_m)?;
-        altitude_m = profile.altitude_m;
-        sender = Sender::relay(mission, profile);
+        let mut reaches = PerTarget::new();
+        pass::extend(mission, behind, at, profile, &[target], &from, &mut reaches);
+        if at == index {
+            return reaches.first().map(|&x_m| Placement {
+                x_m,
+                altitude_m: profile.altitude_m,
+            });
+        }
+        behind = Some(Behind {
+            profile,
+            measured_per_w: None,
+        });
+        from = reaches;
+        at = mission.after(at)?;
     }
-    Some(Placement { x_m, altitude_m })
 }
 
 /// The place relay `index` finds for itself without a message, where every relay holds what the mission has in common.
@@ -155,9 +174,4 @@ pub fn silent_place(mission: &Mission, index: u16) -> Result<Placement, Infeasib
     let common = |_| mission.config().common;
     let agreed = solve(mission, Schedule::Bracketed, common)?;
     place(mission, agreed.target, index, common).ok_or(Infeasible)
-}
-
-/// The transmitter's own "reaches": x = 0 for every target.
-pub(crate) fn origins() -> PerTarget {
-    PerTarget::from([0.0; TARGETS])
 }

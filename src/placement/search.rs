@@ -4,12 +4,16 @@
 //! one tries a ladder of targets a sweep; feasibility is monotone in the target, so the answer lies between the highest
 //! that was met and the lowest that was not, and the slacks, smooth in log gamma, tell where: inverse interpolation puts
 //! the next ladder's dense middle there while its ends still span the bracket.
+//!
+//! In a field that is not the same everywhere a target may be met while lower ones are not. There the bracket is looked for
+//! from the top downward, in steps of [`scan::STEP`](super::scan::STEP).
 
 use core::ops::Range;
 
 use super::ladder::Ladder;
+use super::scan::{Found, Scan};
 use super::verdict::met;
-use crate::mission::{Mission, MissionConfig, Profile};
+use crate::mission::{Heading, Mission, MissionConfig, Profile};
 use crate::sir::{self, Placement, Sender};
 
 /// Which targets the head tries.
@@ -56,7 +60,7 @@ const MOST_SWEEPS: u32 = 48;
 pub struct Search {
     schedule: Schedule,
     tolerance: f32,
-    /// What the first hop can have at most, hence the chain.
+    /// What the leader's own end of the chain can have at most, hence the chain.
     ceiling: f32,
     /// The first target of the fixed-step schedule: the paper's gamma_0.
     start: f32,
@@ -69,14 +73,16 @@ pub struct Search {
     ladder: Ladder,
     /// Sweeps whose verdict has come in.
     tried: u32,
+    /// The way down to the bracket, where a target may be met that is above others that are not.
+    scan: Option<Scan>,
 }
 
 impl Search {
-    /// A search by the head of `mission`, which holds `head`; the other relays need not hold what the mission has in common.
+    /// A search by the leader of `mission`, which holds `leader`; the other relays need not hold what the mission has in common.
     ///
     /// # Errors
     /// [`Infeasible`] where even a relay right above the receiver gives it no SIR: an interferer standing at the receiver.
-    pub fn new(mission: &Mission, head: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
+    pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
         let MissionConfig {
             distance_m, common, ..
         } = *mission.config();
@@ -84,22 +90,38 @@ impl Search {
             x_m: distance_m,
             altitude_m: profile.altitude_m,
         };
-        let ceiling = sir::first_hop_ceiling(mission, head.altitude_m);
-        let start = ceiling.min(sir::at_receiver(
-            mission,
-            above_receiver(common),
-            common.power_w,
-        ));
+        // What the hop at either end can have at most, and what a chain of equals meets that takes no step at all.
+        let (ceiling, start, met) = match mission.heading() {
+            Heading::TowardRx => {
+                let ceiling = sir::first_hop_ceiling(mission, leader.altitude_m);
+                let last = sir::at_receiver(mission, above_receiver(common), common.power_w);
+                let met = Sender::transmitter(mission).sir_at(mission, 0.0, above_receiver(leader));
+                (ceiling, ceiling.min(last), met)
+            }
+            Heading::TowardTx => {
+                let ceiling = sir::at_receiver(mission, above_receiver(leader), leader.power_w);
+                let above_transmitter = Placement {
+                    x_m: 0.0,
+                    altitude_m: leader.altitude_m,
+                };
+                let met = sir::at_receiver(mission, above_transmitter, leader.power_w);
+                (ceiling, ceiling, met)
+            }
+        };
         // A subnormal start has no digits left to search with.
         if !(start >= f32::MIN_POSITIVE / DEPTH) {
             return Err(Infeasible);
         }
+        let uneven = mission.field().is_some_and(|field| !field.is_constant());
+        let scan = (uneven && schedule == Schedule::Bracketed).then(|| Scan::new(start));
         let ladder = match schedule {
             Schedule::FixedStep { .. } => Ladder::single(start),
             Schedule::Bracketed => {
-                // With every relay above the receiver a chain of equals meets this; half of it leaves room for rounding.
-                let met = Sender::transmitter(mission).sir_at(mission, 0.0, above_receiver(head));
-                Ladder::spanning(met.min(start).max(start * DEPTH) / 2.0, start * 1.01)
+                scan.map_or_else(
+                    // Half of what is met leaves room for rounding.
+                    || Ladder::spanning(met.min(start).max(start * DEPTH) / 2.0, start * 1.01),
+                    Scan::ladder,
+                )
             }
         };
         Ok(Self {
@@ -112,6 +134,7 @@ impl Search {
             width: f32::INFINITY,
             ladder,
             tried: 0,
+            scan,
         })
     }
 
@@ -120,9 +143,24 @@ impl Search {
         &self.ladder
     }
 
+    /// The way down, in a field; without the feature for it there is none, and none of its code.
+    fn scan(&mut self) -> Option<&mut Scan> {
+        self.scan.as_mut().filter(|_| cfg!(feature = "field"))
+    }
+
     /// Tries `ladder` next instead: the one by which the head, having solved the chain beforehand, expects a commit.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.ladder = ladder;
+        if let Some(scan) = self.scan() {
+            scan.put_off();
+        }
+    }
+
+    /// Takes it that the lower a target the easier it is met, whatever the field: as where every relay uses what it measures.
+    pub(crate) fn take_as_even(&mut self) {
+        if cfg!(feature = "field") && self.scan.take().is_some() {
+            self.ladder = Ladder::spanning(self.start * 1e-4, self.start * 1.01);
+        }
     }
 
     /// Takes the slacks of [`Search::ladder`], in metres for as many targets as every hop could meet, and moves on.
@@ -135,7 +173,23 @@ impl Search {
         self.tried = self.tried.saturating_add(1);
         self.ladder = match self.schedule {
             Schedule::FixedStep { step } => self.step_down(step)?,
-            Schedule::Bracketed => self.narrow(slacks)?,
+            Schedule::Bracketed => {
+                let targets = self.ladder.targets();
+                match self.scan().map(|scan| scan.advance(&targets, slacks)) {
+                    Some(Found::Nothing(next))
+                        if next.targets().first() > Some(&(self.start * DEPTH)) =>
+                    {
+                        next
+                    }
+                    Some(Found::Nothing(_)) => return Err(Infeasible),
+                    Some(Found::Bracket) => {
+                        self.scan = None;
+                        self.tried = 0;
+                        self.narrow(slacks)?
+                    }
+                    None => self.narrow(slacks)?,
+                }
+            }
         };
         Ok(())
     }

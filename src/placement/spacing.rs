@@ -24,8 +24,7 @@
 //! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement.rs` asserts it against a bisection of the
 //! SIR itself in f64.
 
-use super::PerTarget;
-use crate::mission::{Mission, Profile};
+use crate::mission::{Interferer, Mission, Profile};
 use crate::root::sqrt;
 use crate::sir::{Sender, square};
 
@@ -53,9 +52,16 @@ pub struct Hop {
 }
 
 impl Hop {
-    /// The hop from `sender` to relay `index`, which holds `altitude_m`.
-    pub fn new(mission: &Mission, sender: Sender, index: u16, altitude_m: f32) -> Self {
-        let interferer = mission.interferer();
+    /// The hop from `sender` to relay `index`, which holds `altitude_m`; neighbours among the relays after it may differ by
+    /// `climb_m` in altitude.
+    pub fn new(
+        mission: &Mission,
+        interferer: &Interferer,
+        sender: Sender,
+        index: u16,
+        altitude_m: f32,
+        climb_m: f32,
+    ) -> Self {
         let climb = altitude_m - sender.altitude_m;
         Self {
             sender,
@@ -69,7 +75,7 @@ impl Hop {
             } else {
                 mission.least_step(climb)
             },
-            end_m: mission.end_for(index),
+            end_m: mission.end_for(index, climb_m),
         }
     }
 
@@ -120,21 +126,6 @@ impl Hop {
         // A hop too short for an f32 is none: two relays never share a place.
         (place > from_m).then_some(place)
     }
-
-    /// Extends a chain by this hop: `onto` gets the reach for every target that the sender's `reaches` still meet.
-    ///
-    /// Feasibility is monotone in the target, so the first target that cannot be met ends the list.
-    pub fn extend(&self, targets: &[f32], reaches: &[f32], onto: &mut PerTarget) {
-        onto.clear();
-        for (&target, &from_m) in targets.iter().zip(reaches) {
-            let Some(place) = self.reach(target, from_m) else {
-                break;
-            };
-            if onto.push(place).is_err() {
-                break;
-            }
-        }
-    }
 }
 
 /// The farthest a relay may be from the receiver, m along x, for the receiver to meet `target`: the paper's `d_max`.
@@ -150,7 +141,7 @@ pub fn receiver_reach(mission: &Mission, profile: Profile, target: f32) -> Optio
 mod tests {
     use super::Hop;
     use crate::mission::tests::paper;
-    use crate::mission::{Interferer, Mission, MissionConfig};
+    use crate::mission::{Interference, Interferer, Mission, MissionConfig};
     use crate::sir::Sender;
 
     fn first_hop(x_m: f32, distance_m: f32, altitude_m: f32) -> Hop {
@@ -161,11 +152,12 @@ mod tests {
         };
         let config = MissionConfig {
             distance_m,
-            interferer,
+            interference: Interference::Source(interferer),
             ..paper(1)
         };
         let mission = Mission::try_new(config).unwrap();
-        Hop::new(&mission, Sender::transmitter(&mission), 1, altitude_m)
+        let sender = Sender::transmitter(&mission);
+        Hop::new(&mission, &interferer, sender, 1, altitude_m, 0.0)
     }
 
     /// Behind the transmitter an interferer makes SIR_1 rise at first: at 10 m behind, from 1.04 above Tx to 1.22 at 45 m.

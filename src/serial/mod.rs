@@ -26,7 +26,7 @@
 //! ```
 //! use uav_relay::channel::{AirGround, Channel};
 //! use uav_relay::serial::{Nb, Pair, SerialLink, byte_time};
-//! use uav_relay::{Event, Identity, Instant, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
+//! use uav_relay::{Band, Event, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
 //! use embedded_hal_nb::{nb, serial};
 //!
 //! #[derive(Default)]
@@ -61,7 +61,8 @@
 //!     tx_power_w: 80.0,
 //!     common: Profile { altitude_m: 20.0, power_w: 1.0 },
 //!     channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?,
-//!     interferer: Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 },
+//!     band: Band::at(20.0),
+//!     interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
 //!     tolerance: 1e-4,
 //! })?;
 //! let identity = Identity { network: 7, index: 1 };

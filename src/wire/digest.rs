@@ -1,7 +1,7 @@
 //! The 16-bit digest of a mission, by which relays tell whether they fly the same one.
 
 use super::crc::Crc32c;
-use crate::mission::Mission;
+use crate::mission::{Interference, Mission};
 
 /// The low half of a CRC-32C over every parameter of `mission`; `FORMAT.md` has their order.
 ///
@@ -16,15 +16,30 @@ pub fn digest(mission: &Mission) -> u16 {
         c.tx_power_w,
         c.common.altitude_m,
         c.common.power_w,
-        c.interferer.power_w,
-        c.interferer.x_m,
-        c.interferer.y_m,
-        c.tolerance,
     ] {
         crc.update(&number.to_le_bytes());
     }
+    match c.interference {
+        Interference::Source(interferer) => {
+            for number in [interferer.power_w, interferer.x_m, interferer.y_m] {
+                crc.update(&number.to_le_bytes());
+            }
+        }
+        Interference::Field(field) => {
+            for point in field.points() {
+                crc.update(&point.x_m.to_le_bytes());
+                crc.update(&point.upsilon_per_w.to_le_bytes());
+            }
+        }
+    }
+    crc.update(&c.tolerance.to_le_bytes());
     for number in [c.channel.mu_los(), c.channel.mu_nlos(), c.channel.eta()] {
         crc.update(&number.to_le_bytes());
+    }
+    // A band of one altitude leaves the digest as it was before there were bands.
+    if !c.band.is_single() {
+        crc.update(&c.band.least_m.to_le_bytes());
+        crc.update(&c.band.most_m.to_le_bytes());
     }
     let [a, b, ..] = crc.finish().to_le_bytes();
     u16::from_le_bytes([a, b])
@@ -33,8 +48,8 @@ pub fn digest(mission: &Mission) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::digest;
-    use crate::mission::tests::paper;
-    use crate::mission::{Mission, MissionConfig};
+    use crate::mission::tests::{interferer, paper};
+    use crate::mission::{Band, Interference, Interferer, Mission, MissionConfig};
 
     #[test]
     fn the_digest_tells_missions_apart() {
@@ -46,7 +61,24 @@ mod tests {
         let same = of(|_| ());
         assert_eq!(same, of(|_| ()));
         assert_ne!(same, of(|c| c.relays = 9));
-        assert_ne!(same, of(|c| c.interferer.y_m = c.interferer.y_m.next_up()));
+        assert_ne!(
+            same,
+            of(|c| {
+                c.interference = Interference::Source(Interferer {
+                    y_m: 400.0_f32.next_up(),
+                    ..interferer()
+                });
+            })
+        );
+        assert_ne!(
+            same,
+            of(|c| {
+                c.band = Band {
+                    least_m: 20.0,
+                    most_m: 300.0,
+                };
+            })
+        );
         assert_ne!(same, of(|c| c.tolerance = 2e-4));
     }
 }

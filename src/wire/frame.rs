@@ -15,8 +15,11 @@ const CHECK: usize = 4;
 /// The longest frame before COBS.
 pub const MAX_DECODED: usize = HEADER + MAX_BODY + CHECK;
 
-/// The longest frame on the wire: COBS adds one byte to anything this short, the delimiter is another.
+/// The longest frame on the wire: COBS adds one byte to anything shorter than 254, the delimiter is another.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
+
+/// The longest frame of a sweep on the wire: sixteen targets.
+pub const MAX_SWEEP: usize = 100;
 
 /// The largest node number an address can hold; 4095 is kept for a broadcast.
 pub const MAX_NODE: u16 = 4094;
@@ -69,11 +72,14 @@ impl core::error::Error for FrameError {}
 /// Writes the frame for `message` into `out` and returns its length, delimiter included; 0 if a node number is too large.
 ///
 /// Work linear in the length of the frame, at most [`MAX_FRAME`] bytes.
-pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
+pub fn encode(header: Header, message: &Message<'_>, out: &mut FrameBuf) -> usize {
     if header.sender > MAX_NODE || header.destination > MAX_NODE {
         return 0;
     }
-    let mut plain = [0; MAX_DECODED];
+    // The first byte and the last are for COBS and the delimiter.
+    let Some(plain) = out.get_mut(1..=MAX_DECODED) else {
+        return 0;
+    };
     let Some((head, rest)) = plain.split_first_chunk_mut::<HEADER>() else {
         return 0;
     };
@@ -94,7 +100,7 @@ pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
     if let Some(place) = plain.get_mut(checked..checked + CHECK) {
         place.copy_from_slice(&crc.finish().to_le_bytes());
     }
-    stuff(plain.get(..checked + CHECK).unwrap_or_default(), out)
+    stuff(out, checked + CHECK)
 }
 
 /// The header and the body in `plain`, a frame without COBS and delimiter.
@@ -132,27 +138,29 @@ pub fn open(plain: &[u8]) -> Result<(Header, &[u8]), FrameError> {
 ///
 /// # Errors
 /// [`FrameError`] says what is wrong.
-pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
+pub fn decode(plain: &[u8]) -> Result<(Header, Message<'_>), FrameError> {
     let (header, body) = open(plain)?;
     let message = Message::decode(body).map_err(FrameError::Message)?;
     Ok((header, message))
 }
 
-/// COBS: `plain`, of fewer than 254 bytes, without its zeros, and the delimiter. Returns the length.
-fn stuff(plain: &[u8], out: &mut FrameBuf) -> usize {
-    let mut at = 0;
-    for run in plain.split(|&byte| byte == 0) {
-        let Some((code, rest)) = out.get_mut(at..).and_then(<[u8]>::split_first_mut) else {
-            return 0;
-        };
-        let Some(place) = rest.get_mut(..run.len()) else {
-            return 0;
-        };
-        *code = u8::try_from(run.len() + 1).unwrap_or(u8::MAX);
-        place.copy_from_slice(run);
-        at += run.len() + 1;
+/// COBS in place: the `len` bytes from the second on, fewer than 254, without their zeros, and the delimiter. Returns the
+/// length of all.
+fn stuff(out: &mut FrameBuf, len: usize) -> usize {
+    // From the end: every zero, and the byte before the first, becomes the way to the next.
+    let mut run: u8 = 1;
+    for byte in out.iter_mut().take(len + 1).skip(1).rev() {
+        if *byte == 0 {
+            *byte = run;
+            run = 0;
+        }
+        run = run.wrapping_add(1);
     }
-    let Some(end) = out.get_mut(at) else { return 0 };
-    *end = 0;
-    at + 1
+    if let Some(first) = out.first_mut() {
+        *first = run;
+    }
+    if let Some(end) = out.get_mut(len + 1) {
+        *end = 0;
+    }
+    len + 2
 }

@@ -1,31 +1,32 @@
-//! What neighbours say to each other. The bodies are postcard; `FORMAT.md` has their byte tables.
-//!
-//! The types on the wire hold bytes, and their values are checked where they become messages: what [`Message::decode`]
-//! returns is in range.
-
-use serde::{Deserialize, Serialize};
+//! What neighbours say to each other. `body` has how they say it, `FORMAT.md` the byte tables.
 
 use crate::mission::Profile;
 use crate::placement::PerTarget;
-use crate::placement::ladder::{Ladder, TARGETS};
+use crate::placement::coded::{PLACES, WIDTH};
+use crate::placement::ladder::Ladder;
+use crate::placement::levels::Levels;
+use crate::placement::local::Local;
 use crate::placement::verdict::Verdict;
+use crate::placement::wave::{Choice, Rungs};
+use crate::sir::Placement;
 
-/// The longest body: a sweep with a full ladder.
-pub const MAX_BODY: usize = 84;
+/// The longest body: a wave with a place for every pair of a target and a level, or a sweep with what was measured.
+pub const MAX_BODY: usize = if cfg!(feature = "altitude") {
+    29 + WIDTH * PLACES
+} else {
+    88
+};
 
-/// No slack or reach in metres is larger: a place is at most 1e6, a reach of the last hop is cut at 1e9.
-const FARTHEST_M: f32 = 2e9;
-
-/// One message between neighbours.
+/// One message between neighbours. *Onward* is the way a pass goes: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]
-pub enum Message {
-    /// Toward Rx: targets, and how far the sender reaches for each.
+pub enum Message<'a> {
+    /// Onward: targets, and how far the sender reaches for each.
     Sweep(Sweep),
-    /// Toward Tx: what became of them. It acknowledges the sweep of the same number.
+    /// Back: what became of them. It acknowledges the sweep of the same number.
     Verdict(Answer),
-    /// Toward Tx: the sweep of this number has arrived, its verdict has not. Sent for a repeated sweep only.
+    /// Back: the pass of this number has arrived, what became of it is not known yet. Sent for a repeated one only.
     Busy {
-        /// The number of the sweep.
+        /// The number of the pass.
         sweep: u16,
     },
     /// Either way: a sign of life from a link that would be silent otherwise.
@@ -35,12 +36,20 @@ pub enum Message {
         /// Whether the sender asks for a heartbeat in return.
         answer: bool,
     },
+    /// Onward: targets, altitude levels, and how far the sender reaches for each pair.
+    Wave(Wave<'a>),
+    /// Back: which of them were chosen.
+    Trace(Trace),
+    /// Onward: whose turn it is to move.
+    Token(Token),
+    /// Back: who has moved where.
+    Moved(Moved),
 }
 
 /// One pass of targets along the chain, as one relay hands it to the next.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
-    /// Number of the sweep, wrapping.
+    /// Number of the pass, wrapping.
     pub number: u16,
     /// [`super::digest::digest`] of the sender.
     pub mission: u16,
@@ -48,6 +57,8 @@ pub struct Sweep {
     pub ladder: Ladder,
     /// What the sender holds.
     pub profile: Profile,
+    /// Upsilon as the sender measures it where it stands, 1/W, in a closed loop.
+    pub measured_per_w: Option<f32>,
     /// The sender's place for each target, m along x; shorter than the ladder where the upper targets cannot be met.
     pub reaches: PerTarget,
 }
@@ -61,6 +72,83 @@ pub struct Answer {
     pub mission: u16,
     /// What became of the targets.
     pub verdict: Verdict,
+}
+
+/// One pass of targets and altitude levels.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Wave<'a> {
+    /// Number of the pass, wrapping.
+    pub number: u16,
+    /// [`super::digest::digest`] of the sender.
+    pub mission: u16,
+    /// The targets.
+    pub rungs: Rungs,
+    /// The sender's levels.
+    pub levels: Levels,
+    /// The sender's transmit power, W.
+    pub power_w: f32,
+    /// The sender's place for each pair, target by target, as in [`crate::placement::coded`].
+    pub reaches: &'a [u8],
+}
+
+/// What was chosen of a wave, as it travels back.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Trace {
+    /// Number of the pass.
+    pub number: u16,
+    /// [`super::digest::digest`] of the sender.
+    pub mission: u16,
+    /// The target, and the level that the receiver takes for it; `None` if no target was met.
+    pub choice: Option<Choice>,
+}
+
+/// One turn of Algorithm 2.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Token {
+    /// Number of the pass, wrapping.
+    pub number: u16,
+    /// [`super::digest::digest`] of the sender.
+    pub mission: u16,
+    /// Where the sender stands now.
+    pub place: Placement,
+    /// The sender's transmit power, W.
+    pub power_w: f32,
+    /// What this pass is for.
+    pub turn: Turn,
+    /// SIR of the chain before this pass, linear; 0 before it is known.
+    pub sir: f32,
+}
+
+/// What a relay does when the token comes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Turn {
+    /// It stays, and hears where its neighbours are.
+    Look,
+    /// It moves if that is better.
+    Move {
+        /// How far up or down it may, m: the paper's `epsilon_h`.
+        explore_m: f32,
+        /// How it looks for a better place.
+        local: Local,
+    },
+    /// It stays for good.
+    Stop,
+}
+
+/// What a turn came to, as it travels back.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Moved {
+    /// Number of the pass.
+    pub number: u16,
+    /// [`super::digest::digest`] of the sender.
+    pub mission: u16,
+    /// Where the sender stands now.
+    pub place: Placement,
+    /// Whether it or any relay after it has moved.
+    pub any: bool,
+    /// SIR of the worst hop after the sender, linear.
+    pub worst: f32,
 }
 
 /// Why a body is no message.
@@ -84,161 +172,3 @@ impl core::fmt::Display for MessageError {
 }
 
 impl core::error::Error for MessageError {}
-
-/// The wire form; the order of variants and fields is the format.
-#[derive(Serialize, Deserialize)]
-enum Body {
-    Sweep {
-        number: [u8; 2],
-        mission: [u8; 2],
-        anchor: f32,
-        gap: u8,
-        growth: u8,
-        altitude_m: f32,
-        power_w: f32,
-        reaches: PerTarget,
-    },
-    Verdict {
-        number: [u8; 2],
-        mission: [u8; 2],
-        commit: Option<u8>,
-        slacks: PerTarget,
-    },
-    Busy {
-        number: [u8; 2],
-    },
-    Heartbeat {
-        mission: [u8; 2],
-        answer: bool,
-    },
-}
-
-impl Body {
-    /// Bytes of the shortest encoding. postcard reads longer ones too, whose tag or count is padded with empty varint bytes,
-    /// and how many it puts up with depends on the width of a usize: what one node took, another would refuse.
-    fn shortest(&self) -> usize {
-        match self {
-            Self::Sweep { reaches, .. } => 20 + 4 * reaches.len(),
-            Self::Verdict { commit, slacks, .. } => {
-                7 + usize::from(commit.is_some()) + 4 * slacks.len()
-            }
-            Self::Busy { .. } => 3,
-            Self::Heartbeat { .. } => 4,
-        }
-    }
-}
-
-impl Message {
-    /// Writes the body into `buffer` and returns how many bytes it takes, at most [`MAX_BODY`]; `None` if it does not fit.
-    pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        let body = match self {
-            Self::Sweep(sweep) => {
-                let (anchor, gap, growth) = sweep.ladder.parts();
-                Body::Sweep {
-                    number: sweep.number.to_le_bytes(),
-                    mission: sweep.mission.to_le_bytes(),
-                    anchor,
-                    gap,
-                    growth,
-                    altitude_m: sweep.profile.altitude_m,
-                    power_w: sweep.profile.power_w,
-                    reaches: sweep.reaches.clone(),
-                }
-            }
-            Self::Verdict(answer) => Body::Verdict {
-                number: answer.number.to_le_bytes(),
-                mission: answer.mission.to_le_bytes(),
-                commit: answer.verdict.commit,
-                slacks: answer.verdict.slacks.clone(),
-            },
-            Self::Busy { sweep } => Body::Busy {
-                number: sweep.to_le_bytes(),
-            },
-            Self::Heartbeat { mission, answer } => Body::Heartbeat {
-                mission: mission.to_le_bytes(),
-                answer: *answer,
-            },
-        };
-        postcard::to_slice(&body, buffer)
-            .ok()
-            .map(|written| written.len())
-    }
-
-    /// The message in `bytes`, with every number in its range. Work linear in their number, at most [`MAX_BODY`] of use.
-    ///
-    /// # Errors
-    /// [`MessageError::Encoding`] if it is not one message in its shortest form and nothing else, [`MessageError::Value`] for
-    /// a number that is not finite or outside its range.
-    #[inline(never)]
-    pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
-        let (body, rest): (Body, _) =
-            postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)?;
-        if !rest.is_empty() || bytes.len() != body.shortest() {
-            return Err(MessageError::Encoding);
-        }
-        Ok(match body {
-            Body::Sweep {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
-                reaches,
-            } => {
-                let ladder = Ladder::from_parts(anchor, gap, growth).ok_or(MessageError::Value)?;
-                let profile = Profile {
-                    altitude_m,
-                    power_w,
-                };
-                let reaches = in_range(reaches, 0.0)?;
-                if !profile.is_valid() || reaches.len() > ladder.len() {
-                    return Err(MessageError::Value);
-                }
-                Self::Sweep(Sweep {
-                    number: u16::from_le_bytes(number),
-                    mission: u16::from_le_bytes(mission),
-                    ladder,
-                    profile,
-                    reaches,
-                })
-            }
-            Body::Verdict {
-                number,
-                mission,
-                commit,
-                slacks,
-            } => {
-                let slacks = in_range(slacks, -FARTHEST_M)?;
-                if commit.is_some_and(|target| usize::from(target) >= TARGETS) {
-                    return Err(MessageError::Value);
-                }
-                Self::Verdict(Answer {
-                    number: u16::from_le_bytes(number),
-                    mission: u16::from_le_bytes(mission),
-                    verdict: Verdict { commit, slacks },
-                })
-            }
-            Body::Busy { number } => Self::Busy {
-                sweep: u16::from_le_bytes(number),
-            },
-            Body::Heartbeat { mission, answer } => Self::Heartbeat {
-                mission: u16::from_le_bytes(mission),
-                answer,
-            },
-        })
-    }
-}
-
-/// The numbers, if all are within [`least`, `FARTHEST_M`].
-fn in_range(numbers: PerTarget, least: f32) -> Result<PerTarget, MessageError> {
-    if numbers
-        .iter()
-        .all(|number| (least..=FARTHEST_M).contains(number))
-    {
-        Ok(numbers)
-    } else {
-        Err(MessageError::Value)
-    }
-}

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use host_tests::firmware::block::Flight;
 use host_tests::firmware::config::{ADDRESS, LEN};
-use host_tests::scenario::Scenario;
+use host_tests::scenario::{Interference, Scenario};
+use uav_relay::{Adjust, Local, Measure};
 
 /// Writes the configuration block of one relay: which one it is, and the mission it flies.
 #[derive(Parser, Debug)]
@@ -27,9 +28,38 @@ struct Options {
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
     #[arg(long, value_name = "T", default_value_t = 1e-4)]
     tolerance: f64,
+    /// How the places are found; in a field, only by `align`
+    #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
+    method: Method,
+    /// Rounds of `adjust` at most, 1 to 65535
+    #[arg(long, value_name = "K", default_value_t = 500, value_parser = clap::value_parser!(u16).range(1..))]
+    rounds: u16,
+    /// How far a relay may go up or down in one round of `adjust`, metres, 0 to 1e5
+    #[arg(long = "explore", value_name = "M", default_value_t = 10.0, value_parser = explore)]
+    explore_m: f32,
+    /// In a field: the relay measures it too, and believes this many samples at a place, 100 to 1000000
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
+    samples: Option<u32>,
     /// File to write the block to
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Method {
+    /// Algorithm 1, in a field Algorithm 4
+    Align,
+    /// Joint distance and altitude
+    Altitude,
+    /// Algorithm 1, then Algorithm 2
+    Adjust,
+}
+
+fn explore(text: &str) -> Result<f32, String> {
+    let value: Option<f32> = text.parse().ok();
+    value
+        .filter(|value| (0.0..=1e5).contains(value))
+        .ok_or_else(|| "must be a number within 0.0 to 100000.0".to_owned())
 }
 
 fn main() -> ExitCode {
@@ -87,9 +117,20 @@ fn run(options: &Options) -> Result<String, String> {
         .scenario
         .as_ref()
         .map_or("default scenario".into(), |file| file.to_string_lossy());
+    let method = match options.method {
+        Method::Align => uav_relay::Method::Align,
+        Method::Altitude => uav_relay::Method::Altitude,
+        Method::Adjust => uav_relay::Method::Adjust(Adjust {
+            rounds: options.rounds,
+            explore_m: options.explore_m,
+            local: Local::Fine,
+        }),
+    };
     let flight = Flight::new(&scenario, uavs, options.tolerance, network)
-        .map_err(|refusal| format!("{name}: {refusal}"))?;
+        .map_err(|error| format!("{name}: {error}"))?;
     let block = flight
+        .by(method)
+        .measuring(measure(options, &scenario)?)
         .block(index)
         .map_err(|error| format!("{name}: {error}"))?;
     let file = &options.out;
@@ -99,4 +140,21 @@ fn run(options: &Options) -> Result<String, String> {
         "{}: relay {index} of {uavs}, network {network}; {LEN} bytes for {ADDRESS:#010x}",
         file.display()
     ))
+}
+
+fn measure(options: &Options, scenario: &Scenario) -> Result<Option<Measure>, String> {
+    let Some(samples) = options.samples else {
+        return Ok(None);
+    };
+    let Interference::Field(field) = &scenario.interference else {
+        return Err(format!(
+            "--samples {samples}: is for a scenario with a [field]"
+        ));
+    };
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "1e-30 to 1e6 by the scenario"
+    )]
+    let i_max_w = field.i_max_w as f32;
+    Ok(Some(Measure { i_max_w, samples }))
 }

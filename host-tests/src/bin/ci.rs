@@ -57,6 +57,14 @@ fn steps() -> Vec<Step> {
             "cargo build --release --target thumbv7em-none-eabihf --examples --locked",
         ),
         step(
+            "firmware of Algorithm 1 alone",
+            "cargo build -p uav-relay --release --target thumbv7em-none-eabihf --examples --no-default-features --locked",
+        ),
+        step(
+            "Algorithm 1 alone",
+            "cargo test -p uav-relay --lib --no-default-features --locked",
+        ),
+        step(
             "firmware with its log",
             "cargo build -p uav-relay --release --target thumbv7em-none-eabihf --examples --features defmt --locked",
         ),

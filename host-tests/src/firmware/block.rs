@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use uav_relay::{Identity, Mission, Profile};
+use uav_relay::{Identity, Interference, Measure, Method, Mission, Profile};
 
-use super::config::{Block, ChannelNumbers, Config, ConfigError, read, write};
+use super::config::{Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, read, write};
 use crate::brief::{self, Refusal};
 use crate::scenario::{AirGround, ChannelSpec, Scenario};
 
@@ -14,6 +14,8 @@ use crate::scenario::{AirGround, ChannelSpec, Scenario};
 pub enum BlockError {
     /// The scenario is no mission.
     Refused(Refusal),
+    /// The field has this many points, more than a block has room for.
+    Points(usize),
     /// The drone would refuse the block.
     Config(ConfigError),
     /// The drone would read another mission than was meant.
@@ -24,11 +26,22 @@ impl fmt::Display for BlockError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Refused(refusal) => refusal.fmt(f),
+            Self::Points(points) => write!(
+                f,
+                "field: a drone has room for {MAX_POINTS} points, and these are {points}"
+            ),
             Self::Config(ConfigError::Index) => {
                 f.write_str("index must be within 1 to the number of relays")
             }
             Self::Config(ConfigError::Profile) => {
                 f.write_str("altitude or power of that relay is out of range")
+            }
+            Self::Config(ConfigError::Method) => f.write_str("method must be align in a field"),
+            Self::Config(ConfigError::Adjust) => {
+                f.write_str("rounds must be within 1 to 65535, explore within 0 to 1e5")
+            }
+            Self::Config(ConfigError::Measure) => {
+                f.write_str("samples must be within 100 to 1000000, i_max_w within 1e-30 to 1e6")
             }
             Self::Config(ConfigError::Mission(error)) => error.fmt(f),
             Self::Config(ConfigError::Channel(error)) => error.fmt(f),
@@ -45,27 +58,49 @@ pub struct Flight {
     mission: Mission,
     numbers: ChannelNumbers,
     own: Vec<(u16, Profile)>,
+    held: Vec<u16>,
+    method: Method,
+    measure: Option<Measure>,
     network: u16,
 }
 
 impl Flight {
-    /// The flight of `uavs` relays in `scenario`, on network `network`.
+    /// The flight of `uavs` relays in `scenario`, on network `network`: places alone, and nothing is measured.
     ///
     /// # Errors
-    /// [`Refusal`] where the scenario is no mission.
+    /// [`BlockError`] where the scenario is no mission, or none that a block has room for.
     pub fn new(
         scenario: &Scenario,
         uavs: u16,
         tolerance: f64,
         network: u16,
-    ) -> Result<Self, Refusal> {
-        let (mission, own) = brief::mission(scenario, uavs, tolerance)?;
+    ) -> Result<Self, BlockError> {
+        let (mission, own) =
+            brief::mission(scenario, uavs, tolerance).map_err(BlockError::Refused)?;
+        if let Interference::Field(field) = mission.interference()
+            && field.points().len() > MAX_POINTS
+        {
+            return Err(BlockError::Points(field.points().len()));
+        }
         Ok(Self {
             mission,
             numbers: channel_numbers(&scenario.channel),
             own,
+            held: brief::held(scenario, uavs),
+            method: Method::Align,
+            measure: None,
             network,
         })
+    }
+
+    /// The same, by another method.
+    pub fn by(self, method: Method) -> Self {
+        Self { method, ..self }
+    }
+
+    /// The same, with relays that measure the interference.
+    pub fn measuring(self, measure: Option<Measure>) -> Self {
+        Self { measure, ..self }
     }
 
     /// The mission.
@@ -76,6 +111,16 @@ impl Flight {
     /// What single relays hold of their own, by index from 1.
     pub fn profiles(&self) -> &[(u16, Profile)] {
         &self.own
+    }
+
+    /// Relays that keep to their altitude when altitudes are chosen, by index from 1.
+    pub fn held(&self) -> &[u16] {
+        &self.held
+    }
+
+    /// What the leader has the chain do.
+    pub const fn method(&self) -> Method {
+        self.method
     }
 
     /// The block of relay `index`, read back to be sure.
@@ -91,9 +136,12 @@ impl Flight {
             },
             mission: self.mission,
             profile: own.map_or(self.mission.config().common, |(_, profile)| *profile),
+            hold_altitude: self.held.contains(&index),
+            method: self.method,
+            measure: self.measure,
         };
         let block = write(&config, &self.numbers);
-        match read(&block) {
+        match read(&block, Box::leak(Box::new(EMPTY))) {
             Ok(read) if read == config => Ok(block),
             Ok(_) => Err(BlockError::Changed),
             Err(error) => Err(BlockError::Config(error)),

@@ -6,7 +6,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::node::settings::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Event, Identity, Instant, Phase, Port, Relay, Settings, Side};
+use uav_relay::{
+    Event, Identity, Instant, Method, Phase, Placement, Port, Relay, Sample, Settings, Side,
+};
 
 use super::faults::Injected;
 use super::link::Line;
@@ -56,6 +58,7 @@ impl Chain {
             let own = setup.profiles.iter().find(|(of, _)| *of == index);
             let settings = Settings {
                 profile: own.map(|(_, profile)| *profile),
+                hold_altitude: setup.held.contains(&index),
                 hop_time: setup.link.hop_time(),
                 ..setup.settings
             };
@@ -87,6 +90,7 @@ impl Chain {
             outcome: Outcome {
                 ending: Ending::OutOfTime,
                 relays: Vec::new(),
+                rounds: Vec::new(),
                 sweeps: 0,
                 messages: 0,
                 bytes: 0,
@@ -109,9 +113,8 @@ impl Chain {
     /// Sweeps the head has begun and virtual time so far.
     pub fn progress(&self) -> (u32, Instant) {
         let sweeps = self
-            .members
-            .first()
-            .map_or(0, |head| head.relay.stats().sweeps);
+            .leader()
+            .map_or(0, |leader| leader.relay.stats().sweeps);
         (sweeps, self.now)
     }
 
@@ -133,6 +136,47 @@ impl Chain {
             self.happen(relay, happening);
         }
         false
+    }
+
+    /// Has every living relay that holds a place measure there: `samples` times what `draw` gives for a place, W.
+    pub fn measure(
+        &mut self,
+        samples: u32,
+        mut draw: impl FnMut(Placement, &mut ChaCha8Rng) -> f32,
+    ) {
+        for index in 0..self.members.len() {
+            let Some(member) = self.members.get_mut(index) else {
+                continue;
+            };
+            if let Some(place) = member.relay.setpoint()
+                && member.killed.is_none()
+            {
+                for _ in 0..samples {
+                    let power_w = draw(place, &mut self.rng);
+                    member.relay.handle_sample(Sample::Interference { power_w });
+                }
+            }
+            self.drain(index);
+        }
+    }
+
+    /// Where the relays were told to fly, if all of them were.
+    pub fn setpoints(&self) -> Option<Vec<Placement>> {
+        self.members
+            .iter()
+            .map(|member| member.relay.setpoint())
+            .collect()
+    }
+
+    /// Has the chain agree again.
+    pub fn restart(&mut self) {
+        let now = self.now;
+        self.holding = 0;
+        let index = usize::from(self.setup.mission.leader()).saturating_sub(1);
+        if let Some(leader) = self.members.get_mut(index) {
+            leader.relay.restart(now);
+        }
+        self.drain(index);
     }
 
     /// Runs to the end.
@@ -159,6 +203,12 @@ impl Chain {
         self.outcome
     }
 
+    /// The relay that begins the passes.
+    fn leader(&self) -> Option<&Member> {
+        let index = usize::from(self.setup.mission.leader());
+        self.members.get(index.checked_sub(1)?)
+    }
+
     fn ending(&self) -> Option<Ending> {
         let killed = self.members.iter().any(|member| member.killed.is_some());
         if killed && self.kills_ahead == 0 {
@@ -168,9 +218,8 @@ impl Chain {
             return None;
         }
         if self
-            .members
-            .first()
-            .is_some_and(|head| head.relay.phase() == Phase::Infeasible)
+            .leader()
+            .is_some_and(|leader| leader.relay.phase() == Phase::Infeasible)
         {
             return Some(Ending::Infeasible);
         }
@@ -263,11 +312,28 @@ impl Chain {
             }
         }
         if let Some(place) = member.relay.setpoint() {
-            let end = self.setup.mission.config().distance_m;
-            let altitude = member.relay.profile().altitude_m;
+            let config = self.setup.mission.config();
+            let end = config.distance_m;
+            // What it was given, or one of the band.
+            let given = self.setup.profiles.iter().find(|(of, _)| *of == by);
+            let altitude = given.map_or(config.common, |(_, own)| *own).altitude_m;
+            let chosen = self.setup.settings.method != Method::Align
+                && !self.setup.held.contains(&by)
+                && (config.band.least_m..=config.band.most_m).contains(&place.altitude_m);
             let inside = (0.0..=end).contains(&place.x_m)
-                && place.altitude_m.to_bits() == altitude.to_bits();
+                && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
             self.outcome.unsafe_setpoints += u64::from(!inside);
+        }
+        if let Some((done, sir)) = member.relay.rounds()
+            && sir > 0.0
+            && self.outcome.rounds.len() <= usize::from(done)
+        {
+            // Algorithm 2 moves only what makes the worse of two hops better.
+            debug_assert!(
+                self.outcome.rounds.last().is_none_or(|last| sir >= *last),
+                "round {done} has made the chain worse"
+            );
+            self.outcome.rounds.push(sir);
         }
         if let Some(at) = member.relay.poll_timeout()
             && member.wake.is_none_or(|wake| at < wake)

@@ -39,6 +39,14 @@ pub struct Arrival {
 }
 
 impl Faults {
+    /// Everything at once, as a bad day has it.
+    pub const BAD_DAY: Self = Self {
+        loss: 0.3,
+        corrupt: 0.15,
+        duplicate: 0.1,
+        reorder: 0.1,
+    };
+
     /// Whether nothing can happen.
     pub fn none(&self) -> bool {
         *self == Self::default()

@@ -2,7 +2,7 @@
 
 use uav_relay::Duration;
 use uav_relay::Instant;
-use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::wire::frame::MAX_SWEEP;
 
 /// What a link is like.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -30,9 +30,9 @@ impl LinkSpec {
         Duration::from_micros(bits.div_ceil(u64::from(self.baud.max(300))))
     }
 
-    /// The longest a frame takes from one relay to the next, and a millisecond for computing.
+    /// The longest a sweep takes from one relay to the next, and a millisecond for computing.
     pub fn hop_time(&self) -> Duration {
-        let frame = self.line_time(MAX_FRAME).as_micros();
+        let frame = self.line_time(MAX_SWEEP).as_micros();
         Duration::from_micros(frame + self.latency.as_micros() + 1_000)
     }
 }

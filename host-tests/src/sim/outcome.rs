@@ -41,6 +41,8 @@ pub struct Outcome {
     pub ending: Ending,
     /// The relays, from the head.
     pub relays: Vec<RelayEnd>,
+    /// SIR of the chain after each round of Algorithm 2, linear; the first is that before any.
+    pub rounds: Vec<f32>,
     /// Forward passes along the chain.
     pub sweeps: u32,
     /// Frames put on any link.
@@ -55,4 +57,18 @@ pub struct Outcome {
     pub noticed: BTreeMap<(u16, Side), Instant>,
     /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.
     pub unsafe_setpoints: u64,
+}
+
+impl Outcome {
+    /// Where the relays were told to fly, to the bit: x and altitude; `None` for one that was told nothing.
+    pub fn bits(&self) -> Vec<Option<(u32, u32)>> {
+        self.relays
+            .iter()
+            .map(|relay| {
+                relay
+                    .setpoint
+                    .map(|place| (place.x_m.to_bits(), place.altitude_m.to_bits()))
+            })
+            .collect()
+    }
 }

@@ -12,7 +12,9 @@ pub struct Setup {
     pub mission: Mission,
     /// What relays hold of their own, by index from 1.
     pub profiles: Vec<(u16, Profile)>,
-    /// What every relay is set to; `hop_time` and `profile` are filled in.
+    /// Relays that keep to their altitude when altitudes are chosen.
+    pub held: Vec<u16>,
+    /// What every relay is set to; `hop_time`, `hold_altitude` and `profile` are filled in.
     pub settings: Settings,
     /// The links.
     pub link: LinkSpec,
@@ -32,6 +34,7 @@ impl Setup {
         Self {
             mission,
             profiles: Vec::new(),
+            held: Vec::new(),
             settings: Settings::default(),
             link: LinkSpec::default(),
             faults: Faults::default(),

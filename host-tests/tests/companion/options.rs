@@ -96,6 +96,51 @@ const WRONG: &[(&[&str], &[&str])] = &[
             "-10000000.0 to 10000000.0",
         ],
     ),
+    (
+        &["--method", "stochastic"],
+        &["--method", "'stochastic'", "align, altitude, adjust"],
+    ),
+    (&["--band", "20"], &["--band", "'20'", "LEAST,MOST"]),
+    (
+        &["--band", "0,20"],
+        &["--band", "'0,20'", "LEAST ", "0.1 to 100000.0"],
+    ),
+    (
+        &["--band", "20,NaN"],
+        &["--band", "'20,NaN'", "MOST ", "0.1 to 100000.0"],
+    ),
+    (
+        &["--band", "30,300"],
+        &["--band 30,300", "LEAST to MOST", "--altitude 20"],
+    ),
+    (
+        &["--band", "300,10"],
+        &["--band 300,10", "LEAST to MOST", "--altitude 20"],
+    ),
+    (
+        &["--field", "0:1e6,5"],
+        &["--field", "'0:1e6,5'", "X:UPSILON"],
+    ),
+    (
+        &["--field", "-1e8:1e6"],
+        &["--field", "'-1e8:1e6'", "X ", "-10000000.0 to 10000000.0"],
+    ),
+    (
+        &["--field", "0:0"],
+        &["--field", "'0:0'", "UPSILON ", "1e-9 to 1e32"],
+    ),
+    (
+        &["--field", "5:1e6,5:1e6"],
+        &["--field", "'5:1e6,5:1e6'", "x_m must rise"],
+    ),
+    (
+        &["--field", "0:1e6", "--interferer", "80,500,400"],
+        &["--field", "--interferer", "cannot be used"],
+    ),
+    (
+        &["--field", "0:1e6", "--method", "altitude"],
+        &["--method altitude", "align with --field"],
+    ),
     (&["--nonsense"], &["--nonsense"]),
 ];
 

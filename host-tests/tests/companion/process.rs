@@ -93,6 +93,23 @@ impl Relay {
         [setpoint[0], setpoint[1], target[0]]
     }
 
+    /// Waits until it has agreed on these bits of x, altitude and target: it may agree on others on its way there.
+    pub(crate) fn settles_at(&mut self, expected: [u32; 3]) {
+        let mut place = Vec::new();
+        loop {
+            let line = self.line(" (0x");
+            let mut agreed = bits(&line);
+            if !line.contains("converged: ") {
+                place = agreed;
+                continue;
+            }
+            agreed.splice(0..0, place.iter().copied());
+            if agreed == expected {
+                return;
+            }
+        }
+    }
+
     pub(crate) fn signal(&self, signal: Signal) {
         kill_process(self.pid(), signal).unwrap();
     }

@@ -25,6 +25,8 @@ pub(crate) fn paper(uavs: u16) -> Flight {
 pub(crate) fn simulated(flight: &Flight) -> Vec<(u32, u32)> {
     let mut setup = Setup::new(*flight.mission());
     setup.profiles = flight.profiles().to_vec();
+    setup.held = flight.held().to_vec();
+    setup.settings.method = flight.method();
     let outcome = run(setup).unwrap();
     assert_eq!(outcome.ending, Ending::Settled);
     outcome

@@ -165,6 +165,21 @@ impl Fleet {
             .collect()
     }
 
+    /// Waits until the chain has agreed on `places`, to the bit: it may agree on others on its way there.
+    pub(crate) fn settle_at(&mut self, places: &[(u32, u32)]) {
+        assert_eq!(self.drones.len(), places.len());
+        self.wait("agreement on these places", |lines| {
+            (1..).zip(places).all(|(drone, place)| {
+                let mut back = lines.iter().rev().filter(|line| line.drone == drone);
+                // An agreement is logged behind the places agreed on.
+                let agreed =
+                    back.find(|line| line.setpoint().is_some() || line.text == "event Converged");
+                agreed.is_some_and(|line| line.text == "event Converged")
+                    && back.find_map(Line::setpoint) == Some(*place)
+            })
+        });
+    }
+
     /// Asks a drone for its counters, and waits for them.
     pub(crate) fn counters(&mut self, drone: u16) -> Line {
         let before = self.lines.len();

@@ -10,6 +10,7 @@ use uav_relay::Settings;
 use crate::chain::{paper, simulated};
 use crate::fleet::{Fleet, Image};
 use crate::log::Line;
+use crate::methods::field;
 
 /// What the machine may add, in microseconds of the drones' clock: it passes 10.5 times as fast as the wall's and does not
 /// stand still while an emulator waits for a processor, so 50 ms of waiting are half a second. The simulated chain, which
@@ -74,6 +75,7 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
     damaged[20] ^= 1;
     let mut other_version = good.clone();
     other_version[4] = 9;
+    let field = field().block(2).unwrap().to_vec();
     let blocks = [
         vec![0xFF; LEN],
         vec![0; LEN],
@@ -83,6 +85,15 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
         with(&good, 16, &0.5_f32.to_le_bytes()),
         with(&good, 36, &f32::NAN.to_le_bytes()),
         with(&good, 60, &1.0_f64.to_le_bytes()),
+        with(&good, 92, &30.0_f32.to_le_bytes()),
+        with(&good, 14, &[3]),
+        with(&good, 15, &[2]),
+        with(&good, 104, &[1]),
+        with(&good, 112, &[1]),
+        with(&good, 106, &[17]),
+        with(&good, 200, &[1]),
+        with(&field, 44, &80.0_f32.to_le_bytes()),
+        with(&field, 120, &0.0_f32.to_le_bytes()),
     ];
     let words = [
         "no configuration: the block is blank",
@@ -93,6 +104,15 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
         "configuration refused: mission, Distance",
         "configuration refused: own altitude or power",
         "configuration refused: channel, Carrier",
+        "configuration refused: mission, Band",
+        "configuration refused: method unknown, or not for a field",
+        "configuration refused: byte 15 is neither 0 nor 1",
+        "configuration refused: rounds or altitudes of adjust",
+        "configuration refused: samples or most interference",
+        "configuration refused: too many points of the field",
+        "configuration refused: bytes behind the last point are not 0",
+        "configuration refused: interferer and field at once",
+        "configuration refused: field, Upsilon",
     ];
     let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
     fleet.wait("word from every drone", |lines| lines.len() >= words.len());

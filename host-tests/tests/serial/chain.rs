@@ -4,8 +4,8 @@ use uav_relay::channel::{AirGround, Channel};
 use uav_relay::serial::{Io, Nb, Pair, SerialLink, SerialPort, SerialStats, Shared, byte_time};
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
-    Duration, Event, FrameBuf, Identity, Instant, Interferer, Mission, MissionConfig, Placement,
-    Port, Profile, Relay, Settings, Side, Wiring,
+    Band, Duration, Event, FrameBuf, Identity, Instant, Interference, Interferer, Mission,
+    MissionConfig, Placement, Port, Profile, Relay, Settings, Side, Wiring,
 };
 
 use crate::pipe::{End, IoEnd, NbEnd, Trouble};
@@ -23,11 +23,12 @@ pub(crate) fn mission(relays: u16) -> Mission {
             power_w: 1.0,
         },
         channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
-        interferer: Interferer {
+        band: Band::at(20.0),
+        interference: Interference::Source(Interferer {
             power_w: 80.0,
             x_m: 500.0,
             y_m: 400.0,
-        },
+        }),
         tolerance: 1e-4,
     })
     .unwrap()

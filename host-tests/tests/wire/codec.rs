@@ -3,12 +3,16 @@
 
 use crc::{CRC_32_ISCSI, Crc};
 use serde::Deserialize;
-use uav_relay::Profile;
 use uav_relay::placement::PerTarget;
 use uav_relay::placement::ladder::Ladder;
+use uav_relay::placement::levels::Levels;
 use uav_relay::placement::verdict::Verdict;
+use uav_relay::placement::wave::{Choice, Rungs};
 use uav_relay::wire::frame::Header;
-use uav_relay::wire::message::{Answer, Message, MessageError, Sweep};
+use uav_relay::wire::message::{
+    Answer, Message, MessageError, Moved, Sweep, Token, Trace, Turn, Wave,
+};
+use uav_relay::{Local, Placement, Profile};
 
 /// What a body says, field by field.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
@@ -36,10 +40,60 @@ pub(crate) enum Said {
         mission: u16,
         answer: bool,
     },
+    Measured {
+        number: u16,
+        mission: u16,
+        anchor: f32,
+        gap: u8,
+        growth: u8,
+        altitude_m: f32,
+        power_w: f32,
+        upsilon_per_w: f32,
+        reaches: Vec<f32>,
+    },
+    Wave {
+        number: u16,
+        mission: u16,
+        base: f32,
+        rise: f32,
+        targets: u8,
+        centre_m: f32,
+        width_m: f32,
+        levels: u8,
+        power_w: f32,
+        /// The bytes of the places.
+        reaches: Vec<u8>,
+    },
+    Trace {
+        number: u16,
+        mission: u16,
+        choice: Option<[u8; 2]>,
+    },
+    Token {
+        number: u16,
+        mission: u16,
+        x_m: f32,
+        altitude_m: f32,
+        power_w: f32,
+        turn: u8,
+        explore_m: f32,
+        columns: u8,
+        rows: u8,
+        sir: f32,
+    },
+    Moved {
+        number: u16,
+        mission: u16,
+        x_m: f32,
+        altitude_m: f32,
+        any: bool,
+        worst: f32,
+    },
 }
 
 impl Said {
     /// The bytes of the body.
+    #[expect(clippy::too_many_lines, reason = "an arm for each message")]
     pub(crate) fn body(&self) -> Vec<u8> {
         let mut out = Vec::new();
         match self {
@@ -86,14 +140,109 @@ impl Said {
                 out.extend(mission.to_le_bytes());
                 out.push(u8::from(*answer));
             }
+            Self::Measured {
+                number,
+                mission,
+                anchor,
+                gap,
+                growth,
+                altitude_m,
+                power_w,
+                upsilon_per_w,
+                reaches,
+            } => {
+                out.push(4);
+                out.extend(number.to_le_bytes());
+                out.extend(mission.to_le_bytes());
+                out.extend(anchor.to_le_bytes());
+                out.extend([*gap, *growth]);
+                reals(&mut out, &[*altitude_m, *power_w, *upsilon_per_w]);
+                list(&mut out, reaches);
+            }
+            Self::Wave {
+                number,
+                mission,
+                base,
+                rise,
+                targets,
+                centre_m,
+                width_m,
+                levels,
+                power_w,
+                reaches,
+            } => {
+                out.push(5);
+                out.extend(number.to_le_bytes());
+                out.extend(mission.to_le_bytes());
+                reals(&mut out, &[*base, *rise]);
+                out.push(*targets);
+                reals(&mut out, &[*centre_m, *width_m]);
+                out.push(*levels);
+                reals(&mut out, &[*power_w]);
+                match u8::try_from(reaches.len()).unwrap() {
+                    count @ 0..128 => out.push(count),
+                    count => out.extend([count, 1]),
+                }
+                out.extend(reaches);
+            }
+            Self::Trace {
+                number,
+                mission,
+                choice,
+            } => {
+                out.push(6);
+                out.extend(number.to_le_bytes());
+                out.extend(mission.to_le_bytes());
+                match choice {
+                    None => out.push(0),
+                    Some([target, level]) => out.extend([1, *target, *level]),
+                }
+            }
+            Self::Token {
+                number,
+                mission,
+                x_m,
+                altitude_m,
+                power_w,
+                turn,
+                explore_m,
+                columns,
+                rows,
+                sir,
+            } => {
+                out.push(7);
+                out.extend(number.to_le_bytes());
+                out.extend(mission.to_le_bytes());
+                reals(&mut out, &[*x_m, *altitude_m, *power_w]);
+                out.push(*turn);
+                reals(&mut out, &[*explore_m]);
+                out.extend([*columns, *rows]);
+                reals(&mut out, &[*sir]);
+            }
+            Self::Moved {
+                number,
+                mission,
+                x_m,
+                altitude_m,
+                any,
+                worst,
+            } => {
+                out.push(8);
+                out.extend(number.to_le_bytes());
+                out.extend(mission.to_le_bytes());
+                reals(&mut out, &[*x_m, *altitude_m]);
+                out.push(u8::from(*any));
+                reals(&mut out, &[*worst]);
+            }
         }
         out
     }
 
     /// The message that says this.
-    pub(crate) fn message(&self) -> Message {
+    #[expect(clippy::too_many_lines, reason = "an arm for each message")]
+    pub(crate) fn message(&self) -> Message<'_> {
         let per_target = |numbers: &[f32]| PerTarget::from_slice(numbers).unwrap();
-        match self.clone() {
+        match *self {
             Self::Sweep {
                 number,
                 mission,
@@ -102,7 +251,7 @@ impl Said {
                 growth,
                 altitude_m,
                 power_w,
-                reaches,
+                ref reaches,
             } => Message::Sweep(Sweep {
                 number,
                 mission,
@@ -111,23 +260,117 @@ impl Said {
                     altitude_m,
                     power_w,
                 },
-                reaches: per_target(&reaches),
+                measured_per_w: None,
+                reaches: per_target(reaches),
+            }),
+            Self::Measured {
+                number,
+                mission,
+                anchor,
+                gap,
+                growth,
+                altitude_m,
+                power_w,
+                upsilon_per_w,
+                ref reaches,
+            } => Message::Sweep(Sweep {
+                number,
+                mission,
+                ladder: Ladder::from_parts(anchor, gap, growth).unwrap(),
+                profile: Profile {
+                    altitude_m,
+                    power_w,
+                },
+                measured_per_w: Some(upsilon_per_w),
+                reaches: per_target(reaches),
             }),
             Self::Verdict {
                 number,
                 mission,
                 commit,
-                slacks,
+                ref slacks,
             } => Message::Verdict(Answer {
                 number,
                 mission,
                 verdict: Verdict {
                     commit,
-                    slacks: per_target(&slacks),
+                    slacks: per_target(slacks),
                 },
             }),
             Self::Busy { number } => Message::Busy { sweep: number },
             Self::Heartbeat { mission, answer } => Message::Heartbeat { mission, answer },
+            Self::Wave {
+                number,
+                mission,
+                base,
+                rise,
+                targets,
+                centre_m,
+                width_m,
+                levels,
+                power_w,
+                ref reaches,
+            } => Message::Wave(Wave {
+                number,
+                mission,
+                rungs: Rungs::from_parts(base, rise, targets).unwrap(),
+                levels: Levels::from_parts(centre_m, width_m, levels).unwrap(),
+                power_w,
+                reaches,
+            }),
+            Self::Trace {
+                number,
+                mission,
+                choice,
+            } => Message::Trace(Trace {
+                number,
+                mission,
+                choice: choice.map(|[target, level]| Choice { target, level }),
+            }),
+            Self::Token {
+                number,
+                mission,
+                x_m,
+                altitude_m,
+                power_w,
+                turn,
+                explore_m,
+                columns,
+                rows,
+                sir,
+            } => Message::Token(Token {
+                number,
+                mission,
+                place: Placement { x_m, altitude_m },
+                power_w,
+                turn: match (turn, columns) {
+                    (0, _) => Turn::Look,
+                    (1, _) => Turn::Stop,
+                    (_, 0) => Turn::Move {
+                        explore_m,
+                        local: Local::Fine,
+                    },
+                    _ => Turn::Move {
+                        explore_m,
+                        local: Local::Grid { columns, rows },
+                    },
+                },
+                sir,
+            }),
+            Self::Moved {
+                number,
+                mission,
+                x_m,
+                altitude_m,
+                any,
+                worst,
+            } => Message::Moved(Moved {
+                number,
+                mission,
+                place: Placement { x_m, altitude_m },
+                any,
+                worst,
+            }),
         }
     }
 
@@ -156,29 +399,122 @@ impl Said {
                 reaches,
                 ..
             } => {
-                let targets = targets(*anchor, *gap, *growth);
-                (*gap > 0 || *growth == 0)
-                    && targets[0] >= f32::MIN_POSITIVE
-                    && targets[targets.len() - 1] < f32::INFINITY
-                    && (0.1..=1e5).contains(altitude_m)
-                    && (1e-6..=1e6).contains(power_w)
-                    && reaches.len() <= targets.len()
-                    && reaches.iter().all(|reach| (0.0..=2e9).contains(reach))
+                is_sweep((*anchor, *gap, *growth), reaches)
+                    && is_altitude(*altitude_m)
+                    && is_power(*power_w)
+            }
+            Self::Measured {
+                anchor,
+                gap,
+                growth,
+                altitude_m,
+                power_w,
+                upsilon_per_w,
+                reaches,
+                ..
+            } => {
+                is_sweep((*anchor, *gap, *growth), reaches)
+                    && is_altitude(*altitude_m)
+                    && is_power(*power_w)
+                    && (1e-9..=1e32).contains(upsilon_per_w)
             }
             Self::Verdict { commit, slacks, .. } => {
                 commit.is_none_or(|target| target <= 15)
                     && slacks.iter().all(|slack| (-2e9..=2e9).contains(slack))
             }
             Self::Busy { .. } | Self::Heartbeat { .. } => true,
+            Self::Wave {
+                base,
+                rise,
+                targets,
+                centre_m,
+                width_m,
+                levels,
+                power_w,
+                reaches,
+                ..
+            } => {
+                let pairs = usize::from(*targets) * usize::from(*levels);
+                (f32::MIN_POSITIVE..=1e30).contains(base)
+                    && (0.0..=1e6).contains(rise)
+                    && (1..=16).contains(targets)
+                    && is_altitude(*centre_m)
+                    && (0.0..=1e5).contains(width_m)
+                    && (1..=64).contains(levels)
+                    && is_power(*power_w)
+                    && pairs <= 64
+                    && reaches.len() == 3 * pairs
+            }
+            Self::Trace { choice, .. } => {
+                choice.is_none_or(|[target, level]| target <= 63 && level <= 63)
+            }
+            Self::Token {
+                x_m,
+                altitude_m,
+                power_w,
+                turn,
+                explore_m,
+                columns,
+                rows,
+                sir,
+                ..
+            } => {
+                let fine = (*columns, *rows) == (0, 0);
+                let turn = match turn {
+                    0 | 1 => explore_m.to_bits() == 0 && fine,
+                    2 => (0.0..=1e5).contains(explore_m) && (fine || *columns.min(rows) >= 2),
+                    _ => false,
+                };
+                turn && is_place(*x_m)
+                    && is_altitude(*altitude_m)
+                    && is_power(*power_w)
+                    && is_sir(*sir)
+            }
+            Self::Moved {
+                x_m,
+                altitude_m,
+                worst,
+                ..
+            } => is_place(*x_m) && is_altitude(*altitude_m) && is_sir(*worst),
         }
+    }
+}
+
+fn is_altitude(altitude_m: f32) -> bool {
+    (0.1..=1e5).contains(&altitude_m)
+}
+
+fn is_power(power_w: f32) -> bool {
+    (1e-6..=1e6).contains(&power_w)
+}
+
+fn is_place(x_m: f32) -> bool {
+    (0.0..=1e6).contains(&x_m)
+}
+
+fn is_sir(sir: f32) -> bool {
+    (0.0..f32::INFINITY).contains(&sir)
+}
+
+/// Whether there is such a ladder, and the reaches are in range and no more than it has targets.
+fn is_sweep((anchor, gap, growth): (f32, u8, u8), reaches: &[f32]) -> bool {
+    let targets = targets(anchor, gap, growth);
+    (gap > 0 || growth == 0)
+        && targets[0] >= f32::MIN_POSITIVE
+        && targets[targets.len() - 1] < f32::INFINITY
+        && reaches.len() <= targets.len()
+        && reaches.iter().all(|reach| (0.0..=2e9).contains(reach))
+}
+
+fn reals(out: &mut Vec<u8>, numbers: &[f32]) {
+    for number in numbers {
+        out.extend(number.to_le_bytes());
     }
 }
 
 fn list(out: &mut Vec<u8>, numbers: &[f32]) {
     out.push(u8::try_from(numbers.len()).unwrap());
-    for number in numbers {
-        out.extend(number.to_le_bytes());
-    }
+    reals(out, numbers);
 }
 
 /// What is left of a body; every method is `None` where the bytes are no such thing.
@@ -208,6 +544,28 @@ impl Reader<'_> {
         (0..count).map(|_| self.real()).collect()
     }
 
+    fn bool(&mut self) -> Option<bool> {
+        match self.byte()? {
+            0 => Some(false),
+            1 => Some(true),
+            _ => None,
+        }
+    }
+
+    /// The places of a wave, whose number has one byte up to 127 and two from there on.
+    fn places(&mut self) -> Option<Vec<u8>> {
+        let count = match self.byte()? {
+            low @ 128.. => match self.byte()? {
+                high @ 1..128 => usize::from(low - 128) + 128 * usize::from(high),
+                _ => return None,
+            },
+            count => usize::from(count),
+        };
+        let (taken, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(taken.to_vec())
+    }
+
     fn said(&mut self) -> Option<Said> {
         Some(match self.byte()? {
             0 => Said::Sweep {
@@ -235,11 +593,59 @@ impl Reader<'_> {
             },
             3 => Said::Heartbeat {
                 mission: self.word()?,
-                answer: match self.byte()? {
-                    0 => false,
-                    1 => true,
+                answer: self.bool()?,
+            },
+            4 => Said::Measured {
+                number: self.word()?,
+                mission: self.word()?,
+                anchor: self.real()?,
+                gap: self.byte()?,
+                growth: self.byte()?,
+                altitude_m: self.real()?,
+                power_w: self.real()?,
+                upsilon_per_w: self.real()?,
+                reaches: self.list()?,
+            },
+            5 => Said::Wave {
+                number: self.word()?,
+                mission: self.word()?,
+                base: self.real()?,
+                rise: self.real()?,
+                targets: self.byte()?,
+                centre_m: self.real()?,
+                width_m: self.real()?,
+                levels: self.byte()?,
+                power_w: self.real()?,
+                reaches: self.places()?,
+            },
+            6 => Said::Trace {
+                number: self.word()?,
+                mission: self.word()?,
+                choice: match self.byte()? {
+                    0 => None,
+                    1 => Some(self.take()?),
                     _ => return None,
                 },
+            },
+            7 => Said::Token {
+                number: self.word()?,
+                mission: self.word()?,
+                x_m: self.real()?,
+                altitude_m: self.real()?,
+                power_w: self.real()?,
+                turn: self.byte()?,
+                explore_m: self.real()?,
+                columns: self.byte()?,
+                rows: self.byte()?,
+                sir: self.real()?,
+            },
+            8 => Said::Moved {
+                number: self.word()?,
+                mission: self.word()?,
+                x_m: self.real()?,
+                altitude_m: self.real()?,
+                any: self.bool()?,
+                worst: self.real()?,
             },
             _ => return None,
         })
@@ -248,13 +654,10 @@ impl Reader<'_> {
 
 /// A ladder's targets. Every step is worked out in f64, where sum, product and quotient of two f32 keep more than twice
 /// their digits, and then rounded to f32: the same as one f32 operation, by another route.
-#[expect(clippy::cast_possible_truncation, reason = "this is the rounding")]
 pub(crate) fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     if gap == 0 {
         return vec![anchor];
     }
-    let wide = f64::from;
-    let narrow = |value: f64| value as f32;
     let (e, m) = (i32::from(gap >> 3), f64::from(gap & 7));
     let ratio = 1.0 + f64::from(growth) / 16.0;
     let mut gaps = [narrow((1.0 + m / 8.0) * 2_f64.powi(e - 25)); 8];
@@ -271,6 +674,74 @@ pub(crate) fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
         targets[7 - k] = narrow(wide(targets[8 - k]) / wide(factor));
     }
     targets
+}
+
+fn wide(value: f32) -> f64 {
+    value.into()
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "this is the rounding")]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+/// A wave's targets, each step rounded as those of [`targets`].
+pub(crate) fn rungs(base: f32, rise: f32, count: u8) -> Vec<f32> {
+    let risen = |k: u8| {
+        let part = narrow(wide(rise) / 2_f64.powi(i32::from(count - 1 - k)));
+        narrow(wide(base) + wide(narrow(wide(base) * wide(part))))
+    };
+    let above = (1..count).map(risen);
+    [base].into_iter().chain(above).collect()
+}
+
+/// A wave's levels within a band, each step rounded as those of [`targets`].
+pub(crate) fn altitudes(centre_m: f32, width_m: f32, count: u8, band: (f32, f32)) -> Vec<f32> {
+    const TUBE: [f64; 9] = [-1.0, -0.5, -0.25, -0.125, 0.0, 0.125, 0.25, 0.5, 1.0];
+    let last = f64::from(count.max(2) - 1);
+    let at = |level: u8| {
+        if width_m == 0.0 {
+            return centre_m;
+        }
+        let part = match count {
+            1 => 1.0,
+            9 => TUBE[usize::from(level)],
+            _ => wide(narrow(wide(narrow(2.0 * f64::from(level) / last)) - 1.0)),
+        };
+        let offset = narrow(wide(width_m) * part);
+        let altitude_m = narrow(wide(centre_m) + wide(offset));
+        altitude_m.max(band.0).min(band.1)
+    };
+    (0..count).map(at).collect()
+}
+
+/// What three bytes of a wave stand for on a link of `distance_m`.
+pub(crate) fn place([a, b, c]: [u8; 3], distance_m: f32) -> Option<f32> {
+    let code = u32::from(a) + 256 * u32::from(b) + 65536 * u32::from(c);
+    let step = narrow(wide(distance_m) / 16_777_214.0);
+    let place = narrow(f64::from(code) * wide(step)).min(distance_m);
+    (code < 0x00FF_FFFF).then_some(place)
+}
+
+/// The three bytes of a place in [0, `distance_m`].
+pub(crate) fn code(x_m: f32, distance_m: f32) -> [u8; 3] {
+    let step = narrow(wide(distance_m) / 16_777_214.0);
+    let steps = wide(narrow(wide(x_m) / wide(step))).min(16_777_214.0);
+    let bytes = |code: u32| {
+        let [a, b, c, _] = code.to_le_bytes();
+        [a, b, c]
+    };
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a whole number of 0 to 16 777 214"
+    )]
+    let code = steps.floor() as u32;
+    if place(bytes(code), distance_m).unwrap() > x_m {
+        bytes(code.saturating_sub(1))
+    } else {
+        bytes(code)
+    }
 }
 
 /// The ten bytes before the body.

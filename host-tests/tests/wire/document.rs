@@ -3,10 +3,10 @@
 use crc::{CRC_32_ISCSI, Crc};
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame;
-use uav_relay::{Port, Wiring};
+use uav_relay::{Band, Interference, Mission, MissionConfig, Port, Wiring};
 
 use super::golden::{bytes, only_frame, vectors};
-use super::receive::{counted, relay};
+use super::receive::{FIELD, counted, relay};
 
 const DOCUMENT: &str = include_str!("../../../src/wire/FORMAT.md");
 
@@ -48,12 +48,12 @@ fn the_annotated_examples_are_golden_vectors() {
         assert_eq!(wire, vector.wire(), "{name}");
         let len = format!("On the wire, {} bytes:", wire.len());
         assert!(section.contains(&len), "{name}");
-        let (_, message) = frame::decode(&only_frame(&wire)).unwrap();
-        seen.push(core::mem::discriminant(&message));
+        assert!(frame::decode(&only_frame(&wire)).is_ok(), "{name}");
+        seen.push(plain[10]);
     }
-    seen.sort_by_key(|kind| format!("{kind:?}"));
+    seen.sort_unstable();
     seen.dedup();
-    assert_eq!(seen.len(), 4, "each kind of message has an example");
+    assert_eq!(seen, [0, 1, 2, 3, 4, 5, 6, 7, 8], "each tag has an example");
 }
 
 #[test]
@@ -67,6 +67,54 @@ fn the_ladders_of_the_document_are_golden_vectors() {
         found += 1;
     }
     assert!(found > 1);
+}
+
+/// The number before the bits of an f32 in a cell such as "1.5 (`3fc00000`)", and those bits; they must agree.
+fn number(cell: &str) -> String {
+    let (decimal, bits) = cell.split_once(" (`").unwrap();
+    let bits = bits.strip_suffix("`)").unwrap();
+    let number: f32 = decimal.parse().unwrap();
+    assert_eq!(format!("{:08x}", number.to_bits()), bits, "{cell}");
+    bits.to_owned()
+}
+
+#[test]
+fn the_targets_levels_and_places_of_the_document_are_golden_vectors() {
+    let vectors = vectors();
+    let section = |name: &str| DOCUMENT.split(name).nth(1).unwrap();
+    let words = |cell: &str| -> Vec<String> { code(cell).split(' ').map(str::to_owned).collect() };
+    let mut found = [0; 3];
+    for row in rows(section("### Targets of a wave")) {
+        let (base, rise) = (number(row[0]), number(row[1]));
+        assert!(vectors.rungs.iter().any(|vector| {
+            (&vector.base, &vector.rise) == (&base, &rise)
+                && vector.count.to_string() == row[2]
+                && vector.targets == words(row[3])
+        }));
+        found[0] += 1;
+    }
+    for row in rows(section("### Levels of a wave")) {
+        let (centre, width) = (number(row[0]), number(row[1]));
+        let (least, most) = row[3].split_once(" to ").unwrap();
+        let bits = |metres: &str| format!("{:08x}", metres.parse::<f32>().unwrap().to_bits());
+        let band = (bits(least), bits(most));
+        assert!(vectors.levels.iter().any(|vector| {
+            (&vector.centre, &vector.width) == (&centre, &width)
+                && (&vector.least, &vector.most) == (&band.0, &band.1)
+                && vector.count.to_string() == row[2]
+                && vector.altitudes == words(row[4])
+        }));
+        found[1] += 1;
+    }
+    for row in rows(section("### Places of a wave")) {
+        let (distance, x, place) = (number(row[0]), number(row[1]), number(row[3]));
+        assert!(vectors.places.iter().any(|vector| {
+            (&vector.distance, &vector.x, &vector.place) == (&distance, &x, &place)
+                && bytes(&vector.code) == bytes(code(row[2]))
+        }));
+        found[2] += 1;
+    }
+    assert!(found.iter().all(|&rows| rows > 1), "{found:?}");
 }
 
 #[test]
@@ -89,12 +137,11 @@ fn every_row_of_the_rejection_table_is_counted_as_it_says() {
         assert_eq!(counted(relay.stats()), wanted, "{}", row[1]);
         found += 1;
     }
-    assert!(found > 30);
+    assert!(found > 60);
 }
 
-#[test]
-fn the_digest_is_what_the_document_says() {
-    let mission = *relay(1, 8, Wiring::Pair).mission();
+/// The digest of a mission whose interference is these f32, by the document.
+fn digest_by_the_rules(mission: &Mission, interference: &[f32]) -> u16 {
     let config = mission.config();
     let mut bytes = config.relays.to_le_bytes().to_vec();
     for number in [
@@ -103,17 +150,58 @@ fn the_digest_is_what_the_document_says() {
         config.tx_power_w,
         config.common.altitude_m,
         config.common.power_w,
-        config.interferer.power_w,
-        config.interferer.x_m,
-        config.interferer.y_m,
-        config.tolerance,
     ] {
+        bytes.extend(number.to_le_bytes());
+    }
+    for number in interference.iter().chain([&config.tolerance]) {
         bytes.extend(number.to_le_bytes());
     }
     let channel = config.channel;
     for number in [channel.mu_los(), channel.mu_nlos(), channel.eta()] {
         bytes.extend(number.to_le_bytes());
     }
+    if config.band.least_m < config.band.most_m {
+        bytes.extend(config.band.least_m.to_le_bytes());
+        bytes.extend(config.band.most_m.to_le_bytes());
+    }
     let crc = Crc::<u32>::new(&CRC_32_ISCSI).checksum(&bytes);
-    assert_eq!(u32::from(digest(&mission)), crc & 0xFFFF);
+    u16::try_from(crc & 0xFFFF).unwrap()
+}
+
+#[test]
+fn the_digest_is_what_the_document_says() {
+    let base = *relay(1, 8, Wiring::Pair).mission().config();
+    let Interference::Source(interferer) = base.interference else {
+        panic!("the paper's mission has an interferer");
+    };
+    let source = [interferer.power_w, interferer.x_m, interferer.y_m];
+    let points = FIELD.points().iter();
+    let field: Vec<f32> = points
+        .flat_map(|point| [point.x_m, point.upsilon_per_w])
+        .collect();
+    assert!(field.len() > 4);
+    let wide = Band {
+        least_m: 20.0,
+        most_m: 300.0,
+    };
+    let mut seen = Vec::new();
+    for (interference, numbers) in [
+        (base.interference, &source[..]),
+        (Interference::Field(FIELD), &field),
+    ] {
+        for band in [base.band, wide] {
+            let config = MissionConfig {
+                interference,
+                band,
+                ..base
+            };
+            let mission = Mission::try_new(config).unwrap();
+            let by_the_rules = digest_by_the_rules(&mission, numbers);
+            assert_eq!(digest(&mission), by_the_rules);
+            seen.push(by_the_rules);
+        }
+    }
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen.len(), 4);
 }

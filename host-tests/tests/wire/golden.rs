@@ -1,8 +1,13 @@
-//! Golden vectors, both ways: `data/vectors.json`, made by a Python program of its own (bodies by the byte tables and again
-//! by the postcard implementation pohlednice 0.2.1, CRC bit by bit, COBS by its definition, ladders with each step rounded).
+//! Golden vectors, both ways: `data/vectors.json`, made by a Python program of its own (bodies by the byte tables, those of
+//! the tags 0 to 3 again by the postcard implementation pohlednice 0.2.1, CRC bit by bit, COBS by its definition, ladders
+//! with each step rounded; targets, levels and places of waves in fractions, each step rounded once).
 
 use serde::Deserialize;
+use uav_relay::Band;
+use uav_relay::placement::coded::Coded;
 use uav_relay::placement::ladder::Ladder;
+use uav_relay::placement::levels::Levels;
+use uav_relay::placement::wave::Rungs;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message};
@@ -13,6 +18,9 @@ use super::codec::{self, Said};
 pub(crate) struct Vectors {
     pub(crate) frames: Vec<Frame>,
     pub(crate) ladders: Vec<LadderVector>,
+    pub(crate) rungs: Vec<RungsVector>,
+    pub(crate) levels: Vec<LevelsVector>,
+    pub(crate) places: Vec<PlaceVector>,
 }
 
 #[derive(Deserialize)]
@@ -39,6 +47,35 @@ pub(crate) struct LadderVector {
     gap: u8,
     growth: u8,
     pub(crate) targets: Vec<String>,
+}
+
+/// Targets of a wave; numbers as the bits of their f32.
+#[derive(Deserialize)]
+pub(crate) struct RungsVector {
+    pub(crate) base: String,
+    pub(crate) rise: String,
+    pub(crate) count: u8,
+    pub(crate) targets: Vec<String>,
+}
+
+/// Levels of a wave in a band.
+#[derive(Deserialize)]
+pub(crate) struct LevelsVector {
+    pub(crate) centre: String,
+    pub(crate) width: String,
+    pub(crate) count: u8,
+    pub(crate) least: String,
+    pub(crate) most: String,
+    pub(crate) altitudes: Vec<String>,
+}
+
+/// What a place is sent as, and what that is read as.
+#[derive(Deserialize)]
+pub(crate) struct PlaceVector {
+    pub(crate) distance: String,
+    pub(crate) x: String,
+    pub(crate) code: String,
+    pub(crate) place: String,
 }
 
 impl Frame {
@@ -69,7 +106,8 @@ impl Frame {
 /// The vectors of the file.
 pub(crate) fn vectors() -> Vectors {
     let vectors: Vectors = serde_json::from_str(include_str!("../data/vectors.json")).unwrap();
-    assert!(vectors.frames.len() >= 20 && vectors.ladders.len() >= 10);
+    assert!(vectors.frames.len() >= 40 && vectors.ladders.len() >= 10);
+    assert!(vectors.rungs.len() >= 8 && vectors.levels.len() >= 10 && vectors.places.len() >= 15);
     vectors
 }
 
@@ -127,7 +165,8 @@ fn the_crate_writes_the_vectors() {
 fn the_crate_reads_the_vectors() {
     for vector in vectors().frames {
         let name = &vector.name;
-        let message = Message::decode(&bytes(&vector.body)).unwrap();
+        let body = bytes(&vector.body);
+        let message = Message::decode(&body).unwrap();
         assert_eq!(message, vector.message.message(), "{name}");
         let plain = only_frame(&vector.wire());
         assert_eq!(plain, vector.plain(), "{name}");
@@ -158,8 +197,80 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
     some(|said| matches!(said, Said::Busy { .. }));
     some(|said| matches!(said, Said::Heartbeat { answer: true, .. }));
     some(|said| matches!(said, Said::Heartbeat { answer: false, .. }));
-    let longest = frames.iter().map(|vector| vector.wire().len()).max();
-    assert_eq!(longest, Some(100));
+    some(|said| matches!(said, Said::Measured { reaches, .. } if reaches.len() == 16));
+    some(|said| matches!(said, Said::Measured { upsilon_per_w, .. } if *upsilon_per_w == 1e-9));
+    some(|said| matches!(said, Said::Measured { upsilon_per_w, .. } if *upsilon_per_w == 1e32));
+    for (least, most) in [(3, 3), (126, 126), (129, 129), (192, 192)] {
+        assert!(frames.iter().any(|vector| matches!(
+            &vector.message,
+            Said::Wave { reaches, .. } if (least..=most).contains(&reaches.len())
+        )));
+    }
+    some(|said| {
+        matches!(
+            said,
+            Said::Wave {
+                targets: 16,
+                levels: 4,
+                ..
+            }
+        )
+    });
+    some(|said| {
+        matches!(
+            said,
+            Said::Wave {
+                targets: 1,
+                levels: 64,
+                ..
+            }
+        )
+    });
+    some(|said| matches!(said, Said::Wave { reaches, .. } if reaches.iter().all(|&b| b == 0)));
+    some(|said| matches!(said, Said::Wave { reaches, .. } if reaches.iter().all(|&b| b == 255)));
+    some(|said| matches!(said, Said::Trace { choice: None, .. }));
+    some(|said| {
+        matches!(
+            said,
+            Said::Trace {
+                choice: Some([63, 63]),
+                ..
+            }
+        )
+    });
+    some(|said| matches!(said, Said::Token { turn: 0, .. }));
+    some(|said| matches!(said, Said::Token { turn: 1, .. }));
+    some(|said| {
+        matches!(
+            said,
+            Said::Token {
+                turn: 2,
+                columns: 0,
+                ..
+            }
+        )
+    });
+    some(|said| {
+        matches!(
+            said,
+            Said::Token {
+                turn: 2,
+                columns: 2,
+                rows: 255,
+                ..
+            }
+        )
+    });
+    some(|said| matches!(said, Said::Moved { any: true, .. }));
+    some(|said| matches!(said, Said::Moved { worst, .. } if *worst == f32::MAX));
+    let longest = |of_four: bool| {
+        let known = frames
+            .iter()
+            .filter(|vector| !of_four || bytes(&vector.body)[0] < 4);
+        known.map(|vector| vector.wire().len()).max()
+    };
+    assert_eq!(longest(true), Some(100));
+    assert_eq!(longest(false), Some(237));
 }
 
 #[test]
@@ -174,5 +285,58 @@ fn the_ladders_of_the_file_are_met_to_the_bit() {
         assert_eq!(hex(&ladder.targets()), vector.targets);
         let by_the_rules = codec::targets(anchor, vector.gap, vector.growth);
         assert_eq!(hex(&by_the_rules), vector.targets);
+    }
+}
+
+/// The f32 of these bits.
+fn real(bits: &str) -> f32 {
+    f32::from_bits(u32::from_str_radix(bits, 16).unwrap())
+}
+
+fn hex(numbers: &[f32]) -> Vec<String> {
+    let bits = numbers.iter().map(|number| number.to_bits());
+    bits.map(|bits| format!("{bits:08x}")).collect()
+}
+
+#[test]
+fn the_targets_of_waves_are_met_to_the_bit() {
+    for vector in vectors().rungs {
+        let (base, rise) = (real(&vector.base), real(&vector.rise));
+        let rungs = Rungs::from_parts(base, rise, vector.count).unwrap();
+        let targets: Vec<f32> = (0..vector.count).map(|at| rungs.target(at)).collect();
+        assert_eq!(hex(&targets), vector.targets);
+        assert_eq!(hex(&codec::rungs(base, rise, vector.count)), vector.targets);
+    }
+}
+
+#[test]
+fn the_levels_of_waves_are_met_to_the_bit() {
+    for vector in vectors().levels {
+        let (centre_m, width_m) = (real(&vector.centre), real(&vector.width));
+        let (least_m, most_m) = (real(&vector.least), real(&vector.most));
+        let levels = Levels::from_parts(centre_m, width_m, vector.count).unwrap();
+        let band = Band { least_m, most_m };
+        let altitudes: Vec<f32> = (0..vector.count)
+            .map(|level| levels.altitude(band, level))
+            .collect();
+        assert_eq!(hex(&altitudes), vector.altitudes);
+        let by_the_rules = codec::altitudes(centre_m, width_m, vector.count, (least_m, most_m));
+        assert_eq!(hex(&by_the_rules), vector.altitudes);
+    }
+}
+
+#[test]
+fn the_places_of_waves_are_met_to_the_bit() {
+    for vector in vectors().places {
+        let (distance_m, x_m) = (real(&vector.distance), real(&vector.x));
+        let mut coded = Coded::new();
+        coded.set(0, Some(x_m), distance_m);
+        assert_eq!(coded.bytes(1), bytes(&vector.code));
+        let place = coded.get(0, distance_m).unwrap();
+        assert_eq!(hex(&[place]), [&*vector.place]);
+        let code = codec::code(x_m, distance_m);
+        assert_eq!(code, *bytes(&vector.code));
+        let place = codec::place(code, distance_m).unwrap();
+        assert_eq!(hex(&[place]), [&*vector.place]);
     }
 }

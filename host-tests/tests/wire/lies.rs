@@ -17,12 +17,27 @@ use super::strategies::{messages, sweeps};
 use super::stream::unstuffed;
 
 /// Puts a number and a digest into a message, where it has them.
-fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
+pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
     match &mut said {
         Said::Sweep {
             number, mission, ..
         }
+        | Said::Measured {
+            number, mission, ..
+        }
         | Said::Verdict {
+            number, mission, ..
+        }
+        | Said::Wave {
+            number, mission, ..
+        }
+        | Said::Trace {
+            number, mission, ..
+        }
+        | Said::Token {
+            number, mission, ..
+        }
+        | Said::Moved {
             number, mission, ..
         } => (*number, *mission) = (as_number, as_mission),
         Said::Busy { number } => *number = as_number,

@@ -8,10 +8,10 @@ use uav_relay::wire::message::{MAX_BODY, Message, MessageError};
 use super::codec::{self, Said, plain, sealed, wire};
 use super::config;
 use super::golden::only_frame;
-use super::strategies::{bodies, headers, messages, sweeps};
+use super::strategies::{bodies, headers, measured, messages, sweeps, waves};
 
 /// Bodies are compared rather than messages: bytes tell -0 from 0.
-fn body_of(message: &Message) -> Vec<u8> {
+fn body_of(message: &Message<'_>) -> Vec<u8> {
     let mut body = [0; MAX_BODY];
     let len = message.encode(&mut body).unwrap();
     body[..len].to_vec()
@@ -35,10 +35,21 @@ proptest! {
     }
 
     #[test]
-    fn every_frame_fits_in_a_hundred_bytes_with_one_zero(said in messages(), head in headers()) {
+    fn every_frame_fits_in_its_bytes_with_one_zero(said in messages(), head in headers()) {
         let mut frame = [0; MAX_FRAME];
         let len = frame::encode(head, &said.message(), &mut frame);
-        prop_assert!(len <= 100);
+        let most = match &said {
+            Said::Sweep { .. } => 100,
+            Said::Verdict { .. } => 88,
+            Said::Busy { .. } => 19,
+            Said::Heartbeat { .. } => 20,
+            Said::Measured { .. } => 104,
+            Said::Wave { .. } => 237,
+            Said::Trace { .. } => 24,
+            Said::Token { .. } => 44,
+            Said::Moved { .. } => 34,
+        };
+        prop_assert!(len <= most && most <= MAX_FRAME);
         prop_assert_eq!(frame[..len].iter().position(|&byte| byte == 0), Some(len - 1));
         prop_assert_eq!(only_frame(&frame[..len]).len(), len - 2);
         let expected = match said {
@@ -48,6 +59,14 @@ proptest! {
             }
             Said::Busy { .. } => 19,
             Said::Heartbeat { .. } => 20,
+            Said::Measured { reaches, .. } => 40 + 4 * reaches.len(),
+            Said::Wave { targets, levels, .. } => {
+                let places = 3 * usize::from(targets) * usize::from(levels);
+                43 + if places < 128 { 1 } else { 2 } + places
+            }
+            Said::Trace { choice, .. } => if choice.is_some() { 24 } else { 22 },
+            Said::Token { .. } => 44,
+            Said::Moved { .. } => 34,
         };
         prop_assert_eq!(len, expected);
     }
@@ -56,6 +75,19 @@ proptest! {
     fn every_full_sweep_takes_exactly_a_hundred_bytes(said in sweeps(16), head in headers()) {
         let mut frame = [0; MAX_FRAME];
         prop_assert_eq!(frame::encode(head, &said.message(), &mut frame), 100);
+    }
+
+    #[test]
+    fn every_full_measured_sweep_takes_104_bytes_and_every_largest_wave_237(
+        sweep in measured(sweeps(16)),
+        wave in waves(prop_oneof![Just((1, 64)), Just((4, 16)), Just((8, 8)), Just((16, 4))]),
+        head in headers(),
+    ) {
+        let mut frame = [0; MAX_FRAME];
+        prop_assert_eq!(frame::encode(head, &sweep.message(), &mut frame), 104);
+        prop_assert_eq!(frame::encode(head, &wave.message(), &mut frame), 237);
+        prop_assert_eq!(MAX_FRAME, 237);
+        prop_assert_eq!(only_frame(&frame).len(), 235);
     }
 
     #[test]
@@ -76,7 +108,7 @@ proptest! {
         match Said::read(&body) {
             Ok(said) => {
                 prop_assert_eq!(said.body(), &*body, "one encoding a message");
-                prop_assert_eq!(read.as_ref().map(body_of), Ok(body));
+                prop_assert_eq!(read.as_ref().map(body_of), Ok(body.clone()));
                 prop_assert_eq!(read, Ok(said.message()));
             }
             Err(error) => prop_assert_eq!(read, Err(error)),
@@ -85,7 +117,7 @@ proptest! {
 
     #[test]
     fn any_bytes_with_a_good_crc_are_read_or_refused_as_the_rules_say(
-        bytes in vec(any::<u8>(), 0..120),
+        bytes in vec(any::<u8>(), 0..240),
         version in prop_oneof![3 => Just(Some(0x10)), 1 => Just(None)],
         flags in prop_oneof![3 => Just(Some(0)), 1 => Just(None)],
         body in proptest::option::of(bodies()),
@@ -107,7 +139,8 @@ proptest! {
         } else {
             Said::read(&bytes[10..]).map_err(FrameError::Message)
         };
-        let read = frame::decode(&sealed(bytes.clone()));
+        let sealed = sealed(bytes.clone());
+        let read = frame::decode(&sealed);
         match expected {
             Err(error) => prop_assert_eq!(read, Err(error)),
             Ok(said) => {
@@ -123,7 +156,8 @@ proptest! {
         // A right CRC among random ones comes once in 2^32; these draws hold none.
         let expected = if bytes.len() < 14 { FrameError::Short } else { FrameError::Crc };
         prop_assert_eq!(frame::decode(&bytes), Err(expected));
-        let read = Said::read(&bytes).map(|said| said.message());
+        let said = Said::read(&bytes);
+        let read = said.as_ref().map(Said::message).map_err(|error| *error);
         prop_assert_eq!(Message::decode(&bytes), read);
     }
 }
@@ -134,15 +168,22 @@ fn the_draws_reach_messages_and_both_refusals() {
     use proptest::test_runner::TestRunner;
 
     let mut runner = TestRunner::new(config(1));
-    let (mut good, mut encoding, mut value) = (0, 0, 0);
-    for _ in 0..2000 {
+    // Of each tag: messages, wrongly encoded, out of range. Every busy and every heartbeat is in range.
+    let mut seen = [[0; 3]; 10];
+    for _ in 0..8000 {
         let body = bodies().new_tree(&mut runner).unwrap().current();
-        match Said::read(&body) {
-            Ok(_) => good += 1,
-            Err(MessageError::Encoding) => encoding += 1,
-            Err(_) => value += 1,
-        }
+        let tag = body.first().map_or(9, |&tag| usize::from(tag.min(9)));
+        let what = match Said::read(&body) {
+            Ok(_) => 0,
+            Err(MessageError::Encoding) => 1,
+            Err(_) => 2,
+        };
+        seen[tag][what] += 1;
     }
-    println!("{good} messages, {encoding} wrongly encoded, {value} out of range");
-    assert!(good.min(encoding).min(value) > 50);
+    println!("{seen:?}");
+    for (tag, [good, encoding, value]) in seen.into_iter().enumerate() {
+        assert!(encoding > 50, "{tag}");
+        assert!(good > 50 || tag == 9, "{tag}");
+        assert!(value > 5 || [2, 3, 9].contains(&tag), "{tag}");
+    }
 }

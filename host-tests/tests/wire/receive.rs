@@ -11,8 +11,8 @@ use uav_relay::channel::AirGround;
 use uav_relay::wire::deframe::DeframeError;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::{
-    Channel, Duration, Identity, Instant, Interferer, Mission, MissionConfig, Port, Profile, Relay,
-    Settings, Stats, Wiring,
+    Band, Channel, Duration, Field, FieldPoint, Identity, Instant, Interference, Interferer,
+    Mission, MissionConfig, Port, Profile, Relay, Settings, Stats, Wiring,
 };
 
 use super::codec::{Said, sealed};
@@ -22,9 +22,25 @@ use super::stream::{chunks, unstuffed};
 
 pub(crate) const NETWORK: u16 = 7;
 
-/// Relay `index` of `relays` in the paper's scenario, on network 7.
-pub(crate) fn relay(index: u16, relays: u16, wiring: Wiring) -> Relay {
-    let mission = Mission::try_new(MissionConfig {
+/// A field in which a chain of eight can be placed.
+pub(crate) const FIELD: Field = Field::new(&[
+    FieldPoint {
+        x_m: -100.0,
+        upsilon_per_w: 1e8,
+    },
+    FieldPoint {
+        x_m: 500.0,
+        upsilon_per_w: 3e7,
+    },
+    FieldPoint {
+        x_m: 900.0,
+        upsilon_per_w: 2e8,
+    },
+]);
+
+/// The paper's scenario.
+pub(crate) fn paper(relays: u16) -> MissionConfig {
+    MissionConfig {
         relays,
         distance_m: 1000.0,
         min_separation_m: 4.0,
@@ -34,14 +50,24 @@ pub(crate) fn relay(index: u16, relays: u16, wiring: Wiring) -> Relay {
             power_w: 1.0,
         },
         channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
-        interferer: Interferer {
+        band: Band::at(20.0),
+        interference: Interference::Source(Interferer {
             power_w: 80.0,
             x_m: 500.0,
             y_m: 400.0,
-        },
+        }),
         tolerance: 1e-4,
-    })
-    .unwrap();
+    }
+}
+
+/// Relay `index` of `relays` in the paper's scenario, on network 7.
+pub(crate) fn relay(index: u16, relays: u16, wiring: Wiring) -> Relay {
+    relay_of(paper(relays), index, wiring)
+}
+
+/// Relay `index` of this mission, on network 7.
+pub(crate) fn relay_of(mission: MissionConfig, index: u16, wiring: Wiring) -> Relay {
+    let mission = Mission::try_new(mission).unwrap();
     let identity = Identity {
         network: NETWORK,
         index,
@@ -159,7 +185,17 @@ fn near_relay_4() -> impl Strategy<Value = Header> {
 }
 
 /// Feeds relay `index` of 8 with random pieces at random ports and compares every counter; all of `expected` must occur.
-fn fed_with_anything(index: u16, wiring: Wiring, ports: &'static [Port], expected: &[&str]) {
+fn fed_with_anything(
+    interference: Interference,
+    index: u16,
+    wiring: Wiring,
+    ports: &'static [Port],
+    expected: &[&str],
+) {
+    let mission = MissionConfig {
+        interference,
+        ..paper(8)
+    };
     let seen = Cell::new(BTreeMap::new());
     let steps = (
         proptest::sample::select(ports),
@@ -168,7 +204,7 @@ fn fed_with_anything(index: u16, wiring: Wiring, ports: &'static [Port], expecte
     );
     TestRunner::new(config(400))
         .run(&vec(steps, 0..24), |steps| {
-            let mut relay = relay(index, 8, wiring);
+            let mut relay = relay_of(mission, index, wiring);
             let mut streams: BTreeMap<String, (Port, Vec<u8>)> = BTreeMap::new();
             let mut now = Instant::ZERO;
             for (port, piece, wait_ms) in steps {
@@ -219,8 +255,10 @@ fn with_two_links_every_frame_is_counted_once() {
         "version",
     ];
     let ports = &[Port::Upstream, Port::Downstream];
-    fed_with_anything(4, Wiring::Pair, ports, &expected);
-    fed_with_anything(1, Wiring::Pair, ports, &["misaddressed"]);
+    for interference in [paper(8).interference, Interference::Field(FIELD)] {
+        fed_with_anything(interference, 4, Wiring::Pair, ports, &expected);
+        fed_with_anything(interference, 1, Wiring::Pair, ports, &["misaddressed"]);
+    }
 }
 
 #[test]
@@ -236,12 +274,15 @@ fn on_a_shared_channel_every_frame_is_counted_once() {
         "truncated",
         "version",
     ];
-    fed_with_anything(4, Wiring::Shared, &[Port::Shared], &expected);
+    for interference in [paper(8).interference, Interference::Field(FIELD)] {
+        fed_with_anything(interference, 4, Wiring::Shared, &[Port::Shared], &expected);
+    }
 }
 
 #[test]
 fn bytes_at_a_port_that_is_not_wired_are_dropped() {
     let all = &[Port::Upstream, Port::Downstream, Port::Shared];
-    fed_with_anything(4, Wiring::Pair, all, &["received"]);
-    fed_with_anything(4, Wiring::Shared, all, &["received"]);
+    let interference = paper(8).interference;
+    fed_with_anything(interference, 4, Wiring::Pair, all, &["received"]);
+    fed_with_anything(interference, 4, Wiring::Shared, all, &["received"]);
 }

@@ -88,6 +88,217 @@ pub(crate) fn sweeps(least: usize) -> BoxedStrategy<Said> {
         .boxed()
 }
 
+fn altitudes() -> impl Strategy<Value = f32> {
+    prop_oneof![4 => 15.0..400.0_f32, 1 => 0.1..=1e5_f32, 1 => Just(0.1), 1 => Just(1e5)]
+}
+
+fn powers() -> impl Strategy<Value = f32> {
+    prop_oneof![4 => 0.1..10.0_f32, 1 => 1e-6..=1e6_f32, 1 => Just(1e-6), 1 => Just(1e6)]
+}
+
+/// From 0 to `most`, small and large alike.
+fn up_to(most: f32) -> BoxedStrategy<f32> {
+    let any_size = (-40.0..=most.log2())
+        .prop_map(f32::exp2)
+        .prop_map(move |number| number.min(most));
+    prop_oneof![
+        2 => 0.0..=most,
+        4 => any_size,
+        1 => Just(0.0),
+        1 => Just(-0.0),
+        1 => Just(f32::from_bits(1)),
+        1 => Just(most),
+    ]
+    .boxed()
+}
+
+fn sirs() -> impl Strategy<Value = f32> {
+    prop_oneof![4 => 0.0..10.0_f32, 1 => up_to(f32::MAX)]
+}
+
+/// The sweeps of `plain` with a measured Upsilon.
+pub(crate) fn measured(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
+    let upsilons = prop_oneof![
+        4 => (-29.0..106.0_f32).prop_map(f32::exp2),
+        1 => Just(1e-9),
+        1 => Just(1e32),
+    ];
+    (plain, upsilons)
+        .prop_map(|(said, upsilon_per_w)| match said {
+            Said::Sweep {
+                number,
+                mission,
+                anchor,
+                gap,
+                growth,
+                altitude_m,
+                power_w,
+                reaches,
+            } => Said::Measured {
+                number,
+                mission,
+                anchor,
+                gap,
+                growth,
+                altitude_m,
+                power_w,
+                upsilon_per_w,
+                reaches,
+            },
+            other => other,
+        })
+        .boxed()
+}
+
+/// Numbers of targets and of levels that a wave may have.
+pub(crate) fn sizes() -> BoxedStrategy<(u8, u8)> {
+    let any_size = (1..=16_u8).prop_flat_map(|targets| (Just(targets), 1..=64 / targets));
+    prop_oneof![
+        4 => any_size,
+        1 => Just((7, 9)),
+        1 => Just((3, 21)),
+        1 => Just((1, 1)),
+        1 => Just((16, 4)),
+        1 => Just((1, 64)),
+    ]
+    .boxed()
+}
+
+/// A wave's base and rise.
+pub(crate) fn rises() -> BoxedStrategy<(f32, f32)> {
+    let bases = prop_oneof![
+        4 => (-10.0..5.0_f32).prop_map(f32::exp2),
+        1 => (-126.0..99.0_f32).prop_map(f32::exp2),
+        1 => Just(f32::MIN_POSITIVE),
+        1 => Just(1e30),
+    ];
+    (bases, up_to(1e6)).boxed()
+}
+
+/// The centre of a wave's levels and their width.
+pub(crate) fn widths() -> BoxedStrategy<(f32, f32)> {
+    (altitudes(), up_to(1e5)).boxed()
+}
+
+/// A wave in range, of one of these `sizes`.
+pub(crate) fn waves(sizes: impl Strategy<Value = (u8, u8)> + 'static) -> BoxedStrategy<Said> {
+    let places = || {
+        let code = prop_oneof![
+            8 => 0..=0x00FF_FFFF_u32,
+            2 => Just(0x00FF_FFFF),
+            1 => Just(0x00FF_FFFE),
+            1 => Just(0),
+        ];
+        vec(code, 64)
+    };
+    let numbers = (any::<u16>(), any::<u16>());
+    (numbers, sizes, rises(), widths(), powers(), places())
+        .prop_map(
+            |(
+                (number, mission),
+                (targets, levels),
+                (base, rise),
+                (centre_m, width_m),
+                power_w,
+                places,
+            )| {
+                let pairs = usize::from(targets) * usize::from(levels);
+                let bytes = places.iter().map(|code| code.to_le_bytes());
+                Said::Wave {
+                    number,
+                    mission,
+                    base,
+                    rise,
+                    targets,
+                    centre_m,
+                    width_m,
+                    levels,
+                    power_w,
+                    reaches: bytes
+                        .take(pairs)
+                        .flat_map(|[a, b, c, _]| [a, b, c])
+                        .collect(),
+                }
+            },
+        )
+        .boxed()
+}
+
+fn traces() -> BoxedStrategy<Said> {
+    let numbers = prop_oneof![3 => 0..8_u8, 1 => 0..64_u8];
+    let choice = proptest::option::of([numbers.clone(), numbers]);
+    (any::<u16>(), any::<u16>(), choice)
+        .prop_map(|(number, mission, choice)| Said::Trace {
+            number,
+            mission,
+            choice,
+        })
+        .boxed()
+}
+
+/// A place along x.
+fn along() -> impl Strategy<Value = f32> {
+    prop_oneof![4 => 0.0..=1000.0_f32, 1 => up_to(1e6)]
+}
+
+/// A turn's byte, how far it may go, columns and rows.
+fn turns() -> BoxedStrategy<(u8, f32, u8, u8)> {
+    prop_oneof![
+        1 => Just((0, 0.0, 0, 0)),
+        1 => Just((1, 0.0, 0, 0)),
+        2 => up_to(1e5).prop_map(|explore_m| (2, explore_m, 0, 0)),
+        2 => (up_to(1e5), 2..12_u8, 2..12_u8).prop_map(|(most, columns, rows)| (2, most, columns, rows)),
+        1 => (up_to(1e5), 2..=u8::MAX, 2..=u8::MAX)
+            .prop_map(|(most, columns, rows)| (2, most, columns, rows)),
+    ]
+    .boxed()
+}
+
+fn tokens() -> BoxedStrategy<Said> {
+    let numbers = (any::<u16>(), any::<u16>());
+    (numbers, along(), altitudes(), powers(), turns(), sirs())
+        .prop_map(
+            |(
+                (number, mission),
+                x_m,
+                altitude_m,
+                power_w,
+                (turn, explore_m, columns, rows),
+                sir,
+            )| {
+                Said::Token {
+                    number,
+                    mission,
+                    x_m,
+                    altitude_m,
+                    power_w,
+                    turn,
+                    explore_m,
+                    columns,
+                    rows,
+                    sir,
+                }
+            },
+        )
+        .boxed()
+}
+
+fn moves() -> BoxedStrategy<Said> {
+    let numbers = (any::<u16>(), any::<u16>());
+    (numbers, along(), altitudes(), any::<bool>(), sirs())
+        .prop_map(
+            |((number, mission), x_m, altitude_m, any, worst)| Said::Moved {
+                number,
+                mission,
+                x_m,
+                altitude_m,
+                any,
+                worst,
+            },
+        )
+        .boxed()
+}
+
 /// A message in range.
 pub(crate) fn messages() -> BoxedStrategy<Said> {
     let verdicts = (
@@ -108,6 +319,11 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         1 => any::<u16>().prop_map(|number| Said::Busy { number }),
         1 => (any::<u16>(), any::<bool>())
             .prop_map(|(mission, answer)| Said::Heartbeat { mission, answer }),
+        2 => measured(sweeps(0)),
+        3 => waves(sizes()),
+        1 => traces(),
+        2 => tokens(),
+        2 => moves(),
     ]
     .boxed()
 }
@@ -134,8 +350,16 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
     ]);
     let renumbered =
         (valid(), any::<proptest::sample::Index>(), strange).prop_map(|(mut body, at, number)| {
-            // Numbers begin at 5, 11, 15 and 20 in a sweep, at 7 or 8 in a verdict, and every four bytes from there.
-            let starts = [5, 7, 8, 11, 15, 20, 24];
+            // Where numbers begin in the messages of each tag; in lists every four bytes from the last of them.
+            let starts: &[usize] = match body[0] {
+                0 => &[5, 11, 15, 20, 24],
+                1 => &[7, 8],
+                4 => &[5, 11, 15, 19, 24, 28],
+                5 => &[5, 9, 14, 18, 23],
+                7 => &[5, 9, 13, 18, 24],
+                8 => &[5, 9, 14],
+                _ => &[1],
+            };
             let at = starts[at.index(starts.len())];
             if let Some(place) = body.get_mut(at..at + 4) {
                 place.copy_from_slice(&f32::to_le_bytes(number));
@@ -147,11 +371,32 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         body
     });
     let longer = (valid(), vec(any::<u8>(), 1..4)).prop_map(|(body, more)| [body, more].concat());
+    // Every byte that is neither part of a number nor of a place.
+    let recounted = (valid(), any::<proptest::sample::Index>(), any::<u8>()).prop_map(
+        |(mut body, at, byte)| {
+            let bytes: &[usize] = match body[0] {
+                0 => &[9, 10, 19],
+                1 => &[5, 6],
+                3 => &[3],
+                4 => &[9, 10, 23],
+                5 => &[13, 22, 27, 28],
+                6 => &[5, 6, 7],
+                7 => &[17, 22, 23],
+                8 => &[13],
+                _ => &[0],
+            };
+            let at = bytes[at.index(bytes.len())];
+            if let Some(place) = body.get_mut(at) {
+                *place = if byte % 2 == 0 { byte / 2 % 20 } else { byte };
+            }
+            body
+        },
+    );
     let padded = (valid(), any::<bool>(), 0..9_usize).prop_map(|(mut body, tag, more)| {
         pad(&mut body, tag, more);
         body
     });
-    let tagged = (0..6_u8, vec(any::<u8>(), 0..84)).prop_map(|(tag, mut body)| {
+    let tagged = (0..12_u8, vec(any::<u8>(), 0..=220)).prop_map(|(tag, mut body)| {
         body.insert(0, tag);
         body
     });
@@ -159,11 +404,12 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         2 => valid(),
         3 => replaced.boxed(),
         2 => renumbered.boxed(),
+        2 => recounted.boxed(),
         1 => cut.boxed(),
         1 => longer.boxed(),
         1 => padded.boxed(),
         2 => tagged.boxed(),
-        1 => vec(any::<u8>(), 0..=84).boxed(),
+        1 => vec(any::<u8>(), 0..=221).boxed(),
     ]
     .boxed()
 }
@@ -173,6 +419,9 @@ pub(crate) fn pad(body: &mut Vec<u8>, tag: bool, more: usize) {
     let count = match (body[0], body.get(5)) {
         (0, _) => 19,
         (1, Some(commit)) => 6 + usize::from(*commit),
+        (4, _) => 23,
+        // The last byte of the count: its first may go on already.
+        (5, _) => 27 + usize::from(body[27] >= 0x80),
         _ => 0,
     };
     let at = if tag { 0 } else { count };
@@ -190,7 +439,7 @@ pub(crate) fn pieces(heads: impl Strategy<Value = Header> + 'static) -> BoxedStr
         .prop_map(|(head, said)| wire(&plain(head, &said.body())))
         .boxed();
     let sealed_body = (heads, bodies()).prop_map(|(head, body)| wire(&plain(head, &body)));
-    let sealed_noise = vec(any::<u8>(), 0..=94).prop_map(|bytes| wire(&sealed(bytes)));
+    let sealed_noise = vec(any::<u8>(), 0..=231).prop_map(|bytes| wire(&sealed(bytes)));
     let damaged = (good.clone(), any::<proptest::sample::Index>(), 0..8_u8).prop_map(
         |(mut frame, at, bit)| {
             let at = at.index(frame.len());
@@ -210,8 +459,8 @@ pub(crate) fn pieces(heads: impl Strategy<Value = Header> + 'static) -> BoxedStr
             }
             frame
         });
-    let noise = vec(any::<u8>(), 0..150);
-    let oversized = vec(1..=u8::MAX, 90..400).prop_map(|mut bytes| {
+    let noise = vec(any::<u8>(), 0..300);
+    let oversized = vec(1..=u8::MAX, 220..700).prop_map(|mut bytes| {
         bytes.push(0);
         bytes
     });

@@ -1,40 +1,18 @@
 //! The mission: everything the relays agree on before flight, validated once.
 
+mod parts;
+
+pub use parts::{Band, Heading, Interference, Interferer, Profile};
+
+use parts::within;
+
 use crate::channel::Channel;
+use crate::field::Field;
 use crate::gain::Gain;
 use crate::root::sqrt;
 
 /// The most relays a mission may have; addresses on the wire are 12 bits wide.
 pub const MAX_RELAYS: u16 = 1000;
-
-/// The interferer (the paper's MSI), on the ground: a jammer, a base station, a licensed user.
-#[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Interferer {
-    /// Transmit power, W.
-    pub power_w: f32,
-    /// Place along the line from Tx (0) to Rx (D), m; before Tx or beyond Rx too.
-    pub x_m: f32,
-    /// Distance from that line, m.
-    pub y_m: f32,
-}
-
-/// What one relay brings along: its altitude and its transmit power.
-#[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Profile {
-    /// Altitude above the ground plane that the relay holds, m: 0.1 to 1e5.
-    pub altitude_m: f32,
-    /// Transmit power, W: 1e-6 to 1e6.
-    pub power_w: f32,
-}
-
-impl Profile {
-    /// Whether both numbers are within their ranges.
-    pub const fn is_valid(&self) -> bool {
-        within(self.altitude_m, 0.1, 1e5) && within(self.power_w, 1e-6, 1e6)
-    }
-}
 
 /// The parameters of a mission, as plain numbers; [`Mission::try_new`] checks them.
 ///
@@ -52,10 +30,12 @@ pub struct MissionConfig {
     pub tx_power_w: f32,
     /// What every relay holds that was given nothing of its own.
     pub common: Profile,
+    /// The altitudes that methods which choose altitudes may choose from; `common.altitude_m` is one of them.
+    pub band: Band,
     /// Path loss of the three kinds of link.
     pub channel: Channel,
-    /// The source of interference.
-    pub interferer: Interferer,
+    /// What degrades the hops.
+    pub interference: Interference,
     /// How close to the best SIR is close enough, relative: 1e-6 to 0.1.
     pub tolerance: f32,
 }
@@ -77,10 +57,14 @@ pub enum MissionError {
     TxPower,
     /// `common.altitude_m` is not within 0.1 to 1e5, or `common.power_w` not within 1e-6 to 1e6.
     Common,
+    /// `band` is not in order, not within 0.1 to 1e5, or leaves out `common.altitude_m`.
+    Band,
     /// `interferer.power_w` is not within 1e-6 to 1e9.
     InterfererPower,
     /// `interferer.x_m` or `interferer.y_m` is not within -1e7 to 1e7.
     InterfererPlace,
+    /// The crate was built without its feature `field`.
+    Field,
     /// `tolerance` is not within 1e-6 to 0.1.
     Tolerance,
 }
@@ -98,8 +82,12 @@ impl core::fmt::Display for MissionError {
             Self::Common => {
                 "common.altitude_m must be within 0.1 to 1e5, common.power_w within 1e-6 to 1e6"
             }
+            Self::Band => {
+                "band must be within 0.1 to 1e5, from least to most, with common.altitude_m in it"
+            }
             Self::InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
             Self::InterfererPlace => "interferer.x_m and y_m must be within -1e7 to 1e7",
+            Self::Field => "a field of interference needs the feature `field`",
             Self::Tolerance => "tolerance must be within 1e-6 to 0.1",
         })
     }
@@ -113,9 +101,10 @@ impl core::error::Error for MissionError {}
 pub struct Mission {
     config: MissionConfig,
     tx_gain: Gain,
-    /// eta / (`mu_los` `p_MSI`): what a relay's transmit power is worth on a drone-to-drone hop, 1/W.
+    /// What a relay's transmit power is worth on a drone-to-drone hop, 1/W: eta / (`mu_los` `p_MSI`), in a field m^2/W:
+    /// `Upsilon_max` / `mu_los`.
     relay_gain_per_w: f64,
-    /// (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`: what it is worth on the last hop, m^2/W.
+    /// What it is worth on the last hop, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) / eta.
     receiver_gain_per_w: f64,
 }
 
@@ -137,8 +126,9 @@ impl Mission {
             min_separation_m,
             tx_power_w,
             common,
+            band,
             channel,
-            interferer,
+            interference,
             tolerance,
         } = config;
         if relays < 1 || relays > MAX_RELAYS {
@@ -159,24 +149,49 @@ impl Mission {
         if !common.is_valid() {
             return Err(MissionError::Common);
         }
-        if !within(interferer.power_w, 1e-6, 1e9) {
-            return Err(MissionError::InterfererPower);
+        if !band.is_valid() || !within(common.altitude_m, band.least_m, band.most_m) {
+            return Err(MissionError::Band);
         }
-        if !within(interferer.x_m, -1e7, 1e7) || !within(interferer.y_m, -1e7, 1e7) {
-            return Err(MissionError::InterfererPlace);
+        if let Interference::Source(interferer) = &interference {
+            if !within(interferer.power_w, 1e-6, 1e9) {
+                return Err(MissionError::InterfererPower);
+            }
+            if !within(interferer.x_m, -1e7, 1e7) || !within(interferer.y_m, -1e7, 1e7) {
+                return Err(MissionError::InterfererPlace);
+            }
         }
         if !within(tolerance, 1e-6, 0.1) {
             return Err(MissionError::Tolerance);
         }
-        let p_msi = interferer.power_w as f64;
-        let beyond = interferer.x_m as f64 - distance_m as f64;
-        let aside = interferer.y_m as f64;
-        let nlos_over_eta = channel.mu_nlos() / channel.eta();
+        if matches!(interference, Interference::Field(_)) && !cfg!(feature = "field") {
+            return Err(MissionError::Field);
+        }
+        let eta = channel.eta();
+        let (tx_gain, relay_gain_per_w, receiver_gain_per_w) = match interference {
+            Interference::Source(interferer) => {
+                let p_msi = interferer.power_w as f64;
+                let beyond = interferer.x_m as f64 - distance_m as f64;
+                let aside = interferer.y_m as f64;
+                (
+                    tx_power_w as f64 / p_msi,
+                    eta / channel.mu_los() / p_msi,
+                    channel.mu_nlos() / eta * (beyond * beyond + aside * aside) / p_msi,
+                )
+            }
+            Interference::Field(field) => {
+                let most = field.largest() as f64;
+                (
+                    tx_power_w as f64 * most / eta,
+                    most / channel.mu_los(),
+                    field.upsilon(distance_m) as f64 / eta,
+                )
+            }
+        };
         Ok(Self {
             config,
-            tx_gain: Gain::new(tx_power_w as f64 / p_msi),
-            relay_gain_per_w: channel.eta() / channel.mu_los() / p_msi,
-            receiver_gain_per_w: nlos_over_eta * (beyond * beyond + aside * aside) / p_msi,
+            tx_gain: Gain::new(tx_gain),
+            relay_gain_per_w,
+            receiver_gain_per_w,
         })
     }
 
@@ -215,17 +230,60 @@ impl Mission {
         self.config.relays
     }
 
-    /// The interferer.
-    pub const fn interferer(&self) -> &Interferer {
-        &self.config.interferer
+    /// What degrades the hops.
+    pub const fn interference(&self) -> &Interference {
+        &self.config.interference
     }
 
-    /// `p_t` / `p_MSI`: what multiplies the distances of the first hop.
+    /// The interferer, where there is one.
+    pub const fn interferer(&self) -> Option<&Interferer> {
+        match &self.config.interference {
+            Interference::Source(interferer) => Some(interferer),
+            Interference::Field(_) => None,
+        }
+    }
+
+    /// The field, where there is one.
+    pub const fn field(&self) -> Option<&Field> {
+        match &self.config.interference {
+            Interference::Field(field) if cfg!(feature = "field") => Some(field),
+            _ => None,
+        }
+    }
+
+    /// Which way the places are worked out.
+    pub const fn heading(&self) -> Heading {
+        match self.field() {
+            None => Heading::TowardRx,
+            Some(_) => Heading::TowardTx,
+        }
+    }
+
+    /// The relay that works out its place first, and begins the passes: 1, or N in a field.
+    pub const fn leader(&self) -> u16 {
+        match self.heading() {
+            Heading::TowardRx => 1,
+            Heading::TowardTx => self.config.relays,
+        }
+    }
+
+    /// The relay that comes after `index` on a pass; `None` after the last.
+    pub const fn after(&self, index: u16) -> Option<u16> {
+        match self.heading() {
+            Heading::TowardRx if index < self.config.relays => Some(index + 1),
+            Heading::TowardTx if index > 1 => Some(index - 1),
+            _ => None,
+        }
+    }
+
+    /// What multiplies the quiet of a place (see [`crate::sir::quiet`]) on the first hop: `p_t` / `p_MSI`, in a field
+    /// `p_t` `Upsilon_max` / eta.
     pub const fn tx_gain(&self) -> Gain {
         self.tx_gain
     }
 
-    /// (`p_u` / `p_MSI`)(eta / `mu_los`): what multiplies the distances of a hop that a relay of `power_w` watts feeds.
+    /// What multiplies it on a hop that a relay of `power_w` watts feeds: (`p_u` / `p_MSI`)(eta / `mu_los`), in a field
+    /// `p_u` `Upsilon_max` / `mu_los`.
     pub const fn relay_gain(&self, power_w: f32) -> Gain {
         Gain::new(power_w as f64 * self.relay_gain_per_w)
     }
@@ -239,123 +297,47 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
+    /// Power that Tx's signal has at a relay whose squared distance is `squared_m2`, W.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a float that fits by the ranges of the mission"
+    )]
+    pub(crate) fn first_hop_power_w(&self, squared_m2: f32) -> f32 {
+        let loss = self.config.channel.eta() * f64::from(squared_m2);
+        (f64::from(self.config.tx_power_w) / loss) as f32
+    }
+
     /// The least step in x between neighbours whose altitudes differ by `climb_m`, m: what keeps the separation asked for.
     pub(crate) fn least_step(&self, climb_m: f32) -> f32 {
         let apart = self.config.min_separation_m;
+        if !(climb_m.abs() > 0.0) {
+            return apart;
+        }
         sqrt(apart * apart - climb_m * climb_m)
     }
 
-    /// The farthest place toward Rx that leaves relays `index` + 1 to N room to stand `min_separation_m` apart, m.
-    pub(crate) fn end_for(&self, index: u16) -> f32 {
-        let behind = f32::from(self.config.relays.saturating_sub(index));
-        let MissionConfig {
-            distance_m,
-            min_separation_m,
-            ..
-        } = self.config;
-        let step = if min_separation_m > 0.0 {
-            min_separation_m + distance_m * ROUNDING
+    /// The last place on its way that leaves the relays after `index` room to stand `min_separation_m` apart, m.
+    ///
+    /// `climb_m` is by how much the altitudes of two neighbours among them may differ: what they are apart in height they need
+    /// not be along x.
+    pub(crate) fn end_for(&self, index: u16, climb_m: f32) -> f32 {
+        let behind = f32::from(match self.heading() {
+            Heading::TowardRx => self.config.relays.saturating_sub(index),
+            Heading::TowardTx => index.saturating_sub(1),
+        });
+        let distance_m = self.config.distance_m;
+        let least = self.least_step(climb_m);
+        let step = if least > 0.0 {
+            least + distance_m * ROUNDING
         } else {
             distance_m * FINEST_STEP
         };
-        (distance_m - behind * step).max(0.0)
+        match self.heading() {
+            Heading::TowardRx => (distance_m - behind * step).max(0.0),
+            Heading::TowardTx => (behind * step).min(distance_m),
+        }
     }
-}
-
-/// Whether `value` is a number in [`least`, `most`].
-const fn within(value: f32, least: f32, most: f32) -> bool {
-    value >= least && value <= most
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
-    use super::{Interferer, Mission, MissionConfig, MissionError, Profile};
-    use crate::channel::{AirGround, Channel};
-
-    /// The paper's multi-hop scenario with `relays` relays.
-    pub(crate) fn paper(relays: u16) -> MissionConfig {
-        MissionConfig {
-            relays,
-            distance_m: 1000.0,
-            min_separation_m: 4.0,
-            tx_power_w: 80.0,
-            common: Profile {
-                altitude_m: 20.0,
-                power_w: 1.0,
-            },
-            channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
-            interferer: Interferer {
-                power_w: 80.0,
-                x_m: 500.0,
-                y_m: 400.0,
-            },
-            tolerance: 1e-4,
-        }
-    }
-
-    #[test]
-    fn every_parameter_is_checked_at_both_ends_and_for_nan() {
-        type Set = fn(&mut MissionConfig, f32);
-        let table: [(Set, f32, f32, MissionError); 9] = [
-            (|c, v| c.distance_m = v, 1.0, 1e6, MissionError::Distance),
-            (
-                |c, v| c.min_separation_m = v,
-                0.0,
-                1e5,
-                MissionError::Separation,
-            ),
-            (|c, v| c.tx_power_w = v, 1e-6, 1e6, MissionError::TxPower),
-            (
-                |c, v| c.common.altitude_m = v,
-                0.1,
-                1e5,
-                MissionError::Common,
-            ),
-            (|c, v| c.common.power_w = v, 1e-6, 1e6, MissionError::Common),
-            (
-                |c, v| c.interferer.power_w = v,
-                1e-6,
-                1e9,
-                MissionError::InterfererPower,
-            ),
-            (
-                |c, v| c.interferer.x_m = v,
-                -1e7,
-                1e7,
-                MissionError::InterfererPlace,
-            ),
-            (
-                |c, v| c.interferer.y_m = v,
-                -1e7,
-                1e7,
-                MissionError::InterfererPlace,
-            ),
-            (|c, v| c.tolerance = v, 1e-6, 0.1, MissionError::Tolerance),
-        ];
-        for (set, least, most, error) in table {
-            let with = |value| {
-                let mut config = paper(1);
-                set(&mut config, value);
-                Mission::try_new(config).map(|_| ())
-            };
-            assert_eq!(with(least), Ok(()), "{error}");
-            assert_eq!(with(most), Ok(()), "{error}");
-            for bad in [
-                least.next_down(),
-                most.next_up(),
-                f32::NAN,
-                f32::INFINITY,
-                f32::NEG_INFINITY,
-            ] {
-                assert_eq!(with(bad), Err(error), "{bad}");
-            }
-        }
-        assert_eq!(Mission::try_new(paper(0)), Err(MissionError::Relays));
-        assert_eq!(Mission::try_new(paper(1001)), Err(MissionError::Relays));
-        assert_eq!(
-            Mission::try_new(paper(251)),
-            Err(MissionError::TooManyForDistance)
-        );
-        assert!(Mission::try_new(paper(250)).is_ok());
-    }
-}
+pub(crate) mod tests;

@@ -1,0 +1,296 @@
+//! `cargo chain`: simulated relays, each running the on-board code, find their places over simulated serial links.
+
+mod options;
+
+use std::io::{IsTerminal as _, Write as _};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::{Parser as _, ValueEnum as _};
+use host_tests::brief::{self, Refusal};
+use host_tests::random::beta::beta_w;
+use host_tests::report::ChainReport;
+use host_tests::scenario::{Interference, Scenario};
+use host_tests::sim::chain::Chain;
+use host_tests::sim::faults::Faults;
+use host_tests::sim::outcome::Outcome;
+use host_tests::sim::setup::Setup;
+use host_tests::svg::{self, Picture};
+use indicatif::{ProgressBar, ProgressStyle};
+use uav_relay::{Measure, Mission, Schedule};
+
+use options::{Method, Options, narrow};
+
+/// Why there is no result: the one line on standard error, and the exit status.
+struct Failure {
+    status: u8,
+    line: String,
+}
+
+impl Failure {
+    fn input(line: impl Into<String>) -> Self {
+        Self {
+            status: 2,
+            line: line.into(),
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let options = match Options::try_parse() {
+        Ok(options) => options,
+        Err(error) => return usage(&error),
+    };
+    match run(&options) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("{}", failure.line);
+            ExitCode::from(failure.status)
+        }
+    }
+}
+
+/// Help as it is; of an error only the line that says what is wrong.
+fn usage(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        print!("{error}");
+        return ExitCode::SUCCESS;
+    }
+    let text = error.to_string();
+    let wrong = text
+        .lines()
+        .find(|line| !line.trim().is_empty())
+        .unwrap_or("wrong options");
+    eprintln!("{}", wrong.trim_start_matches("error: "));
+    ExitCode::from(2)
+}
+
+fn run(options: &Options) -> Result<(), Failure> {
+    let method = options
+        .method
+        .to_possible_value()
+        .map_or_else(String::new, |value| value.get_name().to_owned());
+    let scenario = match &options.scenario {
+        Some(file) => Scenario::load(file).map_err(|error| Failure::input(error.to_string()))?,
+        None => Scenario::default(),
+    };
+    agree(options, &method, &scenario)?;
+    let (mission, profiles) = match brief::mission(&scenario, options.uavs, options.tolerance) {
+        Ok(briefed) => briefed,
+        Err(refusal @ Refusal::NoRoom) => {
+            let report =
+                ChainReport::refused(&method, options.uavs, options.seed, &refusal.to_string());
+            return show(options, &report);
+        }
+        Err(refusal) => {
+            let file = options
+                .scenario
+                .as_ref()
+                .map_or("default scenario".into(), |file| file.to_string_lossy());
+            return Err(Failure::input(format!("{file}: {refusal}")));
+        }
+    };
+    let mut setup = setup(options, mission);
+    setup.profiles = profiles;
+    setup.held = brief::held(&scenario, options.uavs);
+    let outcome = fly(options, &scenario, setup)?;
+    let report = ChainReport::new(&method, &mission, &outcome, options.seed);
+    if let Some(file) = &options.svg {
+        let drawing = svg::draw(&picture(&method, &mission, &scenario, &outcome, &report));
+        std::fs::write(file, drawing).map_err(|error| {
+            Failure::input(format!(
+                "{}: --svg cannot be written: {error}",
+                file.display()
+            ))
+        })?;
+    }
+    show(options, &report)
+}
+
+/// Whether the options go together, and with the scenario.
+fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Failure> {
+    if options.closed_loop.is_some() && !options.method.is_for_fields() {
+        let line = format!("--closed-loop: there is nothing to measure with --method {method}");
+        return Err(Failure::input(line));
+    }
+    if let Some(kill) = options
+        .kill
+        .iter()
+        .find(|kill| !(1..=options.uavs).contains(&kill.index))
+    {
+        let line = format!(
+            "--kill {}@..: relay must be within 1 to {}",
+            kill.index, options.uavs
+        );
+        return Err(Failure::input(line));
+    }
+    let is_field = matches!(scenario.interference, Interference::Field(_));
+    if options.method.is_for_fields() != is_field {
+        let line = if is_field {
+            format!(
+                "--method {method} needs an [[interferer]], and the scenario has a [field]: take stochastic or stochastic-step"
+            )
+        } else {
+            format!("--method {method} needs a --scenario with a [field] of interference")
+        };
+        return Err(Failure::input(line));
+    }
+    for index in scenario
+        .relays
+        .keys()
+        .filter(|index| **index > options.uavs)
+    {
+        eprintln!(
+            "note: [[relay]] index {index} is left out of a chain of {}",
+            options.uavs
+        );
+    }
+    Ok(())
+}
+
+/// What the options say of the run.
+fn setup(options: &Options, mission: Mission) -> Setup {
+    let mut setup = Setup::new(mission);
+    setup.settings.schedule = match options.method {
+        Method::AlignStep | Method::StochasticStep => Schedule::FixedStep {
+            step: options.epsilon,
+        },
+        _ => Schedule::Bracketed,
+    };
+    setup.settings.method = match options.method {
+        Method::Altitude => uav_relay::Method::Altitude,
+        Method::Adjust => uav_relay::Method::Adjust(uav_relay::Adjust {
+            rounds: options.rounds,
+            explore_m: options.explore_m,
+            local: options.grid.unwrap_or_default(),
+        }),
+        _ => uav_relay::Method::Align,
+    };
+    setup.settings.predict = !options.no_predict;
+    setup.seed = options.seed;
+    setup.kills = options
+        .kill
+        .iter()
+        .map(|kill| (kill.index, kill.at))
+        .collect();
+    setup.faults = Faults {
+        loss: options.loss,
+        corrupt: options.corrupt,
+        duplicate: options.duplicate,
+        reorder: options.reorder,
+    };
+    setup
+}
+
+/// Runs the chain to its end; in a closed loop as often as that measures.
+fn fly(options: &Options, scenario: &Scenario, mut setup: Setup) -> Result<Outcome, Failure> {
+    let start = |setup| Chain::new(setup).map_err(|error| Failure::input(error.to_string()));
+    let (Interference::Field(field), Some(rounds)) = (&scenario.interference, options.closed_loop)
+    else {
+        let mut chain = start(setup)?;
+        watch(&mut chain);
+        return Ok(chain.finish());
+    };
+    let i_max_w = narrow(field.i_max_w);
+    setup.mission = brief::told_of_an_even_field(&setup.mission);
+    setup.settings.measure = Some(Measure {
+        i_max_w,
+        samples: SAMPLES,
+    });
+    let mut chain = start(setup)?;
+    watch(&mut chain);
+    for _ in 0..rounds {
+        chain.measure(SAMPLES, |place, rng| {
+            let (alpha, beta) = brief::shapes(field, f64::from(place.x_m));
+            beta_w(rng, alpha, beta, i_max_w)
+        });
+        chain.restart();
+        watch(&mut chain);
+    }
+    Ok(chain.finish())
+}
+
+/// Samples that a relay of a closed loop takes at each place.
+const SAMPLES: u32 = 10_000;
+
+/// Runs the chain, with a progress line on a terminal once it takes longer than a second.
+fn watch(chain: &mut Chain) {
+    let started = Instant::now();
+    let mut line: Option<ProgressBar> = None;
+    while !chain.step(20_000) {
+        if line.is_none()
+            && started.elapsed() > Duration::from_secs(1)
+            && std::io::stderr().is_terminal()
+        {
+            let bar = ProgressBar::new_spinner();
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
+                bar.set_style(style);
+            }
+            line = Some(bar);
+        }
+        if let Some(bar) = &line {
+            let (sweeps, now) = chain.progress();
+            bar.set_message(format!(
+                "sweep {sweeps}, {:.0} s of virtual time",
+                now.as_micros() as f64 / 1e6
+            ));
+            bar.tick();
+        }
+    }
+    if let Some(bar) = line {
+        bar.finish_and_clear();
+    }
+}
+
+fn picture(
+    method: &str,
+    mission: &Mission,
+    scenario: &Scenario,
+    outcome: &Outcome,
+    report: &ChainReport,
+) -> Picture {
+    let interferers = match &scenario.interference {
+        Interference::Sources(sources) => {
+            sources.iter().map(|s| (s.power_w, s.x_m, s.y_m)).collect()
+        }
+        Interference::Field(_) => Vec::new(),
+    };
+    let mut hop_sir: Vec<f64> = report.relays.iter().map(|relay| relay.sir).collect();
+    hop_sir.extend(report.rx_sir);
+    Picture {
+        title_method: method.to_owned(),
+        distance_m: f64::from(mission.config().distance_m),
+        interferers,
+        nodes: report
+            .relays
+            .iter()
+            .map(|relay| (relay.x_m, relay.h_m))
+            .collect(),
+        hop_sir,
+        lost: (1..)
+            .zip(&outcome.relays)
+            .filter(|(_, relay)| relay.killed.is_some())
+            .map(|(index, _)| index)
+            .collect(),
+    }
+}
+
+/// Prints the report; what it says went wrong is the failure.
+fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
+    let text = if options.json {
+        serde_json::to_string(report)
+            .map(|json| json + "\n")
+            .map_err(|error| Failure::input(error.to_string()))?
+    } else {
+        report.table()
+    };
+    // A reader that has had enough, such as `head`, is no fault of the chain.
+    _ = std::io::stdout().write_all(text.as_bytes());
+    match &report.error {
+        None => Ok(()),
+        Some(error) => Err(Failure {
+            status: 1,
+            line: error.clone(),
+        }),
+    }
+}

@@ -1,0 +1,279 @@
+//! Algorithm 2: turn by turn, never worse, and what a coarse grid cannot do.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    clippy::cast_possible_truncation,
+    missing_docs
+)]
+
+use core::task::Poll;
+
+use host_tests::brief::of_link;
+use host_tests::random;
+use host_tests::reference::{Link, Station};
+use host_tests::sim::chain::run;
+use host_tests::sim::faults::Faults;
+use host_tests::sim::outcome::{Ending, Outcome};
+use host_tests::sim::setup::Setup;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::gain::Gain;
+use uav_relay::placement::local::{Beside, Hops, Search};
+use uav_relay::sir::{Sender, at_receiver};
+use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig, Placement, Profile};
+
+/// X = 500, Y = 150, all relays at 220 m to begin with, 20 m to 300 m allowed, 4 m apart.
+fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
+    let mut link = Link {
+        y_i: 150.0,
+        min_separation_m: 4.0,
+        ..Link::paper(relays)
+    };
+    for relay in &mut link.relays {
+        relay.altitude_m = 220.0;
+    }
+    let (mission, _) = of_link(&link, 1e-4).unwrap();
+    let config = MissionConfig {
+        band: Band {
+            least_m: 20.0,
+            most_m: 300.0,
+        },
+        ..*mission.config()
+    };
+    let mut setup = Setup::new(Mission::try_new(config).unwrap());
+    setup.settings.method = Method::Adjust(adjust);
+    (link, setup)
+}
+
+fn settle(setup: Setup) -> Outcome {
+    let outcome = run(setup).unwrap();
+    assert_eq!(outcome.ending, Ending::Settled);
+    assert_eq!(outcome.unsafe_setpoints, 0);
+    outcome
+}
+
+/// SIR of the chain by the reference, and the least distance between neighbours, m.
+fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
+    let places: Vec<Placement> = outcome
+        .relays
+        .iter()
+        .map(|relay| relay.setpoint.unwrap())
+        .collect();
+    let link = Link {
+        relays: places
+            .iter()
+            .zip(&link.relays)
+            .map(|(place, relay)| Station {
+                altitude_m: f64::from(place.altitude_m),
+                ..*relay
+            })
+            .collect(),
+        ..link.clone()
+    };
+    let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
+    let apart = places.windows(2).map(|pair| {
+        let (dx, dh) = (
+            f64::from(pair[1].x_m - pair[0].x_m),
+            f64::from(pair[1].altitude_m - pair[0].altitude_m),
+        );
+        dx.hypot(dh)
+    });
+    (link.chain_sir(&x), apart.fold(f64::INFINITY, f64::min))
+}
+
+fn rises(outcome: &Outcome) -> bool {
+    outcome.rounds.windows(2).all(|pair| pair[1] >= pair[0])
+}
+
+/// Fifty relays, from Algorithm 1's places at 220 m: what the two local searches make of them. The joint optimum is
+/// 6.49838, 19.4 % above where they begin: the paper's 25 % cannot be had.
+#[test]
+fn fine_turns_gain_what_a_coarse_grid_does_not() {
+    let of = |rounds, local| {
+        let (link, setup) = setup(
+            50,
+            Adjust {
+                rounds,
+                explore_m: 10.0,
+                local,
+            },
+        );
+        let outcome = settle(setup);
+        let (sir, apart) = judged(&link, &outcome);
+        println!(
+            "{local:?}, at most {rounds} rounds: {} rounds, SIR {:.5} to {sir:.5}; {} messages, {} bytes",
+            outcome.rounds.len() - 1,
+            outcome.rounds[0],
+            outcome.messages,
+            outcome.bytes
+        );
+        assert!(rises(&outcome), "a round has made the chain worse");
+        assert!(apart >= 4.0 - 1e-3, "{apart} m");
+        assert!((sir / f64::from(*outcome.rounds.last().unwrap()) - 1.0).abs() < 1e-5);
+        (sir, outcome.rounds[0])
+    };
+    let (sir, begin) = of(500, Local::Fine);
+    assert!((6.40..=6.498_377_7).contains(&sir), "{sir}");
+    assert!((f64::from(begin) / 5.442_6 - 1.0).abs() < 1e-4);
+    let grid = Local::Grid {
+        columns: 41,
+        rows: 21,
+    };
+    let (sir, begin) = of(500, grid);
+    assert!((sir / f64::from(begin) - 1.0).abs() < 1e-6, "{sir}");
+    let (ten, _) = of(10, Local::Fine);
+    assert!((ten / 5.555 - 1.0).abs() < 1e-3, "{ten}");
+}
+
+/// Relays that begin far from balanced, as the paper's grid goes: the values of a separate program.
+#[test]
+fn the_grid_moves_where_a_separate_program_moves() {
+    let link = Link {
+        y_i: 150.0,
+        min_separation_m: 4.0,
+        ..Link::paper(4)
+    };
+    let (mission, _) = of_link(&link, 1e-4).unwrap();
+    let interferer = *mission.interferer().unwrap();
+    let apart_m = 4.0;
+    let mut places = [300.0_f32, 400.0, 500.0, 600.0].map(|x_m| Placement {
+        x_m,
+        altitude_m: 100.0,
+    });
+    let how = Local::Grid {
+        columns: 41,
+        rows: 21,
+    };
+    let chain = |places: &[Placement]| {
+        let mut sender = Sender::transmitter(&mission);
+        let (mut worst, mut from) = (f32::INFINITY, 0.0);
+        for place in places {
+            worst = worst.min(sender.sir_at(&mission, from, *place));
+            from = place.x_m;
+            sender = Sender::relay(
+                &mission,
+                Profile {
+                    altitude_m: place.altitude_m,
+                    power_w: 1.0,
+                },
+            );
+        }
+        worst.min(at_receiver(&mission, places[3], 1.0))
+    };
+    let mut history = vec![chain(&places)];
+    for _ in 0..5 {
+        for at in 0..4 {
+            let (before, gain): (Beside, Gain) = match at {
+                0 => (
+                    Beside {
+                        place: Placement::default(),
+                        apart_m: 0.0,
+                    },
+                    mission.tx_gain(),
+                ),
+                _ => (
+                    Beside {
+                        place: places[at - 1],
+                        apart_m,
+                    },
+                    mission.relay_gain(1.0),
+                ),
+            };
+            let after = places.get(at + 1).map(|&place| Beside { place, apart_m });
+            let hops = Hops::new(&mission, &interferer, before, gain, 1.0, after);
+            let mut search = Search::new(how, hops, places[at], 10.0, (20.0, 300.0));
+            let found = loop {
+                if let Poll::Ready(found) = search.step(100) {
+                    break found;
+                }
+            };
+            if let Some(better) = found {
+                assert!(hops.worse(better) > hops.worse(places[at]));
+                places[at] = better;
+            }
+        }
+        history.push(chain(&places));
+    }
+    let theirs = [
+        0.040_625,
+        0.073_272_789,
+        0.144_227_248,
+        0.233_182_708,
+        0.233_182_708,
+        0.241_606_825,
+    ];
+    println!("{history:?}");
+    for (ours, theirs) in history.iter().zip(theirs) {
+        assert!(
+            (f64::from(*ours) / theirs - 1.0).abs() < 1e-5,
+            "{ours} against {theirs}"
+        );
+    }
+}
+
+/// The fine search is never below a dense grid of the same rectangle by more than that grid's step explains, and never leaves it.
+#[test]
+fn the_fine_search_is_as_good_as_a_dense_grid() {
+    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(71));
+    let (mut lower, mut higher) = (0.0_f64, 0);
+    for _ in 0..300 {
+        let link = Link {
+            x_i: rng.random_range(-200.0..1200.0),
+            y_i: rng.random_range(0.0..300.0),
+            ..Link::paper(3)
+        };
+        let (mission, _) = of_link(&link, 1e-4).unwrap();
+        let interferer = *mission.interferer().unwrap();
+        let mut place = |low: f32, high: f32| Placement {
+            x_m: rng.random_range(low..high),
+            altitude_m: rng.random_range(30.0..200.0),
+        };
+        let (a, b, c) = (place(50.0, 300.0), place(350.0, 600.0), place(650.0, 950.0));
+        let beside = |place| Beside {
+            place,
+            apart_m: 4.0,
+        };
+        let gain = mission.relay_gain(1.0);
+        let hops = Hops::new(&mission, &interferer, beside(a), gain, 1.0, Some(beside(c)));
+        let find = |local| {
+            let mut search = Search::new(local, hops, b, 20.0, (30.0, 200.0));
+            loop {
+                if let Poll::Ready(found) = search.step(500) {
+                    break hops.worse(found.unwrap_or(b));
+                }
+            }
+        };
+        let fine = find(Local::Fine);
+        let grid = find(Local::Grid {
+            columns: 255,
+            rows: 255,
+        });
+        lower = lower.max(1.0 - f64::from(fine / grid));
+        higher += u32::from(fine > grid);
+    }
+    println!("higher than the grid in {higher} of 300, lower by at most {lower:.1e}");
+    assert!(higher > 250);
+    assert!(lower < 1e-2, "{lower}");
+}
+
+#[test]
+fn faults_change_nothing() {
+    for seed in 0..20 {
+        let adjust = Adjust {
+            rounds: 8,
+            ..Adjust::default()
+        };
+        let (_, mut setup) = setup(2 + seed % 7, adjust);
+        let clean = settle(setup.clone());
+        setup.faults = Faults::BAD_DAY;
+        setup.seed = seed as u64;
+        let faulty = settle(setup);
+        let injected = faulty.injected;
+        assert!(injected.lost > 0 && injected.corrupted > 0 && injected.reordered > 0);
+        assert!(rises(&faulty));
+        assert_eq!(clean.bits(), faulty.bits(), "seed {seed}");
+    }
+}

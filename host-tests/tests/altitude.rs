@@ -1,0 +1,260 @@
+//! Joint altitude and distance: how near the true optimum the chain comes, in how many passes, whatever happens to frames.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    clippy::cast_possible_truncation,
+    missing_docs
+)]
+
+use host_tests::brief::{as_relays_know_it, of_link};
+use host_tests::random::{self, joint::scenario};
+use host_tests::reference::Link;
+use host_tests::reference::joint::{self, Band, Effort, Place};
+use host_tests::sim::chain::run;
+use host_tests::sim::faults::Faults;
+use host_tests::sim::outcome::{Ending, Outcome};
+use host_tests::sim::setup::Setup;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use uav_relay::{Method, Mission, MissionConfig, Profile};
+
+/// The setup of a chain that chooses altitudes within `band`; `None` where a relay would refuse the numbers.
+fn setup(link: &Link, band: Band) -> Option<Setup> {
+    let (mission, profiles) = of_link(link, 1e-4)?;
+    let config = MissionConfig {
+        band: uav_relay::Band {
+            least_m: band.least_m as f32,
+            most_m: band.most_m as f32,
+        },
+        ..*mission.config()
+    };
+    let mut setup = Setup::new(Mission::try_new(config).ok()?);
+    setup.profiles = profiles;
+    setup.settings.method = Method::Altitude;
+    Some(setup)
+}
+
+fn places(outcome: &Outcome) -> Vec<Place> {
+    let place = |relay: &host_tests::sim::outcome::RelayEnd| relay.setpoint.unwrap();
+    outcome
+        .relays
+        .iter()
+        .map(|relay| Place {
+            x_m: f64::from(place(relay).x_m),
+            altitude_m: f64::from(place(relay).altitude_m),
+        })
+        .collect()
+}
+
+/// What one random scenario came to.
+struct Result {
+    of: String,
+    /// Reached over the optimum.
+    ratio: f64,
+    sweeps: u32,
+    bytes: u64,
+}
+
+fn random_results(count: usize, seed: u64, predict: bool) -> Vec<Result> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut results = Vec::new();
+    while results.len() < count {
+        let drawn = scenario(&mut rng, &(1..=50));
+        let link = as_relays_know_it(&drawn.link);
+        let band = Band {
+            least_m: f64::from(drawn.band.least_m as f32),
+            most_m: f64::from(drawn.band.most_m as f32),
+        };
+        let Some(mut setup) = setup(&link, band) else {
+            continue;
+        };
+        setup.settings.predict = predict;
+        let Some(best) = joint::optimum(&link, band, Effort::usual(seed)) else {
+            continue;
+        };
+        let outcome = run(setup).unwrap();
+        let of = format!(
+            "N = {}, D = {:.0}, X = {:.3} D, Y = {:.4} D, band {:.4} D to {:.4} D, d_min {:.4} D",
+            link.len(),
+            link.distance_m,
+            link.x_i / link.distance_m,
+            link.y_i / link.distance_m,
+            band.least_m / link.distance_m,
+            band.most_m / link.distance_m,
+            link.min_separation_m / link.distance_m,
+        );
+        assert_eq!(outcome.ending, Ending::Settled, "{of}");
+        assert_eq!(outcome.unsafe_setpoints, 0, "{of}");
+        let places = places(&outcome);
+        results.push(Result {
+            ratio: joint::sir(&link, &places).unwrap() / best.sir,
+            of,
+            sweeps: outcome.sweeps,
+            bytes: outcome.bytes,
+        });
+    }
+    results
+}
+
+/// The scenario that the figures are for: X = 500, Y = 150, altitudes of 20 m to 300 m, 4 m apart.
+fn close_by(relays: usize) -> (Link, Band) {
+    let link = Link {
+        y_i: 150.0,
+        min_separation_m: 4.0,
+        ..Link::paper(relays)
+    };
+    let band = Band {
+        least_m: 20.0,
+        most_m: 300.0,
+    };
+    (link, band)
+}
+
+fn settle(setup: Setup) -> Outcome {
+    let outcome = run(setup).unwrap();
+    assert_eq!(outcome.ending, Ending::Settled);
+    assert_eq!(outcome.unsafe_setpoints, 0);
+    outcome
+}
+
+/// What is asked of the method, and the true optima, from an independent program.
+#[test]
+fn the_joint_optima_are_reached() {
+    for (relays, common, least, best) in [
+        (2, 0.881_533, 0.881_45, 0.881_533_886_7),
+        (5, 1.047_409, 1.047_36, 1.047_463_457_8),
+        (8, 1.228_700, 1.235_66, 1.235_783_782_6),
+        (50, 5.450_572, 6.497_73, 6.498_377_624_8),
+    ] {
+        let (link, band) = close_by(relays);
+        for predict in [true, false] {
+            let mut setup = setup(&link, band).unwrap();
+            setup.settings.predict = predict;
+            let outcome = settle(setup);
+            let places = places(&outcome);
+            let sir = joint::sir(&link, &places).unwrap();
+            println!(
+                "N = {relays}: {sir:.7} of {best}, best common altitude {common}; {} passes, {} messages, {} bytes",
+                outcome.sweeps, outcome.messages, outcome.bytes
+            );
+            assert!(sir >= least && sir <= best * (1.0 + 1e-6), "{sir}");
+            assert!(!predict || outcome.sweeps <= 16, "{}", outcome.sweeps);
+            assert!(outcome.sweeps <= 30, "{}", outcome.sweeps);
+            let band = Band {
+                least_m: band.least_m - 1e-9,
+                most_m: band.most_m + 1e-9,
+            };
+            assert!(joint::keeps_rules(&link, band, &places));
+        }
+    }
+}
+
+/// A hundred random scenarios (`COUNT` takes another number) against an optimiser that shares no formula with the crate.
+#[test]
+fn random_chains_come_near_the_joint_optimum() {
+    let count = std::env::var("COUNT").map_or(100, |text| text.parse().unwrap());
+    let mut results = random_results(count, random::seed(41), true);
+    results.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
+    for result in results.iter().take_while(|result| result.ratio < 0.999) {
+        println!(
+            "{:.5} in {} passes: {}",
+            result.ratio, result.sweeps, result.of
+        );
+    }
+    let near = results
+        .iter()
+        .filter(|result| result.ratio >= 0.999)
+        .count();
+    let passes: u32 = results.iter().map(|result| result.sweeps).sum();
+    let (worst, best) = (results[0].ratio, results.last().unwrap().ratio);
+    println!(
+        "{near} of {count} within 0.1 %, worst {worst:.5}, best {best:.8}; {:.1} passes, at most {}; at most {} bytes",
+        f64::from(passes) / count as f64,
+        results.iter().map(|result| result.sweeps).max().unwrap(),
+        results.iter().map(|result| result.bytes).max().unwrap(),
+    );
+    assert!(near * 100 >= 98 * count, "{near} of {count}");
+    assert!(worst >= 0.94, "{worst}");
+    assert!(best <= 1.0 + 1e-5, "{best}");
+}
+
+#[test]
+fn faults_change_nothing() {
+    for seed in 0..20 {
+        let (link, band) = close_by(2 + seed % 7);
+        let mut setup = setup(&link, band).unwrap();
+        setup.settings.predict = seed % 2 > 0;
+        let clean = settle(setup.clone());
+        setup.faults = Faults::BAD_DAY;
+        setup.seed = seed as u64;
+        let faulty = settle(setup);
+        let injected = faulty.injected;
+        assert!(injected.lost > 0 && injected.corrupted > 0 && injected.reordered > 0);
+        assert_eq!(clean.bits(), faulty.bits(), "seed {seed}");
+    }
+}
+
+/// A relay that was given an altitude of its own, and is to hold it, does; the others choose around it.
+#[test]
+fn a_relay_may_hold_its_altitude() {
+    let (link, band) = close_by(6);
+    let mut setup = setup(&link, band).unwrap();
+    let own = Profile {
+        altitude_m: 77.7,
+        power_w: 1.0,
+    };
+    setup.profiles.push((3, own));
+    setup.held.push(3);
+    let outcome = settle(setup);
+    let altitudes: Vec<f32> = outcome
+        .relays
+        .iter()
+        .map(|relay| relay.setpoint.unwrap().altitude_m)
+        .collect();
+    assert_eq!(altitudes[2], 77.7);
+    assert!(
+        altitudes[1] != 20.0 && altitudes[3] != 20.0,
+        "{altitudes:?}"
+    );
+}
+
+/// Where relays bring powers of their own the leader's prediction is wrong, and the chain finds its altitudes all the same.
+#[test]
+fn own_powers_are_found_out_about() {
+    let (link, band) = close_by(8);
+    let mut setup = setup(&link, band).unwrap();
+    for (index, power_w) in [(2, 0.4), (5, 2.5), (7, 0.7)] {
+        let own = Profile {
+            altitude_m: 20.0,
+            power_w,
+        };
+        setup.profiles.push((index, own));
+    }
+    let mut real = link.clone();
+    for (index, own) in &setup.profiles {
+        real.relays[usize::from(*index) - 1].power_w = f64::from(own.power_w);
+    }
+    let outcome = settle(setup);
+    let best = joint::optimum(&real, band, Effort::usual(1)).unwrap();
+    let ratio = joint::sir(&real, &places(&outcome)).unwrap() / best.sir;
+    println!("{ratio:.6} of the optimum in {} passes", outcome.sweeps);
+    assert!((0.99..=1.0 + 1e-6).contains(&ratio), "{ratio}");
+}
+
+/// There is nothing to choose in a band of one altitude.
+#[test]
+fn a_band_of_one_altitude_is_algorithm_1() {
+    let (link, _) = close_by(5);
+    let band = Band {
+        least_m: 20.0,
+        most_m: 20.0,
+    };
+    let outcome = settle(setup(&link, band).unwrap());
+    assert_eq!(outcome.sweeps, 1);
+    let mut align = setup(&link, band).unwrap();
+    align.settings.method = Method::Align;
+    assert_eq!(outcome.bits(), settle(align).bits());
+}

@@ -1,0 +1,117 @@
+//! Emulated drones that choose altitudes, and drones in a field: passes that take a while on board, and passes that begin at
+//! relay N.
+
+use std::time::Instant;
+
+use host_tests::firmware::block::Flight;
+use host_tests::scenario::{BetaPoint, Field, Interference, RelayOverride, Scenario, Source};
+use host_tests::sim::faults::Faults;
+use uav_relay::{Adjust, Method};
+
+use crate::chain::{BAD_DAY, simulated};
+use crate::fleet::{Fleet, Image};
+
+/// An interferer `y_m` beside the link, and altitudes to get away from it; `held` has one of its own, by relay.
+fn past(y_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
+    let own = |(index, altitude)| {
+        let own = RelayOverride {
+            altitude_m: Some(altitude),
+            power_w: None,
+        };
+        (index, own)
+    };
+    let scenario = Scenario {
+        relays: held.into_iter().map(own).collect(),
+        altitude_max_m: 300.0,
+        interference: Interference::Sources(vec![Source {
+            power_w: 80.0,
+            x_m: 500.0,
+            y_m,
+        }]),
+        ..Scenario::default()
+    };
+    Flight::new(&scenario, 5, 1e-4, 7).unwrap().by(method)
+}
+
+/// Interference that is worst two thirds of the way.
+pub(crate) fn field() -> Flight {
+    let beta = [
+        (0.0, 2.0, 3.0),
+        (300.0, 3.0, 2.5),
+        (650.0, 6.0, 1.5),
+        (1000.0, 2.5, 2.0),
+    ];
+    let beta = beta.map(|(x_m, alpha, beta)| BetaPoint { x_m, alpha, beta });
+    let scenario = Scenario {
+        interference: Interference::Field(Field {
+            i_max_w: 1e-6,
+            beta: beta.to_vec(),
+        }),
+        ..Scenario::default()
+    };
+    Flight::new(&scenario, 5, 1e-4, 7).unwrap()
+}
+
+/// Emulated drones agree on the places of the simulated chain, clean and on a bad day.
+fn settles(flight: &Flight) {
+    let expected = simulated(flight);
+    for (faults, seed) in [(Faults::default(), 1), (BAD_DAY, 2)] {
+        let begun = Instant::now();
+        let mut fleet = Fleet::of(Image::Wires, flight, faults, seed);
+        fleet.settle_at(&expected);
+        println!(
+            "{:?} {faults:?}: {:?}, {:?}",
+            flight.method(),
+            begun.elapsed(),
+            fleet.injected()
+        );
+        for drone in 1..=5 {
+            let counters = fleet.counters(drone);
+            assert_eq!(counters.counter("misaddressed"), Some(0), "{counters:?}");
+            assert_eq!(counters.counter("mission"), Some(0), "{counters:?}");
+        }
+        assert_eq!(fleet.places(), expected, "{faults:?}");
+    }
+}
+
+#[test]
+fn five_choose_the_altitudes_of_the_simulated_chain() {
+    let flight = past(50.0, None, Method::Altitude);
+    let low = 20.0_f32.to_bits();
+    let places = simulated(&flight);
+    assert!(places.iter().all(|(_, altitude)| *altitude != low));
+    settles(&flight);
+    // One of them may not.
+    let flight = past(50.0, Some((4, 200.0)), Method::Altitude);
+    let held = simulated(&flight);
+    assert_eq!(held[3].1, 200.0_f32.to_bits());
+    assert_ne!(held, places);
+    settles(&flight);
+}
+
+/// From this interferer they get away along the link, and no altitude is better than theirs.
+#[test]
+fn five_stay_low_where_the_simulated_chain_does() {
+    let flight = past(150.0, None, Method::Altitude);
+    let low = 20.0_f32.to_bits();
+    let places = simulated(&flight);
+    assert!(places.iter().all(|(_, altitude)| *altitude == low));
+    settles(&flight);
+}
+
+#[test]
+fn five_adjust_themselves_as_the_simulated_chain_does() {
+    settles(&past(
+        50.0,
+        Some((2, 35.0)),
+        Method::Adjust(Adjust {
+            rounds: 3,
+            ..Adjust::default()
+        }),
+    ));
+}
+
+#[test]
+fn five_in_a_field_settle_where_the_simulated_chain_does() {
+    settles(&field());
+}

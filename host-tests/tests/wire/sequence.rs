@@ -1,0 +1,672 @@
+//! Intact messages of every kind, in any order and from either side: what a relay takes them for in a mission with an
+//! interferer and in one with a field, and that none of them leads it out of bounds.
+
+use std::cell::Cell;
+use std::collections::BTreeMap;
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use uav_relay::wire::digest::digest;
+use uav_relay::wire::frame::{self, Header, MAX_FRAME};
+use uav_relay::{
+    Band, Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, Relay, Wiring,
+};
+
+use super::codec::{Said, plain, wire};
+use super::config;
+use super::lies::renamed;
+use super::receive::{FIELD, NETWORK, counted, drain, paper, relay_of};
+use super::strategies::messages;
+use super::stream::unstuffed;
+
+/// A field as strong and as weak as one may be.
+const WILD: Field = Field::new(&[
+    FieldPoint {
+        x_m: 0.0,
+        upsilon_per_w: 1e32,
+    },
+    FieldPoint {
+        x_m: 1000.0,
+        upsilon_per_w: 1e-9,
+    },
+]);
+
+/// A field of next to no interference.
+const WEAK: Field = Field::new(&[FieldPoint {
+    x_m: 0.0,
+    upsilon_per_w: 1e32,
+}]);
+
+/// The paper's scenario with other interference, between 20 m and 300 m.
+fn mission(interference: Interference) -> MissionConfig {
+    MissionConfig {
+        interference,
+        band: Band {
+            least_m: 20.0,
+            most_m: 300.0,
+        },
+        ..paper(8)
+    }
+}
+
+fn source() -> MissionConfig {
+    mission(paper(8).interference)
+}
+
+/// The stream of one frame to relay `own` from the side of `port`.
+fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
+    let header = Header {
+        network: NETWORK,
+        sender: if port == Port::Upstream {
+            own - 1
+        } else {
+            own + 1
+        },
+        destination: own,
+        counter: 0,
+    };
+    wire(&plain(header, &said.body()))
+}
+
+/// What `relay` sends at `now`: ports, and bodies as the rules read them.
+fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
+    let mut out = Vec::new();
+    let mut buffer = [0; MAX_FRAME];
+    while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
+        let plain = unstuffed(&buffer[..transmit.len - 1]).unwrap();
+        assert!(frame::decode(&plain).is_ok());
+        let said = Said::read(&plain[10..plain.len() - 4]).unwrap();
+        out.push((transmit.port, said));
+    }
+    out
+}
+
+/// Lets time pass until `relay` has no work to do, at most a second; what it sends on the way.
+fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> {
+    let mut out = sent(relay, *now);
+    for _ in 0..1000 {
+        *now = *now + Duration::from_millis(1);
+        relay.handle_timeout(*now);
+        out.extend(sent(relay, *now));
+    }
+    out
+}
+
+/// One message of each tag, of this pass.
+fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
+    let x_m = 400.0;
+    let altitude_m = 20.0;
+    let (anchor, power_w) = (1.0, 1.0);
+    vec![
+        Said::Sweep {
+            number,
+            mission,
+            anchor,
+            gap: 0,
+            growth: 0,
+            altitude_m,
+            power_w,
+            reaches: vec![x_m],
+        },
+        Said::Verdict {
+            number,
+            mission,
+            commit: Some(0),
+            slacks: vec![1.0],
+        },
+        Said::Busy { number },
+        Said::Heartbeat {
+            mission,
+            answer: false,
+        },
+        Said::Measured {
+            number,
+            mission,
+            anchor,
+            gap: 0,
+            growth: 0,
+            altitude_m,
+            power_w,
+            upsilon_per_w: 1e8,
+            reaches: vec![x_m],
+        },
+        Said::Wave {
+            number,
+            mission,
+            base: 1.0,
+            rise: 0.0,
+            targets: 1,
+            centre_m: altitude_m,
+            width_m: 0.0,
+            levels: 1,
+            power_w,
+            reaches: vec![0, 0, 0x60],
+        },
+        Said::Trace {
+            number,
+            mission,
+            choice: Some([0, 0]),
+        },
+        Said::Token {
+            number,
+            mission,
+            x_m,
+            altitude_m,
+            power_w,
+            turn: 2,
+            explore_m: 10.0,
+            columns: 0,
+            rows: 0,
+            sir: 1.0,
+        },
+        Said::Moved {
+            number,
+            mission,
+            x_m: 600.0,
+            altitude_m,
+            any: true,
+            worst: 1.0,
+        },
+    ]
+}
+
+/// Relay 4 of 8 and the ports that a pass comes from and goes to.
+fn relay_4(config: MissionConfig) -> (Relay, Port, Port) {
+    let relay = relay_of(config, 4, Wiring::Pair);
+    match config.interference {
+        Interference::Source(_) => (relay, Port::Upstream, Port::Downstream),
+        Interference::Field(_) => (relay, Port::Downstream, Port::Upstream),
+    }
+}
+
+/// Has `relay` take its place by pass `number`.
+fn placed(relay: &mut Relay, (from, to): (Port, Port), now: &mut Instant, number: u16) {
+    let kinds = one_of_each(number, digest(relay.mission()));
+    for (port, said) in [(from, &kinds[0]), (to, &kinds[1])] {
+        relay.handle_bytes(*now, port, &framed(4, port, said));
+        drain(relay, *now);
+    }
+    assert!(relay.setpoint().is_some());
+}
+
+#[test]
+fn a_message_from_the_wrong_side_for_the_heading_is_misdirected_and_nothing_else() {
+    for config in [source(), mission(Interference::Field(FIELD))] {
+        for with_place in [false, true] {
+            let (mut relay, from, to) = relay_4(config);
+            let mut now = Instant::ZERO;
+            if with_place {
+                placed(&mut relay, (from, to), &mut now, 7);
+            }
+            for said in one_of_each(8, digest(relay.mission())) {
+                let wrong = match said.body()[0] {
+                    0 | 4 | 5 | 7 => to,
+                    1 | 2 | 6 | 8 => from,
+                    _ => continue,
+                };
+                let mut after = relay.clone();
+                let before = *after.stats();
+                after.handle_bytes(now, wrong, &framed(4, wrong, &said));
+                let stats = after.stats();
+                assert_eq!(stats.misdirected, before.misdirected + 1, "{said:?}");
+                assert_eq!(stats.received, before.received + 1);
+                assert_eq!(stats.rejected(), before.rejected() + 1);
+                assert_eq!(sent(&mut after, now), []);
+                assert_eq!(after.setpoint(), relay.setpoint());
+                assert_eq!(after.phase(), relay.phase());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_message_of_another_mission_is_ignored_from_either_side() {
+    for config in [source(), mission(Interference::Field(FIELD))] {
+        let (relay, from, to) = relay_4(config);
+        let other = digest(relay.mission()) ^ 1;
+        for said in one_of_each(8, other) {
+            if matches!(said, Said::Busy { .. }) {
+                continue;
+            }
+            for port in [from, to] {
+                let mut after = relay.clone();
+                after.handle_bytes(Instant::ZERO, port, &framed(4, port, &said));
+                assert_eq!(counted(after.stats()), ["mission", "received"], "{said:?}");
+                assert_eq!(sent(&mut after, Instant::ZERO), []);
+                assert_eq!(after.phase(), relay.phase());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_sweep_goes_the_way_of_the_mission_and_its_verdict_back() {
+    for config in [source(), mission(Interference::Field(FIELD))] {
+        for kind in [0, 4] {
+            let (mut relay, from, to) = relay_4(config);
+            let kinds = one_of_each(3, digest(relay.mission()));
+            let now = Instant::ZERO;
+            relay.handle_bytes(now, from, &framed(4, from, &kinds[kind]));
+            let out = sent(&mut relay, now);
+            let [
+                (
+                    port,
+                    Said::Sweep {
+                        number: 3, reaches, ..
+                    },
+                ),
+            ] = &out[..]
+            else {
+                panic!("{out:?}");
+            };
+            assert_eq!(*port, to);
+            assert_eq!(reaches[0] > 400.0, to == Port::Downstream, "a step onward");
+            relay.handle_bytes(now, from, &framed(4, from, &kinds[kind]));
+            assert_eq!(sent(&mut relay, now), [(from, Said::Busy { number: 3 })]);
+            relay.handle_bytes(now, to, &framed(4, to, &kinds[1]));
+            let out = sent(&mut relay, now);
+            assert_eq!(out, [(from, kinds[1].clone())]);
+            assert_eq!(relay.setpoint().unwrap().x_m, reaches[0]);
+            assert_eq!(counted(relay.stats()), ["received", "repeated"]);
+        }
+    }
+}
+
+#[test]
+fn a_wave_goes_onward_and_its_trace_back() {
+    let (mut relay, from, to) = relay_4(source());
+    let mut now = Instant::ZERO;
+    let kinds = one_of_each(3, digest(relay.mission()));
+    relay.handle_bytes(now, from, &framed(4, from, &kinds[5]));
+    let out = settle(&mut relay, &mut now);
+    let Some((port, Said::Wave { number: 3, .. })) = out.first() else {
+        panic!("{out:?}");
+    };
+    assert_eq!(*port, to);
+    relay.handle_bytes(now, from, &framed(4, from, &kinds[5]));
+    assert_eq!(sent(&mut relay, now), [(from, Said::Busy { number: 3 })]);
+    relay.handle_bytes(now, to, &framed(4, to, &kinds[6]));
+    assert_eq!(sent(&mut relay, now), [(from, kinds[6].clone())]);
+    assert!(relay.setpoint().is_some_and(|place| place.x_m > 375.0));
+    assert_eq!(counted(relay.stats()), ["received", "repeated"]);
+}
+
+#[test]
+fn a_token_goes_onward_and_what_came_of_it_back() {
+    let (mut relay, from, to) = relay_4(source());
+    let mut now = Instant::ZERO;
+    placed(&mut relay, (from, to), &mut now, 2);
+    let kinds = one_of_each(3, digest(relay.mission()));
+    relay.handle_bytes(now, from, &framed(4, from, &kinds[7]));
+    let out = settle(&mut relay, &mut now);
+    assert!(
+        matches!(out[0], (port, Said::Token { number: 3, .. }) if port == to),
+        "{out:?}"
+    );
+    relay.handle_bytes(now, to, &framed(4, to, &kinds[8]));
+    let out = sent(&mut relay, now);
+    let [
+        (
+            port,
+            Said::Moved {
+                number: 3,
+                any: true,
+                worst,
+                ..
+            },
+        ),
+    ] = &out[..]
+    else {
+        panic!("{out:?}");
+    };
+    assert_eq!(*port, from);
+    assert!(*worst <= 1.0);
+    assert_eq!(counted(relay.stats()), ["received"]);
+}
+
+#[test]
+fn what_is_not_awaited_or_does_not_fit_is_stale() {
+    let now = Instant::ZERO;
+    for config in [source(), mission(Interference::Field(FIELD))] {
+        for with_sweep in [false, true] {
+            let (mut relay, from, to) = relay_4(config);
+            let digest = digest(relay.mission());
+            if with_sweep {
+                relay.handle_bytes(now, from, &framed(4, from, &one_of_each(3, digest)[0]));
+                drain(&mut relay, now);
+            }
+            // An answer to another pass, or of another kind; a token for a relay without a place; a pass that is over.
+            let mut stale = vec![(from, renamed(one_of_each(3, digest)[7].clone(), 4, digest))];
+            for kind in [1, 6, 8] {
+                let number = if with_sweep && kind != 1 { 3 } else { 4 };
+                stale.push((to, one_of_each(number, digest)[kind].clone()));
+            }
+            if with_sweep {
+                for kind in [0, 4, 5, 7] {
+                    stale.push((from, one_of_each(2, digest)[kind].clone()));
+                }
+            }
+            for (port, said) in stale {
+                let mut after = relay.clone();
+                after.handle_bytes(now, port, &framed(4, port, &said));
+                assert_eq!(counted(after.stats()), ["received", "stale"], "{said:?}");
+                assert_eq!(sent(&mut after, now), []);
+                assert_eq!(after.phase(), relay.phase());
+            }
+        }
+    }
+}
+
+/// Nobody stands beyond Rx, whatever a neighbour says.
+#[test]
+fn what_comes_from_beyond_rx_is_of_no_use() {
+    let (mut relay, from, to) = relay_4(source());
+    let mut now = Instant::ZERO;
+    placed(&mut relay, (from, to), &mut now, 2);
+    let mut kinds = one_of_each(3, digest(relay.mission()));
+    for said in &mut kinds {
+        if let Said::Token { x_m, .. } | Said::Moved { x_m, .. } = said {
+            *x_m = 1000.0_f32.next_up();
+        }
+    }
+    let mut after = relay.clone();
+    after.handle_bytes(now, from, &framed(4, from, &kinds[7]));
+    assert_eq!(counted(after.stats()), ["received", "stale"]);
+    let token = one_of_each(3, digest(relay.mission()))[7].clone();
+    relay.handle_bytes(now, from, &framed(4, from, &token));
+    settle(&mut relay, &mut now);
+    relay.handle_bytes(now, to, &framed(4, to, &kinds[8]));
+    assert_eq!(counted(relay.stats()), ["received", "stale"]);
+
+    let (mut relay, from, to) = relay_4(mission(Interference::Field(FIELD)));
+    let mut sweep = one_of_each(3, digest(relay.mission()))[0].clone();
+    if let Said::Sweep { reaches, .. } = &mut sweep {
+        reaches[0] = 1000.0_f32.next_up();
+    }
+    relay.handle_bytes(now, from, &framed(4, from, &sweep));
+    let out = sent(&mut relay, now);
+    let [(port, Said::Sweep { reaches, .. })] = &out[..] else {
+        panic!("{out:?}");
+    };
+    assert_eq!((*port, &reaches[..]), (to, &[][..]));
+}
+
+/// In a field there are neither altitudes to choose nor turns: such a pass changes nothing about the one under way.
+#[test]
+fn waves_and_tokens_are_stale_in_a_field() {
+    let (mut relay, from, to) = relay_4(mission(Interference::Field(FIELD)));
+    let mut now = Instant::ZERO;
+    placed(&mut relay, (from, to), &mut now, 2);
+    for kind in [5, 7] {
+        let mut after = relay.clone();
+        let kinds = one_of_each(3, digest(relay.mission()));
+        after.handle_bytes(now, from, &framed(4, from, &kinds[kind]));
+        assert_eq!(counted(after.stats()), ["received", "stale"]);
+        assert_eq!(settle(&mut after, &mut now.clone()), []);
+        assert_eq!(after.phase(), relay.phase());
+    }
+}
+
+/// Makes a message one that may well be of this mission.
+fn tamed(said: Said) -> Said {
+    let into = |reach: f32| reach % 1000.0;
+    match said {
+        Said::Sweep {
+            number,
+            mission,
+            gap,
+            growth,
+            altitude_m,
+            power_w,
+            mut reaches,
+            ..
+        } => {
+            for reach in &mut reaches {
+                *reach = into(*reach);
+            }
+            Said::Sweep {
+                number,
+                mission,
+                anchor: 1.0,
+                gap: gap.min(140),
+                growth: if gap == 0 { 0 } else { growth.min(4) },
+                altitude_m,
+                power_w,
+                reaches,
+            }
+        }
+        Said::Verdict {
+            number,
+            mission,
+            mut slacks,
+            ..
+        } => {
+            slacks.truncate(1);
+            for slack in &mut slacks {
+                *slack = slack.abs();
+            }
+            Said::Verdict {
+                number,
+                mission,
+                commit: (!slacks.is_empty()).then_some(0),
+                slacks,
+            }
+        }
+        Said::Wave {
+            number,
+            mission,
+            rise,
+            targets,
+            width_m,
+            levels,
+            reaches,
+            ..
+        } => Said::Wave {
+            number,
+            mission,
+            base: 0.5,
+            rise: rise.min(1.0),
+            targets,
+            centre_m: 50.0,
+            width_m,
+            levels,
+            power_w: 1.0,
+            reaches,
+        },
+        Said::Trace {
+            number,
+            mission,
+            choice,
+        } => Said::Trace {
+            number,
+            mission,
+            choice: choice.map(|[_, level]| [0, level % 2]),
+        },
+        other => other,
+    }
+}
+
+/// However far below a chain's best a target is, it is met: what is too large for an f32 on the way is no obstacle.
+#[test]
+fn the_smallest_targets_are_met_in_a_field() {
+    for (field, anchor) in [
+        (FIELD, 1e-9),
+        (FIELD, f32::MIN_POSITIVE),
+        (WEAK, f32::MIN_POSITIVE),
+    ] {
+        for own in [4, 1] {
+            let mut relay = relay_of(mission(Interference::Field(field)), own, Wiring::Pair);
+            let now = Instant::ZERO;
+            let mut sweep = one_of_each(3, digest(relay.mission()))[0].clone();
+            if let Said::Sweep { anchor: own, .. } = &mut sweep {
+                *own = anchor;
+            }
+            relay.handle_bytes(
+                now,
+                Port::Downstream,
+                &framed(own, Port::Downstream, &sweep),
+            );
+            match &sent(&mut relay, now)[..] {
+                [(Port::Upstream, Said::Sweep { reaches, .. })] => {
+                    // As near to Tx as the three relays before it leave room for.
+                    assert!((12.0..12.1).contains(&reaches[0]), "{reaches:?}");
+                }
+                [
+                    (
+                        Port::Downstream,
+                        Said::Verdict {
+                            commit: Some(0),
+                            slacks,
+                            ..
+                        },
+                    ),
+                ] => {
+                    assert!((1e5..=1e9).contains(&slacks[0]), "{slacks:?}");
+                    assert_eq!(relay.setpoint().unwrap().x_m, 0.0);
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+}
+
+/// What neighbours may say in one step.
+#[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is drawn by itself")]
+struct Step {
+    said: Said,
+    /// Whether it comes from the side that it should come from.
+    right_side: bool,
+    right_mission: bool,
+    /// Its number, if it is not the next pass or the answer to the last one.
+    number: Option<u16>,
+    tame: bool,
+    /// For how long the relay is left alone afterwards.
+    wait_ms: u64,
+    /// Whether a pass is then answered as it might be.
+    answered: bool,
+}
+
+fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let mostly = || prop_oneof![9 => Just(true), 1 => Just(false)];
+    let waits = prop_oneof![3 => Just(0), 4 => 1..8_u64, 1 => 0..100_u64];
+    let drawn = (
+        messages(),
+        mostly(),
+        mostly(),
+        prop_oneof![4 => Just(None), 1 => (0..20_u16).prop_map(Some)],
+        prop_oneof![3 => Just(true), 1 => Just(false)],
+        waits,
+        any::<bool>(),
+    );
+    let step = drawn.prop_map(
+        |(said, right_side, right_mission, number, tame, wait_ms, answered)| Step {
+            said,
+            right_side,
+            right_mission,
+            number,
+            tame,
+            wait_ms,
+            answered,
+        },
+    );
+    vec(step, 1..40)
+}
+
+/// Leads a relay of 8 by any messages, from a place or from none: it must be drained at any time, asleep until later, its
+/// setpoint between Tx and Rx and within the band. `expected` names what must have moved the setpoint at times.
+fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
+    let seen: Cell<BTreeMap<&str, u32>> = Cell::new(BTreeMap::new());
+    let (from, to) = match mission.interference {
+        Interference::Source(_) => (Port::Upstream, Port::Downstream),
+        Interference::Field(_) => (Port::Downstream, Port::Upstream),
+    };
+    TestRunner::new(config(1500))
+        .run(&(steps(), any::<bool>()), |(steps, with_place)| {
+            let mut relay = relay_of(mission, own, Wiring::Pair);
+            let digest = digest(relay.mission());
+            let mut now = Instant::ZERO;
+            if with_place && own == 4 {
+                placed(&mut relay, (from, to), &mut now, 0);
+            }
+            let mut counts = seen.take();
+            let mut place = relay.setpoint();
+            let mut pass = 0;
+            for step in steps {
+                let kind = step.said.body()[0];
+                let onward = [0, 4, 5, 7].contains(&kind);
+                pass += u16::from(onward);
+                let number = step.number.unwrap_or(pass);
+                let said = renamed(step.said, number, digest ^ u16::from(!step.right_mission));
+                let said = if step.tame { tamed(said) } else { said };
+                let port = if onward == step.right_side { from } else { to };
+                let answer = match kind {
+                    0 | 4 => 1,
+                    5 => 6,
+                    _ => 8,
+                };
+                let answer = one_of_each(number, digest)[answer].clone();
+                let mut heard = vec![(port, said)];
+                if onward && step.answered {
+                    heard.push((to, answer));
+                }
+                for ((port, said), pause) in heard.iter().flat_map(|message| {
+                    let pauses = 0..=step.wait_ms;
+                    pauses.map(move |pause| (message, pause))
+                }) {
+                    if pause == 0 {
+                        relay.handle_bytes(now, *port, &framed(own, *port, said));
+                    }
+                    drain(&mut relay, now);
+                    if let Some(at) = relay.setpoint() {
+                        prop_assert!((0.0..=1000.0).contains(&at.x_m), "{at:?}");
+                        prop_assert!((20.0..=300.0).contains(&at.altitude_m), "{at:?}");
+                    }
+                    if relay.setpoint() != place {
+                        let cause = match (said.body()[0], pause) {
+                            (1, 0) => "verdict",
+                            (6, 0) => "trace",
+                            (7, _) => "turn",
+                            (0 | 4, 0) => "sweep at the last",
+                            _ => "work",
+                        };
+                        *counts.entry(cause).or_insert(0) += 1;
+                        place = relay.setpoint();
+                    }
+                    now = now + Duration::from_millis(1);
+                    relay.handle_timeout(now);
+                }
+            }
+            drain(&mut relay, now);
+            prop_assert_eq!(relay.stats().malformed, 0);
+            seen.set(counts);
+            Ok(())
+        })
+        .unwrap();
+    let seen = seen.take();
+    println!("relay {own}: the setpoint moved by {seen:?}");
+    for cause in expected {
+        assert!(seen.get(cause).is_some_and(|&count| count > 10), "{cause}");
+    }
+}
+
+#[test]
+fn any_messages_leave_a_relay_in_bounds() {
+    led_by_anything(source(), 4, &["verdict", "trace", "turn"]);
+    led_by_anything(source(), 1, &[]);
+    led_by_anything(source(), 8, &["work"]);
+}
+
+#[test]
+fn any_messages_leave_a_relay_in_a_field_in_bounds() {
+    let field = mission(Interference::Field(FIELD));
+    led_by_anything(field, 4, &["verdict"]);
+    led_by_anything(field, 1, &["sweep at the last"]);
+    led_by_anything(field, 8, &[]);
+    let wild = mission(Interference::Field(WILD));
+    led_by_anything(wild, 4, &[]);
+    led_by_anything(wild, 1, &[]);
+    let weak = mission(Interference::Field(WEAK));
+    led_by_anything(weak, 1, &[]);
+}

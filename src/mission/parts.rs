@@ -1,0 +1,92 @@
+//! What a mission is made of: interference, altitudes, what a relay brings along.
+
+use crate::field::Field;
+
+/// The interferer (the paper's MSI), on the ground: a jammer, a base station, a licensed user.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Interferer {
+    /// Transmit power, W.
+    pub power_w: f32,
+    /// Place along the line from Tx (0) to Rx (D), m; before Tx or beyond Rx too.
+    pub x_m: f32,
+    /// Distance from that line, m.
+    pub y_m: f32,
+}
+
+/// What degrades the hops.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Interference {
+    /// One transmitter at a known place.
+    Source(Interferer),
+    /// Interference that is only known as a distribution along x.
+    Field(Field),
+}
+
+/// Which way the places of a chain are worked out, one relay after the other, and hence who begins.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Heading {
+    /// From relay 1 on: Algorithm 1, where an interferer is known. The SIR of a hop tells where its *receiver* may stand.
+    TowardRx,
+    /// From relay N on: Algorithm 4, in a field. Where the receiver stands, its interference tells where the *sender* may.
+    TowardTx,
+}
+
+/// The altitudes a relay may choose from.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Band {
+    /// Lowest altitude, m: 0.1 to 1e5.
+    pub least_m: f32,
+    /// Highest altitude, m: `least_m` to 1e5.
+    pub most_m: f32,
+}
+
+impl Band {
+    /// The band that is a single altitude.
+    pub const fn at(altitude_m: f32) -> Self {
+        Self {
+            least_m: altitude_m,
+            most_m: altitude_m,
+        }
+    }
+
+    /// From the lowest altitude to the highest, m.
+    pub const fn span_m(self) -> f32 {
+        self.most_m - self.least_m
+    }
+
+    /// Whether there is nothing to choose.
+    pub const fn is_single(self) -> bool {
+        !(self.least_m < self.most_m)
+    }
+
+    /// Whether it is in order and within its range.
+    pub(super) const fn is_valid(self) -> bool {
+        within(self.least_m, 0.1, 1e5) && within(self.most_m, self.least_m, 1e5)
+    }
+}
+
+/// What one relay brings along: its altitude and its transmit power.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Profile {
+    /// Altitude above the ground plane that the relay holds, m: 0.1 to 1e5.
+    pub altitude_m: f32,
+    /// Transmit power, W: 1e-6 to 1e6.
+    pub power_w: f32,
+}
+
+impl Profile {
+    /// Whether both numbers are within their ranges.
+    pub const fn is_valid(&self) -> bool {
+        within(self.altitude_m, 0.1, 1e5) && within(self.power_w, 1e-6, 1e6)
+    }
+}
+
+/// Whether `value` is a number in [`least`, `most`].
+pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
+    value >= least && value <= most
+}

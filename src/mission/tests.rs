@@ -1,0 +1,108 @@
+//! The paper's scenario, and the checks of a mission's parameters.
+
+use super::{Band, Interference, Interferer, Mission, MissionConfig, MissionError, Profile};
+use crate::channel::{AirGround, Channel};
+
+/// The interferer of the paper's multi-hop scenario.
+pub(crate) const fn interferer() -> Interferer {
+    Interferer {
+        power_w: 80.0,
+        x_m: 500.0,
+        y_m: 400.0,
+    }
+}
+
+/// The paper's multi-hop scenario with `relays` relays.
+pub(crate) fn paper(relays: u16) -> MissionConfig {
+    MissionConfig {
+        relays,
+        distance_m: 1000.0,
+        min_separation_m: 4.0,
+        tx_power_w: 80.0,
+        common: Profile {
+            altitude_m: 20.0,
+            power_w: 1.0,
+        },
+        band: Band::at(20.0),
+        channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
+        interference: Interference::Source(interferer()),
+        tolerance: 1e-4,
+    }
+}
+
+fn with_source(config: &mut MissionConfig, change: impl FnOnce(&mut Interferer)) {
+    let mut source = interferer();
+    change(&mut source);
+    config.interference = Interference::Source(source);
+}
+
+#[test]
+fn every_parameter_is_checked_at_both_ends_and_for_nan() {
+    type Set = fn(&mut MissionConfig, f32);
+    let table: [(Set, f32, f32, MissionError); 11] = [
+        (|c, v| c.distance_m = v, 1.0, 1e6, MissionError::Distance),
+        (
+            |c, v| c.min_separation_m = v,
+            0.0,
+            1e5,
+            MissionError::Separation,
+        ),
+        (|c, v| c.tx_power_w = v, 1e-6, 1e6, MissionError::TxPower),
+        (
+            |c, v| {
+                c.common.altitude_m = v;
+                c.band = Band::at(v.clamp(0.1, 1e5));
+            },
+            0.1,
+            1e5,
+            MissionError::Common,
+        ),
+        (|c, v| c.band.least_m = v, 0.1, 20.0, MissionError::Band),
+        (|c, v| c.band.most_m = v, 20.0, 1e5, MissionError::Band),
+        (|c, v| c.common.power_w = v, 1e-6, 1e6, MissionError::Common),
+        (
+            |c, v| with_source(c, |source| source.power_w = v),
+            1e-6,
+            1e9,
+            MissionError::InterfererPower,
+        ),
+        (
+            |c, v| with_source(c, |source| source.x_m = v),
+            -1e7,
+            1e7,
+            MissionError::InterfererPlace,
+        ),
+        (
+            |c, v| with_source(c, |source| source.y_m = v),
+            -1e7,
+            1e7,
+            MissionError::InterfererPlace,
+        ),
+        (|c, v| c.tolerance = v, 1e-6, 0.1, MissionError::Tolerance),
+    ];
+    for (set, least, most, error) in table {
+        let with = |value| {
+            let mut config = paper(1);
+            set(&mut config, value);
+            Mission::try_new(config).map(|_| ())
+        };
+        assert_eq!(with(least), Ok(()), "{error}");
+        assert_eq!(with(most), Ok(()), "{error}");
+        for bad in [
+            least.next_down(),
+            most.next_up(),
+            f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+        ] {
+            assert_eq!(with(bad), Err(error), "{bad}");
+        }
+    }
+    assert_eq!(Mission::try_new(paper(0)), Err(MissionError::Relays));
+    assert_eq!(Mission::try_new(paper(1001)), Err(MissionError::Relays));
+    assert_eq!(
+        Mission::try_new(paper(251)),
+        Err(MissionError::TooManyForDistance)
+    );
+    assert!(Mission::try_new(paper(250)).is_ok());
+}

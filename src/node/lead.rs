@@ -1,0 +1,97 @@
+//! What the leader has beyond every other relay: which pass comes next.
+
+use super::settings::{Adjust, Method, Settings};
+use crate::mission::{Mission, Profile};
+use crate::placement::climb::Climb;
+use crate::placement::coarse::Coarse;
+use crate::placement::plan::Planner;
+use crate::placement::search::{Infeasible, Schedule, Search};
+use crate::wire::message::Turn;
+
+/// What the leader is at.
+#[derive(Clone, Debug)]
+pub(crate) enum Lead {
+    /// Not the leader, or nothing begun yet, or all done.
+    No,
+    /// Solving the chain from the mission.
+    Predicting(Planner),
+    /// Trying targets at the altitudes held; whether the chain settles with what is agreed.
+    Searching { search: Search, last: bool },
+    /// Solving it for the whole band of altitudes.
+    Surveying(Coarse),
+    /// Trying targets and altitudes.
+    Climbing(Climb),
+    /// Algorithm 2.
+    Adjusting(Rounds),
+}
+
+/// Where Algorithm 2 is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rounds {
+    adjust: Adjust,
+    /// Rounds that are over; the first pass, which only looks, is not one.
+    done: u16,
+    turn: Turn,
+    /// SIR of the chain after the last round.
+    pub(crate) sir: f32,
+}
+
+impl Rounds {
+    pub(crate) const fn new(adjust: Adjust) -> Self {
+        Self {
+            adjust,
+            done: 0,
+            turn: Turn::Look,
+            sir: 0.0,
+        }
+    }
+
+    /// What the next pass is for.
+    pub(crate) const fn turn(&self) -> Turn {
+        self.turn
+    }
+
+    /// How many rounds are over.
+    pub(crate) const fn done(&self) -> u16 {
+        self.done
+    }
+
+    /// Takes what came of a pass; whether that was the last one.
+    pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
+        self.sir = sir;
+        let idle = match self.turn {
+            Turn::Stop => return true,
+            Turn::Look => false,
+            Turn::Move { .. } => {
+                self.done = self.done.saturating_add(1);
+                !any
+            }
+        };
+        self.turn = if idle || self.done >= self.adjust.rounds {
+            Turn::Stop
+        } else {
+            Turn::Move {
+                explore_m: self.adjust.explore_m,
+                local: self.adjust.local,
+            }
+        };
+        false
+    }
+}
+
+impl Lead {
+    /// What the leader begins with: its prediction, if it may, or the search itself.
+    pub(crate) fn begin(
+        mission: &Mission,
+        profile: Profile,
+        settings: &Settings,
+    ) -> Result<Self, Infeasible> {
+        if settings.predict && settings.schedule == Schedule::Bracketed {
+            Planner::new(mission, profile, settings.schedule).map(Self::Predicting)
+        } else {
+            let last = settings.method == Method::Align;
+            Search::new(mission, profile, settings.schedule)
+                .map(|search| Self::Searching { search, last })
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! A relay's share of a sweep (Algorithms 1 and 4), and of its verdict.
+
+use super::super::align::Sweeping;
+use super::super::exchange::{Arrival, Next, Phase};
+use super::super::lead::{Lead, Rounds};
+use super::super::settings::Method;
+use super::{ADJUST, ALTITUDE, Own, Pass, Share};
+use crate::placement::PerTarget;
+use crate::placement::ladder::Ladder;
+use crate::placement::levels::{Levels, TUBE};
+use crate::placement::pass::Behind;
+use crate::sir::Placement;
+use crate::wire::message::{Answer, Sweep};
+
+impl Share {
+    /// A sweep from the relay before.
+    pub(crate) fn on_sweep(&mut self, own: Own<'_>, sweep: &Sweep) -> Next {
+        let same = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.ladder == sweep.ladder);
+        match self.exchange.arrival(sweep.number, same) {
+            Arrival::Again => return self.exchange.again(),
+            Arrival::Straggler => return Next::Stale,
+            Arrival::New => {}
+        }
+        self.exchange.number = sweep.number;
+        let behind = Behind {
+            profile: sweep.profile,
+            measured_per_w: sweep.measured_per_w,
+        };
+        self.sweep_on(own, sweep.ladder, Some(behind), &sweep.reaches)
+    }
+
+    /// Works out this relay's share of a sweep.
+    pub(super) fn sweep_on(
+        &mut self,
+        own: Own<'_>,
+        ladder: Ladder,
+        behind: Option<Behind>,
+        from: &PerTarget,
+    ) -> Next {
+        if !matches!(self.pass, Pass::Sweep(_)) {
+            self.pass = Pass::Sweep(Sweeping::new(ladder));
+        }
+        let Pass::Sweep(sweeping) = &mut self.pass else {
+            return Next::Stale;
+        };
+        sweeping.ladder = ladder;
+        let known = sweeping.reach(
+            own.mission,
+            behind,
+            own.index,
+            self.profile,
+            own.measured_per_w,
+            from,
+        );
+        self.exchange.phase = Phase::Waiting;
+        if known {
+            self.conclude_sweep(own)
+        } else {
+            Next::Forward { moved: false }
+        }
+    }
+
+    /// A verdict from the relay after.
+    pub(crate) fn on_verdict(&mut self, own: Own<'_>, answer: &Answer) -> Next {
+        if let Pass::Sweep(sweeping) = &mut self.pass
+            && self.exchange.awaits(answer.number)
+            && sweeping.take(&answer.verdict)
+        {
+            return self.conclude_sweep(own);
+        }
+        Next::Stale
+    }
+
+    /// The verdict on the current sweep is known.
+    pub(super) fn conclude_sweep(&mut self, own: Own<'_>) -> Next {
+        let Pass::Sweep(sweeping) = &self.pass else {
+            return Next::Stale;
+        };
+        if let Some((x_m, target)) = sweeping.agreed() {
+            let altitude_m = self.profile.altitude_m;
+            self.altitude_m = altitude_m;
+            self.tube = Levels::held(altitude_m, TUBE);
+            self.setpoint = Some(Placement { x_m, altitude_m });
+            self.target = Some(target);
+            return self.agree(own);
+        }
+        self.exchange.phase = Phase::Answered;
+        let Lead::Searching { search, .. } = &mut self.lead else {
+            return Next::Answer {
+                moved: false,
+                agreed: false,
+            };
+        };
+        if search.advance(&sweeping.verdict.slacks).is_err() {
+            return self.give_up();
+        }
+        Next::Work { moved: false }
+    }
+
+    /// The chain has agreed on a target. The leader may have more in mind.
+    pub(super) fn agree(&mut self, own: Own<'_>) -> Next {
+        self.exchange.phase = Phase::Holding;
+        if let Lead::Searching { last: false, .. } = self.lead
+            && let Some(target) = self.target
+        {
+            match own.settings.method {
+                Method::Adjust(adjust) if ADJUST => {
+                    self.lead = Lead::Adjusting(Rounds::new(adjust));
+                    self.exchange.phase = Phase::Answered;
+                    return Next::Work { moved: true };
+                }
+                Method::Altitude if ALTITUDE && !own.mission.config().band.is_single() => {
+                    if own.settings.predict {
+                        self.survey(own, target);
+                    } else {
+                        self.climb(own, None);
+                    }
+                    self.exchange.phase = Phase::Answered;
+                    return Next::Work { moved: true };
+                }
+                _ => {}
+            }
+        }
+        self.lead = Lead::No;
+        Next::Answer {
+            moved: true,
+            agreed: true,
+        }
+    }
+}
