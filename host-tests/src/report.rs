@@ -163,8 +163,10 @@ impl ChainReport {
         Self {
             method: method.to_owned(),
             uavs: mission.relays(),
-            error: error(outcome),
-            best_sir: (outcome.ending == Ending::Infeasible).then_some(0.0),
+            error: error(method, outcome),
+            // A fixed step may have stepped over what there is.
+            best_sir: (outcome.ending == Ending::Infeasible && !method.ends_with("-step"))
+                .then_some(0.0),
             sir: worst,
             sir_db: worst.map(db),
             target: target.map(f64::from),
@@ -330,9 +332,13 @@ fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
     noticed.filter(|silence| killed(silence.silent)).collect()
 }
 
-fn error(outcome: &Outcome) -> Option<String> {
+fn error(method: &str, outcome: &Outcome) -> Option<String> {
     match outcome.ending {
         Ending::Settled => None,
+        Ending::Infeasible if method.ends_with("-step") => Some(
+            "none of the targets that the fixed step takes can be met; a smaller one may find one"
+                .to_owned(),
+        ),
         Ending::Infeasible => Some("no placement gives every hop an SIR above 0".to_owned()),
         Ending::Broken => {
             let silent: Vec<String> = (1..)

@@ -277,6 +277,27 @@ fn a_field_is_flown_by_what_was_agreed_or_by_what_is_measured() {
     assert!(measured("6") > 0.97 * sir, "{} {sir}", measured("6"));
 }
 
+/// A step that is larger than the best there is steps over it, which is no proof that there is nothing.
+#[test]
+fn a_step_that_is_too_large_says_so() {
+    let output = chain(&[
+        "--json",
+        "--scenario",
+        &example("field.toml"),
+        "--method",
+        "stochastic-step",
+        "--epsilon",
+        "0.2",
+    ]);
+    assert_eq!(output.status.code(), Some(1));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(
+        report["error"].as_str().unwrap().contains("fixed step"),
+        "{report}"
+    );
+    assert!(report.get("best_sir").is_none());
+}
+
 /// With one interferer `adjust` and `altitude` draw the chain they choose; a field is drawn without an interferer.
 #[test]
 fn every_method_can_be_drawn() {

@@ -1,8 +1,14 @@
-//! Placement maths for a chain at given altitudes: pure functions of the mission, no state beyond what they are handed.
+//! Placement maths: pure functions of the mission, no state beyond what they are handed.
 //!
-//! [`spacing`] answers how far one hop reaches for a target SIR; [`ladder`] is the set of targets that one sweep tries;
-//! [`verdict`] closes a chain at its tail; [`search`] narrows the targets from one sweep to the next; [`plan`] runs all
-//! of it for a whole chain without a message. The node walks the same functions one hop a relay.
+//! | for | files |
+//! | --- | --- |
+//! | how far one hop reaches for a target SIR | [`spacing`] toward Rx, [`retreat`] toward Tx in a field |
+//! | a pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass), [`verdict`]; [`search`] and [`scan`] say which come next; [`plan`] runs all of it for a whole chain without a message; [`promise`] whether it is the most |
+//! | a pass of targets and altitude levels | [`levels`], [`coded`], [`wave`]; [`climb`] says which come next; [`coarse`] predicts where to begin |
+//! | one relay between its neighbours | [`local`]: Algorithm 2 |
+//! | one relay alone in a field | [`single`]: Algorithm 3 |
+//!
+//! The node walks the same functions one hop a relay.
 
 pub mod climb;
 pub mod coarse;
