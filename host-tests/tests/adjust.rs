@@ -277,3 +277,108 @@ fn faults_change_nothing() {
         assert_eq!(clean.bits(), faulty.bits(), "seed {seed}");
     }
 }
+
+/// The hops of relay `at` (from 0) of a chain of relays of 1 W at `places`.
+fn hops_of(mission: &Mission, places: &[Placement], at: usize) -> Hops {
+    let apart_m = mission.config().min_separation_m;
+    let beside = |place| Beside { place, apart_m };
+    let (before, gain) = match at.checked_sub(1) {
+        None => (
+            Beside {
+                place: Placement::default(),
+                apart_m: 0.0,
+            },
+            mission.tx_gain(),
+        ),
+        Some(before) => (beside(places[before]), mission.relay_gain(1.0)),
+    };
+    let after = places.get(at + 1).map(|&place| beside(place));
+    Hops::new(
+        mission,
+        mission.interferer().unwrap(),
+        before,
+        gain,
+        1.0,
+        after,
+    )
+}
+
+/// When it ends before its last round, no relay has a better place: what one relay has moved is known to all.
+#[test]
+fn it_ends_where_nobody_can_do_better() {
+    let local = Local::Grid {
+        columns: 21,
+        rows: 11,
+    };
+    for relays in 2..8 {
+        let adjust = Adjust {
+            rounds: 2_000,
+            explore_m: 10.0,
+            local,
+        };
+        let (_, mut setup) = setup(relays, adjust);
+        // Far from where it will end, and the first relay where it may well stay.
+        let low = Profile {
+            altitude_m: 60.0,
+            power_w: 1.0,
+        };
+        setup.profiles.push((relays as u16, low));
+        let mission = setup.mission;
+        let outcome = settle(setup);
+        let rounds = outcome.rounds.len() - 1;
+        assert!(rounds < 2_000, "it never ended");
+        let places: Vec<Placement> = outcome
+            .relays
+            .iter()
+            .map(|relay| relay.setpoint.unwrap())
+            .collect();
+        for at in 0..relays {
+            let hops = hops_of(&mission, &places, at);
+            let mut search = Search::new(local, hops, places[at], 10.0, (20.0, 300.0));
+            let better = loop {
+                if let Poll::Ready(found) = search.step(500) {
+                    break found;
+                }
+            };
+            assert_eq!(
+                better,
+                None,
+                "relay {} of {relays} after {rounds} rounds",
+                at + 1
+            );
+        }
+    }
+}
+
+/// Relays that would crowd next to each other stay apart, by either search.
+#[test]
+fn relays_keep_their_distance_where_it_costs() {
+    for local in [
+        Local::Fine,
+        Local::Grid {
+            columns: 41,
+            rows: 21,
+        },
+    ] {
+        let adjust = Adjust {
+            rounds: 60,
+            explore_m: 30.0,
+            local,
+        };
+        let (link, mut setup) = setup(12, adjust);
+        let config = MissionConfig {
+            min_separation_m: 24.0,
+            ..*setup.mission.config()
+        };
+        setup.mission = Mission::try_new(config).unwrap();
+        let outcome = settle(setup);
+        let (sir, apart) = judged(&link, &outcome);
+        println!("{local:?}: {apart:.3} m apart, SIR {sir:.4}");
+        assert!(apart >= 24.0 - 1e-3, "{apart}");
+        assert!(
+            apart < 26.0,
+            "{apart}: it does not bind, and the test tests nothing"
+        );
+        assert!(rises(&outcome));
+    }
+}

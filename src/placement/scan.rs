@@ -3,12 +3,18 @@
 //! A relay that steps back may come to where less is heard of the interference, and from there reach farther than one that
 //! did not have to. So the slack of a target is a curve with hills, and the first of them that rises above zero, from the
 //! top, is looked for: in steps of [`STEP`], and closer where a hill's top between two of them may just rise above it.
+//!
+//! The top itself comes first, alone: the target that the last hop meets with the relay right above Rx. Just below it a
+//! small change of the target takes that relay far (the square root of the hop begins there), so the steps begin small.
 
 use super::ladder::{Ladder, TARGETS};
 use super::verdict::met;
 
 /// From one target to the next, relative. A hill that is narrower may be missed.
 pub const STEP: f32 = 0.0025;
+
+/// The first steps, below the top; each sixteen are twice as wide as those before.
+const FIRST_STEP: f32 = 1e-5;
 
 /// How often a hill's top is looked at more closely.
 const LOOKS: u8 = 2;
@@ -27,6 +33,8 @@ pub(crate) enum Found {
 pub(crate) struct Scan {
     /// The highest target of the next step down.
     top: f32,
+    /// From one target to the next, relative; 0 for the top alone.
+    step: f32,
     /// How often the hill in sight may still be looked at more closely.
     looks: u8,
     /// Whether what is tried now is no step of the scan.
@@ -37,6 +45,7 @@ impl Scan {
     pub(crate) const fn new(top: f32) -> Self {
         Self {
             top,
+            step: 0.0,
             looks: LOOKS,
             aside: false,
         }
@@ -49,8 +58,12 @@ impl Scan {
 
     /// The targets from the top downward.
     pub(crate) fn ladder(self) -> Ladder {
-        const SPAN: f32 = 1.0 + STEP * (TARGETS - 1) as f32;
-        Ladder::spanning(self.top / SPAN, self.top)
+        if self.step > 0.0 {
+            let span = 1.0 + self.step * (TARGETS - 1) as f32;
+            Ladder::spanning(self.top / span, self.top)
+        } else {
+            Ladder::single(self.top)
+        }
     }
 
     /// Takes the `slacks` of `targets`.
@@ -82,6 +95,7 @@ impl Scan {
         if let Some(&top) = targets.get(1) {
             self.top = top;
         }
+        self.step = (2.0 * self.step).clamp(FIRST_STEP, STEP);
     }
 }
 
