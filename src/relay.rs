@@ -143,7 +143,7 @@ impl Relay {
     }
 
     /// Handles what is due by `now`. Bounded by one portion of a computation: 256 reaches while the leader predicts, 320 hops
-    /// of a wave, 622 places of Algorithm 2; next to nothing otherwise.
+    /// of a wave, 624 places of Algorithm 2; next to nothing otherwise.
     #[inline(never)] // as `poll_transmit`
     pub fn handle_timeout(&mut self, now: Instant) {
         self.node.handle_timeout(now);

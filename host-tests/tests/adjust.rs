@@ -214,11 +214,14 @@ fn the_grid_moves_where_a_separate_program_moves() {
     }
 }
 
-/// The fine search is never below a dense grid of the same rectangle by more than that grid's step explains, and never leaves it.
+/// The fine search is hardly ever below a dense grid of the same rectangle, and comes no nearer to a neighbour than it may.
 #[test]
 fn the_fine_search_is_as_good_as_a_dense_grid() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(71));
-    let (mut lower, mut higher) = (0.0_f64, 0);
+    let (mut lower, mut higher, mut far) = (0.0_f64, 0, 0);
+    // A neighbour to keep away from that is louder than the other: the best place would be next to it.
+    let apart_m = 120.0;
+    let mut nearest = f32::INFINITY;
     for _ in 0..300 {
         let link = Link {
             x_i: rng.random_range(-200.0..1200.0),
@@ -231,18 +234,21 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
             x_m: rng.random_range(low..high),
             altitude_m: rng.random_range(30.0..200.0),
         };
-        let (a, b, c) = (place(50.0, 300.0), place(350.0, 600.0), place(650.0, 950.0));
-        let beside = |place| Beside {
-            place,
-            apart_m: 4.0,
-        };
+        let (a, b, c) = (place(50.0, 250.0), place(380.0, 550.0), place(680.0, 950.0));
+        let beside = |place| Beside { place, apart_m };
         let gain = mission.relay_gain(1.0);
         let hops = Hops::new(&mission, &interferer, beside(a), gain, 1.0, Some(beside(c)));
-        let find = |local| {
+        let mut find = |local| {
             let mut search = Search::new(local, hops, b, 20.0, (30.0, 200.0));
             loop {
                 if let Poll::Ready(found) = search.step(500) {
-                    break hops.worse(found.unwrap_or(b));
+                    let to = found.unwrap_or(b);
+                    for neighbour in [a, c] {
+                        let (dx, dh) =
+                            (to.x_m - neighbour.x_m, to.altitude_m - neighbour.altitude_m);
+                        nearest = nearest.min(dx.hypot(dh));
+                    }
+                    break hops.worse(to);
                 }
             }
         };
@@ -252,11 +258,15 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
             rows: 255,
         });
         lower = lower.max(1.0 - f64::from(fine / grid));
+        far += u32::from(f64::from(fine) < 0.99 * f64::from(grid));
         higher += u32::from(fine > grid);
     }
     println!("higher than the grid in {higher} of 300, lower by at most {lower:.1e}");
-    assert!(higher > 250);
-    assert!(lower < 1e-2, "{lower}");
+    println!("nearest neighbour at {nearest} m");
+    assert!((apart_m - 1e-2..apart_m + 5.0).contains(&nearest));
+    assert!(higher > 200);
+    // Next to the interferer a row may have two hilltops, of which halving finds one.
+    assert!(far <= 3, "{far}");
 }
 
 #[test]

@@ -234,7 +234,7 @@ fn in_an_uneven_field_the_brackets_end_no_lower_than_the_step() {
         "{islands} with an island on top, {missed} missed; in {short} a chain that falls short of its target has 0.2 % more"
     );
     assert!(promised > judged / 10 && promised < judged);
-    assert!(islands > 0 && missed * 50 <= judged, "{islands} {missed}");
+    assert!(islands > 0 && missed * 200 <= judged, "{islands} {missed}");
 }
 
 /// Relays that bring an altitude or a power of their own make the leader's prediction wrong: their answers decide.
@@ -382,25 +382,23 @@ fn what_is_measured_takes_the_place_of_what_was_agreed() {
     }
 }
 
-/// A field that rises steeply behind quiet places: relays that step back less may reach farther, and nothing is promised.
+/// A promise takes that every hop from farther on ends farther on: not so where Upsilon rises faster than a hop is long.
 #[test]
 fn nothing_is_promised_where_stepping_back_less_may_reach_farther() {
-    let steep = StochasticLink {
-        upsilon: vec![(0.0, 1e5), (600.0, 1e5), (620.0, 4e6), (1000.0, 4e6)],
-        ..even(6)
+    let promise = |upsilon: Vec<(f64, f64)>| {
+        let link = StochasticLink {
+            tx_w: 1.0,
+            upsilon,
+            ..even(6)
+        };
+        let mission = mission(&link, 0.0);
+        let common = mission.config().common;
+        let agreed = plan::solve(&mission, Schedule::Bracketed, |_| common).unwrap();
+        let first = plan::place(&mission, agreed.target, 1, |_| common).unwrap();
+        is_most(&mission, agreed.target, first.x_m)
     };
-    let mission = mission(&steep, 0.0);
-    let common = mission.config().common;
-    let agreed = plan::solve(&mission, Schedule::Bracketed, |_| common).unwrap();
-    let first = plan::place(&mission, agreed.target, 1, |_| common).unwrap();
-    assert!(!is_most(&mission, agreed.target, first.x_m));
-    // The other way round it can be, if the first hop gains nothing from being longer.
-    let falling = StochasticLink {
-        upsilon: vec![(0.0, 4e6), (1000.0, 1e5)],
-        ..even(6)
-    };
-    let mission = of_stochastic_link(&falling, 0.0).unwrap();
-    let agreed = plan::solve(&mission, Schedule::Bracketed, |_| common).unwrap();
-    let first = plan::place(&mission, agreed.target, 1, |_| common).unwrap();
-    assert!(is_most(&mission, agreed.target, first.x_m));
+    assert!(!promise(vec![(600.0, 1e6), (605.0, 3e6)]));
+    assert!(promise(vec![(400.0, 1e6), (1000.0, 3e6)]));
+    // Falling is no harm.
+    assert!(promise(vec![(600.0, 3e6), (605.0, 1e6)]));
 }

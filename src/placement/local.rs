@@ -30,7 +30,7 @@ const ROUNDING: f32 = 3e-7;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// From coarse to fine: at most 990 evaluations of both hops.
+    /// From coarse to fine: at most 1080 evaluations of both hops.
     #[default]
     Fine,
     /// The paper's grid, `columns` by `rows` evaluations.
@@ -176,7 +176,7 @@ impl Search {
         }
     }
 
-    /// Goes on for at most `budget` evaluations and one row of 21; ready when it is over: where to stand, if that is
+    /// Goes on for at most `budget` evaluations and one row of 24; ready when it is over: where to stand, if that is
     /// strictly better than where the relay stands.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let mut left = budget;
@@ -227,7 +227,7 @@ impl Search {
             self.best_row = (altitude_m, sir);
         }
         self.row += 1;
-        Some(u16::from(HALVINGS) + 2)
+        Some(u16::from(HALVINGS) + 4)
     }
 
     /// The best of a row: where, going toward Rx, the hop into the relay stops being the better one.
@@ -244,6 +244,8 @@ impl Search {
             return -1.0;
         }
         let at = |x_m| Placement { x_m, altitude_m };
+        // Past the interferer the hop into the relay may get better with its length: then an end of the row is best.
+        let ends = self.weigh(at(low)).max(self.weigh(at(high)));
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
             let (incoming, outgoing) = self.hops.both(at(middle));
@@ -253,7 +255,7 @@ impl Search {
                 high = middle;
             }
         }
-        self.weigh(at(low)).max(self.weigh(at(high)))
+        ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
     /// One more point of the grid, along the altitudes first; `None` when there is none left.

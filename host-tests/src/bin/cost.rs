@@ -248,7 +248,7 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     (
-        "a local search, at most 990 evaluations",
+        "a local search, at most 1080 evaluations",
         "instructions",
         &["search"],
         None,

@@ -32,7 +32,7 @@ const HOPS_AT_ONCE: u16 = 16;
 /// Hops evaluated in one call of `work` on a pass of altitude levels, and 64 more at most.
 const LEVELS_AT_ONCE: u16 = 256;
 
-/// Places weighed in one call of `work` in Algorithm 2, and a row of 22 more at most.
+/// Places weighed in one call of `work` in Algorithm 2, and a row of 24 more at most.
 const PLACES_AT_ONCE: u16 = 600;
 
 /// Whether this crate was built with the methods beyond Algorithm 1. Without one, none of its code is reached.
@@ -140,7 +140,7 @@ impl Share {
 
     /// Goes on with a computation: the relay's own share of the current pass, or the leader's next pass.
     ///
-    /// Bounded by 16 hops of 16 reaches, 320 hops of a wave, or 622 places of Algorithm 2.
+    /// Bounded by 16 hops of 16 reaches, 320 hops of a wave, or 624 places of Algorithm 2.
     pub(crate) fn work(&mut self, own: Own<'_>) -> Next {
         if self.exchange.phase == Phase::Waiting {
             return match &self.pass {
