@@ -9,6 +9,7 @@
 //! | `align` | a sweep of Algorithms 1 and 4 |
 //! | `adjust` | a turn of Algorithm 2 |
 //! | [`sample`] | the interference that a relay measures |
+//! | `repeats` | how long an answer is awaited, and when a pass is sent again |
 //! | [`liveness`] | when a neighbour counts as lost |
 //! | [`timers`] | every timer, in one table |
 //! | [`event`] | what the firmware is told |
@@ -23,9 +24,11 @@ pub mod event;
 pub mod exchange;
 mod lead;
 pub mod liveness;
+mod repeats;
 pub mod sample;
 pub mod settings;
 mod share;
+mod side;
 pub mod stats;
 pub mod timers;
 
@@ -38,37 +41,16 @@ use crate::wire::message::Message;
 use event::{Event, Pending};
 use exchange::{Next, Phase};
 use liveness::{Neighbour, Silence};
+use repeats::Repeats;
 use sample::{Meter, Sample};
 use settings::{Identity, Settings};
 use share::{ADJUST, ALTITUDE, Own, Share};
+pub use side::Side;
 use stats::{Stats, bump};
 use timers::{Timer, Timers};
 
-/// One of the two neighbours of a relay, or the link to it.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Side {
-    /// Toward the transmitter.
-    Upstream,
-    /// Toward the receiver.
-    Downstream,
-}
-
-impl Side {
-    const fn timer(self) -> Timer {
-        match self {
-            Self::Upstream => Timer::Upstream,
-            Self::Downstream => Timer::Downstream,
-        }
-    }
-}
-
-/// How long the head rests between two portions of a computation, so that a caller's loop gets its turn.
+/// How long a relay rests between two portions of a computation, so that a caller's loop gets its turn.
 const PAUSE: Duration = Duration::from_millis(1);
-
-/// How many times longer than a sweep a pass may take on which relays compute: its frames are more than twice as long, and
-/// a relay's share of it takes up to thirty portions.
-const SLOW: u32 = 4;
 
 /// What waits to be sent to one neighbour, apart from passes and what comes back of them.
 #[derive(Clone, Copy, Debug, Default)]
@@ -101,11 +83,9 @@ pub(crate) struct Node {
     onward_due: bool,
     back_due: bool,
     busy_due: bool,
-    /// How often the current pass has been sent again since anything was heard of it.
-    unheard: u8,
+    repeats: Repeats,
     pending: Pending,
     pub(crate) stats: Stats,
-    random: u32,
 }
 
 impl Node {
@@ -146,10 +126,9 @@ impl Node {
             onward_due: false,
             back_due: false,
             busy_due: false,
-            unheard: 0,
+            repeats: Repeats::new(random),
             pending: Pending::default(),
             stats: Stats::default(),
-            random,
         };
         for side in [Side::Upstream, Side::Downstream] {
             if node.link(side).is_some() {
@@ -180,22 +159,6 @@ impl Node {
         }
     }
 
-    /// The side that a pass goes to.
-    fn onward(&self) -> Side {
-        match self.mission.heading() {
-            Heading::TowardRx => Side::Downstream,
-            Heading::TowardTx => Side::Upstream,
-        }
-    }
-
-    /// The side that a pass comes from.
-    fn backward(&self) -> Side {
-        match self.mission.heading() {
-            Heading::TowardRx => Side::Upstream,
-            Heading::TowardTx => Side::Downstream,
-        }
-    }
-
     /// The relay's share, and what it needs to know of the relay.
     fn parts(&mut self) -> (&mut Share, Own<'_>) {
         let own = Own {
@@ -218,32 +181,27 @@ impl Node {
         if back {
             self.pending.raise(Event::NeighbourBack(side));
         }
-        let digest = match message {
-            Message::Sweep(sweep) => Some(sweep.mission),
-            Message::Verdict(answer) => Some(answer.mission),
-            Message::Heartbeat { mission, .. } => Some(*mission),
-            Message::Wave(wave) => Some(wave.mission),
-            Message::Trace(trace) => Some(trace.mission),
-            Message::Token(token) => Some(token.mission),
-            Message::Moved(moved) => Some(moved.mission),
-            Message::Busy { .. } => None,
-        };
-        if digest.is_some_and(|digest| digest != self.digest) {
+        if message
+            .mission()
+            .is_some_and(|digest| digest != self.digest)
+        {
             bump(&mut self.stats.mission);
             self.pending.raise(Event::MissionMismatch(side));
             return;
         }
-        let wanted = match message {
-            Message::Heartbeat { answer, .. } => {
-                if let Some(link) = self.link(side)
-                    && *answer
-                {
-                    link.signs.answer = true;
-                }
-                return;
+        if let Message::Heartbeat { answer, .. } = message {
+            if let Some(link) = self.link(side)
+                && *answer
+            {
+                link.signs.answer = true;
             }
-            Message::Sweep(_) | Message::Wave(_) | Message::Token(_) => self.backward(),
-            _ => self.onward(),
+            return;
+        }
+        let heading = self.mission.heading();
+        let wanted = if message.is_onward() {
+            Side::back(heading)
+        } else {
+            Side::onward(heading)
         };
         if side != wanted {
             bump(&mut self.stats.misdirected);
@@ -260,7 +218,7 @@ impl Node {
             Message::Busy { sweep } => {
                 if self.share.phase() == Phase::Waiting && *sweep == self.share.number() {
                     // It has arrived: what is missing is the answer, and that may take its time.
-                    self.unheard = 0;
+                    self.repeats.heard();
                     let patience = self.patience();
                     self.timers.set(Timer::Repeat, now + patience);
                 }
@@ -287,7 +245,7 @@ impl Node {
             }
             Next::Forward { moved: to } => {
                 moved = to;
-                self.unheard = 0;
+                self.repeats.heard();
                 self.onward_due = true;
                 self.busy_due = false;
                 // An answer to the pass before would be stale.
@@ -309,7 +267,7 @@ impl Node {
                 self.busy_due = false;
                 self.timers.stop(Timer::Repeat);
                 self.timers.stop(Timer::Work);
-                let back = self.backward();
+                let back = Side::back(self.mission.heading());
                 self.back_due = self.link(back).is_some();
                 if agreed {
                     self.pending.raise(Event::Converged);
@@ -341,7 +299,7 @@ impl Node {
                 Timer::Repeat => {
                     if self.share.phase() == Phase::Waiting {
                         bump(&mut self.stats.repeats);
-                        self.unheard = self.unheard.saturating_add(1);
+                        self.repeats.unheard();
                         self.onward_due = true;
                     }
                 }
@@ -380,7 +338,8 @@ impl Node {
 
     /// The next message to send, and to which neighbour. Call until there is none.
     pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, Message<'_>)> {
-        let (onward, backward) = (self.onward(), self.backward());
+        let heading = self.mission.heading();
+        let (onward, backward) = (Side::onward(heading), Side::back(heading));
         if core::mem::take(&mut self.onward_due) && self.share.phase() == Phase::Waiting {
             let patience = self.patience();
             self.timers.set(Timer::Repeat, now + patience);
@@ -412,35 +371,14 @@ impl Node {
         None
     }
 
-    /// How long what comes back of a pass sent now may take: there and back over every hop that is left, and two to spare;
-    /// [`SLOW`] times as long where relays compute on the way.
-    ///
-    /// The relay next to a lost frame runs out of patience first, so one loss costs one repetition. From then on it is
-    /// known that frames get lost here, and the pass is repeated sooner, first after four hops' time and then after twice
-    /// as long each, until a neighbour says that it has arrived. A random eighth keeps relays on a shared channel from
-    /// repeating in step.
+    /// How long what comes back of a pass sent now may take.
     fn patience(&mut self) -> Duration {
         let hops = u32::from(match self.mission.heading() {
             Heading::TowardRx => self.mission.relays().saturating_sub(self.index),
             Heading::TowardTx => self.index.saturating_sub(1),
         });
-        let answer = (2 * hops + 2) * if self.share.is_slow() { SLOW } else { 1 };
-        let hops = match self.unheard {
-            0 => answer,
-            again => answer.min(2 << u32::from(again).min(16)),
-        };
-        let patience = self.settings.hop_time.times(hops).as_micros();
-        Duration::from_micros(patience.saturating_add(u64::from(self.draw()) % (patience / 8 + 1)))
-    }
-
-    /// A xorshift generator (Marsaglia 2003, 13-17-5): only timing depends on it, never a placement.
-    fn draw(&mut self) -> u32 {
-        let mut x = self.random;
-        x ^= x << 13;
-        x ^= x >> 17;
-        x ^= x << 5;
-        self.random = x;
-        x
+        let hop_time = self.settings.hop_time;
+        self.repeats.patience(hop_time, hops, self.share.is_slow())
     }
 
     pub(crate) fn poll_event(&mut self) -> Option<Event> {

@@ -8,7 +8,7 @@ pub struct Stats {
     pub sent: u32,
     /// Sweeps sent again because no answer came.
     pub repeats: u32,
-    /// Sweeps the head has begun.
+    /// Passes that the leader has begun.
     pub sweeps: u32,
     /// Messages from a neighbour, in range; what becomes of them may still be counted below as misdirected, of another
     /// mission or stale.

@@ -46,6 +46,27 @@ pub enum Message<'a> {
     Moved(Moved),
 }
 
+impl Message<'_> {
+    /// The digest of the sender's mission; a [`Message::Busy`] bears none.
+    pub const fn mission(&self) -> Option<u16> {
+        match self {
+            Self::Sweep(sweep) => Some(sweep.mission),
+            Self::Verdict(answer) => Some(answer.mission),
+            Self::Busy { .. } => None,
+            Self::Heartbeat { mission, .. } => Some(*mission),
+            Self::Wave(wave) => Some(wave.mission),
+            Self::Trace(trace) => Some(trace.mission),
+            Self::Token(token) => Some(token.mission),
+            Self::Moved(moved) => Some(moved.mission),
+        }
+    }
+
+    /// Whether it is a pass, which goes onward.
+    pub const fn is_onward(&self) -> bool {
+        matches!(self, Self::Sweep(_) | Self::Wave(_) | Self::Token(_))
+    }
+}
+
 /// One pass of targets along the chain, as one relay hands it to the next.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
