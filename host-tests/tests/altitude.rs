@@ -10,16 +10,17 @@
 )]
 
 use host_tests::brief::{as_relays_know_it, of_link};
-use host_tests::random::{self, joint::scenario};
+use host_tests::random::joint::{CROWDED, ROOMY, scenario};
+use host_tests::random::{self, log_uniform};
 use host_tests::reference::Link;
 use host_tests::reference::joint::{self, Band, Effort, Place};
 use host_tests::sim::chain::run;
 use host_tests::sim::faults::Faults;
 use host_tests::sim::outcome::{Ending, Outcome};
 use host_tests::sim::setup::Setup;
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::{Method, Mission, MissionConfig, Profile};
+use uav_relay::{Adjust, Method, Mission, MissionConfig, Profile};
 
 /// The setup of a chain that chooses altitudes within `band`; `None` where a relay would refuse the numbers.
 fn setup(link: &Link, band: Band) -> Option<Setup> {
@@ -58,20 +59,19 @@ struct Result {
     bytes: u64,
 }
 
-fn random_results(count: usize, seed: u64, predict: bool) -> Vec<Result> {
+fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut results = Vec::new();
     while results.len() < count {
-        let drawn = scenario(&mut rng, &(1..=50));
+        let drawn = scenario(&mut rng, &(1..=50), apart);
         let link = as_relays_know_it(&drawn.link);
         let band = Band {
             least_m: f64::from(drawn.band.least_m as f32),
             most_m: f64::from(drawn.band.most_m as f32),
         };
-        let Some(mut setup) = setup(&link, band) else {
+        let Some(setup) = setup(&link, band) else {
             continue;
         };
-        setup.settings.predict = predict;
         let Some(best) = joint::optimum(&link, band, Effort::usual(seed)) else {
             continue;
         };
@@ -89,6 +89,12 @@ fn random_results(count: usize, seed: u64, predict: bool) -> Vec<Result> {
         assert_eq!(outcome.ending, Ending::Settled, "{of}");
         assert_eq!(outcome.unsafe_setpoints, 0, "{of}");
         let places = places(&outcome);
+        // What an f32 rounds away between two places.
+        let rounded = Link {
+            min_separation_m: (link.min_separation_m - 1e-6 * link.distance_m).max(0.0),
+            ..link.clone()
+        };
+        assert!(joint::keeps_rules(&rounded, band, &places), "{of}");
         results.push(Result {
             ratio: joint::sir(&link, &places).unwrap() / best.sir,
             of,
@@ -152,11 +158,8 @@ fn the_joint_optima_are_reached() {
     }
 }
 
-/// A hundred random scenarios (`COUNT` takes another number) against an optimiser that shares no formula with the crate.
-#[test]
-fn random_chains_come_near_the_joint_optimum() {
-    let count = std::env::var("COUNT").map_or(100, |text| text.parse().unwrap());
-    let mut results = random_results(count, random::seed(41), true);
+/// Prints what fell short and what it all took; how many are within 0.1 %, the worst, the best and all passes.
+fn summary(results: &mut [Result]) -> (usize, f64, f64, u32) {
     results.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
     for result in results.iter().take_while(|result| result.ratio < 0.999) {
         println!(
@@ -171,16 +174,41 @@ fn random_chains_come_near_the_joint_optimum() {
     let passes: u32 = results.iter().map(|result| result.sweeps).sum();
     let (worst, best) = (results[0].ratio, results.last().unwrap().ratio);
     println!(
-        "{near} of {count} within 0.1 %, worst {worst:.5}, best {best:.8}; {:.1} passes, at most {}; at most {} bytes",
-        f64::from(passes) / count as f64,
+        "{near} of {} within 0.1 %, worst {worst:.5}, best {best:.8}; {:.1} passes, at most {}; at most {} bytes",
+        results.len(),
+        f64::from(passes) / results.len() as f64,
         results.iter().map(|result| result.sweeps).max().unwrap(),
         results.iter().map(|result| result.bytes).max().unwrap(),
     );
+    (near, worst, best, passes)
+}
+
+/// How many scenarios to draw: the environment variable `COUNT`, or `usual`.
+fn count(usual: usize) -> usize {
+    std::env::var("COUNT").map_or(usual, |text| text.parse().unwrap())
+}
+
+/// A hundred random scenarios against an optimiser that shares no formula with the crate.
+#[test]
+fn random_chains_come_near_the_joint_optimum() {
+    let count = count(100);
+    let mut results = random_results(count, random::seed(41), ROOMY);
+    let (near, worst, best, passes) = summary(&mut results);
     // What a search costs that finds its way with the first rise: 8.5 on average.
     assert!(f64::from(passes) <= 10.0 * count as f64, "{passes}");
     assert!(near * 100 >= 98 * count, "{near} of {count}");
     assert!(worst >= 0.94, "{worst}");
     assert!(best <= 1.0 + 1e-5, "{best}");
+}
+
+/// Where the least separation binds the best chain may need relays that hold back, which farthest places do not offer.
+#[test]
+fn crowded_chains_are_safe_and_seldom_far_from_the_joint_optimum() {
+    let count = count(60);
+    let mut results = random_results(count, random::seed(43), CROWDED);
+    let (near, worst, best, _) = summary(&mut results);
+    assert!(near * 100 >= 95 * count, "{near} of {count}");
+    assert!(worst >= 0.5 && best <= 1.0 + 1e-5, "{worst} {best}");
 }
 
 #[test]
@@ -259,4 +287,50 @@ fn a_band_of_one_altitude_is_algorithm_1() {
     let mut align = setup(&link, band).unwrap();
     align.settings.method = Method::Align;
     assert_eq!(outcome.bits(), settle(align).bits());
+}
+
+/// Random links, relays with an altitude or a power of their own, both joint methods: faults change nothing.
+#[test]
+fn faults_change_nothing_on_random_links() {
+    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(44));
+    let mut injected = 0;
+    for round in 0..120 {
+        let drawn = scenario(&mut rng, &(1..=12), CROWDED);
+        let link = as_relays_know_it(&drawn.link);
+        let Some(mut setup) = setup(&link, drawn.band) else {
+            continue;
+        };
+        let common = setup.mission.config().common;
+        for index in 1..=setup.mission.relays() {
+            if rng.random_bool(0.15) {
+                let own = Profile {
+                    power_w: (f64::from(common.power_w) * log_uniform(&mut rng, 0.3, 3.0)) as f32,
+                    ..common
+                };
+                setup.profiles.push((index, own));
+            }
+            if rng.random_bool(0.1) {
+                setup.held.push(index);
+            }
+        }
+        if round % 3 == 0 {
+            setup.settings.method = Method::Adjust(Adjust {
+                rounds: 5,
+                explore_m: 0.1 * drawn.band.most_m as f32,
+                ..Adjust::default()
+            });
+        }
+        setup.settings.predict = rng.random();
+        let clean = run(setup.clone()).unwrap();
+        setup.faults = Faults::BAD_DAY;
+        setup.seed = round;
+        let faulty = run(setup).unwrap();
+        assert_eq!(clean.ending, faulty.ending);
+        assert_eq!(clean.bits(), faulty.bits(), "round {round}");
+        assert_eq!((clean.unsafe_setpoints, faulty.unsafe_setpoints), (0, 0));
+        assert!(faulty.rounds.windows(2).all(|pair| pair[1] >= pair[0]));
+        injected += faulty.injected.lost + faulty.injected.corrupted;
+    }
+    println!("{injected} frames lost or corrupted");
+    assert!(injected > 10_000);
 }

@@ -4,7 +4,7 @@
 
 use std::iter::successors;
 
-use host_tests::random::joint::{Scenario, scenario};
+use host_tests::random::joint::{ROOMY, Scenario, scenario};
 use host_tests::random::{self, log_uniform};
 use host_tests::reference::joint::{Band, Effort, JointOptimum, Place, keeps_rules, optimum, sir};
 use host_tests::reference::{Link, Station};
@@ -54,7 +54,7 @@ fn for_scenarios(
 ) {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(default_seed));
     for _ in 0..count {
-        let drawn = scenario(&mut rng, &(1..=most_relays));
+        let drawn = scenario(&mut rng, &(1..=most_relays), ROOMY);
         check(drawn, &mut rng);
     }
 }
