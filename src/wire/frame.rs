@@ -149,7 +149,7 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message<'_>), FrameError> {
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first, becomes the way to the next.
     let mut run: u8 = 1;
-    for byte in out.iter_mut().take(len + 1).skip(1).rev() {
+    for byte in out.get_mut(1..=len).unwrap_or_default().iter_mut().rev() {
         if *byte == 0 {
             *byte = run;
             run = 0;
