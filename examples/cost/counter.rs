@@ -1,0 +1,52 @@
+//! How instructions are counted, and relays made.
+
+use core::hint::black_box;
+use cortex_m::peripheral::SYST;
+use cortex_m_semihosting::debug;
+use uav_relay::FrameBuf;
+use uav_relay::Identity;
+use uav_relay::Instant;
+use uav_relay::Mission;
+use uav_relay::Relay;
+use uav_relay::Settings;
+use uav_relay::wire::frame::MAX_FRAME;
+
+/// SysTick's largest value.
+pub(crate) const TOP: u32 = 0x00FF_FFFF;
+
+/// Ticks of SysTick in `work`.
+pub(crate) fn ticks<T>(work: impl FnOnce() -> T) -> u32 {
+    let before = SYST::get_current();
+    black_box(work());
+    before.wrapping_sub(SYST::get_current()) & TOP
+}
+
+/// Instructions of `work`, at most 97 000; those of the measurement itself are taken off.
+pub(crate) fn instructions<T>(work: impl FnOnce() -> T) -> u32 {
+    let empty = ticks(|| ());
+    // 1024 ns at 168 MHz are 172.032 ticks.
+    (ticks(work).saturating_sub(empty) * 1000 + 86_016) / 172_032
+}
+
+pub(crate) fn relay(index: u16, settings: Settings, of: Mission) -> Relay {
+    let identity = Identity { network: 1, index };
+    if let Ok(relay) = Relay::new(of, identity, settings, 1, Instant::ZERO) {
+        return relay;
+    }
+    debug::exit(debug::EXIT_FAILURE);
+    stop()
+}
+
+/// What `relay` sends next, if anything.
+pub(crate) fn sends(relay: &mut Relay, now: Instant) -> Option<(FrameBuf, usize)> {
+    let mut frame: FrameBuf = [0; MAX_FRAME];
+    let transmit = relay.poll_transmit(now, &mut frame)?;
+    Some((frame, transmit.len))
+}
+
+/// Where the program ends should QEMU not take its leave.
+pub(crate) fn stop() -> ! {
+    loop {
+        cortex_m::asm::wfi();
+    }
+}

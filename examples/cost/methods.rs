@@ -1,0 +1,130 @@
+//! What every call costs while three relays fly each method.
+
+use cortex_m_semihosting::hprintln;
+use uav_relay::Adjust;
+use uav_relay::FrameBuf;
+use uav_relay::Instant;
+use uav_relay::Method;
+use uav_relay::Mission;
+use uav_relay::Phase;
+use uav_relay::Port;
+use uav_relay::Relay;
+use uav_relay::Settings;
+use uav_relay::wire::frame::MAX_FRAME;
+
+use super::counter::{instructions, relay};
+use super::missions::{HIGH, UNEVEN};
+
+/// A chain of three that settles on its own terms, and what its calls cost.
+pub(crate) struct Flight {
+    relays: [Relay; 3],
+    /// The costliest call, and the longest frame.
+    most: u32,
+    longest: usize,
+}
+
+impl Flight {
+    fn new(mission: Mission, settings: Settings) -> Self {
+        Self {
+            relays: [1, 2, 3].map(|index| relay(index, settings, mission)),
+            most: 0,
+            longest: 0,
+        }
+    }
+
+    /// Delivers what relay `at` has to say.
+    fn drain(&mut self, at: usize, now: Instant) {
+        let mut frame: FrameBuf = [0; MAX_FRAME];
+        loop {
+            let Some(sender) = self.relays.get_mut(at) else {
+                return;
+            };
+            let mut sent = None;
+            let cost = instructions(|| sent = sender.poll_transmit(now, &mut frame));
+            self.most = self.most.max(cost);
+            let Some(transmit) = sent else { return };
+            self.longest = self.longest.max(transmit.len);
+            let (to, port) = match transmit.port {
+                Port::Upstream => (at.wrapping_sub(1), Port::Downstream),
+                _ => (at + 1, Port::Upstream),
+            };
+            let bytes = frame.get(..transmit.len).unwrap_or_default();
+            if let Some(receiver) = self.relays.get_mut(to) {
+                let cost = instructions(|| receiver.handle_bytes(now, port, bytes));
+                self.most = self.most.max(cost);
+            }
+        }
+    }
+
+    /// Until all hold their places, or for `turns` turns.
+    fn settle(&mut self, turns: u32) -> bool {
+        let mut now = Instant::ZERO;
+        for _ in 0..turns {
+            // Twice, so that what a relay says in return is heard.
+            for at in [0, 1, 2, 1, 0] {
+                self.drain(at, now);
+            }
+            if self
+                .relays
+                .iter()
+                .all(|relay| relay.phase() == Phase::Holding)
+            {
+                return true;
+            }
+            let Some(next) = self.relays.iter().filter_map(Relay::poll_timeout).min() else {
+                continue;
+            };
+            now = next;
+            for relay in &mut self.relays {
+                if relay.poll_timeout().is_some_and(|at| at <= now) {
+                    let cost = instructions(|| relay.handle_timeout(now));
+                    self.most = self.most.max(cost);
+                }
+            }
+        }
+        false
+    }
+}
+
+#[inline(never)]
+pub(crate) fn methods() {
+    let settings = Settings {
+        predict: false,
+        ..Settings::default()
+    };
+    let mut climb = Flight::new(
+        HIGH,
+        Settings {
+            method: Method::Altitude,
+            ..settings
+        },
+    );
+    hprintln!("altitude_settled {}", u32::from(climb.settle(20_000)));
+    hprintln!("altitude {}", climb.most);
+    hprintln!("wave_bytes {}", climb.longest);
+    let mut survey = Flight::new(
+        HIGH,
+        Settings {
+            method: Method::Altitude,
+            ..Settings::default()
+        },
+    );
+    hprintln!("survey_settled {}", u32::from(survey.settle(20_000)));
+    hprintln!("survey {}", survey.most);
+    let adjust = Adjust {
+        rounds: 2,
+        ..Adjust::default()
+    };
+    let mut turns = Flight::new(
+        HIGH,
+        Settings {
+            method: Method::Adjust(adjust),
+            ..settings
+        },
+    );
+    hprintln!("adjust_settled {}", u32::from(turns.settle(20_000)));
+    hprintln!("adjust {}", turns.most);
+    let mut field = Flight::new(UNEVEN, Settings::default());
+    hprintln!("field_settled {}", u32::from(field.settle(20_000)));
+    hprintln!("field {}", field.most);
+}

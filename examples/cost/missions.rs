@@ -1,0 +1,82 @@
+//! What the chains here fly.
+
+use uav_relay::Band;
+use uav_relay::Field;
+use uav_relay::FieldPoint;
+use uav_relay::Interference;
+use uav_relay::Interferer;
+use uav_relay::Mission;
+use uav_relay::MissionConfig;
+use uav_relay::Profile;
+use uav_relay::channel::AirGround;
+use uav_relay::channel::Channel;
+
+/// 2 GHz, excess losses of 0.1 dB and 21 dB as factors.
+pub(crate) const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
+    Ok(channel) => channel,
+    Err(_) => panic!("a channel parameter is out of range"),
+};
+
+pub(crate) const fn mission(relays: u16) -> Mission {
+    Mission::new(MissionConfig {
+        relays,
+        distance_m: 1000.0,
+        min_separation_m: 4.0,
+        tx_power_w: 80.0,
+        common: Profile {
+            altitude_m: 20.0,
+            power_w: 1.0,
+        },
+        channel: CHANNEL,
+        band: Band::at(20.0),
+        interference: Interference::Source(Interferer {
+            power_w: 80.0,
+            x_m: 500.0,
+            y_m: 400.0,
+        }),
+        tolerance: 1e-4,
+    })
+}
+
+pub(crate) const MISSION: Mission = mission(8);
+
+pub(crate) const INTERFERER: Interferer = Interferer {
+    power_w: 80.0,
+    x_m: 500.0,
+    y_m: 150.0,
+};
+
+/// As the others, with altitudes to choose from.
+pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
+    band: Band {
+        least_m: 20.0,
+        most_m: 300.0,
+    },
+    interference: Interference::Source(INTERFERER),
+    ..*mission(3).config()
+});
+
+pub(crate) const POINTS: [FieldPoint; 4] = [
+    FieldPoint {
+        x_m: 0.0,
+        upsilon_per_w: 2.0e6,
+    },
+    FieldPoint {
+        x_m: 300.0,
+        upsilon_per_w: 5.0e6,
+    },
+    FieldPoint {
+        x_m: 600.0,
+        upsilon_per_w: 1.1e6,
+    },
+    FieldPoint {
+        x_m: 1000.0,
+        upsilon_per_w: 3.0e6,
+    },
+];
+
+/// As the others, in a field that is not the same everywhere.
+pub(crate) const UNEVEN: Mission = Mission::new(MissionConfig {
+    interference: Interference::Field(Field::new(&POINTS)),
+    ..*mission(3).config()
+});

@@ -1,0 +1,74 @@
+//! What one relay's share of a wave, of a turn and of a measurement costs.
+
+use core::hint::black_box;
+use cortex_m_semihosting::hprintln;
+use uav_relay::Local;
+use uav_relay::Placement;
+use uav_relay::field::estimate::Estimator;
+use uav_relay::placement::levels::Levels;
+use uav_relay::placement::local::Beside;
+use uav_relay::placement::local::Hops;
+use uav_relay::placement::local::Search;
+use uav_relay::placement::wave::Rungs;
+use uav_relay::placement::wave::Wave;
+
+use super::counter::instructions;
+use super::missions::{HIGH, INTERFERER};
+
+/// A wave of sixteen levels and four targets, and a tube, through a middle relay; the local search of Algorithm 2.
+pub(crate) fn shares() {
+    let common = HIGH.config().common;
+    let band = HIGH.config().band;
+    let mut wave = Wave::new(&HIGH);
+    for (name, levels, count) in [
+        ("wave_16", Levels::even(band, 16), 4),
+        ("tube", Levels::tube(100.0, 20.0), 7),
+        ("wave_64", Levels::even(band, 64), 1),
+    ] {
+        wave.begin(&HIGH, Rungs::new(0.7, 0.1, count), levels);
+        while !wave.step(&HIGH, &INTERFERER, 1, 64) {}
+        wave.hand_over(&HIGH, common.power_w);
+        let (mut all, mut done) = (0, false);
+        while !done {
+            all += instructions(|| done = wave.step(&HIGH, &INTERFERER, 2, 96));
+        }
+        hprintln!("{} {}", name, all);
+    }
+    hprintln!("size_of_wave {}", size_of::<Wave>());
+    let place = |x_m, altitude_m| Placement { x_m, altitude_m };
+    let beside = |place| Beside {
+        place,
+        apart_m: 4.0,
+    };
+    let gain = HIGH.relay_gain(1.0);
+    let (before, after) = (place(250.0, 100.0), place(320.0, 110.0));
+    let hops = Hops::new(
+        &HIGH,
+        &INTERFERER,
+        beside(before),
+        gain,
+        1.0,
+        Some(beside(after)),
+    );
+    let hops = black_box(hops);
+    let at = black_box(place(280.0, 104.0));
+    hprintln!(
+        "evaluation {}",
+        instructions(|| black_box(&hops).worse(black_box(at)))
+    );
+    let mut search = Search::new(Local::Fine, hops, at, 10.0, (20.0, 300.0));
+    let (mut all, mut over) = (0, false);
+    while !over {
+        all += instructions(|| over = search.step(240).is_ready());
+    }
+    hprintln!("search {}", all);
+    hprintln!("size_of_search {}", size_of::<Search>());
+    let mut estimator = Estimator::new(1e-6);
+    let mut push = 0;
+    for at in 1..=1000_u16 {
+        let power_w = black_box(1e-9 * f32::from(at));
+        push = push.max(instructions(|| estimator.push(power_w)));
+    }
+    hprintln!("sample {}", push);
+    hprintln!("estimate {}", instructions(|| estimator.estimate()));
+}

@@ -1,0 +1,80 @@
+//! How much stack the calls of a relay use.
+
+use core::hint::black_box;
+use cortex_m_semihosting::hprintln;
+use uav_relay::FrameBuf;
+use uav_relay::Instant;
+use uav_relay::Mission;
+use uav_relay::Phase;
+use uav_relay::Port;
+use uav_relay::Relay;
+use uav_relay::Settings;
+use uav_relay::wire::frame::MAX_FRAME;
+
+use super::counter::relay;
+use super::missions::mission;
+
+/// Bytes of stack that the calls of a relay use, at most: the stack below is painted, and the paint looked for.
+pub(crate) fn stack() {
+    const TWO: Mission = mission(2);
+    let mut head = relay(1, Settings::default(), TWO);
+    let mut tail = relay(2, Settings::default(), TWO);
+    let used = used_stack(|| {
+        let mut now = Instant::ZERO;
+        while head.phase() == Phase::Planning {
+            now = head.poll_timeout().unwrap_or(now);
+            head.handle_timeout(now);
+        }
+        exchange(&mut head, &mut tail, Port::Upstream, now);
+        exchange(&mut tail, &mut head, Port::Downstream, now);
+    });
+    hprintln!("stack {}", used);
+    hprintln!(
+        "agreed {}",
+        u32::from(head.setpoint().is_some() && tail.setpoint().is_some())
+    );
+}
+
+/// Hands over what one relay has to say.
+pub(crate) fn exchange(from: &mut Relay, to: &mut Relay, at: Port, now: Instant) {
+    let mut frame: FrameBuf = [0; MAX_FRAME];
+    while let Some(transmit) = from.poll_transmit(now, &mut frame) {
+        to.handle_bytes(now, at, frame.get(..transmit.len).unwrap_or_default());
+    }
+}
+
+/// Words that are painted: more than any call uses.
+pub(crate) const PAINTED: usize = 1024;
+
+/// What untouched stack looks like.
+pub(crate) const PAINT: u32 = 0xC0FF_EE11;
+
+/// Bytes of stack that `work` uses below this frame.
+#[inline(never)]
+pub(crate) fn used_stack(work: impl FnOnce()) -> u32 {
+    paint();
+    work();
+    look()
+}
+
+/// Paints the stack that the next call will use, by using it.
+#[inline(never)]
+pub(crate) fn paint() {
+    let mut words = [0_u32; PAINTED];
+    for word in &mut words {
+        *word = black_box(PAINT);
+    }
+    black_box(&words);
+}
+
+/// How much of the paint is gone, in bytes. The array is laid where that of `paint` was, and not written.
+#[inline(never)]
+pub(crate) fn look() -> u32 {
+    let words = core::mem::MaybeUninit::<[u32; PAINTED]>::uninit();
+    let first = black_box(words.as_ptr().cast::<u32>());
+    let untouched = (0..PAINTED)
+        // SAFETY: inside the array; that it may hold anything is the point, and volatile reads take it as it is.
+        .take_while(|at| unsafe { first.add(*at).read_volatile() } == PAINT)
+        .count();
+    u32::try_from(4 * (PAINTED - untouched)).unwrap_or(u32::MAX)
+}

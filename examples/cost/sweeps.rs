@@ -1,0 +1,150 @@
+//! What sweeps, verdicts, frames and the prediction of Algorithm 1 cost.
+
+use core::hint::black_box;
+use cortex_m_semihosting::hprintln;
+use uav_relay::FrameBuf;
+use uav_relay::Instant;
+use uav_relay::Mission;
+use uav_relay::Phase;
+use uav_relay::Port;
+use uav_relay::Settings;
+use uav_relay::placement::spacing::Hop;
+use uav_relay::sir::Sender;
+use uav_relay::wire::deframe::Deframer;
+use uav_relay::wire::frame;
+use uav_relay::wire::frame::MAX_FRAME;
+
+use super::counter::{instructions, relay, sends};
+use super::missions::{INTERFERER, MISSION, mission};
+
+pub(crate) fn reach() {
+    let common = MISSION.config().common;
+    let middle = Hop::new(
+        &MISSION,
+        &INTERFERER,
+        Sender::relay(&MISSION, common),
+        4,
+        common.altitude_m,
+        0.0,
+    );
+    let mut most = 0;
+    for from in [100.0_f32, 400.0, 499.9, 500.1, 600.0, 900.0] {
+        for target in [0.005_f32, 0.0125, 1.0, 5.0, 40.0] {
+            let (hop, target, from) = (black_box(&middle), black_box(target), black_box(from));
+            most = most.max(instructions(|| hop.reach(target, from)));
+        }
+    }
+    hprintln!("reach {}", most);
+}
+
+/// A full sweep through a middle relay, and through the tail of a chain of three; the verdict on its way back.
+pub(crate) fn sweep() {
+    const THREE: Mission = mission(3);
+    let settings = Settings {
+        predict: false,
+        ..Settings::default()
+    };
+    let mut head = relay(1, settings, THREE);
+    let mut middle = relay(2, settings, THREE);
+    let mut tail = relay(3, settings, THREE);
+    let (mut now, mut begin) = (Instant::ZERO, 0);
+    while head.phase() == Phase::Planning {
+        now = head.poll_timeout().unwrap_or(now);
+        begin = begin.max(instructions(|| head.handle_timeout(now)));
+    }
+    let (mut through, mut at_tail, mut back, mut next) = (0, 0, 0, 0);
+    let mut longest = 0;
+    while head.phase() == Phase::Waiting {
+        let Some((frame, len)) = sends(&mut head, now) else {
+            break;
+        };
+        longest = longest.max(len);
+        let bytes = frame.get(..len).unwrap_or_default();
+        through = through.max(instructions(|| {
+            middle.handle_bytes(now, Port::Upstream, bytes);
+            let mut out: FrameBuf = [0; MAX_FRAME];
+            black_box(middle.poll_transmit(now, &mut out));
+            black_box(&out);
+        }));
+        // Once more, out of the measured path: the frame itself.
+        let mut again = relay(2, settings, THREE);
+        again.handle_bytes(now, Port::Upstream, bytes);
+        let Some((frame, len)) = sends(&mut again, now) else {
+            break;
+        };
+        let bytes = frame.get(..len).unwrap_or_default();
+        let mut answer: FrameBuf = [0; MAX_FRAME];
+        let mut answered = None;
+        at_tail = at_tail.max(instructions(|| {
+            tail.handle_bytes(now, Port::Upstream, bytes);
+            answered = tail.poll_transmit(now, &mut answer);
+        }));
+        let Some(transmit) = answered else { break };
+        let bytes = answer.get(..transmit.len).unwrap_or_default();
+        let mut onward: FrameBuf = [0; MAX_FRAME];
+        let mut passed = None;
+        back = back.max(instructions(|| {
+            middle.handle_bytes(now, Port::Downstream, bytes);
+            passed = middle.poll_transmit(now, &mut onward);
+        }));
+        let Some(transmit) = passed else { break };
+        let bytes = onward.get(..transmit.len).unwrap_or_default();
+        next = next.max(instructions(|| {
+            head.handle_bytes(now, Port::Downstream, bytes);
+        }));
+        if head.phase() == Phase::Answered {
+            now = head.poll_timeout().unwrap_or(now);
+            begin = begin.max(instructions(|| head.handle_timeout(now)));
+        }
+    }
+    hprintln!("begin_sweep {}", begin);
+    hprintln!("sweep_bytes {}", longest);
+    hprintln!("sweep {}", through);
+    hprintln!("sweep_at_tail {}", at_tail);
+    hprintln!("verdict {}", back);
+    hprintln!("verdict_at_head {}", next);
+    hprintln!("settled {}", u32::from(head.phase() == Phase::Holding));
+}
+
+/// A full frame through the deframer and the checks.
+pub(crate) fn deframe() {
+    let settings = Settings {
+        predict: false,
+        ..Settings::default()
+    };
+    let mut head = relay(1, settings, MISSION);
+    let mut now = Instant::ZERO;
+    while head.phase() == Phase::Planning {
+        now = head.poll_timeout().unwrap_or(now);
+        head.handle_timeout(now);
+    }
+    let Some((frame, len)) = sends(&mut head, now) else {
+        return;
+    };
+    let bytes = black_box(frame.get(..len).unwrap_or_default());
+    let mut deframer = Deframer::new();
+    let cost = instructions(|| {
+        let mut sound = false;
+        for &byte in bytes {
+            if let Some(Ok(plain)) = deframer.push(byte) {
+                sound = frame::open(plain).is_ok();
+            }
+        }
+        sound
+    });
+    hprintln!("frame {}", cost);
+}
+
+/// The largest portion of the head's prediction, and how many it takes for a hundred relays.
+pub(crate) fn predict() {
+    const HUNDRED: Mission = mission(100);
+    let mut head = relay(1, Settings::default(), HUNDRED);
+    let (mut most, mut portions) = (0, 0);
+    while head.phase() == Phase::Planning {
+        let now = head.poll_timeout().unwrap_or(Instant::ZERO);
+        most = most.max(instructions(|| head.handle_timeout(now)));
+        portions += 1;
+    }
+    hprintln!("predict {}", most);
+    hprintln!("predict_portions {}", portions);
+}

@@ -1,0 +1,230 @@
+//! What the counting image reports, and which rows of the table that makes.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+use super::image::{build, run};
+use super::{Row, row};
+
+pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
+    let counted = count(&build("cost", &[])?)?;
+    let figure = |name: &str| {
+        counted
+            .get(name)
+            .copied()
+            .ok_or_else(|| format!("the image did not report {name}"))
+    };
+    let settled = [
+        "settled",
+        "agreed",
+        "altitude_settled",
+        "survey_settled",
+        "adjust_settled",
+        "field_settled",
+    ];
+    for chain in settled {
+        if figure(chain)? != 1 {
+            return Err(format!("a chain in the counting image: not {chain}"));
+        }
+    }
+    let mut rows = Vec::new();
+    for &(what, unit, names, budget) in COUNTED {
+        let mut most = 0;
+        for name in names {
+            most = figure(name)?.max(most);
+        }
+        rows.push(row(what, unit, most, budget));
+    }
+    let mut worst = 0;
+    for call in CALLS {
+        worst = figure(call)?.max(worst);
+    }
+    rows.push(row(
+        "the costliest call",
+        "instructions",
+        worst,
+        Some(50_000),
+    ));
+    Ok(rows)
+}
+
+/// A row of what the counting image reports: the largest of the figures with these names.
+pub(crate) type Counted = (
+    &'static str,
+    &'static str,
+    &'static [&'static str],
+    Option<u64>,
+);
+
+const COUNTED: &[Counted] = &[
+    (
+        "stack, measured: the calls of a relay",
+        "bytes",
+        &["stack"],
+        None,
+    ),
+    ("`size_of::<Relay>()`", "bytes", &["size_of_relay"], None),
+    ("one reach", "instructions", &["reach"], Some(150)),
+    (
+        "a full sweep, message in to message out",
+        "instructions",
+        &["sweep"],
+        Some(12_000),
+    ),
+    ("its frame", "bytes", &["sweep_bytes"], Some(100)),
+    (
+        "a full sweep at the tail, message in to verdict out",
+        "instructions",
+        &["sweep_at_tail"],
+        None,
+    ),
+    (
+        "a full verdict, message in to message out",
+        "instructions",
+        &["verdict"],
+        None,
+    ),
+    (
+        "a full verdict at the head",
+        "instructions",
+        &["verdict_at_head"],
+        None,
+    ),
+    (
+        "a full frame, deframed and checked",
+        "instructions",
+        &["frame"],
+        None,
+    ),
+    (
+        "a portion of the head's prediction",
+        "instructions",
+        &["predict"],
+        None,
+    ),
+    (
+        "portions for a chain of 100",
+        "",
+        &["predict_portions"],
+        None,
+    ),
+    (
+        "a wave of 16 levels and 4 targets, a relay's share",
+        "instructions",
+        &["wave_16"],
+        None,
+    ),
+    (
+        "a tube of 9 levels and 7 targets",
+        "instructions",
+        &["tube"],
+        None,
+    ),
+    (
+        "a wave of 64 levels and 1 target",
+        "instructions",
+        &["wave_64"],
+        None,
+    ),
+    (
+        "the longest wave's frame here",
+        "bytes",
+        &["wave_bytes"],
+        Some(237),
+    ),
+    ("RAM of a wave", "bytes", &["size_of_wave"], None),
+    (
+        "one evaluation of both hops in Algorithm 2",
+        "instructions",
+        &["evaluation"],
+        None,
+    ),
+    (
+        "a local search, at most 1080 evaluations",
+        "instructions",
+        &["search"],
+        None,
+    ),
+    ("its RAM", "bytes", &["size_of_search"], None),
+    (
+        "a sample of the interference",
+        "instructions",
+        &["sample"],
+        None,
+    ),
+    (
+        "an estimate from the samples",
+        "instructions",
+        &["estimate"],
+        None,
+    ),
+    (
+        "the costliest call while altitudes are chosen",
+        "instructions",
+        &["altitude", "survey"],
+        None,
+    ),
+    (
+        "the costliest call of Algorithm 2",
+        "instructions",
+        &["adjust"],
+        None,
+    ),
+    (
+        "the costliest call in a field",
+        "instructions",
+        &["field"],
+        None,
+    ),
+];
+
+/// The figures that are calls of a relay.
+const CALLS: &[&str] = &[
+    "begin_sweep",
+    "sweep",
+    "sweep_at_tail",
+    "verdict",
+    "verdict_at_head",
+    "predict",
+    "altitude",
+    "survey",
+    "adjust",
+    "field",
+    "sample",
+    "estimate",
+];
+
+/// Runs the counting image in QEMU; the figures it reports by name.
+pub(crate) fn count(elf: &Path) -> Result<BTreeMap<String, u64>, String> {
+    let arguments = [
+        "60",
+        "qemu-system-arm",
+        "-machine",
+        "netduinoplus2",
+        "-nographic",
+        "-monitor",
+        "none",
+        "-serial",
+        "null",
+        "-icount",
+        "shift=10",
+        "-semihosting-config",
+        "enable=on,target=native",
+        "-kernel",
+    ];
+    let output = run(Command::new("timeout").args(arguments).arg(elf))?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let figures: BTreeMap<String, u64> = text
+        .lines()
+        .filter_map(|line| {
+            let (name, value) = line.trim().split_once(' ')?;
+            Some((name.to_owned(), value.parse().ok()?))
+        })
+        .collect();
+    if figures.contains_key("done") {
+        Ok(figures)
+    } else {
+        Err(format!("the counting image did not finish:\n{text}"))
+    }
+}
