@@ -29,6 +29,11 @@ impl Gain {
         self.hi
     }
 
+    /// The gain, as f64.
+    pub(crate) fn wide(self) -> f64 {
+        f64::from(self.hi) + f64::from(self.lo)
+    }
+
     /// `target` / gain, rounded.
     pub const fn ratio(&self, target: f32) -> f32 {
         target / self.hi

@@ -5,7 +5,7 @@
 //! `host-tests/tests/placement.rs`.
 
 use crate::gain::Gain;
-use crate::mission::{Mission, Profile};
+use crate::mission::{Interferer, Mission, Profile};
 
 /// A place in the vertical plane through transmitter and receiver.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -75,22 +75,50 @@ pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     mission.receiver_gain(power_w) / (square(distance) + square(from.altitude_m))
 }
 
+/// How SIR_1 behaves along x beyond Tx, x >= 0, at one altitude: the paper's Lemma 2, for any place of the interferer.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Turn {
+    /// It falls up to there, m, the paper's Psi^x, and rises beyond: the interferer is ahead of Tx (X > 0).
+    Valley(f32),
+    /// It rises up to there, m, and falls beyond: the interferer is behind Tx (X < 0).
+    Hill(f32),
+    /// It falls for good: X = 0.
+    Falls,
+    /// It is the same everywhere: the interferer stands at Tx, X = Y = 0.
+    Level,
+}
+
+/// Where SIR_1 of a relay at `altitude_m` turns along x.
+///
+/// The stationary points of SIR_1 are (q +- sqrt(q^2 + 4 X^2 h^2)) / 2X with q = X^2 + Y^2, of which one lies beyond Tx; for
+/// X < 0 it is written without cancellation. Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems.rs`.
+pub fn first_hop_turn(interferer: &Interferer, altitude_m: f32) -> Turn {
+    let x = interferer.x_m;
+    let q = square(x) + square(interferer.y_m);
+    let root = libm::hypotf(q, 2.0 * x * altitude_m);
+    if x > 0.0 {
+        Turn::Valley((q + root) / (2.0 * x))
+    } else if x < 0.0 {
+        Turn::Hill(-2.0 * x * square(altitude_m) / (q + root))
+    } else if q > 0.0 {
+        Turn::Falls
+    } else {
+        Turn::Level
+    }
+}
+
 /// The largest SIR that a relay at `altitude_m` can have on the first hop, over all x in [0, D].
 ///
-/// At x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`). For X < 0 `SIR_1` has its maximum at the other
-/// stationary point, (q - sqrt(q^2 + 4 X^2 h^2)) / 2X with q = X^2 + Y^2, written here without cancellation. In a field
-/// it is a bound: the quietest place right above the transmitter.
+/// At x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), for X < 0 at the hill of [`first_hop_turn`]. In a
+/// field it is a bound: the quietest place right above the transmitter. The lower the altitude, the larger it is.
 pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
     let Some(interferer) = mission.interferer() else {
         return mission.tx_gain().value() / square(altitude_m);
     };
-    let x_m = if interferer.x_m < 0.0 {
-        let q = square(interferer.x_m) + square(interferer.y_m);
-        let twice_area = 2.0 * interferer.x_m * altitude_m;
-        let peak = -2.0 * interferer.x_m * square(altitude_m) / (q + libm::hypotf(q, twice_area));
-        peak.min(mission.config().distance_m)
-    } else {
-        0.0
+    let x_m = match first_hop_turn(interferer, altitude_m) {
+        Turn::Hill(peak) => peak.min(mission.config().distance_m),
+        _ => 0.0,
     };
     Sender::transmitter(mission).sir_at(mission, 0.0, Placement { x_m, altitude_m })
 }

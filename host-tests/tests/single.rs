@@ -14,7 +14,7 @@ use host_tests::reference::stochastic::StochasticLink;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Mission;
-use uav_relay::placement::single::{best_place, stepped};
+use uav_relay::placement::single::stochastic::{best_place, stepped};
 
 fn mission(link: &StochasticLink) -> Mission {
     of_stochastic_link(link, 0.0).unwrap()

@@ -40,6 +40,20 @@ pub struct MissionConfig {
     pub tolerance: f32,
 }
 
+impl MissionConfig {
+    /// Whether that many relays are allowed, and fit.
+    const fn room(&self) -> Result<(), MissionError> {
+        if self.relays < 1 || self.relays > MAX_RELAYS {
+            return Err(MissionError::Relays);
+        }
+        let step = self.min_separation_m + self.distance_m * ROUNDING;
+        if (self.relays - 1) as f32 * step > self.distance_m {
+            return Err(MissionError::TooManyForDistance);
+        }
+        Ok(())
+    }
+}
+
 /// Which parameter of a [`MissionConfig`] was refused, and its range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -121,7 +135,7 @@ impl Mission {
     /// [`MissionError`] names the parameter that is outside its range.
     pub const fn try_new(config: MissionConfig) -> Result<Self, MissionError> {
         let MissionConfig {
-            relays,
+            relays: _,
             distance_m,
             min_separation_m,
             tx_power_w,
@@ -131,17 +145,14 @@ impl Mission {
             interference,
             tolerance,
         } = config;
-        if relays < 1 || relays > MAX_RELAYS {
-            return Err(MissionError::Relays);
-        }
         if !within(distance_m, 1.0, 1e6) {
             return Err(MissionError::Distance);
         }
         if !within(min_separation_m, 0.0, 1e5) {
             return Err(MissionError::Separation);
         }
-        if (relays - 1) as f32 * (min_separation_m + distance_m * ROUNDING) > distance_m {
-            return Err(MissionError::TooManyForDistance);
+        if let Err(error) = config.room() {
+            return Err(error);
         }
         if !within(tx_power_w, 1e-6, 1e6) {
             return Err(MissionError::TxPower);
@@ -295,6 +306,26 @@ impl Mission {
     )]
     pub const fn receiver_gain(&self, power_w: f32) -> f32 {
         (power_w as f64 * self.receiver_gain_per_w) as f32
+    }
+
+    /// What the last hop's K is worth against the first hop's gain, m^2: (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2).
+    pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
+        f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
+    }
+
+    /// The same mission with another number of relays.
+    ///
+    /// # Errors
+    /// [`MissionError::Relays`] or [`MissionError::TooManyForDistance`].
+    pub const fn with_relays(&self, relays: u16) -> Result<Self, MissionError> {
+        let config = MissionConfig {
+            relays,
+            ..self.config
+        };
+        match config.room() {
+            Ok(()) => Ok(Self { config, ..*self }),
+            Err(error) => Err(error),
+        }
     }
 
     /// Power that Tx's signal has at a relay whose squared distance is `squared_m2`, W.

@@ -6,7 +6,7 @@
 //! | a pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass), [`verdict`]; [`search`] and [`scan`] say which come next; [`plan`] runs all of it for a whole chain without a message; [`promise`] whether it is the most |
 //! | a pass of targets and altitude levels | [`levels`], [`coded`], [`wave`]; [`climb`] says which come next; [`coarse`] predicts where to begin |
 //! | one relay between its neighbours | [`local`]: Algorithm 2 |
-//! | one relay alone in a field | [`single`]: Algorithm 3 |
+//! | one relay alone | [`single`]: Theorems 1 to 3, Algorithm 3 |
 //!
 //! The node walks the same functions one hop a relay.
 

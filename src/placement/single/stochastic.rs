@@ -11,77 +11,25 @@
 //!
 //! Accuracy: `host-tests/tests/single.rs`, against a dense search in f64.
 
+use super::{Found, Two};
 use crate::field::Field;
 use crate::mission::{Mission, Profile};
 use crate::root::sqrt;
-use crate::sir::{self, Placement, Sender, square};
+use crate::sir::square;
 
-/// Halvings of a piece for the place where the SIRs cross: to an f32's own step.
-const HALVINGS: u8 = 26;
-
-/// Where a relay stands, and the expected SIR (linear) of the worse of its two hops.
-#[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Found {
-    /// Where.
-    pub place: Placement,
-    /// The worse of E(SIR_1) and E(SIR_2).
-    pub sir: f32,
-}
-
-/// The two hops of a relay that holds `profile`, the only one of `mission`.
-struct Two<'a> {
-    mission: &'a Mission,
-    profile: Profile,
-}
-
-impl Two<'_> {
-    fn at(&self, x_m: f32) -> Placement {
-        Placement {
-            x_m,
-            altitude_m: self.profile.altitude_m,
-        }
+/// The best of [`low`, `high`], on which E(SIR_1) only rises or only falls.
+fn best_of(two: &Two, low: f32, high: f32) -> Found {
+    let ends = two.found(low).or(two.found(high));
+    if two.first(low) <= two.second(low) || two.first(high) >= two.second(high) {
+        return ends;
     }
-
-    fn first(&self, x_m: f32) -> f32 {
-        Sender::transmitter(self.mission).sir_at(self.mission, 0.0, self.at(x_m))
-    }
-
-    fn second(&self, x_m: f32) -> f32 {
-        sir::at_receiver(self.mission, self.at(x_m), self.profile.power_w)
-    }
-
-    fn found(&self, x_m: f32) -> Found {
-        Found {
-            place: self.at(x_m),
-            sir: self.first(x_m).min(self.second(x_m)),
-        }
-    }
-
-    /// The best of [`low`, `high`], on which E(SIR_1) only rises or only falls.
-    fn best_of(&self, low: f32, high: f32) -> Found {
-        let better = |a: Found, b: Found| if b.sir > a.sir { b } else { a };
-        let ends = better(self.found(low), self.found(high));
-        if self.first(low) <= self.second(low) || self.first(high) >= self.second(high) {
-            return ends;
-        }
-        // E(SIR_1) is above at the one end and below at the other, and E(SIR_2) only rises: they cross once.
-        let (mut low, mut high) = (low, high);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if self.first(middle) > self.second(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        better(ends, better(self.found(low), self.found(high)))
-    }
+    // E(SIR_1) is above at the one end and below at the other, and E(SIR_2) only rises: they cross once.
+    ends.or(two.crossing(low, high))
 }
 
 /// Where one relay that holds `profile` does best between Tx and Rx; `None` without a field.
 ///
-/// Within 1e-5 of the best SIR, relative. Work: at most 170 evaluations of both hops for each two points of the field; a plan's, not
+/// Within 1e-5 of the best SIR, relative. Work: at most 260 evaluations of both hops for each two points of the field; a plan's, not
 /// one for a relay's main loop.
 pub fn best_place(mission: &Mission, profile: Profile) -> Option<Found> {
     let field = mission.field()?;
@@ -102,10 +50,7 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<Found> {
             .chain([to])
         {
             if turn > piece && turn <= to {
-                let found = two.best_of(piece, turn);
-                if found.sir > best.sir {
-                    best = found;
-                }
+                best = best.or(best_of(&two, piece, turn));
                 piece = turn;
             }
         }

@@ -1,0 +1,91 @@
+//! One relay at a given altitude: the paper's Corollary 1 and Theorem 1, for an interferer anywhere.
+//!
+//! SIR_2 rises with x. SIR_1 falls up to its valley and rises beyond (X > 0), so the worse of the two is best where they cross
+//! before the valley, or above Rx. With the interferer behind Tx (X < 0), which the paper leaves out, SIR_1 rises up to a hill
+//! and falls beyond: up to the hill both rise, so the best place is the hilltop, the crossing beyond it, or above Rx.
+//!
+//! The crossing is a root of the paper's quartic. Its coefficients cancel in f32; the SIRs themselves do not, so the root is
+//! found by halving a stretch on which their difference changes its sign once.
+//!
+//! Accuracy: `theorem_1_is_no_worse_than_brute_force` in `host-tests/tests/theorems.rs`: within 1e-4 relative of the best SIR.
+
+use super::{Found, Two};
+use crate::mission::{Mission, Profile};
+use crate::sir::{Turn, first_hop_turn};
+
+/// Which case applied; the first five are Corollary 1's, for X >= 0.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Case {
+    /// The first hop is the worse one even right above Tx, p_t / p_u < C_1: x = 0.
+    AboveTx = 1,
+    /// SIR_1 falls all the way that counts and crosses SIR_2 once: x is there.
+    Crossing = 2,
+    /// The first hop is the better one wherever it is not rising: x = D.
+    AboveRx = 3,
+    /// The SIRs cross before the valley of SIR_1: x is there, or D if SIR_1 has recovered by then.
+    BeforeValley = 4,
+    /// The first hop is the better one even in its valley: x = D.
+    OverValley = 5,
+    /// X < 0, and SIR_1 is the worse one even where it is best, on its hill: x is there.
+    Hilltop = 6,
+    /// X < 0, and the SIRs cross beyond the hill of SIR_1: x is there.
+    BeyondHill = 7,
+    /// X < 0, and the first hop is the better one even above Rx, or rises all the way: x = D.
+    HillAboveRx = 8,
+    /// The interferer stands at Tx (X = Y = 0), SIR_1 is the same everywhere: x = D.
+    Level = 9,
+    /// The interferer stands at Rx (X = D, Y = 0), and no place helps: SIR_2 is 0; x = D.
+    Drowned = 10,
+}
+
+impl Case {
+    /// The number that Corollary 1 has for it, 1 to 5; 0 for the cases that it leaves out.
+    pub const fn printed(self) -> u8 {
+        let number = self as u8;
+        if number <= Self::OverValley as u8 {
+            number
+        } else {
+            0
+        }
+    }
+}
+
+/// Where a relay that holds `profile` does best between Tx and Rx, and why; `None` in a field.
+///
+/// Any place of the interferer, any D and altitude that a mission takes. Work: at most 90 evaluations of both hops.
+pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, Case)> {
+    let interferer = mission.interferer()?;
+    let two = Two { mission, profile };
+    let end_m = mission.config().distance_m;
+    let above_rx = two.found(end_m);
+    if !(two.second(end_m) > 0.0) {
+        return Some((above_rx, Case::Drowned));
+    }
+    let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
+    // How far SIR_1 falls, and whether it rises again before Rx.
+    let (to, valley) = match first_hop_turn(interferer, profile.altitude_m) {
+        Turn::Level => return Some((above_rx, Case::Level)),
+        Turn::Hill(peak) => {
+            return Some(if peak >= end_m || !worse_first(end_m) {
+                (above_rx, Case::HillAboveRx)
+            } else if worse_first(peak) {
+                (two.found(peak), Case::Hilltop)
+            } else {
+                (two.crossing(peak, end_m), Case::BeyondHill)
+            });
+        }
+        Turn::Valley(bottom) if bottom < end_m => (bottom, true),
+        _ => (end_m, false),
+    };
+    if two.first(0.0) < two.second(0.0) {
+        return Some((two.found(0.0), Case::AboveTx));
+    }
+    Some(match (worse_first(to), valley) {
+        (true, false) => (two.crossing(0.0, to), Case::Crossing),
+        (true, true) => (two.crossing(0.0, to).or(above_rx), Case::BeforeValley),
+        (false, false) => (above_rx, Case::AboveRx),
+        (false, true) => (above_rx, Case::OverValley),
+    })
+}

@@ -1,0 +1,44 @@
+//! How to choose the powers of Tx and relay: the ratios p_t / p_u at which the cases of Corollary 1 change.
+//!
+//! SIR_1 / SIR_2 is proportional to p_t / p_u, so each is the ratio at which the two are equal at some place: above Tx (C_1),
+//! above Rx (C_2), and at the bottom of SIR_1's valley (C_3). The paper writes them out; here they are the SIRs' own formulas.
+
+use super::Two;
+use crate::mission::{Mission, Profile};
+use crate::sir::{Turn, first_hop_turn};
+
+/// Ratios p_t / p_u, linear.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Guide {
+    /// C_1: below it the first hop is the worse one even right above Tx; 0 with the interferer on Rx.
+    pub c1: f32,
+    /// C_2: above it the first hop is the better one even right above Rx.
+    pub c2: f32,
+    /// C_3: above it the first hop is the better one even where it is worst, be that between Tx and Rx or beyond. Only for an
+    /// interferer ahead of Tx (X > 0).
+    pub c3: Option<f32>,
+}
+
+/// The ratios for a relay at `altitude_m`, m, above 0; `None` in a field.
+///
+/// Relative error below 1e-4: `the_guide_agrees_with_the_cases` in `host-tests/tests/theorems.rs`. Constant work.
+pub fn ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
+    let interferer = mission.interferer()?;
+    let config = mission.config();
+    let profile = Profile {
+        altitude_m,
+        power_w: config.common.power_w,
+    };
+    let two = Two { mission, profile };
+    let present = config.tx_power_w / profile.power_w;
+    let equal_at = |x_m: f32| present * (two.second(x_m) / two.first(x_m));
+    Some(Guide {
+        c1: equal_at(0.0),
+        c2: equal_at(config.distance_m),
+        c3: match first_hop_turn(interferer, altitude_m) {
+            Turn::Valley(bottom) if bottom < 1e18 => Some(equal_at(bottom)),
+            _ => None,
+        },
+    })
+}
