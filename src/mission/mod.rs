@@ -328,6 +328,15 @@ impl Mission {
         }
     }
 
+    /// The same mission, whose relays may stand as close as they like.
+    pub(crate) const fn unseparated(&self) -> Self {
+        let config = MissionConfig {
+            min_separation_m: 0.0,
+            ..self.config
+        };
+        Self { config, ..*self }
+    }
+
     /// Power that Tx's signal has at a relay whose squared distance is `squared_m2`, W.
     #[expect(
         clippy::cast_possible_truncation,

@@ -6,6 +6,7 @@
 //! | a pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass), [`verdict`]; [`search`] and [`scan`] say which come next; [`plan`] runs all of it for a whole chain without a message; [`promise`] whether it is the most |
 //! | a pass of targets and altitude levels | [`levels`], [`coded`], [`wave`]; [`climb`] says which come next; [`coarse`] predicts where to begin |
 //! | one relay between its neighbours | [`local`]: Algorithm 2 |
+//! | how many relays | [`fleet`]: the fewest for a target, and the most any number can have |
 //! | one relay alone | [`single`]: Theorems 1 to 3, Algorithm 3 |
 //!
 //! The node walks the same functions one hop a relay.
@@ -13,6 +14,7 @@
 pub mod climb;
 pub mod coarse;
 pub mod coded;
+pub mod fleet;
 pub mod ladder;
 pub mod levels;
 pub mod local;

@@ -98,27 +98,36 @@ pub fn close(
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
     for (&target, &place) in targets.iter().zip(reaches) {
-        let slack = match mission.field() {
-            None => receiver_reach(mission, own, target)
-                .map(|last_hop| place - mission.config().distance_m + last_hop),
-            Some(field) => {
-                let at = Placement {
-                    x_m: place,
-                    altitude_m: own.altitude_m,
-                };
-                let quiet = measured_per_w
-                    .map_or(sir::quiet(mission, at), |upsilon| upsilon / field.largest());
-                // Cut at 1e9 m, as the last hop toward Rx: an infinite slack would not be sent.
-                let squared =
-                    (mission.tx_gain().value() * quiet / target).min(1e18) - square(own.altitude_m);
-                // Where no place is near enough, by how much the square is negative: it stays continuous in the target.
-                Some((sqrt(squared.abs()).copysign(squared) - place).max(-1e9))
-            }
+        let Some(slack) = slack(mission, own, measured_per_w, target, place) else {
+            break;
         };
-        let Some(slack) = slack else { break };
         if slacks.push(slack).is_err() {
             break;
         }
     }
     Verdict::new(mission, ladder, &targets, slacks)
+}
+
+/// By how much a chain whose last relay, which holds `own`, stands at `place` for `target` overshoots, m: not negative when it
+/// closes. `None` where Rx cannot be reached from anywhere.
+pub(super) fn slack(
+    mission: &Mission,
+    own: Profile,
+    measured_per_w: Option<f32>,
+    target: f32,
+    place: f32,
+) -> Option<f32> {
+    let Some(field) = mission.field() else {
+        return receiver_reach(mission, own, target)
+            .map(|last_hop| place - mission.config().distance_m + last_hop);
+    };
+    let at = Placement {
+        x_m: place,
+        altitude_m: own.altitude_m,
+    };
+    let quiet = measured_per_w.map_or(sir::quiet(mission, at), |upsilon| upsilon / field.largest());
+    // Cut at 1e9 m, as the last hop toward Rx: an infinite slack would not be sent.
+    let squared = (mission.tx_gain().value() * quiet / target).min(1e18) - square(own.altitude_m);
+    // Where no place is near enough, by how much the square is negative: it stays continuous in the target.
+    Some((sqrt(squared.abs()).copysign(squared) - place).max(-1e9))
 }
