@@ -1,0 +1,238 @@
+//! Counts against one interferer.
+
+use host_tests::brief::{as_relays_know_it, of_link};
+use host_tests::random::{self, Chain, Style, log_uniform};
+use host_tests::reference::Link;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::placement::fleet;
+use uav_relay::{Mission, Placement, Profile};
+
+use super::{ROUNDING, count, round};
+
+/// The mission of `link` and what its relays hold, by index; those beyond the link hold what the last does.
+pub(crate) fn briefed(link: &Link) -> (Mission, impl Fn(u16) -> Profile + use<>) {
+    let (mission, own) = of_link(link, 1e-4).unwrap();
+    let common = mission.config().common;
+    let of = move |index: u16| {
+        own.iter()
+            .find(|(at, _)| *at == index)
+            .map_or(common, |(_, profile)| *profile)
+    };
+    (mission, of)
+}
+
+/// The first `relays` of `link`, which are padded with what is common.
+fn with(link: &Link, relays: usize) -> Link {
+    let mut link = link.clone();
+    let common = link.relays[0];
+    link.relays.resize(relays, common);
+    link
+}
+
+/// The fewest relays with which a chain in f64 meets `target`, tried one number after the other; 0 if `most` do not.
+fn exhaustive(link: &Link, target: f64, most: usize) -> usize {
+    let all = with(link, most);
+    let mut from = 0.0;
+    for n in 1..=most {
+        let Some(x) = all.farthest(n, from, target) else {
+            return 0;
+        };
+        if with_rx(&all, n, x) >= target {
+            return n;
+        }
+        from = x;
+    }
+    0
+}
+
+fn with_rx(all: &Link, n: usize, x: f64) -> f64 {
+    let mut last = all.clone();
+    last.relays = vec![all.relays[n - 1]];
+    last.sir_rx(x).unwrap()
+}
+
+/// A target that takes one relay or some dozens: a part of the most that the outer hops can have.
+fn target(rng: &mut impl Rng, link: &Link) -> Option<f64> {
+    let d = link.distance_m;
+    let first = (0..200)
+        .map(|i| link.sir_relay(1, 0.0, d * f64::from(i) / 200.0).unwrap())
+        .fold(0.0, f64::max);
+    let most = first.min(link.sir_rx(d)?);
+    let target = round(most * log_uniform(rng, 1e-4, 1.2));
+    (target > 0.0).then_some(target)
+}
+
+#[test]
+fn as_few_as_an_exhaustive_count() {
+    const MOST: usize = 300;
+    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(601));
+    let (mut met, mut none, mut ties, mut largest, mut fewer) = (0, 0, 0, 0, 0);
+    while met + none < count(10_000) {
+        let chain = if rng.random_bool(0.3) {
+            Chain::OwnPower
+        } else {
+            Chain::Alike
+        };
+        let style = Style {
+            relays: 1..=20,
+            chain,
+        };
+        let link = as_relays_know_it(&random::link(&mut rng, &style));
+        let Some(target) = target(&mut rng, &link) else {
+            continue;
+        };
+        let expected = exhaustive(&link, target, MOST);
+        let (mission, profile_of) = briefed(&link);
+        let found = fleet::fewest(&mission, target as f32, &profile_of);
+        let told = found.map_or(0, |found| usize::from(found.relays));
+        if expected == 0 {
+            assert!(
+                told == 0 || told > MOST || {
+                    ties += 1;
+                    exhaustive(&link, target * (1.0 - ROUNDING), MOST) == told
+                }
+            );
+            none += 1;
+            continue;
+        }
+        met += 1;
+        if told != expected {
+            // A target that the last relay meets or misses by f32's own rounding.
+            ties += 1;
+            let either =
+                [1.0 - ROUNDING, 1.0 + ROUNDING].map(|by| exhaustive(&link, target * by, MOST));
+            assert!(
+                either.contains(&told),
+                "{told} {expected} {either:?} {target} {link:?}"
+            );
+            continue;
+        }
+        assert!(found.unwrap().proven);
+        largest = largest.max(told);
+        // The places are such a chain.
+        let mission = mission.with_relays(found.unwrap().relays).unwrap();
+        let mut places = vec![Placement::default(); told];
+        assert!(fleet::places(
+            &mission,
+            target as f32,
+            &profile_of,
+            &mut places
+        ));
+        let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
+        let sir = with(&link, told).chain_sir(&x);
+        assert!(sir >= target * (1.0 - ROUNDING), "{sir} {target} {link:?}");
+        // And one relay fewer is not enough, by the sets of all places that each relay can have.
+        if told > 1 && told <= 40 {
+            fewer += 1;
+            let fewer = with(&link, told - 1).placement(target * (1.0 + ROUNDING));
+            assert!(fewer.is_none(), "{told} {target} {link:?}");
+        }
+    }
+    println!(
+        "{met} targets met, by up to {largest} relays, {none} not; one relay fewer refused {fewer} times by all places; \
+         {ties} on the very border"
+    );
+    assert!(met > none && largest > 100 && ties < 20);
+}
+
+#[test]
+fn where_they_keep_a_distance_places_do_and_what_is_proven_is_the_fewest() {
+    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(602));
+    let (mut proven, mut not, mut none) = (0, 0, 0);
+    for _ in 0..count(10_000) / 5 {
+        let style = Style {
+            relays: 1..=1,
+            chain: Chain::Alike,
+        };
+        let mut link = random::link(&mut rng, &style);
+        link.min_separation_m = link.distance_m * log_uniform(&mut rng, 1e-3, 0.3);
+        let link = as_relays_know_it(&link);
+        let Some(target) = target(&mut rng, &link) else {
+            continue;
+        };
+        let (mission, profile_of) = briefed(&link);
+        let Ok(found) = fleet::fewest(&mission, target as f32, &profile_of) else {
+            none += 1;
+            continue;
+        };
+        let n = usize::from(found.relays);
+        if found.proven {
+            proven += 1;
+            let freely = exhaustive(&link, target * (1.0 - ROUNDING), 1000);
+            assert!(freely == n || exhaustive(&link, target * (1.0 + ROUNDING), 1000) == n);
+        } else {
+            not += 1;
+        }
+        let mut places = vec![Placement::default(); n];
+        let mission = mission.with_relays(found.relays).unwrap();
+        assert!(fleet::places(
+            &mission,
+            target as f32,
+            &profile_of,
+            &mut places
+        ));
+        let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
+        let sir = with(&link, n).chain_sir(&x);
+        assert!(
+            sir >= target * (1.0 - ROUNDING),
+            "{} {x:?} {link:?}",
+            sir / target
+        );
+        for pair in x.windows(2) {
+            assert!(pair[1] - pair[0] >= link.min_separation_m, "{x:?} {link:?}");
+        }
+    }
+    println!("{proven} proven, {not} not, {none} with no such chain");
+    assert!(proven > 500 && none > 100);
+}
+
+/// The most is met, a bit more is not, whatever the number of relays.
+#[test]
+fn the_most_is_what_no_number_of_relays_exceeds() {
+    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(603));
+    let (mut met, mut exceeded) = (0, 0);
+    for _ in 0..300 {
+        let style = Style {
+            relays: 1..=1,
+            chain: Chain::Alike,
+        };
+        let mut link = random::link(&mut rng, &style);
+        // A separation keeps the number of relays, and the work of the count, low.
+        link.min_separation_m = if rng.random_bool(0.5) {
+            link.distance_m * log_uniform(&mut rng, 0.01, 0.3)
+        } else {
+            0.0
+        };
+        let link = as_relays_know_it(&link);
+        let (mission, profile_of) = briefed(&link);
+        let Some(most) = fleet::most(&mission, &profile_of) else {
+            assert!(link.sir_rx(0.0).unwrap() <= 0.0, "{link:?}");
+            continue;
+        };
+        met += 1;
+        let found = fleet::fewest(&mission, most.target, &profile_of).unwrap();
+        assert_eq!(found.relays, most.relays);
+        if link.min_separation_m > 0.0 {
+            // A chain that has to keep a distance may be able to do more than one with a lower target.
+            exceeded +=
+                u32::from(fleet::fewest(&mission, most.target * 1.001, &profile_of).is_ok());
+            continue;
+        }
+        assert!(fleet::fewest(&mission, most.target * 1.001, &profile_of).is_err());
+        if most.relays < 900 {
+            // Only the outer hops limit it.
+            let d = link.distance_m;
+            let first =
+                (0..=20_000).map(|i| link.sir_relay(1, 0.0, d * f64::from(i) / 2e4).unwrap());
+            let outer = first.fold(0.0, f64::max).min(link.sir_rx(d).unwrap());
+            assert!(
+                (f64::from(most.target) / outer - 1.0).abs() < 1e-4,
+                "{} {outer}",
+                most.target
+            );
+        }
+    }
+    println!("{met} met; with a separation more is met in {exceeded}");
+    assert!(met > 200 && exceeded < 10);
+}

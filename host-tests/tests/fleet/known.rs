@@ -1,0 +1,105 @@
+//! Values of an independent program, and what the printed rules get wrong.
+
+use host_tests::brief::of_stochastic_link;
+use host_tests::cases;
+use host_tests::reference::stochastic::StochasticLink;
+use host_tests::reference::{Link, Station};
+use uav_relay::Placement;
+use uav_relay::placement::fleet;
+
+use super::field::field;
+use super::interferer::briefed;
+
+#[test]
+fn the_reference_cases_hold() {
+    for case in cases::of("min_uavs").unwrap() {
+        let (link, target) = (case.link(1), case.arg("gamma").unwrap());
+        let (mission, profile_of) = briefed(&link);
+        let found = fleet::fewest(&mission, target as f32, &profile_of).unwrap();
+        assert!(found.proven);
+        assert!(
+            (f64::from(found.relays) - case.part("N").unwrap()).abs() < 0.5,
+            "{}",
+            case.id
+        );
+        let mission = mission.with_relays(found.relays).unwrap();
+        let mut places = vec![Placement::default(); usize::from(found.relays)];
+        assert!(fleet::places(
+            &mission,
+            target as f32,
+            &profile_of,
+            &mut places
+        ));
+        let expected = case.part_list("x").unwrap();
+        assert_eq!(expected.len(), places.len());
+        for (place, expected) in places.iter().zip(expected) {
+            let apart = (f64::from(place.x_m) - expected).abs();
+            assert!(
+                apart < 1e-5 * link.distance_m,
+                "{}: {} {expected}",
+                case.id,
+                place.x_m
+            );
+        }
+    }
+    for case in cases::of("problem1").unwrap() {
+        let (params, target) = (&case.params, case.arg("gamma").unwrap());
+        let link = StochasticLink {
+            distance_m: params.d,
+            tx_w: params.p_t,
+            mu_los: params.mu_los,
+            eta: params.eta,
+            upsilon: vec![(0.0, case.arg("upsilon").unwrap())],
+            relays: vec![Station {
+                altitude_m: params.h,
+                power_w: params.p_u,
+            }],
+        };
+        let mission = of_stochastic_link(&link, 0.0).unwrap();
+        let common = mission.config().common;
+        let found = fleet::fewest(&mission, target as f32, |_| common).unwrap();
+        assert!(found.proven);
+        assert!(
+            (f64::from(found.relays) - case.part("N").unwrap()).abs() < 0.5,
+            "{}",
+            case.id
+        );
+        let mission = mission.with_relays(found.relays).unwrap();
+        let mut places = vec![Placement::default(); usize::from(found.relays)];
+        assert!(fleet::places(
+            &mission,
+            target as f32,
+            |_| common,
+            &mut places
+        ));
+        let sirs = StochasticLink {
+            relays: vec![link.relays[0]; places.len()],
+            ..link
+        }
+        .hop_sirs(
+            &places
+                .iter()
+                .map(|place| f64::from(place.x_m))
+                .collect::<Vec<_>>(),
+        );
+        assert!(
+            sirs.iter().all(|sir| *sir >= target * (1.0 - 1e-5)),
+            "{}: {sirs:?}",
+            case.id
+        );
+    }
+    // What the printed rules make 16, 24, 36 and 54.
+    let (mission, profile_of) = briefed(&Link::paper(1));
+    for (target, relays) in [(5.0, 22), (10.0, 40), (20.0, 65), (40.0, 100)] {
+        assert_eq!(
+            fleet::fewest(&mission, target, &profile_of).unwrap().relays,
+            relays
+        );
+    }
+    // The printed rule with rho has no solution here.
+    let mut case = field(105.0, 10.0, vec![(0.0, 100.0)]);
+    case.tx_w = 1.0;
+    let mission = of_stochastic_link(&case, 0.0).unwrap();
+    let common = mission.config().common;
+    assert_eq!(fleet::fewest(&mission, 1.0, |_| common).unwrap().relays, 12);
+}

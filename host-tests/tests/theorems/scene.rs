@@ -1,0 +1,77 @@
+//! One relay, one interferer, and a judge of places that shares no formula with the crate.
+
+use host_tests::brief::{as_relays_know_it, of_link};
+use host_tests::cases::Case;
+use host_tests::random::{self, Chain, Style, log_uniform};
+use host_tests::reference::Link;
+use rand::{Rng, RngExt};
+use uav_relay::placement::single::Found;
+use uav_relay::{Band, Mission, MissionConfig};
+
+/// One relay, its link as the relay's own f32 numbers, and the band it may choose from.
+pub(crate) struct Scene {
+    pub(crate) link: Link,
+    pub(crate) band: (f64, f64),
+    pub(crate) mission: Mission,
+}
+
+impl Scene {
+    pub(crate) fn new(link: &Link, band: (f64, f64)) -> Self {
+        let mut link = as_relays_know_it(link);
+        let round = |value: f64| f64::from(value as f32);
+        let band = (round(band.0), round(band.1));
+        link.relays[0].altitude_m = band.0;
+        let (mission, _) = of_link(&link, 1e-4).unwrap();
+        let config = MissionConfig {
+            band: Band {
+                least_m: band.0 as f32,
+                most_m: band.1 as f32,
+            },
+            ..*mission.config()
+        };
+        Self {
+            link,
+            band,
+            mission: Mission::try_new(config).unwrap(),
+        }
+    }
+
+    /// 10 m to 100 km, the interferer before, between, beyond, on Tx, on Rx, on the line; the lowest altitude 0.002 to 0.5 of D.
+    pub(crate) fn random(rng: &mut impl Rng) -> Self {
+        let style = Style {
+            relays: 1..=1,
+            chain: Chain::Alike,
+        };
+        let link = random::link(rng, &style);
+        let low = link.relays[0].altitude_m;
+        let high = if rng.random_bool(0.1) {
+            low
+        } else {
+            (low * log_uniform(rng, 1.0, 30.0)).min(1e5)
+        };
+        Self::new(&link, (low, high))
+    }
+
+    pub(crate) fn of(case: &Case) -> Self {
+        Self::new(&case.link(1), (case.params.h_min, case.params.h_max))
+    }
+
+    /// The worse SIR of the two hops, in f64, with received powers instead of the crate's formulas.
+    pub(crate) fn sir(&mut self, x: f64, h: f64) -> f64 {
+        self.link.relays[0].altitude_m = h;
+        let first = self.link.sir_relay(1, 0.0, x).unwrap();
+        first.min(self.link.sir_rx(x).unwrap())
+    }
+
+    pub(crate) fn sir_of(&mut self, found: &Found) -> f64 {
+        let place = found.place;
+        self.sir(f64::from(place.x_m), f64::from(place.altitude_m))
+    }
+
+    pub(crate) fn profile(&self, altitude_m: f64) -> uav_relay::Profile {
+        uav_relay::Profile {
+            altitude_m: altitude_m as f32,
+            ..self.mission.config().common
+        }
+    }
+}
