@@ -12,6 +12,8 @@ mod methods;
 #[cfg(target_os = "none")]
 mod missions;
 #[cfg(target_os = "none")]
+mod planning;
+#[cfg(target_os = "none")]
 mod shares;
 #[cfg(target_os = "none")]
 mod stack;
@@ -30,7 +32,7 @@ mod image {
     use stm32f4xx_hal as _;
     use uav_relay::Relay;
 
-    use super::{counter, methods, shares, stack, sweeps};
+    use super::{counter, methods, planning, shares, stack, sweeps};
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -49,6 +51,7 @@ mod image {
         sweeps::predict();
         shares::shares();
         methods::methods();
+        planning::planning();
         stack::stack();
         hprintln!("done 1");
         debug::exit(debug::EXIT_SUCCESS);

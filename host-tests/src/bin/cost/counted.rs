@@ -28,6 +28,9 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
             return Err(format!("a chain in the counting image: not {chain}"));
         }
     }
+    if figure("fewest_relays")? != 22 {
+        return Err("the counting image does not count 22 relays".to_owned());
+    }
     let mut rows = Vec::new();
     for &(what, unit, names, budget) in COUNTED {
         let mut most = 0;
@@ -147,6 +150,25 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     ("its RAM", "bytes", &["size_of_search"], None),
+    (
+        "Theorem 1: one relay placed along x",
+        "instructions",
+        &["theorem_1"],
+        None,
+    ),
+    (
+        "Theorem 2: its altitude",
+        "instructions",
+        &["theorem_2"],
+        None,
+    ),
+    ("Theorem 3: both", "instructions", &["theorem_3"], None),
+    (
+        "the fewest relays for an SIR of 5: 22",
+        "instructions",
+        &["fewest"],
+        None,
+    ),
     (
         "a sample of the interference",
         "instructions",
