@@ -7,6 +7,7 @@ pub mod random;
 pub mod reference;
 pub mod report;
 pub mod scenario;
+pub mod several;
 pub mod sim;
 pub mod stack;
 pub mod svg;

@@ -54,6 +54,22 @@ fn every_case_of_the_file_is_used() {
         "algorithm1_schedule",
         "psi",
         "feasibility_bound_printed",
+        // By tests/theorems.rs and tests/plan.rs.
+        "locus",
+        "quartic_coeffs",
+        "quartic_roots_in_0_D",
+        "theorem1",
+        "theorem2",
+        "theorem3",
+        // By tests/fleet.rs and tests/plan.rs.
+        "min_uavs",
+        "problem1",
+        // By tests/several.rs.
+        "hyp_msi",
+        // By tests/baseline.rs and tests/figures.rs.
+        "baseline_single",
+        "baseline_multi",
+        "algorithm4",
         "forward_mode_derivative",
     ];
     let all = cases::load().unwrap();

@@ -1,0 +1,29 @@
+//! Several interferers at once: the true sum of what they do, the one hypothetical interferer that comes closest to it, and
+//! chains that are placed against the true sum.
+//!
+//! The relays know one interferer. Several are replaced by one for them ([`hypothetical`]), which is an approximation; how
+//! much SIR it costs is known only by comparing with the best chain against the true sum: [`optimum`] for relays that hold
+//! one altitude (exact), [`best_common_altitude`] where that altitude may be chosen, [`polish`] for relays that differ.
+//!
+//! Everything is f64, in SI units, with x along the ground from Tx (0) to Rx (D); SIRs are linear. As everywhere, a relay
+//! never stands behind the one before it.
+
+mod altitude;
+mod crossing;
+mod hypothetical;
+mod line;
+mod mesh;
+mod optimum;
+mod polish;
+mod raster;
+mod scene;
+mod simplex;
+mod spans;
+mod stages;
+
+pub use altitude::best_common_altitude;
+pub use hypothetical::{Fit, Hypothetical, fit, hypothetical};
+pub use optimum::{Chain, optimum};
+pub use polish::{Polished, polish};
+pub use raster::{Raster, Weighed};
+pub use scene::{Relay, Scene};

@@ -1,0 +1,179 @@
+//! Who speaks and who disturbs: a chain of relays under several interferers whose powers add up.
+
+use uav_relay::Channel;
+use uav_relay::channel::AirGround;
+
+use crate::reference::joint::Band;
+use crate::scenario::{self, Interference, Scenario, Source};
+
+/// One relay of a [`Scene`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Relay {
+    /// Altitude at the start, metres, > 0.
+    pub altitude_m: f64,
+    /// Transmit power, watts, > 0.
+    pub power_w: f64,
+    /// Whether the altitude is its own to hold, whatever the band.
+    pub holds: bool,
+}
+
+/// A chain of relays between Tx at (0, 0) and Rx at (D, 0) under any number of interferers on the ground.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// Distance D from Tx to Rx, metres, > 0.
+    pub distance_m: f64,
+    /// Least distance between two relays, metres, >= 0.
+    pub min_separation_m: f64,
+    /// Transmit power of Tx, watts, > 0.
+    pub tx_w: f64,
+    /// The interferers; at least one.
+    pub sources: Vec<Source>,
+    /// Path-loss factor between two relays, 1/m^2, > 0.
+    pub mu_los: f64,
+    /// Path-loss factor between two places on the ground, 1/m^2, > 0.
+    pub mu_nlos: f64,
+    /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
+    pub eta: f64,
+    /// The altitudes that relays without one of their own may be given.
+    pub band: Band,
+    /// The relays from Tx to Rx; their number is N.
+    pub relays: Vec<Relay>,
+}
+
+impl Scene {
+    /// The scene of `relays` relays in `scenario`.
+    ///
+    /// `None` for a field of interference, and for a channel or a list of interferers that no scenario file can have.
+    pub fn new(scenario: &Scenario, relays: u16) -> Option<Self> {
+        let Interference::Sources(sources) = &scenario.interference else {
+            return None;
+        };
+        let spec = &scenario.channel;
+        let air_ground = match spec.air_ground {
+            scenario::AirGround::Los => AirGround::Los,
+            scenario::AirGround::Nlos => AirGround::Nlos,
+            scenario::AirGround::Weight(weight) => AirGround::Weighted(weight),
+        };
+        let channel = Channel::from_db(
+            spec.carrier_hz,
+            spec.excess_loss_los_db,
+            spec.excess_loss_nlos_db,
+            air_ground,
+        )
+        .ok()?;
+        (!sources.is_empty()).then(|| Self {
+            distance_m: scenario.distance_m,
+            min_separation_m: scenario.min_separation_m,
+            tx_w: scenario.tx_w,
+            sources: sources.clone(),
+            mu_los: channel.mu_los(),
+            mu_nlos: channel.mu_nlos(),
+            eta: channel.eta(),
+            band: Band {
+                least_m: scenario.altitude_min_m,
+                most_m: scenario.altitude_max_m,
+            },
+            relays: (1..=relays).map(|index| relay(scenario, index)).collect(),
+        })
+    }
+
+    /// Interference power that a relay at `x` metres and altitude `h` metres (> 0) receives, watts: the sum over all sources.
+    pub fn interference_w(&self, x: f64, h: f64) -> f64 {
+        let each = self
+            .sources
+            .iter()
+            .map(|source| received_w(source.power_w, self.eta, x - source.x_m, source.y_m, h));
+        each.sum()
+    }
+
+    /// Interference power that Rx receives, watts; infinite with an interferer at Rx.
+    pub fn interference_rx_w(&self) -> f64 {
+        let each = self.sources.iter().map(|source| {
+            let dx = self.distance_m - source.x_m;
+            received_w(source.power_w, self.mu_nlos, dx, source.y_m, 0.0)
+        });
+        each.sum()
+    }
+
+    /// SIR (linear) of the N + 1 hops of a chain whose relay k stands at `places[k - 1]`, (x, h) in metres with h > 0.
+    ///
+    /// Infinite where two relays share a place; empty unless there is one place per relay, and at least one relay.
+    pub fn hop_sirs(&self, places: &[(f64, f64)]) -> Vec<f64> {
+        if places.len() != self.relays.len() {
+            return Vec::new();
+        }
+        let mut from = self.tx();
+        let mut sirs = Vec::with_capacity(places.len() + 1);
+        for (&at, relay) in places.iter().zip(&self.relays) {
+            sirs.push(self.sir_at(from, at));
+            from = self.sender(at, relay);
+        }
+        if let (Some(&last), Some(relay)) = (places.last(), self.relays.last()) {
+            sirs.push(self.sir_at_rx(last, relay));
+        }
+        sirs
+    }
+
+    /// SIR (linear) of the worst hop of a chain; 0 where [`Scene::hop_sirs`] is empty.
+    pub fn chain_sir(&self, places: &[(f64, f64)]) -> f64 {
+        let sirs = self.hop_sirs(places).into_iter();
+        sirs.reduce(f64::min).unwrap_or(0.0)
+    }
+
+    /// Tx, as the one who speaks.
+    pub(super) fn tx(&self) -> Sender {
+        Sender {
+            x: 0.0,
+            h: 0.0,
+            power_w: self.tx_w,
+            factor: self.eta,
+        }
+    }
+
+    /// A relay at (x, h), as the one who speaks to another.
+    pub(super) fn sender(&self, (x, h): (f64, f64), relay: &Relay) -> Sender {
+        Sender {
+            x,
+            h,
+            power_w: relay.power_w,
+            factor: self.mu_los,
+        }
+    }
+
+    /// SIR (linear) at a relay at (x, h), metres.
+    pub(super) fn sir_at(&self, from: Sender, (x, h): (f64, f64)) -> f64 {
+        let signal = received_w(from.power_w, from.factor, x - from.x, 0.0, h - from.h);
+        signal / self.interference_w(x, h)
+    }
+
+    /// SIR (linear) at Rx of what `relay`, the last one, sends from (x, h), metres.
+    pub(super) fn sir_at_rx(&self, (x, h): (f64, f64), relay: &Relay) -> f64 {
+        let signal = received_w(relay.power_w, self.eta, self.distance_m - x, 0.0, h);
+        signal / self.interference_rx_w()
+    }
+}
+
+/// One who speaks to a relay: where, in metres, and how loud.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sender {
+    pub(super) x: f64,
+    pub(super) h: f64,
+    power_w: f64,
+    factor: f64,
+}
+
+/// Relay `index` of a scenario, from 1.
+fn relay(scenario: &Scenario, index: u16) -> Relay {
+    let own = scenario.relays.get(&index);
+    let altitude_m = own.and_then(|own| own.altitude_m);
+    Relay {
+        altitude_m: altitude_m.unwrap_or(scenario.altitude_m),
+        power_w: own.and_then(|own| own.power_w).unwrap_or(scenario.uav_w),
+        holds: altitude_m.is_some(),
+    }
+}
+
+/// Power received over a squared-distance path loss, watts; the offsets in metres.
+fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -> f64 {
+    power_w / (factor * (dx * dx + dy * dy + dz * dz))
+}
