@@ -7,16 +7,18 @@ use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
 use uav_relay::{Band, Channel, Field, FieldPoint, Interferer, Mission, MissionConfig, Profile};
 
+use crate::command::narrow;
 use crate::reference::stochastic::StochasticLink;
 use crate::reference::{Link, Station};
 use crate::scenario::{self, Interference, Scenario, Source};
+use crate::several::{self, Hypothetical, Scene};
 
 /// Why a scenario is no mission.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// It asks for something that is not built yet.
-    NotYet(&'static str),
+    /// No single interferer stands for the scenario's.
+    NoHypothetical,
     /// The relays cannot stand that far apart on that distance.
     NoRoom,
     /// The mission refuses a parameter.
@@ -30,7 +32,7 @@ pub enum Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotYet(what) => write!(f, "{what} not supported yet"),
+            Self::NoHypothetical => f.write_str("no single interferer stands for these [[interferer]]"),
             Self::NoRoom => f.write_str("no placement: (relays - 1) x geometry.min_separation_m is above geometry.distance_m"),
             Self::Mission(error) => error.fmt(f),
             Self::Channel(error) => error.fmt(f),
@@ -41,7 +43,7 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// The mission of `uavs` relays in `scenario`, and what single relays hold of their own (index from 1).
+/// The mission of `uavs` relays in `scenario`, with one interferer for several, and what single relays hold of their own (index from 1).
 ///
 /// # Errors
 /// [`Refusal`] for what the relays cannot do, and for numbers they do not take.
@@ -51,14 +53,15 @@ pub fn mission(
     tolerance: f64,
 ) -> Result<(Mission, Vec<(u16, Profile)>), Refusal> {
     let interference = match &scenario.interference {
-        Interference::Sources(sources) => match sources.as_slice() {
-            [source] => uav_relay::Interference::Source(interferer(source)),
-            _ => {
-                return Err(Refusal::NotYet(
-                    "several [[interferer]] in one scenario are",
-                ));
-            }
-        },
+        Interference::Sources(sources) => {
+            let one = if let [source] = sources.as_slice() {
+                interferer(source)
+            } else {
+                let one = hypothetical(scenario).ok_or(Refusal::NoHypothetical)?;
+                interferer(&one.source())
+            };
+            uav_relay::Interference::Source(one)
+        }
         Interference::Field(spec) => {
             uav_relay::Interference::Field(field(spec).map_err(Refusal::Field)?)
         }
@@ -102,6 +105,16 @@ pub fn mission(
         })
         .collect();
     Ok((mission, profiles))
+}
+
+/// The one interferer that stands for several in a mission; `None` where there are not several, or none stands for them.
+pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
+    match &scenario.interference {
+        Interference::Sources(sources) if sources.len() > 1 => {
+            several::hypothetical(&Scene::new(scenario, 1)?)
+        }
+        _ => None,
+    }
 }
 
 /// The relays that hold an altitude of their own, by index from 1.
@@ -194,15 +207,6 @@ fn interferer(source: &Source) -> Interferer {
         x_m: narrow(source.x_m),
         y_m: narrow(source.y_m),
     }
-}
-
-/// The nearest f32: what a relay works with.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "the ranges of a scenario lie well inside those of an f32"
-)]
-fn narrow(value: f64) -> f32 {
-    value as f32
 }
 
 /// The mission of a reference link, and what single relays hold of their own; `None` where a relay would refuse its numbers.

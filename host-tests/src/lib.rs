@@ -2,7 +2,9 @@
 
 pub mod brief;
 pub mod cases;
+pub mod command;
 pub mod firmware;
+pub mod plan;
 pub mod random;
 pub mod reference;
 pub mod report;

@@ -403,3 +403,18 @@ fn relays_of_a_scenario_keep_what_they_hold() {
         4
     );
 }
+
+/// One interferer stands for several; what that does to the places is the planner's to say.
+#[test]
+fn several_interferers_are_flown_as_one_and_a_note_says_so() {
+    let several = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/several.toml");
+    let output = chain(&["--json", "--uavs", "3", "--scenario", several]);
+    assert!(output.status.success());
+    let note = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        note.starts_with("note: one interferer of 79.4") && note.lines().count() == 1,
+        "{note}"
+    );
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(report["sir"].as_f64().unwrap() > 0.1, "{report}");
+}

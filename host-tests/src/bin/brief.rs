@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
+use host_tests::command::{self, Failure};
 use host_tests::firmware::block::Flight;
 use host_tests::firmware::config::{ADDRESS, LEN};
 use host_tests::scenario::{Interference, Scenario};
@@ -63,40 +64,13 @@ fn explore(text: &str) -> Result<f32, String> {
 }
 
 fn main() -> ExitCode {
-    let options = match Options::try_parse() {
-        Ok(options) => options,
-        Err(error) => return usage(&error),
-    };
-    match run(&options) {
-        Ok(line) => {
-            println!("{line}");
-            ExitCode::SUCCESS
+    match Options::try_parse() {
+        Ok(options) => {
+            let line = run(&options).map(|line| println!("{line}"));
+            command::ended(line.map_err(Failure::input))
         }
-        Err(line) => {
-            eprintln!("{line}");
-            ExitCode::from(2)
-        }
+        Err(error) => command::usage(&error),
     }
-}
-
-/// Help as it is; of an error only the line that says what is wrong.
-fn usage(error: &clap::Error) -> ExitCode {
-    if !error.use_stderr() {
-        print!("{error}");
-        return ExitCode::SUCCESS;
-    }
-    let text = error.to_string();
-    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
-    let mut wrong = lines.next().unwrap_or("wrong options").to_owned();
-    // Options that are missing are listed below the first line.
-    if wrong.ends_with(':') {
-        for missing in lines.take_while(|line| line.starts_with("  ")) {
-            wrong.push(' ');
-            wrong.push_str(missing.trim());
-        }
-    }
-    eprintln!("{}", wrong.trim_start_matches("error: "));
-    ExitCode::from(2)
 }
 
 fn run(options: &Options) -> Result<String, String> {

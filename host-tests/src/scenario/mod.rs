@@ -151,6 +151,16 @@ impl Default for Scenario {
 }
 
 impl Scenario {
+    /// Every interferer, as a picture wants it: power in watts, place along x and offset y in metres; none in a field.
+    pub fn sources(&self) -> Vec<(f64, f64, f64)> {
+        match &self.interference {
+            Interference::Sources(sources) => {
+                sources.iter().map(|s| (s.power_w, s.x_m, s.y_m)).collect()
+            }
+            Interference::Field(_) => Vec::new(),
+        }
+    }
+
     /// Reads a scenario file of at most 1 MiB.
     ///
     /// # Errors

@@ -2,12 +2,13 @@
 
 mod options;
 
-use std::io::{IsTerminal as _, Write as _};
+use std::io::IsTerminal as _;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::{Parser as _, ValueEnum as _};
 use host_tests::brief::{self, Refusal};
+use host_tests::command::{self, Failure, narrow};
 use host_tests::random::beta::beta_w;
 use host_tests::report::ChainReport;
 use host_tests::scenario::{Interference, Scenario};
@@ -19,50 +20,13 @@ use host_tests::svg::{self, Picture};
 use indicatif::{ProgressBar, ProgressStyle};
 use uav_relay::{Measure, Mission, Schedule};
 
-use options::{Method, Options, narrow};
-
-/// Why there is no result: the one line on standard error, and the exit status.
-struct Failure {
-    status: u8,
-    line: String,
-}
-
-impl Failure {
-    fn input(line: impl Into<String>) -> Self {
-        Self {
-            status: 2,
-            line: line.into(),
-        }
-    }
-}
+use options::{Method, Options};
 
 fn main() -> ExitCode {
-    let options = match Options::try_parse() {
-        Ok(options) => options,
-        Err(error) => return usage(&error),
-    };
-    match run(&options) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("{}", failure.line);
-            ExitCode::from(failure.status)
-        }
+    match Options::try_parse() {
+        Ok(options) => command::ended(run(&options)),
+        Err(error) => command::usage(&error),
     }
-}
-
-/// Help as it is; of an error only the line that says what is wrong.
-fn usage(error: &clap::Error) -> ExitCode {
-    if !error.use_stderr() {
-        print!("{error}");
-        return ExitCode::SUCCESS;
-    }
-    let text = error.to_string();
-    let wrong = text
-        .lines()
-        .find(|line| !line.trim().is_empty())
-        .unwrap_or("wrong options");
-    eprintln!("{}", wrong.trim_start_matches("error: "));
-    ExitCode::from(2)
 }
 
 fn run(options: &Options) -> Result<(), Failure> {
@@ -96,13 +60,8 @@ fn run(options: &Options) -> Result<(), Failure> {
     let outcome = fly(options, &scenario, setup)?;
     let report = ChainReport::new(&method, &mission, &outcome, options.seed);
     if let Some(file) = &options.svg {
-        let drawing = svg::draw(&picture(&method, &mission, &scenario, &outcome, &report));
-        std::fs::write(file, drawing).map_err(|error| {
-            Failure::input(format!(
-                "{}: --svg cannot be written: {error}",
-                file.display()
-            ))
-        })?;
+        let picture = picture(&method, &mission, &scenario, &outcome, &report);
+        command::write(file, &svg::draw(&picture))?;
     }
     show(options, &report)
 }
@@ -134,6 +93,13 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
             format!("--method {method} needs a --scenario with a [field] of interference")
         };
         return Err(Failure::input(line));
+    }
+    if let Some(one) = brief::hypothetical(scenario) {
+        eprintln!(
+            "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m stands for all, and SIRs are against it; `cargo plan` has what \
+             its places are worth against all",
+            one.power_w, one.x_m, one.y_m
+        );
     }
     for index in scenario
         .relays
@@ -249,18 +215,12 @@ fn picture(
     outcome: &Outcome,
     report: &ChainReport,
 ) -> Picture {
-    let interferers = match &scenario.interference {
-        Interference::Sources(sources) => {
-            sources.iter().map(|s| (s.power_w, s.x_m, s.y_m)).collect()
-        }
-        Interference::Field(_) => Vec::new(),
-    };
     let mut hop_sir: Vec<f64> = report.relays.iter().map(|relay| relay.sir).collect();
     hop_sir.extend(report.rx_sir);
     Picture {
         title_method: method.to_owned(),
         distance_m: f64::from(mission.config().distance_m),
-        interferers,
+        interferers: scenario.sources(),
         nodes: report
             .relays
             .iter()
@@ -277,20 +237,13 @@ fn picture(
 
 /// Prints the report; what it says went wrong is the failure.
 fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
-    let text = if options.json {
-        serde_json::to_string(report)
-            .map(|json| json + "\n")
-            .map_err(|error| Failure::input(error.to_string()))?
+    command::print(&if options.json {
+        command::json(report)?
     } else {
         report.table()
-    };
-    // A reader that has had enough, such as `head`, is no fault of the chain.
-    _ = std::io::stdout().write_all(text.as_bytes());
+    });
     match &report.error {
         None => Ok(()),
-        Some(error) => Err(Failure {
-            status: 1,
-            line: error.clone(),
-        }),
+        Some(error) => Err(Failure::unmet(error.clone())),
     }
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
+use host_tests::command::{narrow, number};
 
 /// N simulated relays exchange real frames over simulated serial links until they hold the places that make the worst hop
 /// as good as it can be.
@@ -96,27 +97,8 @@ pub(crate) struct Kill {
     pub(crate) at: uav_relay::Instant,
 }
 
-fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
-    let range = || format!("must be a number within {least:?} to {most:?}");
-    let value: f64 = text.parse().map_err(|_| range())?;
-    if (least..=most).contains(&value) {
-        Ok(value)
-    } else {
-        Err(range())
-    }
-}
-
 fn probability(text: &str) -> Result<f64, String> {
     number(text, 0.0, 0.9)
-}
-
-/// The nearest f32: what a relay works with.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "the ranges lie well inside those of an f32"
-)]
-pub(crate) fn narrow(value: f64) -> f32 {
-    value as f32
 }
 
 fn grid(text: &str) -> Result<uav_relay::Local, String> {

@@ -1,0 +1,113 @@
+//! What the commands have in common: how they refuse, and numbers from the command line.
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+/// Why there is no result: the one line on standard error, and the exit status.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Failure {
+    /// 1: it ran, but nothing meets what was asked. 2: the input is wrong.
+    pub status: u8,
+    /// What is wrong, in one line.
+    pub line: String,
+}
+
+impl Failure {
+    /// The input is wrong.
+    pub fn input(line: impl Into<String>) -> Self {
+        Self {
+            status: 2,
+            line: line.into(),
+        }
+    }
+
+    /// Nothing meets what was asked.
+    pub fn unmet(line: impl Into<String>) -> Self {
+        Self {
+            status: 1,
+            line: line.into(),
+        }
+    }
+}
+
+/// The exit status of a command, after the line on standard error where it failed.
+pub fn ended(result: Result<(), Failure>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("{}", failure.line);
+            ExitCode::from(failure.status)
+        }
+    }
+}
+
+/// Help as it is; of an error only the line that says what is wrong.
+pub fn usage(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        print!("{error}");
+        return ExitCode::SUCCESS;
+    }
+    let text = error.to_string();
+    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
+    let mut wrong = lines.next().unwrap_or("wrong options").to_owned();
+    // Options that are missing are listed below the first line.
+    if wrong.ends_with(':') {
+        for missing in lines.take_while(|line| line.starts_with("  ")) {
+            wrong.push(' ');
+            wrong.push_str(missing.trim());
+        }
+    }
+    eprintln!("{}", wrong.trim_start_matches("error: "));
+    ExitCode::from(2)
+}
+
+/// Prints `text`. A reader that has had enough, such as `head`, is no fault of the command.
+pub fn print(text: &str) {
+    _ = std::io::stdout().write_all(text.as_bytes());
+}
+
+/// A report as one JSON object.
+///
+/// # Errors
+/// A number that JSON does not have.
+pub fn json(report: &impl serde::Serialize) -> Result<String, Failure> {
+    serde_json::to_string(report)
+        .map(|json| json + "\n")
+        .map_err(|error| Failure::input(error.to_string()))
+}
+
+/// Writes the picture that `--svg` asks for.
+///
+/// # Errors
+/// Names the file, and why it cannot be written.
+pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
+    std::fs::write(file, drawing).map_err(|error| {
+        Failure::input(format!(
+            "{}: --svg cannot be written: {error}",
+            file.display()
+        ))
+    })
+}
+
+/// A number of the command line, within `least` to `most`.
+///
+/// # Errors
+/// The range, where it is not one of them.
+pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
+    let range = || format!("must be a number within {least:?} to {most:?}");
+    let value: f64 = text.parse().map_err(|_| range())?;
+    if (least..=most).contains(&value) {
+        Ok(value)
+    } else {
+        Err(range())
+    }
+}
+
+/// The nearest f32: what a relay works with.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the ranges of options and scenarios lie well inside those of an f32"
+)]
+pub fn narrow(value: f64) -> f32 {
+    value as f32
+}

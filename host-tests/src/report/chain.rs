@@ -1,0 +1,289 @@
+//! The report of a simulated chain.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+use uav_relay::placement::promise::is_most;
+use uav_relay::{Interference, Mission};
+
+use super::{RelayReport, db, hop_sirs};
+use crate::sim::outcome::{Ending, Outcome};
+
+/// What happened to frames.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct FaultReport {
+    /// Frames that never arrived.
+    pub lost: u64,
+    /// Frames that arrived changed.
+    pub corrupted: u64,
+    /// Frames that arrived twice.
+    pub duplicated: u64,
+    /// Frames that others could overtake.
+    pub reordered: u64,
+    /// Frames the relays refused, for whatever reason.
+    pub rejected: u64,
+}
+
+/// A relay whose silence was noticed.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct SilenceReport {
+    /// The relay that went silent.
+    pub silent: u16,
+    /// The neighbour that noticed.
+    pub noticed_by: u16,
+    /// When it had been silent for long enough, s of virtual time.
+    pub at_s: f64,
+}
+
+/// The result of `cargo chain`.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct ChainReport {
+    /// The method, as on the command line.
+    pub method: String,
+    /// Number of relays.
+    pub uavs: u16,
+    /// What went wrong, if anything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    /// The most that could be had, where nothing could be placed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub best_sir: Option<f64>,
+    /// SIR of the worst hop, linear; absent unless every relay has its place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir: Option<f64>,
+    /// The same in dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir_db: Option<f64>,
+    /// The target the relays agreed on, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<f64>,
+    /// In a field: whether no chain of equals can have a higher target. False means that it is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub promised: Option<bool>,
+    /// SIR of the chain before Algorithm 2 and after each of its rounds, linear.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rounds: Vec<f64>,
+    /// The relays that have a place, from the transmitter on.
+    pub relays: Vec<RelayReport>,
+    /// SIR at the receiver, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rx_sir: Option<f64>,
+    /// The same in dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rx_sir_db: Option<f64>,
+    /// Forward passes along the chain.
+    pub sweeps: u32,
+    /// Frames put on any link.
+    pub messages: u64,
+    /// Bytes put on any link.
+    pub bytes: u64,
+    /// Virtual time the run took, s.
+    pub virtual_s: f64,
+    /// What happened to frames.
+    pub faults: FaultReport,
+    /// Whose silence was noticed by whom.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub silences: Vec<SilenceReport>,
+    /// Seed of every random draw.
+    pub seed: u64,
+}
+
+impl ChainReport {
+    /// The report of a run.
+    pub fn new(method: &str, mission: &Mission, outcome: &Outcome, seed: u64) -> Self {
+        let places: Option<Vec<_>> = outcome
+            .relays
+            .iter()
+            .map(|relay| Some((relay.setpoint?, relay.profile)))
+            .collect();
+        let places = places.unwrap_or_default();
+        let sirs = hop_sirs(mission, &places);
+        let worst = sirs.iter().copied().reduce(f64::min);
+        let relays = super::relays(&places, &sirs);
+        let rx_sir = sirs.last().copied();
+        let injected = outcome.injected;
+        let target = outcome.relays.first().and_then(|head| head.target);
+        let promised = match (mission.interference(), target, places.first()) {
+            (Interference::Field(_), Some(target), Some((head, _))) => {
+                let common = mission.config().common;
+                let equals = places.iter().all(|(_, profile)| *profile == common);
+                Some(equals && is_most(mission, target, head.x_m))
+            }
+            _ => None,
+        };
+        Self {
+            method: method.to_owned(),
+            uavs: mission.relays(),
+            error: error(method, outcome),
+            // A fixed step may have stepped over what there is.
+            best_sir: (outcome.ending == Ending::Infeasible && !method.ends_with("-step"))
+                .then_some(0.0),
+            sir: worst,
+            sir_db: worst.map(db),
+            target: target.map(f64::from),
+            promised,
+            rounds: outcome.rounds.iter().copied().map(f64::from).collect(),
+            relays,
+            rx_sir,
+            rx_sir_db: rx_sir.map(db),
+            sweeps: outcome.sweeps,
+            messages: outcome.messages,
+            bytes: outcome.bytes,
+            virtual_s: seconds(outcome.ended),
+            faults: FaultReport {
+                lost: injected.lost,
+                corrupted: injected.corrupted,
+                duplicated: injected.duplicated,
+                reordered: injected.reordered,
+                rejected: outcome
+                    .relays
+                    .iter()
+                    .map(|relay| u64::from(relay.stats.rejected()))
+                    .sum(),
+            },
+            silences: silences(outcome),
+            seed,
+        }
+    }
+
+    /// The report of a run that could not be started.
+    pub fn refused(method: &str, uavs: u16, seed: u64, why: &str) -> Self {
+        Self {
+            method: method.to_owned(),
+            uavs,
+            error: Some(why.to_owned()),
+            best_sir: None,
+            sir: None,
+            sir_db: None,
+            target: None,
+            promised: None,
+            rounds: Vec::new(),
+            relays: Vec::new(),
+            rx_sir: None,
+            rx_sir_db: None,
+            sweeps: 0,
+            messages: 0,
+            bytes: 0,
+            virtual_s: 0.0,
+            faults: FaultReport {
+                lost: 0,
+                corrupted: 0,
+                duplicated: 0,
+                reordered: 0,
+                rejected: 0,
+            },
+            silences: Vec::new(),
+            seed,
+        }
+    }
+
+    /// The report as a table to read, and what it cost.
+    pub fn table(&self) -> String {
+        let mut text = super::hops_table(&self.relays, self.rx_sir);
+        if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
+            _ = writeln!(
+                text,
+                "worst hop: SIR {sir:.6} ({sir_db:.3} dB) with {} relays by `{}`",
+                self.uavs, self.method
+            );
+        }
+        match self.promised {
+            Some(true) => {
+                _ = writeln!(text, "no chain of equals can have more in this field");
+            }
+            Some(false) => {
+                _ = writeln!(
+                    text,
+                    "this field is uneven: that no chain can have more is not certain"
+                );
+            }
+            None => {}
+        }
+        if let (Some(first), Some(last)) = (self.rounds.first(), self.rounds.last()) {
+            _ = writeln!(
+                text,
+                "Algorithm 2: {} rounds, from SIR {first:.6} to {last:.6}",
+                self.rounds.len() - 1
+            );
+        }
+        _ = writeln!(
+            text,
+            "cost: {} sweeps, {} messages, {} bytes, {:.3} s of virtual time",
+            self.sweeps, self.messages, self.bytes, self.virtual_s
+        );
+        let faults = self.faults;
+        if faults.lost + faults.corrupted + faults.duplicated + faults.reordered + faults.rejected
+            > 0
+        {
+            _ = writeln!(
+                text,
+                "faults: {} lost, {} corrupted, {} duplicated, {} reordered; {} frames rejected (seed {})",
+                faults.lost,
+                faults.corrupted,
+                faults.duplicated,
+                faults.reordered,
+                faults.rejected,
+                self.seed
+            );
+        }
+        for silence in &self.silences {
+            _ = writeln!(
+                text,
+                "relay {} noticed at {:.3} s that relay {} is silent",
+                silence.noticed_by, silence.at_s, silence.silent
+            );
+        }
+        text
+    }
+}
+
+fn seconds(at: uav_relay::Instant) -> f64 {
+    at.as_micros() as f64 / 1e6
+}
+
+/// Who noticed the relays that really went silent; over a bad link a living one may be missed for a while as well.
+fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
+    let noticed = outcome
+        .noticed
+        .iter()
+        .map(|(&(by, side), &at)| SilenceReport {
+            silent: match side {
+                uav_relay::Side::Upstream => by.saturating_sub(1),
+                uav_relay::Side::Downstream => by.saturating_add(1),
+            },
+            noticed_by: by,
+            at_s: seconds(at),
+        });
+    let killed = |index: u16| {
+        let at = usize::from(index).checked_sub(1);
+        at.and_then(|at| outcome.relays.get(at))
+            .is_some_and(|relay| relay.killed.is_some())
+    };
+    noticed.filter(|silence| killed(silence.silent)).collect()
+}
+
+fn error(method: &str, outcome: &Outcome) -> Option<String> {
+    match outcome.ending {
+        Ending::Settled => None,
+        Ending::Infeasible if method.ends_with("-step") => Some(
+            "none of the targets that the fixed step takes can be met; a smaller one may find one"
+                .to_owned(),
+        ),
+        Ending::Infeasible => Some("no placement gives every hop an SIR above 0".to_owned()),
+        Ending::Broken => {
+            let silent: Vec<String> = (1..)
+                .zip(&outcome.relays)
+                .filter(|(_, relay): &(u16, _)| relay.killed.is_some())
+                .map(|(index, _)| index.to_string())
+                .collect();
+            Some(format!(
+                "the chain is broken: relay {} went silent",
+                silent.join(", ")
+            ))
+        }
+        Ending::OutOfTime => Some(format!(
+            "the chain had not settled after {:.0} s",
+            seconds(outcome.ended)
+        )),
+    }
+}

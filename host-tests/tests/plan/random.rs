@@ -1,0 +1,217 @@
+//! Random scenarios of every kind: plans keep every limit, and what is said to be proven is.
+
+use std::collections::BTreeMap;
+
+use host_tests::plan::{Ask, NoPlan, Number, Plan, plan};
+use host_tests::random::{self, Chain, Style, log_uniform};
+use host_tests::reference::{Link, Station};
+use host_tests::scenario::{
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
+};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn round(value: f64) -> f64 {
+    f64::from(value as f32)
+}
+
+/// A scenario with one interferer, several, or a field; a band; a separation in half; relays of their own in a third.
+fn scenario(rng: &mut impl Rng) -> Scenario {
+    let style = Style {
+        relays: 1..=1,
+        chain: Chain::Alike,
+    };
+    let link = random::link(rng, &style);
+    let altitude_m = round(link.relays[0].altitude_m);
+    let d = round(link.distance_m);
+    let source = |rng: &mut ChaCha8Rng| {
+        let link = random::link(rng, &style);
+        let scale = d / link.distance_m;
+        Source {
+            power_w: round(link.interferer_w),
+            x_m: round(link.x_i * scale),
+            y_m: round(link.y_i * scale),
+        }
+    };
+    let mut own = ChaCha8Rng::seed_from_u64(rng.random());
+    let interference = match rng.random_range(0..6) {
+        0 => Interference::Field(Field {
+            i_max_w: log_uniform(rng, 1e-12, 1e-6),
+            beta: (0..rng.random_range(1..6))
+                .map(|at| BetaPoint {
+                    x_m: round(d * (f64::from(at) / 4.0 + rng.random_range(0.0..0.2))),
+                    alpha: 1.0 + log_uniform(rng, 0.05, 20.0),
+                    beta: log_uniform(rng, 0.5, 20.0),
+                })
+                .collect(),
+        }),
+        1 | 2 => Interference::Sources(
+            (0..rng.random_range(2..5))
+                .map(|_| source(&mut own))
+                .collect(),
+        ),
+        _ => Interference::Sources(vec![source(&mut own)]),
+    };
+    let relays = if rng.random_bool(0.33) {
+        let one = RelayOverride {
+            altitude_m: rng
+                .random_bool(0.5)
+                .then(|| altitude_m * rng.random_range(0.7..1.5)),
+            power_w: Some(round(link.relays[0].power_w * rng.random_range(0.5..2.0))),
+        };
+        BTreeMap::from([(rng.random_range(1..5), one)])
+    } else {
+        BTreeMap::new()
+    };
+    Scenario {
+        distance_m: d,
+        altitude_m,
+        altitude_min_m: round((altitude_m * rng.random_range(0.5..1.0)).max(0.2)).min(altitude_m),
+        altitude_max_m: round(altitude_m * rng.random_range(1.0..6.0)).max(altitude_m),
+        min_separation_m: if rng.random() {
+            0.0
+        } else {
+            round(d * log_uniform(rng, 1e-4, 0.05))
+        },
+        tx_w: round(link.tx_w),
+        uav_w: round(link.relays[0].power_w),
+        channel: ChannelSpec {
+            air_ground: AirGround::Weight(rng.random_range(0.0..=1.0)),
+            ..ChannelSpec::default()
+        },
+        interference,
+        relays,
+    }
+}
+
+fn ask(rng: &mut impl Rng) -> Ask {
+    let number = if rng.random_bool(0.7) {
+        Number::Of(rng.random_range(1..=12))
+    } else {
+        Number::Meeting(log_uniform(rng, 1e-3, 30.0))
+    };
+    Ask {
+        number,
+        free_altitude: rng.random_bool(0.3),
+        x_m: None,
+        tolerance: 1e-4,
+    }
+}
+
+/// The scenario with its one interferer as the judge's link of `n` relays at the given altitude.
+fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
+    let Interference::Sources(sources) = &scenario.interference else {
+        return None;
+    };
+    let [source] = sources.as_slice() else {
+        return None;
+    };
+    let channel = plan.mission.config().channel;
+    Some(Link {
+        distance_m: scenario.distance_m,
+        min_separation_m: scenario.min_separation_m,
+        tx_w: scenario.tx_w,
+        interferer_w: source.power_w,
+        x_i: source.x_m,
+        y_i: source.y_m,
+        mu_los: channel.mu_los(),
+        mu_nlos: channel.mu_nlos(),
+        eta: channel.eta(),
+        relays: vec![
+            Station {
+                altitude_m: scenario.altitude_m,
+                power_w: scenario.uav_w,
+            };
+            n
+        ],
+    })
+}
+
+#[test]
+fn plans_keep_every_limit_and_what_is_proven_is() {
+    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(701));
+    let (mut planned, mut unmet, mut proven, mut one_proven) = (0, 0, 0, 0);
+    let count = std::env::var("COUNT")
+        .ok()
+        .and_then(|text| text.parse().ok());
+    for _ in 0..count.unwrap_or(250) {
+        let scenario = scenario(&mut rng);
+        let ask = ask(&mut rng);
+        let plan = match plan(&scenario, &ask) {
+            Ok(plan) => plan,
+            Err(NoPlan::Unmet(why, best)) => {
+                assert!(!why.is_empty() && best.is_none_or(|best| best.is_finite() && best >= 0.0));
+                unmet += 1;
+                continue;
+            }
+            Err(NoPlan::Wrong(line)) => panic!("{line}: {scenario:?}"),
+        };
+        planned += 1;
+        proven += usize::from(plan.proven);
+        keeps_the_limits(&scenario, &ask, &plan);
+        if let Number::Meeting(target) = ask.number {
+            assert!(
+                plan.sir() >= target * (1.0 - 1e-4),
+                "{} {target} {scenario:?}",
+                plan.sir()
+            );
+        }
+        let alike = scenario.relays.is_empty();
+        if plan.proven
+            && alike
+            && !ask.free_altitude
+            && let Some(link) = judged(&scenario, &plan, plan.places.len())
+        {
+            one_proven += 1;
+            match ask.number {
+                Number::Of(_) => {
+                    let optimum = link.optimum().unwrap();
+                    let short = 1.0 - plan.sir() / optimum;
+                    assert!(short.abs() < 3e-4, "{short:e} {scenario:?}");
+                }
+                Number::Meeting(target) => {
+                    let n = plan.places.len() - 1;
+                    let fewer = judged(&scenario, &plan, n).unwrap();
+                    assert!(
+                        n == 0 || fewer.feasible(target * (1.0 + 1e-4)).is_none(),
+                        "{scenario:?}"
+                    );
+                }
+            }
+        }
+    }
+    println!(
+        "{planned} plans, {proven} of them proven, {one_proven} held against a judge; {unmet} that cannot be had"
+    );
+    assert!(planned > 150 && unmet > 10 && proven > 80 && one_proven > 30);
+}
+
+fn keeps_the_limits(scenario: &Scenario, ask: &Ask, plan: &Plan) {
+    assert_eq!(plan.sirs.len(), plan.places.len() + 1);
+    assert!(
+        plan.sirs.iter().all(|sir| sir.is_finite() && *sir > 0.0),
+        "{:?}",
+        plan.sirs
+    );
+    let mut before: Option<(f64, f64)> = None;
+    for (index, (place, _)) in (1_u16..).zip(&plan.places) {
+        let (x, h) = (f64::from(place.x_m), f64::from(place.altitude_m));
+        assert!((0.0..=scenario.distance_m).contains(&x), "{x} {scenario:?}");
+        let own = scenario.relays.get(&index).and_then(|own| own.altitude_m);
+        match own {
+            Some(held) => assert!((h / held - 1.0).abs() < 1e-6, "{h} {held}"),
+            None if ask.free_altitude => {
+                let band =
+                    scenario.altitude_min_m * 0.999_999..=scenario.altitude_max_m * 1.000_001;
+                assert!(band.contains(&h), "{h} {scenario:?}");
+            }
+            None => assert!((h / scenario.altitude_m - 1.0).abs() < 1e-6),
+        }
+        if let Some((x0, h0)) = before {
+            let apart = (x - x0).hypot(h - h0);
+            let least = scenario.min_separation_m * (1.0 - 1e-5) - 1e-7 * scenario.distance_m;
+            assert!(apart >= least && x >= x0, "{apart} {plan:?} {scenario:?}");
+        }
+        before = Some((x, h));
+    }
+}
