@@ -1,8 +1,10 @@
 //! A chain of relays simulated on a PC, and what the tools and tests of uav-relay share.
 
+pub mod baseline;
 pub mod brief;
 pub mod cases;
 pub mod command;
+pub mod figures;
 pub mod firmware;
 pub mod plan;
 pub mod random;

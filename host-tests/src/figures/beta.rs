@@ -1,0 +1,103 @@
+//! The paper's figure of Beta distributions: what the interference power, as a part of its largest value, may look like.
+
+use libm::lgamma;
+use serde::Serialize;
+use uav_relay::field::beta_upsilon;
+
+use super::chart::{Axis, Chart, Line, Look};
+use super::sheet::{Sheet, Table};
+use super::trouble::Trouble;
+
+/// The shapes that are drawn, alpha and beta.
+pub const SHAPES: [(f64, f64); 5] = [(1.5, 4.0), (2.0, 2.0), (3.0, 1.2), (4.0, 8.0), (8.0, 4.0)];
+
+/// Steps along the axis from 0 to 1.
+pub const STEPS: u32 = 100;
+
+/// One point of one density.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Row {
+    /// First shape.
+    pub alpha: f64,
+    /// Second shape.
+    pub beta: f64,
+    /// E[`I_max` / I], as relays take it: Upsilon times `I_max`.
+    pub upsilon_times_i_max: f64,
+    /// I / `I_max`, 0 to 1.
+    pub interference_over_i_max: f64,
+    /// Probability density there.
+    pub density: f64,
+}
+
+/// The densities at `steps` + 1 places each, from 0 to 1.
+pub fn data(steps: u32) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for (alpha, beta) in SHAPES {
+        let Some(upsilon_times_i_max) = beta_upsilon(alpha, beta, 1.0) else {
+            continue;
+        };
+        for step in 0..=steps {
+            let y = f64::from(step) / f64::from(steps);
+            rows.push(Row {
+                alpha,
+                beta,
+                upsilon_times_i_max,
+                interference_over_i_max: y,
+                density: density(alpha, beta, y),
+            });
+        }
+    }
+    rows
+}
+
+/// y^(alpha - 1) (1 - y)^(beta - 1) / B(alpha, beta); both shapes above 1.
+fn density(alpha: f64, beta: f64, y: f64) -> f64 {
+    let scale = lgamma(alpha + beta) - lgamma(alpha) - lgamma(beta);
+    scale.exp() * y.powf(alpha - 1.0) * (1.0 - y).powf(beta - 1.0)
+}
+
+/// The figure.
+///
+/// # Errors
+/// Never in practice: see [`Trouble`].
+pub fn sheet() -> Result<Sheet, Trouble> {
+    let rows = data(STEPS);
+    let lines = SHAPES
+        .iter()
+        .enumerate()
+        .map(|(index, &(alpha, beta))| {
+            let of = rows
+                .iter()
+                .filter(|row| (row.alpha, row.beta) == (alpha, beta));
+            let points: Vec<_> = of
+                .map(|row| (row.interference_over_i_max, row.density))
+                .collect();
+            Line::new(
+                &format!("α = {alpha}, β = {beta}"),
+                Look::number(index).spaced(),
+                points,
+            )
+        })
+        .collect();
+    Ok(Sheet {
+        name: "beta",
+        title: "Beta distributions of the interference power",
+        says: vec![
+            "A relay needs one number of such a distribution: Upsilon = E[1/I], in the table as a \
+             multiple of 1 / I_max."
+                .to_owned(),
+        ],
+        taken: vec![
+            "the paper's shapes are only in its picture; these are chosen, all with alpha above \
+             1, without which E[1/I] is infinite"
+                .to_owned(),
+        ],
+        chart: Chart::of(
+            Axis::linear("interference power, part of its largest").between(0.0, 1.0),
+            Axis::linear("probability density"),
+            lines,
+        ),
+        tables: vec![Table::new("beta", &rows)?],
+        shown: Vec::new(),
+    })
+}

@@ -1,0 +1,258 @@
+//! A chart as an SVG document, for half a page: on 8 cm of paper its smallest letters are 6.5 points high.
+
+use std::fmt::Display;
+
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::chart::{Chart, Line, Look, Panel, Signs, Stroke};
+use super::scale::Scale;
+use super::signs::{self, Sign};
+
+/// Width of every picture, in its own units: 960 of them are 8 cm.
+const WIDTH: u32 = 960;
+/// Height of one panel, its axis titles included.
+const PANEL: u32 = 560;
+/// Height of a panel among several.
+const PANEL_OF_SEVERAL: u32 = 470;
+/// Height of one row of the legend.
+const ROW: u32 = 44;
+/// Above and below the legend.
+const GAP: u32 = 10;
+/// Width that a letter takes, about.
+const LETTER: u32 = 17;
+/// From the beginning of an entry of the legend to its words.
+const SAMPLE: u32 = 104;
+
+const FONT: &str = "Helvetica, Arial, 'DejaVu Sans', sans-serif";
+/// The backend takes a factor of 1.24 off.
+const LETTERS: f64 = 28.0 * 1.24;
+const INK: RGBColor = RGBColor(34, 34, 34);
+const GRID: RGBColor = RGBColor(205, 205, 205);
+const FINE_GRID: RGBColor = RGBColor(236, 236, 236);
+/// Width of a line, in units.
+const PEN: u32 = 4;
+/// From one sign of a line to the next where they are spaced, in units.
+const APART: f64 = 105.0;
+/// How much later the signs of each further line begin, in units.
+const APART_BY_HUE: u8 = 25;
+
+/// Why a chart could not be drawn, in the words of the backend.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct NotDrawn(pub String);
+
+impl NotDrawn {
+    fn from(error: impl Display) -> Self {
+        Self(error.to_string())
+    }
+}
+
+/// Draws `chart`, whose `title` a screen reader says.
+///
+/// # Errors
+/// [`NotDrawn`] where the backend fails, or a number does not belong on its axis.
+pub fn draw(chart: &Chart, title: &str) -> Result<String, NotDrawn> {
+    if !chart.is_drawable() {
+        return Err(NotDrawn("a number does not belong on its axis".to_owned()));
+    }
+    let entries = entries(chart);
+    let columns = columns(&entries);
+    let rows = u32::try_from(entries.len().div_ceil(columns)).unwrap_or(u32::MAX);
+    let panel = match chart.panels.len() {
+        1 => PANEL,
+        _ => PANEL_OF_SEVERAL,
+    };
+    let plots = panel * u32::try_from(chart.panels.len()).unwrap_or(1);
+    let height = plots + rows * ROW + 2 * GAP;
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
+        root.fill(&WHITE).map_err(NotDrawn::from)?;
+        let (above, below) = root.split_vertically(plots);
+        for (area, panel) in above
+            .split_evenly((chart.panels.len(), 1))
+            .iter()
+            .zip(&chart.panels)
+        {
+            draw_panel(area, panel)?;
+        }
+        draw_legend(&below, &entries, columns)?;
+        root.present().map_err(NotDrawn::from)?;
+    }
+    Ok(with_title(&svg, title))
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+
+fn letters(colour: RGBColor) -> TextStyle<'static> {
+    (FONT, LETTERS).into_font().color(&colour)
+}
+
+fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), NotDrawn> {
+    let points = || panel.lines.iter().flat_map(|line| &line.points);
+    let x = panel.x.scale(points().map(|point| point.0));
+    let y = panel.y.scale(points().map(|point| point.1));
+    let mut builder = ChartBuilder::on(area);
+    builder
+        .margin_top(16)
+        .margin_left(8)
+        .margin_right(48)
+        .x_label_area_size(92)
+        .y_label_area_size(128);
+    if !panel.heading.is_empty() {
+        builder.caption(&panel.heading, letters(INK));
+    }
+    let mut plot = builder.build_cartesian_2d(x, y).map_err(NotDrawn::from)?;
+    plot.configure_mesh()
+        .bold_line_style(GRID.stroke_width(2))
+        .light_line_style(FINE_GRID.stroke_width(2))
+        .axis_style(INK.stroke_width(3))
+        .label_style(letters(INK))
+        .axis_desc_style(letters(INK))
+        .set_all_tick_mark_size(8)
+        .x_label_formatter(&|value| x.label(*value))
+        .y_label_formatter(&|value| y.label(*value))
+        .x_desc(&panel.x.title)
+        .y_desc(&panel.y.title)
+        .draw()
+        .map_err(NotDrawn::from)?;
+    for line in &panel.lines {
+        draw_line(&mut plot, line)?;
+    }
+    Ok(())
+}
+
+type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Scale, Scale>>;
+
+fn draw_line(plot: &mut Plot<'_, '_>, line: &Line) -> Result<(), NotDrawn> {
+    let colour = signs::colour(line.look.hue);
+    let points = line.points.iter().copied();
+    match dash(line.look.stroke) {
+        None => {}
+        Some((_, 0)) => {
+            plot.draw_series(LineSeries::new(points, colour.stroke_width(PEN)))
+                .map_err(NotDrawn::from)?;
+        }
+        Some((size, gap)) => {
+            plot.draw_series(DashedLineSeries::new(
+                points,
+                size,
+                gap,
+                colour.stroke_width(PEN),
+            ))
+            .map_err(NotDrawn::from)?;
+        }
+    }
+    let hue = line.look.hue;
+    let signed = signed(plot, line);
+    plot.draw_series(signed.into_iter().map(|at| Sign { at, hue }))
+        .map_err(NotDrawn::from)?;
+    Ok(())
+}
+
+/// The points of a line that have a sign.
+fn signed(plot: &Plot<'_, '_>, line: &Line) -> Vec<(f64, f64)> {
+    match line.look.signs {
+        Signs::None => Vec::new(),
+        Signs::All => line.points.clone(),
+        Signs::Spaced => {
+            let mut signed = Vec::new();
+            // Lines that lie on each other begin apart, so that their signs do.
+            let mut since =
+                APART - f64::from(APART_BY_HUE * u8::try_from(line.look.hue).unwrap_or(0));
+            let mut before: Option<(i32, i32)> = None;
+            for &point in &line.points {
+                let (x, y) = plot.backend_coord(&point);
+                if let Some((old_x, old_y)) = before {
+                    since += f64::from(x - old_x).hypot(f64::from(y - old_y));
+                }
+                before = Some((x, y));
+                if since >= APART {
+                    signed.push(point);
+                    since = 0.0;
+                }
+            }
+            if since >= APART / 3.0 {
+                signed.extend(line.points.last());
+            }
+            signed
+        }
+    }
+}
+
+/// Length of a dash and of the gap behind it, in units; no gap for a full line.
+const fn dash(stroke: Stroke) -> Option<(i32, i32)> {
+    match stroke {
+        Stroke::None => None,
+        Stroke::Full => Some((0, 0)),
+        Stroke::Dashed => Some((18, 10)),
+        Stroke::Dotted => Some((5, 8)),
+    }
+}
+
+/// The names of all lines, each once, with the look of the first of that name.
+fn entries(chart: &Chart) -> Vec<(&str, Look)> {
+    let mut entries: Vec<(&str, Look)> = Vec::new();
+    for line in chart.panels.iter().flat_map(|panel| &panel.lines) {
+        if !line.name.is_empty() && entries.iter().all(|(name, _)| *name != line.name) {
+            entries.push((&line.name, line.look));
+        }
+    }
+    entries
+}
+
+/// How many entries of the legend go side by side.
+fn columns(entries: &[(&str, Look)]) -> usize {
+    let letters = entries.iter().map(|(name, _)| name.chars().count()).max();
+    let widest = SAMPLE + LETTER * u32::try_from(letters.unwrap_or(0)).unwrap_or(0);
+    usize::try_from((WIDTH - 40) / widest.max(1))
+        .unwrap_or(1)
+        .clamp(1, entries.len().max(1))
+}
+
+fn draw_legend(area: &Area<'_>, entries: &[(&str, Look)], columns: usize) -> Result<(), NotDrawn> {
+    let column = (WIDTH - 40) / u32::try_from(columns).unwrap_or(1);
+    for (index, (name, look)) in (0_u32..).zip(entries) {
+        let columns = u32::try_from(columns).unwrap_or(1);
+        let place = |units: u32| i32::try_from(units).unwrap_or(0);
+        let x = place(40 + index % columns * column);
+        let y = place(GAP + ROW / 2 + index / columns * ROW);
+        let colour = signs::colour(look.hue);
+        let sample = [(x, y), (x + 76, y)];
+        match dash(look.stroke) {
+            None => {}
+            Some((_, 0)) => area
+                .draw(&PathElement::new(sample, colour.stroke_width(PEN)))
+                .map_err(NotDrawn::from)?,
+            Some((size, gap)) => area
+                .draw(&DashedPathElement::new(
+                    sample,
+                    size,
+                    gap,
+                    colour.stroke_width(PEN),
+                ))
+                .map_err(NotDrawn::from)?,
+        }
+        if look.signs != Signs::None {
+            area.draw(&Sign {
+                at: (x + 38, y),
+                hue: look.hue,
+            })
+            .map_err(NotDrawn::from)?;
+        }
+        let words = letters(INK).pos(Pos::new(HPos::Left, VPos::Center));
+        area.draw_text(name, &words, (x + 92, y))
+            .map_err(NotDrawn::from)?;
+    }
+    Ok(())
+}
+
+/// The document with what it shows in words, for those who cannot see it.
+fn with_title(svg: &str, title: &str) -> String {
+    let title = title.replace('&', "&amp;").replace('<', "&lt;");
+    match svg.split_once(">\n") {
+        Some((head, body)) => format!("{head} role=\"img\">\n<title>{title}</title>\n{body}"),
+        None => svg.to_owned(),
+    }
+}

@@ -1,0 +1,161 @@
+//! Altitudes: the best common one, Algorithm 2 from there, and places and altitudes chosen jointly.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use uav_relay::{Local, Method, Schedule};
+
+use super::adjust::adjusted;
+use super::altitude::best_common;
+use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::flight::fly;
+use super::paper;
+use super::sheet::{Sheet, Table};
+use super::trouble::Trouble;
+
+/// The chains that are flown.
+pub const RELAYS: [u16; 10] = [2, 5, 8, 12, 16, 20, 30, 50, 70, 100];
+
+/// Rounds of Algorithm 2.
+pub const ROUNDS: u16 = 500;
+
+/// Offset of the interferer from the line, m.
+const OFFSET_M: f64 = 150.0;
+
+/// One chain.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Row {
+    /// Number of relays.
+    pub relays: u16,
+    /// Best altitude that all share, m.
+    pub common_altitude_m: f64,
+    /// SIR there by Algorithm 1, linear.
+    pub common_sir_linear: f64,
+    /// SIR after Algorithm 2 from there, linear.
+    pub adjust_sir_linear: f64,
+    /// Messages of both algorithms together.
+    pub adjust_messages: u64,
+    /// SIR of places and altitudes chosen jointly, linear.
+    pub joint_sir_linear: f64,
+    /// Passes until they are.
+    pub joint_passes: u32,
+    /// Messages until they are.
+    pub joint_messages: u64,
+    /// Gain of Algorithm 2 over the common altitude, percent.
+    pub adjust_gain_percent: f64,
+    /// Gain of the joint choice over the common altitude, percent.
+    pub joint_gain_percent: f64,
+}
+
+/// These chains, with `rounds` rounds of Algorithm 2 at most.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn data(relays: &[u16], rounds: u16) -> Result<Vec<Row>, Trouble> {
+    relays
+        .par_iter()
+        .map(|&relays| row(relays, rounds))
+        .collect()
+}
+
+fn row(relays: u16, rounds: u16) -> Result<Row, Trouble> {
+    let (altitude_m, common) = best_common(relays, OFFSET_M)?;
+    let adjusted = adjusted(relays, altitude_m, rounds, Local::Fine)?;
+    let mission = paper::flown(&paper::altitudes(OFFSET_M, altitude_m), relays)?;
+    let joint = fly(&mission, Method::Altitude, Schedule::Bracketed, true)?;
+    Ok(Row {
+        relays,
+        common_altitude_m: altitude_m,
+        common_sir_linear: common,
+        adjust_sir_linear: adjusted.sir,
+        adjust_messages: adjusted.messages,
+        joint_sir_linear: joint.sir,
+        joint_passes: joint.sweeps,
+        joint_messages: joint.messages,
+        adjust_gain_percent: 100.0 * (adjusted.sir / common - 1.0),
+        joint_gain_percent: 100.0 * (joint.sir / common - 1.0),
+    })
+}
+
+/// The figure.
+///
+/// # Errors
+/// Never in practice: see [`Trouble`].
+pub fn sheet() -> Result<Sheet, Trouble> {
+    let rows = data(&RELAYS, ROUNDS)?;
+    let line = |name: &str, index: usize, value: fn(&Row) -> f64| {
+        let points = rows.iter().map(|row| (f64::from(row.relays), value(row)));
+        Line::new(name, Look::number(index), points)
+    };
+    let names = [
+        "best common altitude",
+        "Algorithm 2 from there",
+        "places and altitudes jointly",
+    ];
+    let [common, adjust, joint] = names;
+    let panel = |y: Axis, lines: Vec<Line>| Panel {
+        heading: String::new(),
+        x: Axis::linear("number of relays N").between(0.0, 100.0),
+        y,
+        lines,
+    };
+    let head = [
+        "N",
+        "best common altitude",
+        "SIR there",
+        "Algorithm 2",
+        "jointly",
+        "messages: Algorithm 2",
+        "jointly",
+    ];
+    let mut shown = vec![head.map(str::to_owned).to_vec()];
+    shown.extend(rows.iter().map(|row| {
+        vec![
+            row.relays.to_string(),
+            format!("{:.0} m", row.common_altitude_m),
+            format!("{:.4}", row.common_sir_linear),
+            format!("{:.4}", row.adjust_sir_linear),
+            format!("{:.4}", row.joint_sir_linear),
+            row.adjust_messages.to_string(),
+            row.joint_messages.to_string(),
+        ]
+    }));
+    Ok(Sheet {
+        name: "joint",
+        title: "One altitude, Algorithm 2, and places and altitudes chosen jointly",
+        says: vec![
+            "Not in the paper. What the choice of altitudes is worth over the best altitude that \
+             all share, and what it costs."
+                .to_owned(),
+        ],
+        taken: vec![
+            "D = 1000 m, p_t = p_MSI = 80 W, p_u = 1 W, interferer at (500, 150) m, altitudes of \
+             20 m to 300 m, relays at least 4 m apart"
+                .to_owned(),
+            format!(
+                "Algorithm 2: {ROUNDS} rounds of 10 m up or down at most, each relay \
+             searching from coarse to fine"
+            ),
+        ],
+        chart: Chart {
+            panels: vec![
+                panel(
+                    Axis::log("SIR of the chain, linear"),
+                    vec![
+                        line(common, 0, |row| row.common_sir_linear),
+                        line(adjust, 1, |row| row.adjust_sir_linear),
+                        line(joint, 2, |row| row.joint_sir_linear),
+                    ],
+                ),
+                panel(
+                    Axis::linear("gain over common, %"),
+                    vec![
+                        line(adjust, 1, |row| row.adjust_gain_percent),
+                        line(joint, 2, |row| row.joint_gain_percent),
+                    ],
+                ),
+            ],
+        },
+        tables: vec![Table::new("joint", &rows)?],
+        shown,
+    })
+}
