@@ -295,10 +295,7 @@ fn with_path(folder: &Path) -> Output {
 fn without_python_it_says_so() {
     let folder = TempDir::new().unwrap();
     let line = refusal(&with_path(folder.path()), 2);
-    assert!(
-        line.starts_with("python3 is not on PATH: "),
-        "{line}"
-    );
+    assert!(line.starts_with("python3 is not on PATH: "), "{line}");
 }
 
 /// Programs that do nothing stand in for Python: one that fails, one that succeeds.
