@@ -106,7 +106,6 @@ fn third(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
         free::Case::Lowest(case) => (1, format!("at the lowest altitude: {}", along_x(case))),
         free::Case::Highest(case) => (2, format!("at the highest altitude: {}", along_x(case))),
         free::Case::AboveRx(case) => (3, format!("right above Rx: {}", upward(case))),
-        free::Case::AboveTx(case) => (4, format!("right above Tx: {}", upward(case))),
     };
     Some((
         found,

@@ -66,8 +66,8 @@ pub struct PlanReport {
     /// The theorem that placed the only relay, 1 to 3.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub theorem: Option<u8>,
-    /// Its case as the paper counts them; 0 for one that the paper leaves out. For Theorem 3 the edge of the box: lowest, highest,
-    /// above Rx, above Tx.
+    /// Its case as the paper counts them; 0 for one that the paper leaves out. For Theorem 3 the edge of the box: 1 lowest, 2
+    /// highest, 3 above Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case: Option<u8>,
     /// The case in words.

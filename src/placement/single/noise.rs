@@ -37,16 +37,12 @@ pub fn best_place(mission: &Mission, profile: Profile, noise: Noise) -> Found {
         (first, second)
     };
     let r = second_w / first_w;
-    let x_m = if snr(0.0).0 <= snr(0.0).1 {
-        0.0
-    } else if snr(d).0 >= snr(d).1 {
-        d
-    } else {
-        let root = sqrt(r * square(d) - square((1.0 - r) * h));
-        ((square(d) + (1.0 - r) * square(h)) / (d + root))
-            .max(0.0)
-            .min(d)
-    };
+    // Where they are equal nowhere between Tx and Rx the root lies beyond the end that is best, and so does what is left of it
+    // without a discriminant.
+    let root = sqrt(r * square(d) - square((1.0 - r) * h));
+    let x_m = ((square(d) + (1.0 - r) * square(h)) / (d + root))
+        .max(0.0)
+        .min(d);
     let (first, second) = snr(x_m);
     Found {
         place: Placement { x_m, altitude_m: h },
