@@ -170,7 +170,8 @@ impl Search {
             round: if nowhere { ROUNDS } else { 0 },
             row: 0,
             column: if nowhere { u8::MAX } else { 0 },
-            best_row: (at.altitude_m, -1.0),
+            // Where no row of a round is allowed this bounds the next: from outside the band it would lead out of it.
+            best_row: (at.altitude_m.max(low_m).min(high_m), -1.0),
             found: None,
             best_sir: hops.worse(at),
         }
@@ -206,6 +207,11 @@ impl Search {
         sir
     }
 
+    /// The altitude at `part`, 0 to 1, of what is searched. Rounded, the sum may be above its end, which may be the band's.
+    fn altitude(&self, part: f32) -> f32 {
+        (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
+    }
+
     /// One more row from coarse to fine; the evaluations it took, `None` when there is none left.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
@@ -221,7 +227,7 @@ impl Search {
             return None;
         }
         let part = f32::from(self.row) / f32::from(ROWS - 1);
-        let altitude_m = self.low_m + (self.high_m - self.low_m) * part;
+        let altitude_m = self.altitude(part);
         let sir = self.crossing(altitude_m);
         if sir > self.best_row.1 {
             self.best_row = (altitude_m, sir);
@@ -271,9 +277,76 @@ impl Search {
         let (from, to) = (self.hops.before.place.x_m, self.hops.after.place.x_m);
         _ = self.weigh(Placement {
             x_m: (from + (to - from) * part(self.column, columns)).min(to),
-            altitude_m: self.low_m + (self.high_m - self.low_m) * part(self.row, rows),
+            altitude_m: self.altitude(part(self.row, rows)),
         });
         self.row += 1;
         Some(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::task::Poll;
+
+    use super::{Beside, Hops, Local, Search};
+    use crate::gain::Gain;
+    use crate::mission::Interferer;
+    use crate::sir::Placement;
+
+    /// A relay at `altitude_m` in the middle of two that are 100 m apart at `beside_m`, who may go anywhere within the band.
+    fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> Search {
+        let at = |x_m, altitude_m| Placement { x_m, altitude_m };
+        let beside = |x_m| Beside {
+            place: at(x_m, beside_m),
+            apart_m,
+        };
+        let hops = Hops {
+            before: beside(0.0),
+            after: beside(100.0),
+            gain_in: Gain::new(1.0),
+            gain_out: 1.0,
+            to_rx: false,
+            interferer: Interferer {
+                power_w: 1.0,
+                x_m: 50.0,
+                y_m: 10.0,
+            },
+            quiet_after: 1e6,
+        };
+        Search::new(Local::Fine, hops, at(50.0, altitude_m), 1e5, band)
+    }
+
+    #[test]
+    fn from_outside_the_band_it_ends_in_it_or_stays() {
+        // Once with room in the band, once with room on the way there alone: that is no place to stop at.
+        for (from_m, beside_m, apart_m, band, ends_m) in [
+            (80_000.0, 20.0, 0.0, (20.0, 20.0), Some(20.0)),
+            (80_000.0, 20.0, 150.0, (20.0, 20.0), None),
+            (1.0, 500.0, 0.0, (200.0, 300.0), Some(300.0)),
+            (1.0, 500.0, 400.0, (200.0, 300.0), None),
+        ] {
+            let mut search = search(from_m, beside_m, apart_m, band);
+            let over = search.step(u16::MAX);
+            let ended = over.map(|found| found.map(|at| at.altitude_m));
+            assert_eq!(ended, Poll::Ready(ends_m), "from {from_m} m");
+        }
+    }
+
+    #[test]
+    fn the_highest_row_is_never_above_the_band() {
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f32::from((state >> 16) as u16) / 7.0 + 0.1
+        };
+        let mut rounded_up = 0;
+        for _ in 0..100_000 {
+            let (one, other) = (random(), random());
+            let (low_m, high_m) = (one.min(other), one.max(other));
+            let top_m = search(low_m, low_m, 0.0, (low_m, high_m)).altitude(1.0);
+            assert!(top_m <= high_m, "{top_m} above {high_m}");
+            rounded_up += u32::from(low_m + (high_m - low_m) > high_m);
+        }
+        assert!(rounded_up > 1000, "{rounded_up}");
     }
 }

@@ -43,6 +43,9 @@ impl core::fmt::Display for Infeasible {
 
 impl core::error::Error for Infeasible {}
 
+/// The highest target that is tried.
+const HIGHEST: f32 = 1e30;
+
 /// How far below the ceiling the search gives up.
 const DEPTH: f32 = 1e-12;
 
@@ -108,10 +111,12 @@ impl Search {
                 (ceiling, ceiling, met)
             }
         };
-        // A subnormal start has no digits left to search with.
-        if !(start >= f32::MIN_POSITIVE / DEPTH) {
+        // A subnormal target has no digits left to search with; the lowest of a ladder is up to eight times below `DEPTH`.
+        if !(start >= 8.0 * f32::MIN_POSITIVE / DEPTH) {
             return Err(Infeasible);
         }
+        // In a quiet field they may be above any f32, and no ladder ends there.
+        let (ceiling, start) = (ceiling.min(HIGHEST), start.min(HIGHEST));
         let uneven = mission.field().is_some_and(|field| !field.is_constant());
         let scan = (uneven && schedule == Schedule::Bracketed).then(|| Scan::new(start));
         let ladder = match schedule {
@@ -227,7 +232,7 @@ impl Search {
             return if hopeless {
                 Err(Infeasible)
             } else {
-                Ok(Ladder::between(high / 1e3, high))
+                Ok(Ladder::between((high / 1e3).max(f32::MIN_POSITIVE), high))
             };
         };
         // No chain meets more than its first hop can have.
