@@ -5,6 +5,7 @@
 pub mod channel;
 pub mod field;
 pub mod gain;
+pub mod guard;
 pub mod mission;
 pub mod node;
 pub mod placement;

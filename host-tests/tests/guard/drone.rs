@@ -1,0 +1,184 @@
+//! One drone: where it is, what its flight controller was told, and its guard.
+
+use std::collections::VecDeque;
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use uav_relay::guard::Guard;
+use uav_relay::guard::confines::Confines;
+use uav_relay::{Instant, Placement, Side};
+
+pub(crate) fn instant(at_s: f64) -> Instant {
+    Instant::from_micros((at_s * 1e6).round() as u64)
+}
+
+/// A point in the vertical plane, m.
+pub(crate) type Point = (f64, f64);
+
+#[derive(Debug)]
+pub(crate) struct Drone {
+    pub(crate) at: Point,
+    /// Where it was a step before.
+    pub(crate) was: Point,
+    /// What the flight controller flies to.
+    goal: Point,
+    /// Setpoints on their way there: when each gets there.
+    orders: VecDeque<(f64, Point)>,
+    /// Positions on their way to the guard: when each was measured, when each gets there.
+    reports: VecDeque<(f64, f64, Point)>,
+    pub(crate) speed: f64,
+    /// `None` while it is switched off.
+    pub(crate) guard: Option<Guard>,
+    /// Which nodes are its neighbours.
+    pub(crate) links: [Option<usize>; 2],
+    /// Whether it is in the air.
+    pub(crate) flies: bool,
+    /// Whether its radio works.
+    pub(crate) speaks: bool,
+    next_report_s: f64,
+    next_reminder_s: f64,
+    pub(crate) messages: u64,
+}
+
+/// How its flight controller is connected.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Board {
+    /// Between two reports, at most, s.
+    pub(crate) every_s: f64,
+    /// How old one may be when it arrives, s.
+    pub(crate) stale_s: f64,
+}
+
+impl Drone {
+    pub(crate) fn hovering(at: Point, links: [Option<usize>; 2]) -> Self {
+        Self {
+            at,
+            was: at,
+            goal: at,
+            orders: VecDeque::new(),
+            reports: VecDeque::new(),
+            speed: 0.0,
+            guard: None,
+            links,
+            flies: true,
+            speaks: true,
+            next_report_s: 0.0,
+            next_reminder_s: 0.0,
+            messages: 0,
+        }
+    }
+
+    /// Switches the guard on: it begins with the neighbours of the mission and hears at once who is linked to it now.
+    pub(crate) fn boot(
+        &mut self,
+        confines: Confines,
+        mission: [Option<usize>; 2],
+        seed: u32,
+        now_s: f64,
+    ) {
+        let mut guard = Guard::new(
+            confines,
+            mission.map(|link| link.map(node)),
+            seed,
+            instant(now_s),
+        );
+        for (side, link) in [Side::Upstream, Side::Downstream]
+            .into_iter()
+            .zip(self.links)
+        {
+            guard.link(side, link.map(node));
+        }
+        self.guard = Some(guard);
+    }
+
+    /// Flies on for a step.
+    pub(crate) fn fly(&mut self, now_s: f64, step_s: f64) {
+        while self.orders.front().is_some_and(|(due, _)| *due <= now_s) {
+            self.goal = self.orders.pop_front().unwrap().1;
+        }
+        self.was = self.at;
+        let (dx, dh) = (self.goal.0 - self.at.0, self.goal.1 - self.at.1);
+        let (left, way) = (dx.hypot(dh), self.speed * step_s);
+        self.at = if left <= way {
+            self.goal
+        } else {
+            (self.at.0 + dx / left * way, self.at.1 + dh / left * way)
+        };
+    }
+
+    /// Has the flight controller report, and hands the guard what has arrived.
+    pub(crate) fn report(&mut self, rng: &mut ChaCha8Rng, board: Board, hover_m: f64, now_s: f64) {
+        if now_s >= self.next_report_s {
+            self.next_report_s = now_s + rng.random_range(0.02..=1.0) * board.every_s;
+            let off = hover_m * rng.random_range(-1.0..=1.0);
+            let arrives_s = now_s + rng.random_range(0.0..=1.0) * board.stale_s;
+            self.reports
+                .push_back((now_s, arrives_s, (self.at.0 + off, self.at.1)));
+        }
+        while self.reports.front().is_some_and(|report| report.1 <= now_s) {
+            let (at_s, _, (x, h)) = self.reports.pop_front().unwrap();
+            if let Some(guard) = &mut self.guard {
+                guard.position(instant(at_s), place((x, h)));
+            }
+        }
+    }
+
+    /// Has the guard move the setpoint, and the flight controller hear of it soon.
+    pub(crate) fn steer(&mut self, rng: &mut ChaCha8Rng, confines: &Confines, now_s: f64) {
+        let Some(guard) = &mut self.guard else {
+            return;
+        };
+        let before = guard.setpoint();
+        let after = guard.steer(instant(now_s));
+        assert_eq!(after, guard.setpoint());
+        let Some(setpoint) = after.filter(|_| after != before) else {
+            return;
+        };
+        let fence = confines.fence;
+        assert!(
+            (fence.least_x_m..=fence.most_x_m).contains(&setpoint.x_m),
+            "{setpoint:?}"
+        );
+        assert!(
+            (fence.least_altitude_m..=fence.most_altitude_m).contains(&setpoint.altitude_m),
+            "{setpoint:?}"
+        );
+        let lag_s = confines.lag.as_micros() as f64 / 1e6;
+        // In the order in which they were given.
+        let before_s = self.orders.back().map_or(0.0, |order| order.0);
+        let due_s = (now_s + lag_s * rng.random_range(0.0..=0.99)).max(before_s);
+        let point = (f64::from(setpoint.x_m), f64::from(setpoint.altitude_m));
+        self.orders.push_back((due_s, point));
+    }
+
+    /// Whether it is time to tell everything again.
+    pub(crate) fn reminded(&mut self, now_s: f64) {
+        if now_s >= self.next_reminder_s {
+            self.next_reminder_s = now_s + 1.0;
+            if let Some(guard) = &mut self.guard {
+                guard.remind();
+            }
+        }
+    }
+
+    /// From the lowest to the highest x where it may be from now on if nobody tells it anything any more.
+    pub(crate) fn stretch(&self) -> (f64, f64) {
+        let mut ends = (self.at.0.min(self.goal.0), self.at.0.max(self.goal.0));
+        for (_, (x, _)) in &self.orders {
+            ends = (ends.0.min(*x), ends.1.max(*x));
+        }
+        ends
+    }
+}
+
+/// The node number of drone `k`.
+pub(crate) fn node(k: usize) -> u16 {
+    k as u16 + 1
+}
+
+pub(crate) fn place((x, h): Point) -> Placement {
+    Placement {
+        x_m: x as f32,
+        altitude_m: h as f32,
+    }
+}

@@ -1,0 +1,127 @@
+//! A chain that is as tight as it can be shifts at once, and how long that takes.
+
+use uav_relay::guard::Hindrance;
+use uav_relay::guard::confines::{Confines, Geofence};
+use uav_relay::{Duration, Side};
+
+use crate::drone::{Point, place};
+use crate::world::World;
+
+const SPEED: f64 = 10.0;
+
+fn world(relays: usize, from_m: f64, step_m: f64) -> World {
+    let confines = Confines {
+        fence: Geofence {
+            least_x_m: 0.0,
+            most_x_m: 1000.0,
+            least_altitude_m: 20.0,
+            most_altitude_m: 120.0,
+        },
+        separation_m: 10.0,
+        hover_m: 0.0,
+        lag: Duration::from_millis(200),
+    };
+    let mut world = World::new(1, confines, &row(relays, from_m, step_m));
+    for drone in &mut world.drones {
+        drone.speed = SPEED;
+    }
+    world
+}
+
+fn row(relays: usize, from_m: f64, step_m: f64) -> Vec<Point> {
+    (0..relays)
+        .map(|k| (from_m + step_m * k as f64, 50.0))
+        .collect()
+}
+
+fn commit(world: &mut World, places: &[Point]) {
+    for (drone, at) in world.drones.iter_mut().zip(places) {
+        drone.guard.as_mut().unwrap().commit(place(*at));
+    }
+}
+
+/// How long until everybody is there, s.
+fn time(world: &mut World) -> f64 {
+    let begun_s = world.now_s;
+    while !world
+        .drones
+        .iter()
+        .all(|drone| drone.guard.as_ref().unwrap().is_there())
+    {
+        assert!(world.now_s < begun_s + 1000.0, "they do not get there");
+        world.step();
+    }
+    world.now_s - begun_s
+}
+
+#[test]
+fn a_tight_row_shifts_either_way() {
+    for shift_m in [4.0, -4.0, 100.0, -100.0] {
+        let mut world = world(12, 400.0, 10.0);
+        let start = row(12, 400.0, 10.0);
+        commit(&mut world, &start);
+        let agreed_s = time(&mut world);
+        let targets: Vec<Point> = start.iter().map(|(x, h)| (x + shift_m, *h)).collect();
+        commit(&mut world, &targets);
+        let shifted_s = time(&mut world);
+        println!(
+            "12 relays 10 m apart: {agreed_s:.1} s to agree on the fences, {shifted_s:.1} s for {shift_m} m"
+        );
+        // One after the other at the worst: a flight and a second for what has to be said.
+        assert!(shifted_s < 12.0 * (1.0 + shift_m.abs() / SPEED));
+    }
+}
+
+/// Three places agreed 4 m apart are approached as far as 10 m allow, and that is said; the others get to theirs.
+#[test]
+fn places_too_close_are_approached() {
+    let mut world = world(5, 100.0, 100.0);
+    let targets = [
+        (50.0, 30.0),
+        (300.0, 40.0),
+        (304.0, 50.0),
+        (308.0, 60.0),
+        (600.0, 70.0),
+    ];
+    commit(&mut world, &targets);
+    for _ in 0..3000 {
+        world.step();
+    }
+    let ends: Vec<Point> = world.drones.iter().map(|drone| drone.at).collect();
+    println!("{ends:?}");
+    for k in [0, 4] {
+        assert!(
+            world.drones[k].guard.as_ref().unwrap().is_there(),
+            "{ends:?}"
+        );
+    }
+    for k in 1..4 {
+        assert!((ends[k].0 - targets[k].0).abs() < 10.1, "{ends:?}");
+        assert!(
+            (ends[k].1 - targets[k].1).abs() < 0.1,
+            "altitudes are free: {ends:?}"
+        );
+    }
+    let close = |k: usize, side| {
+        world.drones[k].guard.as_ref().unwrap().hindrance(side) == Some(Hindrance::Close)
+    };
+    let seen: Vec<[bool; 2]> = (0..5)
+        .map(|k| [close(k, Side::Upstream), close(k, Side::Downstream)])
+        .collect();
+    assert_eq!(
+        seen,
+        [
+            [false; 2],
+            [false, true],
+            [true; 2],
+            [true, false],
+            [false; 2]
+        ]
+    );
+    let before: Vec<Point> = ends;
+    for _ in 0..600 {
+        world.step();
+    }
+    let after: Vec<Point> = world.drones.iter().map(|drone| drone.at).collect();
+    assert_eq!(before, after, "they stay");
+}

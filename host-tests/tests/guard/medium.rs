@@ -1,0 +1,75 @@
+//! A medium that loses, duplicates, reorders and delays.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use uav_relay::Side;
+use uav_relay::guard::Fence;
+
+/// How bad it is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Faults {
+    /// The part that is lost, 0 to 1.
+    pub(crate) loss: f64,
+    /// The part that comes twice.
+    pub(crate) twice: f64,
+    /// The longest delay, s.
+    pub(crate) delay_s: f64,
+}
+
+/// One message under way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Letter {
+    due_s: f64,
+    pub(crate) to: usize,
+    pub(crate) from: usize,
+    /// On whose side of the receiver the sender is.
+    pub(crate) side: Side,
+    pub(crate) fence: Fence,
+}
+
+/// Everything under way.
+#[derive(Debug, Default)]
+pub(crate) struct Medium {
+    letters: Vec<Letter>,
+}
+
+impl Medium {
+    pub(crate) fn send(
+        &mut self,
+        rng: &mut ChaCha8Rng,
+        faults: Faults,
+        now_s: f64,
+        (from, to, side): (usize, usize, Side),
+        fence: Fence,
+    ) {
+        let copies = if rng.random_bool(faults.twice) { 2 } else { 1 };
+        for _ in 0..copies {
+            if rng.random_bool(faults.loss) {
+                continue;
+            }
+            // Most come soon, some very late: the square keeps the long delays rare.
+            let delay = faults.delay_s * rng.random_range(0.0..=1.0_f64).powi(3);
+            self.letters.push(Letter {
+                due_s: now_s + 0.01 + delay,
+                to,
+                from,
+                side,
+                fence,
+            });
+        }
+    }
+
+    /// Those that arrive by `now_s`, in no order.
+    pub(crate) fn arrived(&mut self, now_s: f64) -> Vec<Letter> {
+        if self.letters.is_empty() {
+            return Vec::new();
+        }
+        let (arrived, rest) = self
+            .letters
+            .iter()
+            .copied()
+            .partition(|letter| letter.due_s <= now_s);
+        self.letters = rest;
+        arrived
+    }
+}

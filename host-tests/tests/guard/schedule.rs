@@ -1,0 +1,365 @@
+//! A random schedule: a line of drones, what happens to them, and how it ends.
+//!
+//! | quantity | distribution |
+//! | --- | --- |
+//! | relays | 1 to 12 |
+//! | separation | log-uniform 1 m to 50 m; in 5 % 0 |
+//! | D | 0.1 % to 50 % more than the relays take at the separation in 40 %; else 2 to 20 times that |
+//! | reports off by | 0 in 70 %; else up to a twentieth of the separation |
+//! | start and agreed places | in order, the separation apart, crowded at Tx, at Rx, in the middle, or spread |
+//! | agreements | 0 to 6 in 200 s, each heard by a relay with 80 %, up to 60 s late; 20 % closer along x than the separation |
+//! | speed | changes every 20 s on average, 0 in 25 %, else 1 m/s to 40 m/s |
+//! | medium | loses 0 to 50 %, duplicates 0 to 30 %, delays up to 0.1 s to 8 s |
+//! | reports | every 0.1 s to 10 s, up to 0 to 5 s old |
+//! | happens to some | rebooted for up to 15 s; unheard of for up to 60 s, and linked around; taken away for good |
+//!
+//! In the end the medium loses up to 30 %, everybody flies, and everybody hears of the same places.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::guard::confines::{Confines, Geofence};
+use uav_relay::{Duration, Side};
+
+use crate::drone::{Board, Point, place};
+use crate::medium::Faults;
+use crate::world::{World, beside};
+
+/// What became of one.
+#[derive(Debug, Default)]
+pub(crate) struct Report {
+    pub(crate) steps: u64,
+    pub(crate) heard: u64,
+    pub(crate) reboots: u64,
+    pub(crate) silences: u64,
+    pub(crate) gone: u64,
+    pub(crate) closest_m: f64,
+    pub(crate) share_of_time: f64,
+    pub(crate) messages: f64,
+}
+
+/// What happens to drone `.0`.
+#[derive(Clone, Copy, Debug)]
+enum What {
+    Hear(usize, Point),
+    Off(usize),
+    On(usize),
+    Mute(usize),
+    Unmute(usize),
+    Vanish(usize),
+    /// It links to the last one, around the third.
+    Around(usize, Side, usize, Option<usize>),
+    Back(usize, Side, usize),
+    Forget(usize, Side),
+    Speed(usize, f64),
+}
+
+const ROUGH_S: f64 = 200.0;
+const SLOWEST: f64 = 2.0;
+
+pub(crate) fn fly(seed: u64) -> Report {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x00C0_FFEE);
+    let confines = confines(&mut rng);
+    let relays = rng.random_range(1..=12);
+    let (confines, starts) = line(&mut rng, confines, relays);
+    let mut world = World::new(seed, confines, &starts);
+    let mut report = Report::default();
+    rough(&mut rng, &mut world, &mut report);
+    calm(&mut rng, &mut world, &mut report);
+    report.steps = world.steps;
+    report.closest_m = world.closest_m;
+    report
+}
+
+fn confines(rng: &mut ChaCha8Rng) -> Confines {
+    let separation = if rng.random_bool(0.05) {
+        0.0
+    } else {
+        50.0_f64.powf(rng.random_range(0.0..=1.0))
+    };
+    let hover = if rng.random_bool(0.7) {
+        0.0
+    } else {
+        separation * rng.random_range(0.0..=0.05)
+    };
+    Confines {
+        fence: Geofence {
+            least_x_m: 0.0,
+            most_x_m: 0.0,
+            least_altitude_m: 20.0,
+            most_altitude_m: 120.0,
+        },
+        separation_m: separation as f32,
+        hover_m: hover as f32,
+        lag: Duration::from_millis(rng.random_range(0..=600)),
+    }
+}
+
+/// How long the line is, and where everybody begins.
+fn line(rng: &mut ChaCha8Rng, mut confines: Confines, relays: usize) -> (Confines, Vec<Point>) {
+    let taken = f64::from(confines.separation_m) * relays as f64;
+    let distance = if rng.random_bool(0.4) {
+        taken * rng.random_range(1.001..=1.5)
+    } else {
+        taken * rng.random_range(2.0..=20.0)
+    };
+    confines.fence.most_x_m = distance.max(10.0) as f32;
+    let starts = places(rng, &confines, relays);
+    (confines, starts)
+}
+
+/// Places in order, the separation apart.
+fn places(rng: &mut ChaCha8Rng, confines: &Confines, relays: usize) -> Vec<Point> {
+    let distance = f64::from(confines.fence.most_x_m);
+    let step = f64::from(confines.separation_m) + 5e-7 * distance;
+    let slack = distance - step * (relays - 1) as f64;
+    let (from, to) = match rng.random_range(0..4) {
+        0 => (0.0, 0.05),
+        1 => (0.95, 1.0),
+        2 => (0.4, 0.5),
+        _ => (0.0, 1.0),
+    };
+    let mut spare: Vec<f64> = (0..relays)
+        .map(|_| slack * rng.random_range(from..=to))
+        .collect();
+    spare.sort_by(f64::total_cmp);
+    (0..relays)
+        .map(|k| {
+            let x = spare[k] + step * k as f64;
+            (
+                f64::from(x as f32),
+                f64::from(rng.random_range(20.0..=120.0_f32)),
+            )
+        })
+        .collect()
+}
+
+/// Everything that may happen does.
+fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
+    world.faults = Faults {
+        loss: rng.random_range(0.0..=0.5),
+        twice: rng.random_range(0.0..=0.3),
+        delay_s: 80.0_f64.powf(rng.random_range(0.0..=1.0)) / 10.0,
+    };
+    world.board = Board {
+        every_s: 100.0_f64.powf(rng.random_range(0.0..=1.0)) / 10.0,
+        stale_s: rng.random_range(0.0..=5.0),
+    };
+    let mut plan = agreements(rng, world);
+    plan.extend(speeds(rng, world.drones.len()));
+    plan.extend(troubles(rng, world.drones.len()));
+    plan.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut plan = plan.into_iter().peekable();
+    while world.now_s < ROUGH_S {
+        while let Some((_, what)) = plan.next_if(|(at_s, _)| *at_s <= world.now_s) {
+            happen(world, what, report);
+        }
+        world.step();
+    }
+    for (_, what) in plan {
+        happen(world, what, report);
+    }
+}
+
+fn agreements(rng: &mut ChaCha8Rng, world: &World) -> Vec<(f64, What)> {
+    let mut plan = Vec::new();
+    for _ in 0..rng.random_range(0..=6) {
+        let at_s = rng.random_range(0.0..ROUGH_S - 60.0);
+        let mut confines = world.confines;
+        if rng.random_bool(0.2) {
+            confines.separation_m *= rng.random_range(0.0..=1.0);
+        }
+        for (k, at) in places(rng, &confines, world.drones.len())
+            .into_iter()
+            .enumerate()
+        {
+            if rng.random_bool(0.8) {
+                plan.push((
+                    at_s + 60.0 * rng.random_range(0.0..=1.0_f64).powi(3),
+                    What::Hear(k, at),
+                ));
+            }
+        }
+    }
+    plan
+}
+
+fn speeds(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
+    let mut plan = Vec::new();
+    for k in 0..relays {
+        let mut at_s = 0.0;
+        while at_s < ROUGH_S {
+            let speed = if rng.random_bool(0.25) {
+                0.0
+            } else {
+                40.0_f64.powf(rng.random_range(0.0..=1.0))
+            };
+            plan.push((at_s, What::Speed(k, speed)));
+            at_s += rng.random_range(1.0..=40.0);
+        }
+    }
+    plan
+}
+
+/// Relays that are rebooted, fall silent, or go: of three in a row only one in the second and third ways.
+fn troubles(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
+    let mut plan = Vec::new();
+    let mut left_out = 0;
+    for k in 0..relays {
+        let at_s = rng.random_range(5.0..ROUGH_S - 90.0);
+        match rng.random_range(0..10) {
+            0..=3 => {
+                plan.push((at_s, What::Off(k)));
+                plan.push((at_s + rng.random_range(0.0..=15.0), What::On(k)));
+            }
+            kind @ 4..=6 if relays > 2 && left_out < k => {
+                left_out = k + 2;
+                around(rng, &mut plan, (k, relays), at_s, kind == 6);
+            }
+            _ => {}
+        }
+    }
+    plan
+}
+
+/// Relay `k` falls silent, its neighbours link to each other, and it is back some time later; or it is gone.
+fn around(
+    rng: &mut ChaCha8Rng,
+    plan: &mut Vec<(f64, What)>,
+    (k, relays): (usize, usize),
+    at_s: f64,
+    gone: bool,
+) {
+    let [before, after] = beside(k, relays);
+    plan.push((at_s, if gone { What::Vanish(k) } else { What::Mute(k) }));
+    let back_s = at_s + rng.random_range(10.0..=60.0);
+    for (who, side, other) in [
+        (before, Side::Downstream, after),
+        (after, Side::Upstream, before),
+    ] {
+        let Some(who) = who else { continue };
+        plan.push((
+            at_s + rng.random_range(0.0..=10.0),
+            What::Around(who, side, k, other),
+        ));
+        let then_s = back_s + rng.random_range(0.0..=10.0);
+        plan.push(if gone {
+            (then_s, What::Forget(who, side))
+        } else {
+            (then_s, What::Back(who, side, k))
+        });
+    }
+    if !gone {
+        plan.push((back_s, What::Unmute(k)));
+    }
+}
+
+fn happen(world: &mut World, what: What, report: &mut Report) {
+    match what {
+        What::Hear(k, at) => {
+            report.heard += 1;
+            if let Some(guard) = &mut world.drones[k].guard {
+                guard.commit(place(at));
+            }
+        }
+        What::Off(k) => {
+            report.reboots += 1;
+            world.drones[k].guard = None;
+        }
+        What::On(k) => {
+            if world.drones[k].guard.is_none() {
+                world.boot(k);
+            }
+        }
+        What::Mute(k) => {
+            report.silences += 1;
+            world.drones[k].speaks = false;
+        }
+        What::Unmute(k) => world.drones[k].speaks = true,
+        What::Vanish(k) => {
+            report.gone += 1;
+            world.drones[k].flies = false;
+        }
+        What::Around(who, side, k, other) => {
+            if !(world.drones[k].speaks && world.drones[k].flies) {
+                world.link(who, side, other);
+            }
+        }
+        What::Back(who, side, k) => world.link(who, side, Some(k)),
+        What::Forget(k, side) => {
+            if let Some(guard) = &mut world.drones[k].guard {
+                guard.forget(side);
+            }
+        }
+        What::Speed(k, speed) => world.drones[k].speed = speed,
+    }
+}
+
+/// Everybody hears of the same places, and gets there.
+fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
+    world.faults = Faults {
+        loss: rng.random_range(0.0..=0.3),
+        twice: 0.1,
+        delay_s: 0.5,
+    };
+    world.board = Board {
+        every_s: 0.4,
+        stale_s: 0.2,
+    };
+    let left: Vec<usize> = (0..world.drones.len())
+        .filter(|k| world.drones[*k].flies)
+        .collect();
+    let targets = places(rng, &world.confines, left.len());
+    let relays = world.drones.len();
+    let gone: Vec<bool> = world.drones.iter().map(|drone| !drone.flies).collect();
+    for (k, target) in left.iter().zip(&targets) {
+        let drone = &mut world.drones[*k];
+        drone.messages = 0;
+        drone.speed = rng.random_range(SLOWEST..=20.0);
+        let guard = drone.guard.as_mut().unwrap();
+        // Who has been rebooted since does not know who is gone.
+        for (side, there) in [Side::Upstream, Side::Downstream]
+            .into_iter()
+            .zip(beside(*k, relays))
+        {
+            if there.is_some_and(|there| gone[there]) {
+                guard.forget(side);
+            }
+        }
+        guard.commit(place(*target));
+    }
+    let distance = f64::from(world.confines.fence.most_x_m);
+    let (begun_s, allowed_s) = (
+        world.now_s,
+        left.len() as f64 * (10.0 + distance.hypot(100.0) / SLOWEST),
+    );
+    while !left
+        .iter()
+        .all(|k| world.drones[*k].guard.as_ref().unwrap().is_there())
+    {
+        assert!(
+            world.now_s < begun_s + allowed_s,
+            "SEED={}: not there within {allowed_s:.0} s: {:#?}",
+            world.seed,
+            left.iter()
+                .map(|k| (
+                    k,
+                    world.drones[*k].at.0,
+                    targets.len(),
+                    world.drones[*k].guard
+                ))
+                .collect::<Vec<_>>()
+        );
+        world.step();
+    }
+    let off = f64::from(world.confines.hover_m) + world.allowed_m();
+    for (k, target) in left.iter().zip(&targets) {
+        let at = world.drones[*k].at;
+        assert!(
+            (at.0 - target.0).abs() <= off && (at.1 - target.1).abs() <= off,
+            "{at:?} {target:?}"
+        );
+    }
+    report.share_of_time = (world.now_s - begun_s) / allowed_s;
+    let messages: u64 = left.iter().map(|k| world.drones[*k].messages).sum();
+    report.messages = messages as f64 / left.len() as f64 / (world.now_s - begun_s).max(1.0);
+}

@@ -1,0 +1,191 @@
+//! All drones, the medium between them, and the check that is made at every step.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::Side;
+use uav_relay::guard::confines::Confines;
+
+use crate::drone::{Board, Drone, Point, node};
+use crate::medium::{Faults, Medium};
+
+/// Between two looks at everything, s.
+pub(crate) const STEP_S: f64 = 0.1;
+
+#[derive(Debug)]
+pub(crate) struct World {
+    pub(crate) seed: u64,
+    pub(crate) rng: ChaCha8Rng,
+    pub(crate) now_s: f64,
+    pub(crate) confines: Confines,
+    pub(crate) drones: Vec<Drone>,
+    medium: Medium,
+    pub(crate) faults: Faults,
+    pub(crate) board: Board,
+    /// The smallest margin seen, m.
+    pub(crate) closest_m: f64,
+    pub(crate) steps: u64,
+}
+
+impl World {
+    pub(crate) fn new(seed: u64, confines: Confines, starts: &[Point]) -> Self {
+        let links = |k| beside(k, starts.len());
+        let mut world = Self {
+            seed,
+            rng: ChaCha8Rng::seed_from_u64(seed),
+            now_s: 1.0,
+            confines,
+            drones: (0..starts.len())
+                .map(|k| Drone::hovering(starts[k], links(k)))
+                .collect(),
+            medium: Medium::default(),
+            faults: Faults {
+                loss: 0.0,
+                twice: 0.0,
+                delay_s: 0.1,
+            },
+            board: Board {
+                every_s: 0.2,
+                stale_s: 0.1,
+            },
+            closest_m: f64::INFINITY,
+            steps: 0,
+        };
+        for k in 0..starts.len() {
+            world.boot(k);
+        }
+        world
+    }
+
+    /// Switches the guard of drone `k` on, or off and on.
+    pub(crate) fn boot(&mut self, k: usize) {
+        let seed = self.rng.random();
+        let mission = beside(k, self.drones.len());
+        self.drones[k].boot(self.confines, mission, seed, self.now_s);
+    }
+
+    /// Tells drone `k` who its neighbour is.
+    pub(crate) fn link(&mut self, k: usize, side: Side, neighbour: Option<usize>) {
+        let drone = &mut self.drones[k];
+        drone.links[usize::from(side == Side::Downstream)] = neighbour;
+        if let Some(guard) = &mut drone.guard {
+            guard.link(side, neighbour.map(node));
+        }
+    }
+
+    /// What may be missing of the separation, m: what the reports may be off where either was switched on, at most twice each,
+    /// and four roundings of a place at either side.
+    pub(crate) fn allowed_m(&self) -> f64 {
+        let rounding = f64::from(self.confines.fence.most_x_m) * f64::from(f32::EPSILON);
+        4.0 * f64::from(self.confines.hover_m) + 8.0 * rounding
+    }
+
+    pub(crate) fn step(&mut self) {
+        self.now_s += STEP_S;
+        let now_s = self.now_s;
+        for drone in self.drones.iter_mut().filter(|drone| drone.flies) {
+            drone.fly(now_s, STEP_S);
+            drone.report(
+                &mut self.rng,
+                self.board,
+                f64::from(self.confines.hover_m),
+                now_s,
+            );
+        }
+        for letter in self.medium.arrived(now_s) {
+            let drone = &mut self.drones[letter.to];
+            if let Some(guard) = drone.guard.as_mut().filter(|_| drone.speaks && drone.flies) {
+                guard.hear(letter.side, node(letter.from), &letter.fence);
+                // Nobody need look at the setpoint between two messages, but somebody may.
+                if self.rng.random_bool(0.5) {
+                    drone.steer(&mut self.rng, &self.confines, now_s);
+                }
+            }
+        }
+        for k in 0..self.drones.len() {
+            let drone = &mut self.drones[k];
+            if !drone.flies {
+                continue;
+            }
+            drone.reminded(now_s);
+            drone.steer(&mut self.rng, &self.confines, now_s);
+            self.talk(k);
+        }
+        self.check();
+    }
+
+    /// Sends what drone `k` has to say.
+    fn talk(&mut self, k: usize) {
+        let drone = &mut self.drones[k];
+        let Some(guard) = &mut drone.guard else {
+            return;
+        };
+        for round in 0.. {
+            assert!(round < 3, "it never stops talking");
+            let Some((side, to, fence)) = guard.poll() else {
+                return;
+            };
+            assert!(fence.is_valid(), "{fence:?}");
+            drone.messages += 1;
+            let heard_from = match side {
+                Side::Upstream => Side::Downstream,
+                Side::Downstream => Side::Upstream,
+            };
+            let way = (k, usize::from(to) - 1, heard_from);
+            if drone.speaks {
+                self.medium
+                    .send(&mut self.rng, self.faults, self.now_s, way, fence);
+            }
+        }
+    }
+
+    /// Nobody can come too close to another one from where they are, wherever they stop, and nobody has in this step.
+    fn check(&mut self) {
+        let separation = f64::from(self.confines.separation_m);
+        let floor = separation - self.allowed_m();
+        let flying: Vec<&Drone> = self.drones.iter().filter(|drone| drone.flies).collect();
+        self.steps += flying.len() as u64;
+        for pair in flying.windows(2) {
+            let margin = pair[1].stretch().0 - pair[0].stretch().1 - floor;
+            self.closest_m = self.closest_m.min(margin);
+            assert!(
+                margin >= 0.0,
+                "SEED={}: at {:.1} s they may come within {:.6} m of {separation}: {:?} and {:?}",
+                self.seed,
+                self.now_s,
+                margin + floor,
+                pair[0],
+                pair[1],
+            );
+        }
+        for (k, one) in flying.iter().enumerate() {
+            for other in &flying[..k] {
+                let apart = nearest((one.was, one.at), (other.was, other.at));
+                assert!(
+                    apart >= floor,
+                    "SEED={}: {apart} m at {:.1} s",
+                    self.seed,
+                    self.now_s
+                );
+            }
+        }
+    }
+}
+
+/// The neighbours of drone `k` of so many, as the mission has it.
+pub(crate) fn beside(k: usize, relays: usize) -> [Option<usize>; 2] {
+    [k.checked_sub(1), (k + 1 < relays).then_some(k + 1)]
+}
+
+/// How close two drones come that both fly straight on during a step, m.
+fn nearest(one: (Point, Point), other: (Point, Point)) -> f64 {
+    let from = (one.0.0 - other.0.0, one.0.1 - other.0.1);
+    let to = (one.1.0 - other.1.0, one.1.1 - other.1.1);
+    let way = (to.0 - from.0, to.1 - from.1);
+    let length = way.0 * way.0 + way.1 * way.1;
+    let share = if length > 0.0 {
+        (-(from.0 * way.0 + from.1 * way.1) / length).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (from.0 + share * way.0).hypot(from.1 + share * way.1)
+}

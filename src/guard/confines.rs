@@ -1,0 +1,96 @@
+//! The box that no setpoint leaves, and what else is set before flight.
+
+use crate::mission::{Mission, Profile};
+use crate::sir::Placement;
+use crate::time::Duration;
+
+use super::is_place;
+
+/// How long a setpoint takes to the flight controller at most, unless told otherwise.
+const LAG: Duration = Duration::from_millis(200);
+
+/// Where setpoints may be.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Geofence {
+    /// The least x, m from Tx: -1e7 to `most_x_m`.
+    pub least_x_m: f32,
+    /// The largest x, m: to 1e7.
+    pub most_x_m: f32,
+    /// The least altitude, m: -1e7 to `most_altitude_m`.
+    pub least_altitude_m: f32,
+    /// The largest altitude, m: to 1e7.
+    pub most_altitude_m: f32,
+}
+
+/// What a guard is told before flight.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Confines {
+    /// The box that no setpoint leaves.
+    pub fence: Geofence,
+    /// How far apart relays are kept along x, m: 0 to 1e5.
+    pub separation_m: f32,
+    /// How far off its setpoint a relay may be reported that hovers there, m: 0 to 1e3. This much is taken from the separation at
+    /// each of two relays.
+    pub hover_m: f32,
+    /// How long after [`Guard::steer`](super::Guard::steer) gave a setpoint the flight controller has it at the latest.
+    pub lag: Duration,
+}
+
+impl Confines {
+    /// Those of a mission: its separation, its distance, and its band of altitudes, widened to the one that this relay holds.
+    ///
+    /// `hover_m` is 0 and `lag` 0.2 s.
+    pub fn of(mission: &Mission, profile: Profile) -> Self {
+        let config = mission.config();
+        Self {
+            fence: Geofence {
+                least_x_m: 0.0,
+                most_x_m: config.distance_m,
+                least_altitude_m: config.band.least_m.min(profile.altitude_m),
+                most_altitude_m: config.band.most_m.max(profile.altitude_m),
+            },
+            separation_m: config.min_separation_m,
+            hover_m: 0.0,
+            lag: LAG,
+        }
+    }
+
+    /// Whether every number is within its range.
+    pub fn is_valid(&self) -> bool {
+        let fence = &self.fence;
+        is_place(fence.least_x_m)
+            && is_place(fence.most_x_m)
+            && fence.least_x_m <= fence.most_x_m
+            && is_place(fence.least_altitude_m)
+            && is_place(fence.most_altitude_m)
+            && fence.least_altitude_m <= fence.most_altitude_m
+            && (0.0..=1e5).contains(&self.separation_m)
+            && (0.0..=1e3).contains(&self.hover_m)
+    }
+
+    /// The place in the box that is nearest to `place`.
+    #[inline(never)] // called from several places
+    pub(super) fn cut(&self, place: Placement) -> Placement {
+        let fence = &self.fence;
+        Placement {
+            x_m: place.x_m.max(fence.least_x_m).min(fence.most_x_m),
+            altitude_m: place
+                .altitude_m
+                .max(fence.least_altitude_m)
+                .min(fence.most_altitude_m),
+        }
+    }
+
+    /// Whether a relay reported at `x_m` may be inside the box along x.
+    pub(super) fn holds(&self, x_m: f32) -> bool {
+        let fence = &self.fence;
+        x_m >= fence.least_x_m - self.hover_m && x_m <= fence.most_x_m + self.hover_m
+    }
+
+    /// What rounding may make of a place, m: four steps of an f32 at the far end of the box.
+    pub(super) fn rounding(&self) -> f32 {
+        4.0 * f32::EPSILON * self.fence.most_x_m.abs().max(self.fence.least_x_m.abs())
+    }
+}

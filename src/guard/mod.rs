@@ -1,0 +1,331 @@
+//! Keeps relays apart while they fly from one agreed set of places to the next, whatever is lost or late between them.
+//!
+//! Relays stand in order along x, so relays that are the separation apart *along x* from their neighbours are that far from
+//! every other relay, at whatever altitudes: that is what the guard keeps, and why it does not count height. Places that were
+//! agreed closer along x than that (methods that choose altitudes do so in dense chains) are approached as far as this
+//! allows, and [`Guard::hindrance`] says so.
+//!
+//! Between two neighbours there is a *fence*, a line across x. The relay upstream of it, its *keeper*, stays the separation
+//! before it; the other one, the *kept* relay, stays at it or beyond.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | [`confines`] | the box that no setpoint leaves, and what else is set before flight |
+//! | `hull` | where the relay may be, by what was reported and what it was told to fly to |
+//! | `tie` | which life of the neighbour a message is from, so that late ones cannot be mistaken |
+//! | `keeper` | the fence downstream, which this relay places |
+//! | `kept` | the fence upstream, which the neighbour places |
+//!
+//! # Rules
+//!
+//! *Own stretch*: from the lowest to the highest x at which the relay may be, be it stopped anywhere on its way.
+//!
+//! | | rule | so that |
+//! | --- | --- | --- |
+//! | 1 | The kept relay never lowers its setpoint below the newest fence it has heard of, and flies up to it if it is below. | what it promises holds |
+//! | 2 | It tells the newest fence it has heard of, and the low end of its own stretch. | - |
+//! | 3 | The keeper counts on the lowest of: that low end, if told together with the newest fence; every fence announced since. | no message under way can make the kept relay come nearer than it is counted on |
+//! | 4 | The keeper never raises its setpoint to less than the separation before what it counts on. | the stretches of the two are the separation apart |
+//! | 5 | The keeper announces no fence nearer than the separation beyond the high end of its own stretch. | a fence it lowers is one it has cleared already |
+//! | 6 | As far as 5 allows, the fence goes halfway between the two agreed places (and half the separation on). | both can get where they are to be |
+//! | 7 | The first fence is right at the keeper's own stretch; other fences, and changes of altitude, begin when the kept relay has cleared it. Relays in the wrong order stay where they are. | a start that is too close is opened first, and no relay sinks onto another |
+//! | 8 | A setpoint goes no farther toward a neighbour that has not been talked to yet (switched on, rebooted, newly linked) than it is. | nothing is granted unheard; what was granted is flown to the end |
+//! | 9 | Nothing lapses with time: of a neighbour that is replaced or starts anew, the last limit stays until it speaks for itself, or [`Guard::forget`]; if it was never heard, this relay goes no farther toward it. | a silent relay that still hovers is not flown into |
+//!
+//! # Why everybody arrives
+//!
+//! Let the places agreed on be the separation apart; then so are the fences' goals. A fence that has to be lowered waits for
+//! its keeper to come down, and that relay waits only for the fence upstream, if that has to be lowered, too: the first of them
+//! waits for nobody, and so, one after the other, all come down. In the same way all that have to be raised are, from the
+//! receiver's end. Then every relay finds its place between its fences. Fences go along with the flight, so that is one
+//! flight's time and a few messages a relay at the worst.
+//!
+//! # What is not promised
+//!
+//! - Hovering off the reported place by up to [`Confines::hover_m`] takes as much from the separation at either relay, and as
+//!   much again each time that one is rebooted before a fence has opened what is missing.
+//! - A relay says nothing before it has both a place to go to and a report of where it is: until then nobody moves toward it.
+//! - A relay that is rebooted has forgotten whom it was linked to: it has to begin with the neighbours of the mission and be
+//!   linked around those that are silent, so that rule 9 holds it back.
+//! - The numbers of the ties are random: `seed` has to differ from one start to the next.
+
+pub mod confines;
+mod hull;
+mod keeper;
+mod kept;
+#[cfg(test)]
+mod tests;
+mod tie;
+
+use crate::node::Side;
+use crate::node::stats::bump;
+use crate::sir::Placement;
+use crate::time::Instant;
+
+use confines::Confines;
+use hull::Hull;
+use keeper::Keeper;
+use kept::Kept;
+use tie::Random;
+
+/// What a relay tells a neighbour about the fence between them. It is a state, not a step: it may be lost, come twice, late, or
+/// in another order.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Fence {
+    /// Number of the sender's present talk with this neighbour, never 0.
+    pub tie: u16,
+    /// The number of the receiver's as the sender has heard it, 0 for none.
+    pub echo: u16,
+    /// From the keeper: number of the fence, 0 before the first. From the kept relay: of the newest fence it has heard of.
+    pub number: u16,
+    /// From the keeper: where the fence is. From the kept relay: the low end of its own stretch. m along x, -1e7 to 1e7.
+    pub x_m: f32,
+    /// Where the sender is to be in the end, m along x, -1e7 to 1e7.
+    pub target_m: f32,
+}
+
+/// No place is farther than this from Tx, m.
+const FARTHEST_M: f32 = 1e7;
+
+impl Fence {
+    /// Whether its numbers are within their ranges.
+    pub fn is_valid(&self) -> bool {
+        self.tie != 0 && is_place(self.x_m) && is_place(self.target_m)
+    }
+}
+
+/// Why a relay may not get where it is to be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Hindrance {
+    /// The neighbour has not agreed to a fence yet.
+    Unheard,
+    /// The neighbour stands on the wrong side of this relay: neither moves.
+    Order,
+    /// The two are to be closer along x than the separation.
+    Close,
+    /// A relay that fell silent may still hover there.
+    Lost,
+}
+
+/// One relay's guard: where it was agreed to be goes in, where it is safe to fly now comes out.
+///
+/// Feed it with [`commit`](Self::commit), [`position`](Self::position), [`hear`](Self::hear), [`link`](Self::link); after each,
+/// call [`steer`](Self::steer), fly to what it gives, then send what [`poll`](Self::poll) has to say. Every call does a few dozen
+/// operations, none depends on the length of the chain.
+#[derive(Clone, Copy, Debug)]
+pub struct Guard {
+    confines: Confines,
+    random: Random,
+    born: Instant,
+    /// Where the relay was agreed to be, inside the box.
+    target: Option<Placement>,
+    /// Before the first setpoint: where the relay was reported last.
+    found: Option<Placement>,
+    setpoint: Option<Placement>,
+    hull: Hull,
+    /// The altitude reported last, m.
+    altitude_m: f32,
+    kept: Kept,
+    keeper: Keeper,
+    refused: u32,
+}
+
+impl Guard {
+    /// A guard that starts at `now` between `neighbours`, toward Tx and toward Rx; `None` where the chain ends.
+    ///
+    /// `confines` has to be valid ([`Confines::is_valid`]); `seed` has to differ from relay to relay and from start to start.
+    pub fn new(confines: Confines, neighbours: [Option<u16>; 2], seed: u32, now: Instant) -> Self {
+        let [upstream, downstream] = neighbours;
+        let mut random = Random::new(seed);
+        Self {
+            confines,
+            kept: Kept::new(upstream.unwrap_or(0), &mut random),
+            keeper: Keeper::new(downstream.unwrap_or(0), &mut random),
+            random,
+            born: now,
+            target: None,
+            found: None,
+            setpoint: None,
+            hull: Hull::unknown(now),
+            altitude_m: 0.0,
+            refused: 0,
+        }
+    }
+
+    /// The chain has agreed that this relay shall be at `place`. It is cut to the box.
+    pub fn commit(&mut self, place: Placement) {
+        if !is_placement(place) {
+            return bump(&mut self.refused);
+        }
+        self.target = Some(self.confines.cut(place));
+        self.kept.tie.due = true;
+        self.keeper.tie.due = true;
+    }
+
+    /// Whether `place` is where the relay is on its way to, or is.
+    pub fn is_for(&self, place: Placement) -> bool {
+        self.target == Some(self.confines.cut(place))
+    }
+
+    /// The flight controller has found that the relay was at `place` at time `at`: when that was measured, not when it was read.
+    ///
+    /// The first setpoint is a place reported since the start and inside the box along x.
+    pub fn position(&mut self, at: Instant, place: Placement) {
+        if !is_placement(place) {
+            return bump(&mut self.refused);
+        }
+        self.altitude_m = place.altitude_m;
+        if self.setpoint.is_some() {
+            self.hull.report(at, place.x_m, &self.confines);
+        } else if at >= self.born && self.confines.holds(place.x_m) {
+            self.found = Some(self.confines.cut(place));
+        }
+    }
+
+    /// What node `from` at `side` says. What is out of range is counted, what is of an earlier talk or of another node ignored.
+    pub fn hear(&mut self, side: Side, from: u16, fence: &Fence) {
+        if !fence.is_valid() {
+            return bump(&mut self.refused);
+        }
+        match side {
+            Side::Upstream if self.kept.tie.node == from => {
+                self.kept.hear(fence, &self.hull, &mut self.random);
+            }
+            Side::Downstream if self.keeper.tie.node == from => {
+                let apart = self.confines.separation_m;
+                self.keeper.hear(fence, &self.hull, apart, &mut self.random);
+            }
+            _ => {}
+        }
+    }
+
+    /// From now on `neighbour` is the one at `side`, `None` if the chain ends here. The same one again changes nothing.
+    ///
+    /// The one before may still hover: this relay keeps clear of it until [`forget`](Self::forget), or until it, or one between,
+    /// is linked and has spoken.
+    pub fn link(&mut self, side: Side, neighbour: Option<u16>) {
+        let node = neighbour.unwrap_or(0);
+        match side {
+            Side::Upstream if self.kept.tie.node != node => {
+                self.kept.link(node, &self.hull, &mut self.random);
+            }
+            Side::Downstream if self.keeper.tie.node != node => {
+                let apart = self.confines.separation_m;
+                self.keeper.link(node, &self.hull, apart, &mut self.random);
+            }
+            _ => {}
+        }
+    }
+
+    /// Relays that fell silent at `side` are no longer there: they have landed, or were taken away.
+    pub fn forget(&mut self, side: Side) {
+        match side {
+            Side::Upstream => self.kept.wall.clear(),
+            Side::Downstream => self.keeper.wall.clear(),
+        }
+    }
+
+    /// Moves the setpoint as far as is granted by now, and gives it; `None` before there is a place to go to and a report.
+    ///
+    /// `now` is when the setpoint is handed on: the flight controller has it [`Confines::lag`] later.
+    pub fn steer(&mut self, now: Instant) -> Option<Placement> {
+        let target = self.target?;
+        let Some(before) = self.setpoint else {
+            let found = self.found?;
+            self.hull = Hull::at(found.x_m, now);
+            self.kept.wall.begin(found.x_m);
+            self.keeper.wall.begin(found.x_m);
+            self.setpoint = Some(found);
+            return self.setpoint;
+        };
+        let apart = self.confines.separation_m;
+        self.kept.settle(&self.hull);
+        let least = self.kept.least(&self.hull);
+        let most = self.keeper.most(&self.hull, apart);
+        let x_m = target.x_m.max(least).min(most);
+        // Whatever the limits ask for: toward a neighbour only as far as it has granted, back never beyond what was promised.
+        let x_m = x_m.max(least.min(before.x_m)).min(most.max(before.x_m));
+        let clear = self.kept.is_clear() && self.keeper.is_clear();
+        let wanted = Placement {
+            x_m,
+            altitude_m: if clear {
+                target.altitude_m
+            } else {
+                before.altitude_m
+            },
+        };
+        let next = self.confines.cut(wanted);
+        self.hull.go(next.x_m, now);
+        self.setpoint = Some(next);
+        self.keeper.settle(&self.hull, target.x_m, apart);
+        self.setpoint
+    }
+
+    /// Where it is safe to fly, as [`steer`](Self::steer) gave it last.
+    pub const fn setpoint(&self) -> Option<Placement> {
+        self.setpoint
+    }
+
+    /// The next thing to tell a neighbour: on which side, to which node, what.
+    pub fn poll(&mut self) -> Option<(Side, u16, Fence)> {
+        let target = self.target.filter(|_| self.hull.is_known())?;
+        if let Some(fence) = self.kept.tell(&self.hull, target.x_m) {
+            return Some((Side::Upstream, self.kept.tie.node, fence));
+        }
+        let apart = self.confines.separation_m;
+        let fence = self.keeper.tell(&self.hull, target.x_m, apart)?;
+        Some((Side::Downstream, self.keeper.tie.node, fence))
+    }
+
+    /// Has everything told again that may have been lost, and says whether there was anything. To be called every second or so.
+    pub fn remind(&mut self) -> bool {
+        let there = self.is_there();
+        let kept = self.kept.tie.node != 0 && !(there && self.kept.is_agreed());
+        let keeper = self.keeper.tie.node != 0 && !(there && self.keeper.is_agreed());
+        self.kept.tie.due |= kept;
+        self.keeper.tie.due |= keeper;
+        kept || keeper
+    }
+
+    /// Whether the setpoint is the agreed place, cut to the box, and the relay was reported to be there since.
+    pub fn is_there(&self) -> bool {
+        let off = self.confines.rounding();
+        match (self.target, self.setpoint) {
+            (Some(target), Some(setpoint)) => {
+                (target.x_m - setpoint.x_m).abs() <= off
+                    && self.hull.is_still()
+                    && (target.altitude_m - self.altitude_m).abs() <= self.confines.hover_m + off
+            }
+            _ => false,
+        }
+    }
+
+    /// What at `side` keeps this relay from its place, by what was heard so far; `None` if nothing does, or no place is agreed.
+    ///
+    /// While a new agreement spreads it may tell of places that are not to be.
+    pub fn hindrance(&self, side: Side) -> Option<Hindrance> {
+        let target = self.target?.x_m;
+        let near = self.confines.separation_m - self.confines.rounding();
+        match side {
+            Side::Upstream => self.kept.hindrance(target, near),
+            Side::Downstream => self.keeper.hindrance(&self.hull, target, near),
+        }
+    }
+
+    /// Inputs that were refused: not a number, or out of range. It stays at its maximum.
+    pub const fn refused(&self) -> u32 {
+        self.refused
+    }
+}
+
+/// Whether it is a number that may be a place along x, m; not so for NaN.
+fn is_place(x_m: f32) -> bool {
+    x_m.abs() <= FARTHEST_M
+}
+
+#[inline(never)] // called from several places
+fn is_placement(place: Placement) -> bool {
+    is_place(place.x_m) && is_place(place.altitude_m)
+}

@@ -1,0 +1,202 @@
+//! The rules of the guard, one by one: relays whose messages are handed over by hand.
+
+mod pairs;
+
+use super::confines::{Confines, Geofence};
+use super::{Fence, Guard, Hindrance};
+use crate::node::Side;
+use crate::sir::Placement;
+use crate::time::{Duration, Instant};
+
+const APART: f32 = 10.0;
+
+fn confines() -> Confines {
+    Confines {
+        fence: Geofence {
+            least_x_m: 0.0,
+            most_x_m: 1000.0,
+            least_altitude_m: 20.0,
+            most_altitude_m: 120.0,
+        },
+        separation_m: APART,
+        hover_m: 0.0,
+        lag: Duration::from_millis(200),
+    }
+}
+
+fn at(x_m: f32) -> Placement {
+    Placement {
+        x_m,
+        altitude_m: 50.0,
+    }
+}
+
+/// A guard between `neighbours` that hovers at `x_m` and is to be at `target_m`, and the clock.
+struct One {
+    guard: Guard,
+    now: Instant,
+}
+
+impl One {
+    fn new(neighbours: [Option<u16>; 2], x_m: f32, target_m: f32) -> Self {
+        let mut one = Self {
+            guard: Guard::new(confines(), neighbours, 7, Instant::ZERO),
+            now: Instant::ZERO,
+        };
+        one.guard.commit(at(target_m));
+        one.is_at(x_m);
+        one.is_at(x_m);
+        one
+    }
+
+    /// Long after the last setpoint it is reported to be at `x_m`.
+    fn is_at(&mut self, x_m: f32) {
+        self.now = self.now + Duration::from_millis(1000);
+        self.guard.position(self.now, at(x_m));
+        let _ = self.guard.steer(self.now);
+    }
+
+    fn setpoint(&mut self) -> f32 {
+        self.guard.steer(self.now).unwrap().x_m
+    }
+
+    /// What it has to say on `side`.
+    fn says(&mut self, side: Side) -> Fence {
+        self.guard.steer(self.now);
+        self.guard.kept.tie.due = true;
+        self.guard.keeper.tie.due = true;
+        let mut said = None;
+        while let Some((to, _, fence)) = self.guard.poll() {
+            if to == side {
+                said = Some(fence);
+            }
+        }
+        said.unwrap()
+    }
+
+    fn hears(&mut self, side: Side, from: u16, fence: Fence) {
+        self.guard.hear(side, from, &fence);
+        self.guard.steer(self.now);
+    }
+}
+
+#[test]
+fn it_is_small() {
+    assert!(size_of::<Guard>() <= 200, "{}", size_of::<Guard>());
+    assert_eq!(size_of::<Fence>(), 16);
+}
+
+#[test]
+fn there_is_no_setpoint_before_a_place_and_a_report() {
+    let mut guard = Guard::new(confines(), [None, None], 7, Instant::from_millis(1000));
+    let now = Instant::from_millis(2000);
+    assert_eq!(guard.steer(now), None);
+    guard.commit(at(300.0));
+    assert_eq!(guard.steer(now), None);
+    guard.position(Instant::from_millis(999), at(100.0));
+    assert_eq!(guard.steer(now), None, "that was before the start");
+    guard.position(now, at(-20.0));
+    assert_eq!(guard.steer(now), None, "that is outside the box");
+    guard.position(now, at(100.0));
+    assert_eq!(guard.steer(now), Some(at(100.0)), "it holds first");
+    assert_eq!(guard.steer(now), Some(at(300.0)), "it is alone");
+}
+
+#[test]
+fn nothing_leaves_the_box_and_nonsense_is_counted() {
+    let mut one = One::new([None, None], 100.0, 100.0);
+    let far = Placement {
+        x_m: 5000.0,
+        altitude_m: 1.0,
+    };
+    one.guard.commit(far);
+    let cut = Placement {
+        x_m: 1000.0,
+        altitude_m: 20.0,
+    };
+    assert_eq!(one.guard.steer(one.now), Some(cut));
+    one.guard.commit(at(f32::NAN));
+    one.guard.position(one.now, at(f32::INFINITY));
+    let fence = Fence {
+        tie: 1,
+        echo: 0,
+        number: 0,
+        x_m: 2e7,
+        target_m: 0.0,
+    };
+    one.guard.hear(Side::Upstream, 1, &fence);
+    assert_eq!(one.guard.refused(), 3);
+    assert_eq!(one.guard.steer(one.now), Some(cut));
+}
+
+/// Rule 1: not even where the neighbour on the other side began too close.
+#[test]
+fn a_squeezed_relay_keeps_its_promise() {
+    let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
+    for side in [Side::Upstream, Side::Downstream] {
+        let hello = Fence {
+            tie: 9,
+            echo: 0,
+            number: 0,
+            x_m: 0.0,
+            target_m: 0.0,
+        };
+        let from = if side == Side::Upstream { 1 } else { 3 };
+        one.hears(side, from, hello);
+        let said = one.says(side);
+        let answer = Fence {
+            echo: said.tie,
+            number: u16::from(side == Side::Upstream),
+            x_m: if side == Side::Upstream { 98.0 } else { 104.0 },
+            ..hello
+        };
+        one.hears(side, from, answer);
+    }
+    assert_eq!(
+        one.setpoint().to_bits(),
+        98.0_f32.to_bits(),
+        "94 would be clear of relay 3"
+    );
+}
+
+/// Rule 9.
+#[test]
+fn a_lost_relay_is_kept_clear_of() {
+    let mut one = One::new([None, Some(2)], 100.0, 400.0);
+    let mut lost = One::new([Some(1), None], 300.0, 300.0);
+    for _ in 0..4 {
+        lost.hears(Side::Upstream, 1, one.says(Side::Downstream));
+        one.hears(Side::Downstream, 2, lost.says(Side::Upstream));
+    }
+    assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
+    one.guard.link(Side::Downstream, None);
+    assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
+    assert_eq!(one.guard.hindrance(Side::Downstream), Some(Hindrance::Lost));
+    one.guard.forget(Side::Downstream);
+    assert_eq!(one.setpoint().to_bits(), 400.0_f32.to_bits());
+
+    lost.guard.commit(at(50.0));
+    let least = lost.setpoint();
+    assert!(least >= 300.0 - 200.0);
+    lost.guard.link(Side::Upstream, None);
+    assert_eq!(lost.setpoint().to_bits(), least.to_bits());
+    lost.guard.forget(Side::Upstream);
+    assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
+}
+
+#[test]
+fn one_that_was_never_heard_may_be_anywhere() {
+    let mut guard = Guard::new(confines(), [Some(1), Some(3)], 7, Instant::ZERO);
+    guard.link(Side::Upstream, None);
+    guard.link(Side::Downstream, Some(4));
+    guard.link(Side::Downstream, None);
+    let now = Instant::from_millis(1000);
+    guard.position(now, at(500.0));
+    for target in [100.0, 900.0] {
+        guard.commit(at(target));
+        guard.steer(now);
+        assert_eq!(guard.steer(now), Some(at(500.0)));
+    }
+    guard.forget(Side::Downstream);
+    assert_eq!(guard.steer(now), Some(at(900.0)));
+}

@@ -1,0 +1,231 @@
+//! Two relays and the fence between them.
+
+use super::{One, at, confines};
+use crate::guard::{Guard, Hindrance};
+use crate::node::Side;
+use crate::sir::Placement;
+use crate::time::{Duration, Instant};
+
+/// The setpoints of the two, m along x: they are to be exact.
+#[derive(PartialEq, Debug)]
+struct Both(f32, f32);
+
+/// Relay 1 toward Tx and relay 2 toward Rx, between them one fence.
+struct Pair {
+    keeper: One,
+    kept: One,
+}
+
+impl Pair {
+    fn new(keeper: [f32; 2], kept: [f32; 2]) -> Self {
+        Self {
+            keeper: One::new([None, Some(2)], keeper[0], keeper[1]),
+            kept: One::new([Some(1), None], kept[0], kept[1]),
+        }
+    }
+
+    fn ask(&mut self) {
+        let fence = self.keeper.says(Side::Downstream);
+        self.kept.hears(Side::Upstream, 1, fence);
+    }
+
+    fn answer(&mut self) {
+        let fence = self.kept.says(Side::Upstream);
+        self.keeper.hears(Side::Downstream, 2, fence);
+    }
+
+    /// Both hear what the other one has to say, until nothing is new.
+    fn talk(&mut self) {
+        for _ in 0..8 {
+            self.ask();
+            self.answer();
+        }
+    }
+
+    fn setpoints(&mut self) -> Both {
+        Both(self.keeper.setpoint(), self.kept.setpoint())
+    }
+}
+
+/// Rule 8.
+#[test]
+fn nobody_moves_toward_one_who_was_not_heard() {
+    let mut pair = Pair::new([100.0, 200.0], [300.0, 150.0]);
+    assert_eq!(pair.setpoints(), Both(100.0, 300.0));
+    pair.ask();
+    assert_eq!(pair.setpoints(), Both(100.0, 300.0));
+    assert_eq!(
+        pair.keeper.guard.hindrance(Side::Downstream),
+        Some(Hindrance::Unheard)
+    );
+    // Away from it, it may.
+    pair.keeper.guard.commit(at(50.0));
+    pair.kept.guard.commit(at(400.0));
+    assert_eq!(pair.setpoints(), Both(50.0, 400.0));
+}
+
+/// Rules 3, 4 and 6: a fence on the right is asked for, and flown to as the other one clears it.
+#[test]
+fn the_keeper_follows_the_kept_relay() {
+    let mut pair = Pair::new([100.0, 200.0], [120.0, 300.0]);
+    pair.talk();
+    assert_eq!(
+        pair.setpoints(),
+        Both(110.0, 300.0),
+        "half way: (200 + 300 + 10) / 2 is asked for"
+    );
+    pair.kept.is_at(180.0);
+    pair.talk();
+    assert_eq!(pair.setpoints(), Both(170.0, 300.0));
+    pair.kept.is_at(300.0);
+    pair.talk();
+    assert_eq!(pair.setpoints(), Both(200.0, 300.0));
+    pair.keeper.is_at(200.0);
+    assert!(pair.keeper.guard.is_there() && pair.kept.guard.is_there());
+    assert!(
+        !pair.keeper.guard.remind() && !pair.kept.guard.remind(),
+        "nothing is left to say"
+    );
+}
+
+/// Rules 1 and 5: a fence on the left is lowered as the keeper clears it.
+#[test]
+fn the_kept_relay_follows_the_keeper() {
+    let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
+    pair.talk();
+    assert_eq!(pair.setpoints(), Both(100.0, 210.0));
+    pair.keeper.is_at(150.0);
+    pair.talk();
+    assert_eq!(pair.setpoints(), Both(100.0, 160.0));
+    pair.keeper.is_at(100.0);
+    pair.talk();
+    assert_eq!(pair.setpoints(), Both(100.0, 120.0));
+}
+
+/// Rule 3: what was told with an older fence, or late, does not count.
+#[test]
+fn late_messages_grant_nothing() {
+    let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
+    pair.talk();
+    let high = pair.kept.says(Side::Upstream);
+    // It is lowered to (20 + 120 + 10) / 2, but nobody has said so to the kept relay yet.
+    pair.keeper.guard.commit(at(20.0));
+    pair.kept.guard.commit(at(120.0));
+    pair.answer();
+    pair.keeper.is_at(20.0);
+    let low = pair.keeper.says(Side::Downstream);
+    assert_eq!(low.x_m.to_bits(), 75.0_f32.to_bits());
+    pair.keeper.guard.commit(at(290.0));
+    pair.keeper.hears(Side::Downstream, 2, high);
+    assert_eq!(
+        pair.keeper.setpoint().to_bits(),
+        65.0_f32.to_bits(),
+        "the fence under way counts"
+    );
+    pair.kept.hears(Side::Upstream, 1, low);
+    assert_eq!(pair.kept.setpoint().to_bits(), 120.0_f32.to_bits());
+    pair.talk();
+    let raised = pair.keeper.says(Side::Downstream);
+    assert!(raised.x_m > low.x_m);
+    pair.kept.guard.commit(at(80.0));
+    pair.kept.hears(Side::Upstream, 1, low);
+    assert!(pair.kept.setpoint() >= raised.x_m, "the old fence is over");
+}
+
+/// A report that is older than the setpoint, or that the setpoint cannot have had an effect on, frees nothing.
+#[test]
+fn an_old_report_frees_nothing() {
+    let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
+    pair.talk();
+    let now = pair.keeper.now;
+    pair.keeper.guard.position(now, at(100.0));
+    pair.keeper
+        .guard
+        .position(now + Duration::from_millis(199), at(100.0));
+    pair.talk();
+    assert_eq!(pair.setpoints(), Both(100.0, 210.0));
+    pair.keeper
+        .guard
+        .position(now + Duration::from_millis(200), at(100.0));
+    pair.talk();
+    assert_eq!(pair.setpoints(), Both(100.0, 120.0));
+}
+
+/// Rule 7.
+#[test]
+fn a_start_too_close_is_opened_before_anything_else() {
+    let mut pair = Pair::new([100.0, 500.0], [104.0, 600.0]);
+    let high = |x_m| Placement {
+        x_m,
+        altitude_m: 90.0,
+    };
+    pair.kept.guard.commit(high(600.0));
+    pair.keeper.guard.commit(high(500.0));
+    pair.talk();
+    assert_eq!(pair.setpoints(), Both(94.0, 600.0));
+    let low = |one: &One| one.guard.setpoint().unwrap().altitude_m < 60.0;
+    assert!(low(&pair.keeper) && low(&pair.kept), "both altitudes wait");
+    pair.keeper.is_at(94.0);
+    pair.kept.is_at(200.0);
+    pair.talk();
+    assert_eq!(pair.setpoints(), Both(190.0, 600.0));
+    assert!(!low(&pair.keeper) && !low(&pair.kept));
+}
+
+#[test]
+fn relays_in_the_wrong_order_stay() {
+    let mut pair = Pair::new([200.0, 100.0], [150.0, 300.0]);
+    pair.kept.guard.commit(at(300.0));
+    pair.talk();
+    // Away from where the other one should be each could go by itself, but here that is where it is.
+    pair.keeper.guard.commit(at(250.0));
+    pair.kept.guard.commit(at(140.0));
+    pair.talk();
+    let Both(keeper, kept) = pair.setpoints();
+    assert!(keeper <= 200.0 && kept >= 150.0, "{keeper} {kept}");
+    assert_eq!(
+        pair.keeper.guard.hindrance(Side::Downstream),
+        Some(Hindrance::Order)
+    );
+}
+
+/// A keeper that starts again knows nothing of the fence it had announced: the kept relay goes by it until it has talked to the
+/// new one, and by no old message after that.
+#[test]
+fn a_new_life_is_told_from_an_old_one() {
+    let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
+    pair.talk();
+    let old = pair.keeper.says(Side::Downstream);
+    let told = pair.kept.says(Side::Upstream);
+    pair.keeper = One::new([None, Some(2)], 100.0, 280.0);
+    // Another seed, as it has to be.
+    pair.keeper.guard = {
+        let mut guard = Guard::new(confines(), [None, Some(2)], 8, Instant::ZERO);
+        guard.commit(at(280.0));
+        guard
+    };
+    pair.keeper.is_at(100.0);
+    pair.keeper.is_at(100.0);
+    pair.keeper.hears(Side::Downstream, 2, told);
+    assert_eq!(
+        pair.setpoints(),
+        Both(100.0, 300.0),
+        "what its earlier life was told is void"
+    );
+    pair.talk();
+    assert_eq!(pair.setpoints(), Both(280.0, 300.0));
+    pair.kept.guard.commit(at(110.0));
+    for _ in 0..2 {
+        pair.kept.hears(Side::Upstream, 1, old);
+    }
+    assert_eq!(pair.kept.setpoint().to_bits(), 295.0_f32.to_bits());
+    // Three in a row look like a third life; but they grant nothing either.
+    pair.kept.hears(Side::Upstream, 1, old);
+    assert!(pair.kept.setpoint() >= 295.0);
+    pair.talk();
+    assert_eq!(
+        pair.setpoints(),
+        Both(280.0, 290.0),
+        "and the two find each other again"
+    );
+}

@@ -1,0 +1,134 @@
+//! Which life of the neighbour a message is from.
+//!
+//! Each side numbers its talk with the other at random, and a message counts only if it bears the sender's number and echoes the
+//! receiver's. The keeper's number goes with the first number that echoes it; the kept relay takes a new number whenever it
+//! takes up another of the keeper's. So two numbers go together once, and what was said in an earlier talk cannot count in a
+//! later one, however late it comes.
+
+use crate::node::Side;
+
+/// So many messages of another talk in a row are of a new one, not late ones of an old.
+const STRAYS: u8 = 3;
+
+/// Where relays' numbers come from: xorshift, never 0.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Random(u32);
+
+impl Random {
+    pub(super) const fn new(seed: u32) -> Self {
+        // Any odd multiplier keeps distinct seeds distinct; the generator must not start at zero.
+        match seed.wrapping_mul(0x9E37_79B1) {
+            0 => Self(1),
+            state => Self(state),
+        }
+    }
+
+    /// The next number, 1 to 65535.
+    pub(super) const fn next(&mut self) -> u16 {
+        let mut state = self.0;
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        self.0 = state;
+        let [_, a, b, _] = state.to_le_bytes();
+        match u16::from_le_bytes([a, b]) {
+            0 => 1,
+            number => number,
+        }
+    }
+}
+
+/// A talk with the neighbour on one side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tie {
+    /// The neighbour, 0 for none.
+    pub(super) node: u16,
+    /// The number of this relay's talk.
+    pub(super) own: u16,
+    /// The neighbour's, as it goes with `own`; 0 for none.
+    pub(super) heard: u16,
+    /// Messages of other talks in a row.
+    strays: u8,
+    /// Whether there is something to tell.
+    pub(super) due: bool,
+}
+
+impl Tie {
+    #[inline(never)] // called from several places
+    pub(super) const fn new(node: u16, random: &mut Random) -> Self {
+        Self {
+            node,
+            own: random.next(),
+            heard: 0,
+            strays: 0,
+            due: true,
+        }
+    }
+
+    /// Whether a message is of this talk.
+    pub(super) const fn knows(&mut self, tie: u16, echo: u16) -> bool {
+        let known = tie == self.heard && echo == self.own;
+        if known {
+            self.strays = 0;
+        }
+        known
+    }
+
+    /// One more message of another talk; whether they are too many to be late ones.
+    pub(super) const fn stray(&mut self) -> bool {
+        self.strays = self.strays.saturating_add(1);
+        self.strays >= STRAYS
+    }
+}
+
+/// Where a relay that fell silent may still hover, as a limit of this relay's own x.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Wall {
+    /// Of the lost relays the nearest node, and the limit, m.
+    lost: Option<(u16, f32)>,
+}
+
+impl Wall {
+    /// Nothing there.
+    pub(super) const fn none() -> Self {
+        Self { lost: None }
+    }
+
+    /// The limit, m.
+    pub(super) fn limit_m(&self) -> Option<f32> {
+        self.lost.map(|(_, limit_m)| limit_m)
+    }
+
+    /// One more relay, `node`, may hover so that this one may not go beyond `limit_m`; which node is nearer and which limit
+    /// tighter depends on the side.
+    #[inline(never)] // called from both sides
+    pub(super) fn raise(&mut self, side: Side, node: u16, limit_m: f32) {
+        let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
+        self.lost = Some(match side {
+            Side::Upstream => (nearest.max(node), tightest_m.max(limit_m)),
+            Side::Downstream => (nearest.min(node), tightest_m.min(limit_m)),
+        });
+    }
+
+    /// `node` speaks for itself: all that are lost are it, or beyond it.
+    pub(super) fn spoken(&mut self, side: Side, node: u16) {
+        let is_beyond = |lost: u16| match side {
+            Side::Upstream => lost <= node,
+            Side::Downstream => lost >= node,
+        };
+        if self.lost.is_some_and(|(lost, _)| is_beyond(lost)) {
+            self.lost = None;
+        }
+    }
+
+    /// The first setpoint is `x_m`: whoever was lost before was never heard, and may hover anywhere beyond.
+    pub(super) fn begin(&mut self, x_m: f32) {
+        if let Some((_, limit_m)) = &mut self.lost {
+            *limit_m = x_m;
+        }
+    }
+
+    pub(super) const fn clear(&mut self) {
+        self.lost = None;
+    }
+}
