@@ -31,6 +31,8 @@ pub use placement::search::Schedule;
 pub use relay::{Port, Relay, Transmit};
 pub use sir::Placement;
 pub use time::{Duration, Instant};
+#[cfg(feature = "auth")]
+pub use wire::auth::{Auth, Key};
 pub use wire::frame::FrameBuf;
 
 #[cfg(doctest)]

@@ -1,6 +1,11 @@
 //! The facade a firmware uses: bytes in, bytes and setpoints out, and no input or output of its own.
 
+mod incoming;
+#[cfg(feature = "auth")]
+mod signed;
+
 use crate::field::estimate::Estimate;
+use crate::guard::Hindrance;
 use crate::mission::{Mission, Profile};
 use crate::node::event::Event;
 use crate::node::exchange::Phase;
@@ -11,8 +16,9 @@ use crate::node::{Node, Side};
 use crate::sir::Placement;
 use crate::time::Instant;
 use crate::wire::deframe::{DeframeError, Deframer};
-use crate::wire::frame::{self, FrameBuf, FrameError, Header};
-use crate::wire::message::Message;
+use crate::wire::frame::{self, FrameBuf, Header};
+#[cfg(feature = "auth")]
+use crate::wire::session::Session;
 
 /// Where bytes come from and go to.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -84,13 +90,15 @@ pub struct Relay {
     /// Upstream or shared, and downstream.
     deframers: [Deframer; 2],
     counter: u32,
+    #[cfg(feature = "auth")]
+    session: Option<Session>,
 }
 
 impl Relay {
     /// A relay that has just been switched on at `now`; relay 1 (in a field relay N) begins by itself.
     ///
-    /// `seed` should differ from relay to relay and from one start to the next (a chip's number, a noisy ADC); only the timing of
-    /// repetitions and the numbering of sweeps depend on it, never a placement.
+    /// `seed` should differ from relay to relay and from one start to the next (a chip's number, a noisy ADC); the timing of
+    /// repetitions, the numbering of sweeps and which frames a guard takes for old ones depend on it, never a placement.
     ///
     /// # Errors
     /// [`SetupError`] names the part of `identity` or `settings` that does not fit.
@@ -102,12 +110,16 @@ impl Relay {
         now: Instant,
     ) -> Result<Self, SetupError> {
         check(&mission, identity, &settings)?;
+        #[cfg(feature = "auth")]
+        let session = settings.auth.map(Session::new);
         Ok(Self {
             node: Node::new(mission, identity, settings, seed, now),
             network: identity.network,
             wiring: settings.wiring,
             deframers: [Deframer::new(), Deframer::new()],
             counter: 0,
+            #[cfg(feature = "auth")]
+            session,
         })
     }
 
@@ -137,12 +149,24 @@ impl Relay {
                     };
                     bump(counter);
                 }
-                Some(Ok(plain)) => receive(&mut self.node, self.network, now, port, plain),
+                Some(Ok(plain)) => {
+                    let Some((side, frame)) =
+                        incoming::addressed(&mut self.node, self.network, port, plain)
+                    else {
+                        continue;
+                    };
+                    #[cfg(feature = "auth")]
+                    if let Some(session) = &mut self.session {
+                        signed::receive(&mut self.node, session, now, side, &frame);
+                        continue;
+                    }
+                    incoming::receive(&mut self.node, now, side, &frame);
+                }
             }
         }
     }
 
-    /// Handles what is due by `now`. Bounded by one portion of a computation: 256 reaches while the leader predicts, 320 hops
+    /// Handles what is due by `now`. Bounded by one portion of a computation: 256 reaches while the leader predicts, 96 hops
     /// of a wave, 624 places of Algorithm 2; next to nothing otherwise.
     #[inline(never)] // as `poll_transmit`
     pub fn handle_timeout(&mut self, now: Instant) {
@@ -156,6 +180,19 @@ impl Relay {
         self.node.handle_sample(sample);
     }
 
+    /// Takes in where the drone was at time `at`, `x_m` and altitude: when that was measured, not when it was read. Where
+    /// `Settings::guard` is set there is no setpoint before the first of these.
+    ///
+    /// Constant work. A place that is no number, or farther than 1e7 m, is counted by the guard and has no effect.
+    pub fn handle_position(&mut self, now: Instant, at: Instant, place: Placement) {
+        self.node.handle_position(now, at, place);
+    }
+
+    /// Relays that fell silent at `side` have landed, or were taken away: the guard need not keep clear of them any more.
+    pub fn forget(&mut self, now: Instant, side: Side) {
+        self.node.forget(now, side);
+    }
+
     /// Has the chain agree again, from the beginning of its method: in a closed loop, once it has measured where it stands.
     ///
     /// Only the leader (relay 1; in a field relay N) has something to begin; with any other relay nothing happens.
@@ -166,26 +203,38 @@ impl Relay {
     /// Writes the next frame to be sent into `frame`, if there is one.
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
-        let sender = self.node.index();
-        let (side, message) = self.node.poll_message(now)?;
-        let header = Header {
+        let sender = self.node.members().node;
+        let mut header = Header {
             network: self.network,
             sender,
-            destination: match side {
-                Side::Upstream => sender.saturating_sub(1),
-                Side::Downstream => sender.saturating_add(1),
-            },
+            destination: 0,
             counter: self.counter,
         };
-        self.counter = self.counter.wrapping_add(1);
+        #[cfg(feature = "auth")]
+        if let Some(session) = &mut self.session {
+            // A counter is never used twice: after four billion frames a new epoch is due.
+            if self.counter == u32::MAX {
+                return None;
+            }
+            let (side, len) = signed::next(&mut self.node, session, now, &mut header, frame)?;
+            return Some(self.sent(side, len));
+        }
+        let (side, to, message) = self.node.poll_message(now)?;
+        header.destination = to;
         let len = frame::encode(header, &message, frame);
+        Some(self.sent(side, len))
+    }
+
+    /// One more frame has gone out.
+    fn sent(&mut self, side: Side, len: usize) -> Transmit {
+        self.counter = self.counter.wrapping_add(1);
         bump(&mut self.node.stats.sent);
         let port = match (self.wiring, side) {
             (Wiring::Shared, _) => Port::Shared,
             (Wiring::Pair, Side::Upstream) => Port::Upstream,
             (Wiring::Pair, Side::Downstream) => Port::Downstream,
         };
-        Some(Transmit { port, len })
+        Transmit { port, len }
     }
 
     /// The next thing the firmware should know of, if there is one.
@@ -198,9 +247,19 @@ impl Relay {
         self.node.poll_timeout()
     }
 
-    /// Where to fly, once the chain has agreed.
+    /// Where to fly, once the chain has agreed: to its place, or with `Settings::guard` as far toward it as is safe by now.
     pub fn setpoint(&self) -> Option<Placement> {
         self.node.setpoint()
+    }
+
+    /// Where to be in the end, once the chain has agreed.
+    pub fn agreed(&self) -> Option<Placement> {
+        self.node.agreed()
+    }
+
+    /// What keeps the drone from the agreed place at `side`, where `Settings::guard` is set.
+    pub fn hindrance(&self, side: Side) -> Option<Hindrance> {
+        self.node.hindrance(side)
     }
 
     /// The SIR (linear) that every hop of the agreed chain meets.
@@ -218,7 +277,23 @@ impl Relay {
         &self.node.stats
     }
 
-    /// The mission the relay flies.
+    /// Its place in the chain as it was counted last, 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
+    pub fn index(&self) -> u16 {
+        self.node.members().index
+    }
+
+    /// The number of the view of the chain that it has agreed to, 0 before the chain has had to form anew.
+    pub fn view(&self) -> u16 {
+        self.node.members().view
+    }
+
+    /// The nodes it takes for its neighbours toward the transmitter and toward the receiver, by their place in the chain that
+    /// the mission began with.
+    pub fn neighbours(&self) -> [Option<u16>; 2] {
+        self.node.neighbours()
+    }
+
+    /// The mission the relay flies, with as many relays as are left of it.
     pub fn mission(&self) -> &Mission {
         self.node.mission()
     }
@@ -244,39 +319,6 @@ impl Relay {
     }
 }
 
-/// One frame, decoded from COBS: checked, addressed and only then read.
-fn receive(node: &mut Node, network: u16, now: Instant, port: Port, plain: &[u8]) {
-    let own = node.index();
-    let stats = &mut node.stats;
-    let (header, body) = match frame::open(plain) {
-        Ok(opened) => opened,
-        Err(FrameError::Short) => return bump(&mut stats.truncated),
-        Err(FrameError::Crc) => return bump(&mut stats.crc),
-        Err(FrameError::Version) => return bump(&mut stats.version),
-        Err(FrameError::Message(_)) => return bump(&mut stats.malformed),
-    };
-    if header.network != network {
-        return bump(&mut stats.foreign);
-    }
-    if header.destination != own && port == Port::Shared {
-        return bump(&mut stats.overheard);
-    }
-    let through = match port {
-        Port::Upstream => Some(Side::Upstream),
-        Port::Downstream => Some(Side::Downstream),
-        Port::Shared => None,
-    };
-    let side = node
-        .side_of(header.sender)
-        .filter(|side| through.is_none_or(|through| through == *side));
-    let Some(side) = side.filter(|_| header.destination == own) else {
-        return bump(&mut node.stats.misaddressed);
-    };
-    match Message::decode(body) {
-        Ok(message) => {
-            bump(&mut node.stats.received);
-            node.handle_message(now, side, &message);
-        }
-        Err(_) => bump(&mut node.stats.malformed),
-    }
-}
+#[cfg(feature = "auth")]
+#[cfg(test)]
+mod tests;

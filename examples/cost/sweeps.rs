@@ -60,6 +60,7 @@ pub(crate) fn sweep() {
         };
         longest = longest.max(len);
         let bytes = frame.get(..len).unwrap_or_default();
+        let mut again = middle.clone();
         through = through.max(instructions(|| {
             middle.handle_bytes(now, Port::Upstream, bytes);
             let mut out: FrameBuf = [0; MAX_FRAME];
@@ -67,7 +68,6 @@ pub(crate) fn sweep() {
             black_box(&out);
         }));
         // Once more, out of the measured path: the frame itself.
-        let mut again = relay(2, settings, THREE);
         again.handle_bytes(now, Port::Upstream, bytes);
         let Some((frame, len)) = sends(&mut again, now) else {
             break;

@@ -8,6 +8,8 @@
 //! The first relay needs no `--upstream`, the last one no `--downstream`. All relays of a chain are given the same `--of`,
 //! `--baud`, `--network` and mission; a neighbour that was given another mission is reported.
 //!
+//! With `--key-file` and `--epoch-file` its frames are signed; without, anybody in range can move the drones, and it says so.
+//!
 //! Every event is one line on standard output; an f32 also as its bits. To make this program yours, hand the setpoint to
 //! your autopilot in `report.rs`. It ends with status 0 at Ctrl-C or SIGTERM, 1 when a tty fails (let systemd start it again),
 //! 2 when the options are wrong.
@@ -19,11 +21,17 @@
 //! | `ports.rs` | the ttys of either wiring, and sleep until one of them or a timer needs the relay |
 //! | `relay.rs` | the loop |
 //! | `report.rs` | the lines it prints |
+//! | `key.rs`, `epoch.rs` | what frames are signed with, from files |
 //!
 //! It runs on other kinds of Unix too; on a Mac the ttys are called `/dev/cu.*`.
 #![cfg_attr(unix, forbid(unsafe_code))]
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
+#[cfg(unix)]
+mod epoch;
+#[cfg(unix)]
+#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
+mod key;
 #[cfg(unix)]
 mod options;
 #[cfg(unix)]

@@ -13,6 +13,8 @@ use uav_relay::{
     Mission, MissionConfig, Profile, Settings, Wiring,
 };
 
+use crate::key;
+
 /// A frame's way through two kernels and two USB adapters, and the computing: an adapter alone may wait 16 ms.
 const LATENCY: Duration = Duration::from_millis(40);
 
@@ -42,6 +44,12 @@ struct Options {
     /// Number of the network; frames of any other are ignored
     #[arg(long, value_name = "W", default_value_t = 7, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(0..))]
     network: u16,
+    /// File with the network's key, 64 hexadecimal digits: frames carry a tag, and only frames with one count
+    #[arg(long, value_name = "FILE", requires = "epoch_file")]
+    key_file: Option<PathBuf>,
+    /// File that keeps the number of this start, made if it is missing; it must never go back
+    #[arg(long, value_name = "FILE", requires = "key_file")]
+    epoch_file: Option<PathBuf>,
     /// Milliseconds of silence after which a neighbour is asked for a sign of life
     #[arg(long, value_name = "MS", default_value_t = 5_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
     quiet_ms: u64,
@@ -105,8 +113,21 @@ pub(crate) struct Plan {
     pub(crate) mission: Mission,
     pub(crate) identity: Identity,
     pub(crate) settings: Settings,
+    pub(crate) secret: Option<Secret>,
     pub(crate) ttys: Ttys,
     pub(crate) baud: u32,
+}
+
+/// What frames are signed with.
+pub(crate) struct Secret {
+    pub(crate) key: [u8; 32],
+    pub(crate) epoch_file: PathBuf,
+}
+
+impl std::fmt::Debug for Secret {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Secret(..)")
+    }
 }
 
 /// Reads the command line; where there is nothing to run, help or the mistake has been printed.
@@ -181,9 +202,20 @@ fn plan(options: &Options) -> Result<Plan, String> {
             index,
         },
         settings,
+        secret: secret(options)?,
         ttys,
         baud: options.baud,
     })
+}
+
+fn secret(options: &Options) -> Result<Option<Secret>, String> {
+    let (Some(key_file), Some(epoch_file)) = (&options.key_file, &options.epoch_file) else {
+        return Ok(None);
+    };
+    Ok(Some(Secret {
+        key: key::load(key_file)?,
+        epoch_file: epoch_file.clone(),
+    }))
 }
 
 fn ttys(options: &Options) -> Result<Ttys, String> {

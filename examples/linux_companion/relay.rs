@@ -7,8 +7,9 @@ use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant as Clock};
 
 use signal_hook::consts::{SIGINT, SIGTERM};
-use uav_relay::{Instant, Relay};
+use uav_relay::{Auth, Instant, Key, Relay, Settings};
 
+use crate::epoch;
 use crate::options::Plan;
 use crate::ports::{Ports, Woken};
 use crate::report::Report;
@@ -21,17 +22,17 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
     let stop = on_signals().map_err(|error| format!("cannot wait for signals: {error}"))?;
     let mut ports = Ports::open(&plan.ttys, plan.baud)?;
     let clock = Clock::now();
-    let mut relay = Relay::new(
-        plan.mission,
-        plan.identity,
-        plan.settings,
-        seed(),
-        now(clock),
-    )
-    .map_err(|error| error.to_string())?;
+    let auth = auth(plan)?;
+    let settings = Settings {
+        auth,
+        ..plan.settings
+    };
+    let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), now(clock))
+        .map_err(|error| error.to_string())?;
     let report = Report::new(plan.identity, &plan.mission);
     let names: Vec<String> = ports.ttys().map(|tty| tty.name().to_owned()).collect();
     report.started(&names, plan.baud)?;
+    report.signs(auth.map(|auth| auth.epoch))?;
     loop {
         let wake = ports.poll(now(clock), &mut relay);
         while let Some(event) = relay.poll_event() {
@@ -45,6 +46,17 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
             return report.stopped(now(clock), relay.stats());
         }
     }
+}
+
+/// What frames are signed with in this start.
+fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
+    let Some(secret) = &plan.secret else {
+        return Ok(None);
+    };
+    Ok(Some(Auth {
+        key: Key::new(secret.key),
+        epoch: epoch::next(&secret.epoch_file)?,
+    }))
 }
 
 /// Time since the start, by a clock that nobody sets.

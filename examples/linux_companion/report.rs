@@ -54,6 +54,21 @@ impl Report {
         )
     }
 
+    /// With which epoch frames are signed, if they are.
+    #[expect(clippy::unused_self, reason = "as the other lines")]
+    pub(crate) fn signs(&self, epoch: Option<u32>) -> Result<(), String> {
+        match epoch {
+            Some(epoch) => line(
+                Instant::ZERO,
+                format_args!("signed: frames carry a tag, epoch {epoch}"),
+            ),
+            None => line(
+                Instant::ZERO,
+                format_args!("unsigned: no --key-file, anybody can send frames"),
+            ),
+        }
+    }
+
     pub(crate) fn event(&self, now: Instant, event: Event, relay: &Relay) -> Result<(), String> {
         match event {
             Event::SetpointChanged => match relay.setpoint() {

@@ -37,7 +37,9 @@
 //! | 112 | u32 | samples to take at a place; 0 where nothing is measured |
 //! | 116 + 8 k | f32 | x of point k of the field, counted from 0, m; 0 behind the last one |
 //! | 120 + 8 k | f32 | Upsilon of point k, 1/W; 0 behind the last one |
-//! | 244 | u32 | CRC-32C of bytes 0 to 243 |
+//! | 244 | u32 | the least epoch that this relay signs with, 1 to 4294967294; 0 without a key |
+//! | 248 | 32 bytes | the network's key, by which frames carry a tag; all 0 where there is none |
+//! | 280 | u32 | CRC-32C of bytes 0 to 279 |
 //!
 //! The ranges are those of [`MissionConfig`], [`Channel::new`], [`Profile`], [`Adjust`], [`Measure`] and [`Field`].
 
@@ -57,10 +59,10 @@ pub const ADDRESS: u32 = 0x080E_0000;
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// The version of the table above.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 
 /// Bytes of a block.
-pub const LEN: usize = 248;
+pub const LEN: usize = 284;
 
 /// Points of a field that a block has room for.
 pub const MAX_POINTS: usize = 16;
@@ -68,14 +70,33 @@ pub const MAX_POINTS: usize = 16;
 /// Bytes that the check sequence covers.
 const CHECKED: usize = LEN - 4;
 
+/// Where epoch and key begin.
+const SECRET: usize = CHECKED - 36;
+
 /// [`LEN`] as the block states it.
-const LEN_FIELD: u16 = 248;
+const LEN_FIELD: u16 = 284;
 
 /// A block as it is stored.
 pub type Block = [u8; LEN];
 
 /// Where the field of a mission is kept.
 pub type Room = [FieldPoint; MAX_POINTS];
+
+/// What frames are signed with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Secret {
+    /// The network's key, not all 0.
+    pub key: [u8; 32],
+    /// The least epoch, 1 to 4294967294.
+    pub epoch: u32,
+}
+
+impl core::fmt::Debug for Secret {
+    /// Without the key, which does not belong into logs.
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("Secret(..)")
+    }
+}
 
 /// Room for a field that is not known yet.
 pub const EMPTY: Room = [FieldPoint {
@@ -129,6 +150,8 @@ pub enum ConfigError {
     Points,
     /// What is behind the last point is not 0.
     Unused,
+    /// There is a key without an epoch, or the other way round, or the epoch has none after it.
+    Secret,
     /// This number of the field is out of range.
     Field(FieldError),
     /// This number of the channel is out of range.
@@ -251,11 +274,27 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     })
 }
 
-/// Writes the block that says `config`; `numbers` are those its channel was made of.
+/// What the frames of a relay are signed with, by a block that [`read`] has taken.
+///
+/// # Errors
+/// [`ConfigError::Secret`] if there is a key without an epoch, or the other way round.
+pub fn secret(block: &Block) -> Result<Option<Secret>, ConfigError> {
+    let (_, rest) = block.split_at(SECRET);
+    let mut rest = Reader(rest);
+    let epoch = rest.u32();
+    let key = rest.take();
+    match (epoch, key.iter().all(|&byte| byte == 0)) {
+        (0, true) => Ok(None),
+        (1..=0xFFFF_FFFE, false) => Ok(Some(Secret { key, epoch })),
+        _ => Err(ConfigError::Secret),
+    }
+}
+
+/// Writes the block that says `config` and `secret`; `numbers` are those its channel was made of.
 ///
 /// There is no place in it for a grid in adjust, or for points that are too many: what is read of it is something else then.
 #[cfg(not(target_os = "none"))]
-pub fn write(config: &Config, numbers: &ChannelNumbers) -> Block {
+pub fn write(config: &Config, numbers: &ChannelNumbers, secret: Option<Secret>) -> Block {
     let mission = config.mission.config();
     let source = config.mission.interferer().copied().unwrap_or(Interferer {
         power_w: 0.0,
@@ -320,6 +359,11 @@ pub fn write(config: &Config, numbers: &ChannelNumbers) -> Block {
     for point in points {
         bytes.extend(point.x_m.to_le_bytes());
         bytes.extend(point.upsilon_per_w.to_le_bytes());
+    }
+    bytes.resize(SECRET, 0);
+    if let Some(Secret { key, epoch }) = secret {
+        bytes.extend(epoch.to_le_bytes());
+        bytes.extend(key);
     }
     bytes.resize(CHECKED, 0);
     let check = crc(&bytes);

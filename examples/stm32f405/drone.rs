@@ -3,9 +3,14 @@
 use embedded_hal::digital::OutputPin;
 use uav_relay::node::settings::SetupError;
 use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
+use uav_relay::wire::auth::Auth;
+#[cfg(feature = "auth")]
+use uav_relay::wire::auth::Key;
 use uav_relay::{Event, Instant, Placement, Relay, Sample, Settings, Wiring};
 
 use super::clock::Clock;
+#[cfg(feature = "auth")]
+use super::epoch;
 use super::{board, config, log};
 
 /// What the links of both variants have in common.
@@ -70,7 +75,8 @@ pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> 
     match config::read(board::block(), field) {
         Ok(config) => {
             log::begins(&config);
-            switch_on(&config, wiring, now)
+            let auth = sign().ok()?;
+            switch_on(&config, auth, wiring, now)
         }
         Err(error) => {
             log::refused(error);
@@ -82,8 +88,14 @@ pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> 
 /// The relay, in a place of its own in RAM: the stack would have to hold it, and the copy it is made from. What
 /// [`Relay::new`] gives is kept whole, since to take it apart on the way would be one more copy.
 #[inline(never)]
-fn switch_on(config: &config::Config, wiring: Wiring, now: Instant) -> Option<&'static mut Relay> {
+fn switch_on(
+    config: &config::Config,
+    auth: Option<Auth>,
+    wiring: Wiring,
+    now: Instant,
+) -> Option<&'static mut Relay> {
     let settings = Settings {
+        auth,
         profile: Some(config.profile),
         hold_altitude: config.hold_altitude,
         method: config.method,
@@ -101,6 +113,50 @@ fn switch_on(config: &config::Config, wiring: Wiring, now: Instant) -> Option<&'
     ))?
     .as_mut()
     .ok()
+}
+
+/// Frames are to be signed, and cannot be.
+struct CannotSign;
+
+/// What frames are signed with in this start, if they are.
+///
+/// Where the flash cannot be written, as in an emulator, the epoch is the configuration's: for test benches only, since it does
+/// not rise from one start to the next.
+#[cfg(feature = "auth")]
+#[inline(never)]
+fn sign() -> Result<Option<Auth>, CannotSign> {
+    let config::Secret { key, epoch: floor } = match config::secret(board::block()) {
+        Ok(Some(secret)) => secret,
+        Ok(None) => {
+            log::unsigned();
+            return Ok(None);
+        }
+        Err(error) => {
+            log::refused(error);
+            return Err(CannotSign);
+        }
+    };
+    let Some(step) = epoch::next([board::epochs(0), board::epochs(1)], floor) else {
+        log::no_epoch();
+        return Err(CannotSign);
+    };
+    let kept = board::write_epoch(step);
+    let epoch = if kept { step.epoch } else { floor };
+    log::signs(epoch, kept);
+    Ok(Some(Auth {
+        key: Key::new(key),
+        epoch,
+    }))
+}
+
+/// An image without `--features auth` does not fly where frames are to be signed.
+#[cfg(not(feature = "auth"))]
+fn sign() -> Result<Option<Auth>, CannotSign> {
+    if config::secret(board::block()) == Ok(None) {
+        return Ok(None);
+    }
+    log::cannot_sign();
+    Err(CannotSign)
 }
 
 /// Replace this by what your autopilot wants to hear: `place.x_m` metres from the transmitter toward the receiver, at

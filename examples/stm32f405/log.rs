@@ -49,10 +49,41 @@ pub(crate) fn refused(error: ConfigError) {
         ConfigError::Unused => {
             defmt::error!("configuration refused: bytes behind the last point are not 0");
         }
+        ConfigError::Secret => {
+            defmt::error!("configuration refused: key or epoch, without the other or out of range");
+        }
         ConfigError::Field(error) => defmt::error!("configuration refused: field, {}", error),
         ConfigError::Channel(error) => defmt::error!("configuration refused: channel, {}", error),
         ConfigError::Mission(error) => defmt::error!("configuration refused: mission, {}", error),
     }
+}
+
+/// What frames are signed with; `kept` tells whether the epoch stands in the flash.
+#[cfg(feature = "auth")]
+pub(crate) fn signs(epoch: u32, kept: bool) {
+    if kept {
+        defmt::info!("frames are signed, epoch {=u32}", epoch);
+    } else {
+        defmt::warn!(
+            "frames are signed, epoch {=u32}; it cannot be kept: for a test bench only",
+            epoch
+        );
+    }
+}
+
+#[cfg(feature = "auth")]
+pub(crate) fn unsigned() {
+    defmt::warn!("no key: frames are not signed, and anybody can send some");
+}
+
+#[cfg(feature = "auth")]
+pub(crate) fn no_epoch() {
+    defmt::error!("no epoch is left to sign with");
+}
+
+#[cfg(not(feature = "auth"))]
+pub(crate) fn cannot_sign() {
+    defmt::error!("configuration refused: it has a key, and this image was built without auth");
 }
 
 pub(crate) fn event(event: Event, relay: &Relay) {

@@ -18,6 +18,7 @@
 //! | `wires.rs` | its pins and interrupts |
 //! | `drone.rs` | what a drone does, whatever its links are; `fly_to` is where your autopilot comes in |
 //! | `config.rs` | the configuration, byte by byte |
+//! | `epoch.rs` | with `--features auth`, the number that rises at every start |
 //! | `port.rs` | a serial port that an interrupt serves |
 //! | `clock.rs` | time and sleep |
 //! | `log.rs`, `silent.rs` | the log with `--features defmt`, and without |
@@ -34,6 +35,9 @@ mod clock;
 mod config;
 #[cfg(target_os = "none")]
 mod drone;
+#[cfg(all(target_os = "none", feature = "auth"))]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod epoch;
 #[cfg(target_os = "none")]
 #[cfg_attr(not(feature = "defmt"), path = "silent.rs")]
 mod log;

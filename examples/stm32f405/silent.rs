@@ -13,6 +13,18 @@ pub(crate) const fn begins(_: &Config) {}
 
 pub(crate) const fn refused(_: ConfigError) {}
 
+#[cfg(feature = "auth")]
+pub(crate) const fn signs(_: u32, _: bool) {}
+
+#[cfg(feature = "auth")]
+pub(crate) const fn unsigned() {}
+
+#[cfg(feature = "auth")]
+pub(crate) const fn no_epoch() {}
+
+#[cfg(not(feature = "auth"))]
+pub(crate) const fn cannot_sign() {}
+
 pub(crate) const fn event(_: Event, _: &Relay) {}
 
 pub(crate) const fn counters(_: &Relay) {}

@@ -19,6 +19,10 @@ mod config;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/drone.rs"]
 mod drone;
+#[cfg(all(target_os = "none", feature = "auth"))]
+#[path = "../stm32f405/epoch.rs"]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod epoch;
 #[cfg(target_os = "none")]
 #[cfg_attr(feature = "defmt", path = "../stm32f405/log.rs")]
 #[cfg_attr(not(feature = "defmt"), path = "../stm32f405/silent.rs")]

@@ -1,7 +1,11 @@
 //! What a run or a plan came to, as people and programs read it.
 
+pub mod attack;
 pub mod chain;
+pub mod left;
 pub mod plan;
+pub mod recovery;
+pub mod timeline;
 
 use std::fmt::Write as _;
 
@@ -9,7 +13,9 @@ use serde::Serialize;
 use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Mission, Placement, Profile};
 
+pub use attack::AttackReport;
 pub use chain::ChainReport;
+use left::LostReport;
 pub use plan::PlanReport;
 
 /// One relay at its place.
@@ -66,21 +72,28 @@ fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport> {
         .collect()
 }
 
-/// The relays and Rx as a table to read; nothing where no relay has a place.
-fn hops_table(relays: &[RelayReport], rx_sir: Option<f64>) -> String {
+/// The relays and Rx as a table to read, those that are lost at their last places among them; nothing where no relay has a
+/// place.
+fn hops_table(relays: &[RelayReport], lost: &[LostReport], rx_sir: Option<f64>) -> String {
     let mut text = String::new();
-    if !relays.is_empty() {
+    if !(relays.is_empty() && lost.is_empty()) {
         _ = writeln!(
             text,
             "{:>6} {:>12} {:>10} {:>12} {:>9}",
             "relay", "x [m]", "h [m]", "SIR", "SIR [dB]"
         );
-        for relay in relays {
-            _ = writeln!(
-                text,
+        let kept = relays.iter().map(|relay| {
+            let line = format!(
                 "{:>6} {:>12.3} {:>10.2} {:>12.6} {:>9.3}",
                 relay.index, relay.x_m, relay.h_m, relay.sir, relay.sir_db
             );
+            (relay.index, line)
+        });
+        let gone = lost.iter().map(|relay| (relay.index, lost_line(relay)));
+        let mut lines: Vec<(u16, String)> = kept.chain(gone).collect();
+        lines.sort_by_key(|(index, _)| *index);
+        for (_, line) in lines {
+            _ = writeln!(text, "{line}");
         }
     }
     if let Some(rx_sir) = rx_sir {
@@ -95,4 +108,12 @@ fn hops_table(relays: &[RelayReport], rx_sir: Option<f64>) -> String {
         );
     }
     text
+}
+
+fn lost_line(relay: &LostReport) -> String {
+    let place = relay.x_m.zip(relay.h_m).map_or_else(
+        || format!("{:>12} {:>10}", "-", "-"),
+        |(x_m, h_m)| format!("{x_m:>12.3} {h_m:>10.2}"),
+    );
+    format!("{:>6} {place} {:>12}", relay.index, relay.why)
 }

@@ -8,6 +8,9 @@
     missing_docs
 )]
 
+#[path = "cli/hostile.rs"]
+mod hostile;
+
 use std::process::{Command, Output};
 
 use serde_json::Value;
@@ -148,6 +151,28 @@ fn wrong_options_are_named_with_their_value_and_range() {
         (&["--kill", "3"], &["--kill", "3", "I@S"]),
         (&["--kill", "9@1"], &["--kill 9@", "1 to 8"]),
         (&["--kill", "0@1"], &["--kill 0@", "1 to 8"]),
+        (&["--kill", "3@-1"], &["--kill", "3@-1", "0 to 1e6"]),
+        (&["--boot", "3"], &["--boot", "'3'", "I@S"]),
+        (&["--boot", "9@1"], &["--boot 9@", "1 to 8"]),
+        (&["--partition", "3"], &["--partition", "'3'", "K@S-T"]),
+        (&["--partition", "8@1"], &["--partition 8@", "1 to 7"]),
+        (&["--partition", "0@1-2"], &["--partition 0@", "1 to 7"]),
+        (
+            &["--partition", "3@5-5"],
+            &["--partition", "3@5-5", "T after S"],
+        ),
+        (
+            &["--uavs", "1", "--partition", "1@1"],
+            &["--partition 1@", "one relay"],
+        ),
+        (
+            &["--partition", "3@1", "--wires"],
+            &["--partition", "--wires"],
+        ),
+        (&["--forge", "0"], &["--forge", "'0'", "1..=100000"]),
+        (&["--replay", "100001"], &["--replay", "1..=100000"]),
+        (&["--auth", "--no-auth"], &["--auth", "--no-auth"]),
+        (&["--shared", "--wires"], &["--shared", "--wires"]),
         (&["--seed", "-3"], &["-3"]),
         (&["--method", "magic"], &["--method", "magic"]),
         (&["--nonsense"], &["--nonsense"]),
@@ -351,8 +376,8 @@ fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
 }
 
 #[test]
-fn a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
-    let output = chain(&["--json", "--uavs", "4", "--kill", "2@0.01"]);
+fn on_wires_a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
+    let output = chain(&["--json", "--uavs", "4", "--kill", "2@0.01", "--wires"]);
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(

@@ -23,6 +23,8 @@ mod options;
 mod process;
 #[path = "companion/pty.rs"]
 mod pty;
+#[path = "companion/signed.rs"]
+mod signed;
 
 use std::time::{Duration, Instant};
 
@@ -64,19 +66,25 @@ struct Chain {
 
 impl Chain {
     fn start(relays: usize, noise: Noise, options: &[&str]) -> Self {
+        let mut chain = Self::of_wires(relays, noise);
+        chain.options = options.iter().map(ToString::to_string).collect();
+        chain.relays = (1..=relays).map(|index| chain.relay(index)).collect();
+        chain
+    }
+
+    /// The wires, and nobody switched on.
+    fn of_wires(relays: usize, noise: Noise) -> Self {
         let wire = |index: usize| Noise {
             seed: noise.seed * 100 + u64::try_from(index).unwrap(),
             ..noise
         };
-        let mut chain = Self {
+        Self {
             wires: (1..relays)
                 .map(|index| Medium::new(2, wire(index)))
                 .collect(),
             relays: Vec::new(),
-            options: options.iter().map(ToString::to_string).collect(),
-        };
-        chain.relays = (1..=relays).map(|index| chain.relay(index)).collect();
-        chain
+            options: Vec::new(),
+        }
     }
 
     /// Switches relay `index` on.

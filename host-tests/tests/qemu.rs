@@ -25,5 +25,7 @@ mod log;
 mod methods;
 #[path = "qemu/radio.rs"]
 mod radio;
+#[path = "qemu/signed.rs"]
+mod signed;
 #[path = "qemu/silence.rs"]
 mod silence;

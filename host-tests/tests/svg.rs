@@ -8,6 +8,9 @@
     missing_docs
 )]
 
+#[path = "svg/lost.rs"]
+mod lost;
+
 use host_tests::svg::{Picture, draw};
 use roxmltree::{Document, Node};
 
@@ -29,6 +32,7 @@ fn chain(relays: usize, distance_m: f64, altitude: impl Fn(f64) -> f64) -> Pictu
             .map(|hop| 1.0 + hop.abs_diff(relays / 2) as f64)
             .collect(),
         lost: vec![],
+        ..Picture::default()
     }
 }
 
@@ -490,6 +494,11 @@ fn hostile_input_still_makes_a_picture() {
         (1.0, 1e308, 1e308),
     ];
     picture.lost = vec![0, 2, 99];
+    picture.left_out = vec![0, 4, 4, 99];
+    picture.events = vec![
+        (f64::NAN, "<&\u{0}".to_owned()),
+        (f64::INFINITY, String::new()),
+    ];
     let empty = Picture::default();
     let nan = Picture {
         distance_m: f64::NAN,

@@ -24,6 +24,8 @@ mod codec;
 mod damage;
 #[path = "wire/document.rs"]
 mod document;
+#[path = "wire/forming.rs"]
+mod forming;
 #[path = "wire/golden.rs"]
 mod golden;
 #[path = "wire/ladder.rs"]
@@ -38,10 +40,14 @@ mod receive;
 mod reject;
 #[path = "wire/sequence.rs"]
 mod sequence;
+#[path = "wire/shared.rs"]
+mod shared;
 #[path = "wire/strategies.rs"]
 mod strategies;
 #[path = "wire/stream.rs"]
 mod stream;
+#[path = "wire/views.rs"]
+mod views;
 #[path = "wire/wave.rs"]
 mod wave;
 

@@ -19,9 +19,13 @@ pub enum Event {
     NeighbourBack(Side),
     /// That neighbour flies another mission; its messages are ignored.
     MissionMismatch(Side),
+    /// The chain has been counted anew: `Relay::index` and the relays of `Relay::mission` have new values, and new places follow.
+    Reformed,
+    /// Too few relays can be reached to go on without the others: this part of the chain holds its places.
+    Cut,
 }
 
-const ALL: [Event; 9] = [
+const ALL: [Event; 11] = [
     Event::SetpointChanged,
     Event::Converged,
     Event::Infeasible,
@@ -31,6 +35,8 @@ const ALL: [Event; 9] = [
     Event::NeighbourBack(Side::Downstream),
     Event::MissionMismatch(Side::Upstream),
     Event::MissionMismatch(Side::Downstream),
+    Event::Reformed,
+    Event::Cut,
 ];
 
 /// Events that have been raised and not yet taken, one bit each.

@@ -17,6 +17,8 @@
 //! stale wherever it comes. Only an agreement, or a turn of Algorithm 2, moves the setpoint: a relay holds its place
 //! through everything else.
 
+use super::MEMBERSHIP;
+
 /// Where a relay is in the protocol.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -33,11 +35,15 @@ pub enum Phase {
     Holding,
     /// The leader has found that no target can be met.
     Infeasible,
+    /// The leader has found that most of the chain cannot be reached: its part holds its places.
+    Cut,
 }
 
 /// What the node has to do now.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
+    /// Nothing at all.
+    Nothing,
     /// Count a message of a pass that is over.
     Stale,
     /// Call `work` after a pause.
@@ -63,6 +69,13 @@ pub(crate) enum Next {
     },
     /// No target can be met.
     Infeasible,
+    /// Ask for a new view: this pass cannot be taken part in.
+    Foreign,
+    /// What came of the call for a new view is known: hand it back, and go by it if it was granted.
+    Formed {
+        /// How many relays it has; `None` if they are too few.
+        granted: Option<u16>,
+    },
 }
 
 /// What a pass that has come in is to a relay.
@@ -71,36 +84,119 @@ pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
+    /// Of another life of its leader, or one whose beginning was missed.
+    Foreign,
 }
 
-/// A pass that is this many numbers or fewer behind the current one is a straggler; farther off, its leader was rebooted.
-const STRAGGLERS: u16 = 64;
+impl Arrival {
+    /// What to do about one that is not taken up.
+    pub(crate) const fn refused(self, exchange: Exchange) -> Option<Next> {
+        match self {
+            Self::New => None,
+            Self::Again => Some(exchange.again()),
+            Self::Straggler => Some(Next::Stale),
+            Self::Foreign => Some(Next::Foreign),
+        }
+    }
+}
+
+/// A pass that is this many numbers or fewer behind the current one is a straggler, and as many ahead a new one; farther off,
+/// its leader was rebooted.
+const STRAGGLERS: u16 = 32;
+
+/// The first pass that a leader begins has a number divisible by this, and no later one has.
+const LIFE: u16 = 64;
+
+/// So many stragglers in a row are none: frames come late twice, a leader that was rebooted insists.
+const SUSPICIOUS: u8 = 4;
 
 /// Which pass is under way, and how far.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Exchange {
     pub(crate) phase: Phase,
     pub(crate) number: u16,
+    /// Whether a pass has come since the relay was switched on, or since the view.
+    begun: bool,
+    /// Stragglers in a row.
+    stragglers: u8,
 }
 
 impl Exchange {
+    /// The leader's `number` is a random one.
+    pub(crate) const fn new(phase: Phase, number: u16) -> Self {
+        Self {
+            phase,
+            number,
+            begun: false,
+            stragglers: 0,
+        }
+    }
+
+    /// Nothing has come yet in a new view.
+    pub(crate) const fn renew(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.begun = false;
+        self.stragglers = 0;
+    }
+
+    /// The leader numbers its next pass.
+    pub(crate) const fn begin(&mut self) {
+        let next = self.number.wrapping_add(1);
+        self.number = if !self.begun {
+            // The next one that is a first one.
+            self.number.wrapping_add(LIFE) & !(LIFE - 1)
+        } else if next.is_multiple_of(LIFE) {
+            next.wrapping_add(1)
+        } else {
+            next
+        };
+        self.begun = true;
+    }
+
+    /// A pass of `number` is under way.
+    pub(crate) const fn take(&mut self, number: u16) {
+        self.number = number;
+        self.begun = true;
+        self.stragglers = 0;
+    }
+
     /// What a pass of `number` is; `same` tells whether it is the current one in everything else.
-    pub(crate) fn arrival(self, number: u16, same: bool) -> Arrival {
-        let behind = self.number.wrapping_sub(number);
-        match behind {
-            _ if self.phase == Phase::Idle => Arrival::New,
-            0 if same => Arrival::Again,
-            1..=STRAGGLERS => Arrival::Straggler,
+    pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
+        let first = number.is_multiple_of(LIFE);
+        if !self.begun {
+            // What it missed it cannot take part in, where it can ask for another beginning.
+            return if first || !MEMBERSHIP {
+                Arrival::New
+            } else {
+                Arrival::Foreign
+            };
+        }
+        let ahead = number.wrapping_sub(self.number);
+        match (ahead, self.number.wrapping_sub(number)) {
+            (0, _) if same => Arrival::Again,
+            (1..=STRAGGLERS, _) if !first || !MEMBERSHIP => Arrival::New,
+            (_, 1..=STRAGGLERS) => self.straggler(),
+            _ if MEMBERSHIP => Arrival::Foreign,
             _ => Arrival::New,
         }
     }
 
-    /// What to do about a pass that has come again.
-    pub(crate) fn again(self) -> Next {
-        if self.phase == Phase::Waiting {
-            Next::Busy
+    /// One more pass that should be over.
+    pub(crate) const fn straggler(&mut self) -> Arrival {
+        self.stragglers = self.stragglers.saturating_add(1);
+        if MEMBERSHIP && self.stragglers >= SUSPICIOUS {
+            self.stragglers = 0;
+            Arrival::Foreign
         } else {
-            Next::Repeat
+            Arrival::Straggler
+        }
+    }
+
+    /// What to do about a pass that has come again.
+    pub(crate) const fn again(self) -> Next {
+        match self.phase {
+            Phase::Waiting => Next::Busy,
+            _ => Next::Repeat,
         }
     }
 
@@ -112,5 +208,83 @@ impl Exchange {
     /// Whether something can be handed back.
     pub(crate) fn is_answered(self) -> bool {
         matches!(self.phase, Phase::Answered | Phase::Holding)
+    }
+}
+
+#[cfg(all(test, feature = "membership"))]
+mod tests {
+    use super::{Arrival, Exchange, LIFE, Phase, STRAGGLERS, SUSPICIOUS};
+
+    /// One that has taken part in pass 200.
+    fn begun() -> Exchange {
+        let mut exchange = Exchange::new(Phase::Idle, 0);
+        exchange.take(200);
+        exchange
+    }
+
+    #[test]
+    fn who_has_missed_the_beginning_takes_up_a_first_pass_alone() {
+        for number in 0..=u16::MAX {
+            let mut exchange = Exchange::new(Phase::Idle, 7);
+            let expected = if number % LIFE == 0 {
+                Arrival::New
+            } else {
+                Arrival::Foreign
+            };
+            assert_eq!(exchange.arrival(number, false), expected, "{number}");
+        }
+    }
+
+    #[test]
+    fn the_next_passes_are_new_and_another_first_one_is_foreign() {
+        for ahead in 1..=u16::MAX {
+            let number = 200_u16.wrapping_add(ahead);
+            let behind = 200_u16.wrapping_sub(number);
+            let expected = if ahead <= STRAGGLERS && number % LIFE != 0 {
+                Arrival::New
+            } else if behind <= STRAGGLERS {
+                Arrival::Straggler
+            } else {
+                Arrival::Foreign
+            };
+            // 256 is 56 ahead: a leader that is rebooted may begin nearer than that.
+            assert_eq!(begun().arrival(number, false), expected, "{number}");
+        }
+        let mut before = Exchange::new(Phase::Idle, 0);
+        before.take(230);
+        assert_eq!(
+            before.arrival(256, false),
+            Arrival::Foreign,
+            "26 ahead, but a first one"
+        );
+        assert_eq!(before.arrival(257, false), Arrival::New);
+    }
+
+    #[test]
+    fn the_same_again_is_answered_and_the_fourth_straggler_in_a_row_is_none() {
+        let mut exchange = begun();
+        assert_eq!(exchange.arrival(200, true), Arrival::Again);
+        assert_eq!(exchange.arrival(200, false), Arrival::Foreign);
+        for _ in 1..SUSPICIOUS {
+            assert_eq!(exchange.arrival(199, false), Arrival::Straggler);
+        }
+        assert_eq!(exchange.arrival(199, false), Arrival::Foreign);
+        assert_eq!(exchange.arrival(199, false), Arrival::Straggler);
+    }
+
+    #[test]
+    fn a_leader_begins_each_life_and_view_with_a_first_number_and_has_no_other() {
+        let mut exchange = Exchange::new(Phase::Planning, 0xFFF0);
+        for view in 0..3 {
+            for pass in 0..200 {
+                exchange.begin();
+                assert_eq!(
+                    exchange.number.is_multiple_of(LIFE),
+                    pass == 0,
+                    "{view}, {pass}"
+                );
+            }
+            exchange.renew(Phase::Planning);
+        }
     }
 }

@@ -1,13 +1,22 @@
 //! When a neighbour counts as lost.
 //!
-//! Any intact frame from it is a sign of life. After `Settings::quiet` without one it is asked for a heartbeat, eight times
+//! Any intact frame from it is a sign of life. After `Settings::quiet` without one it is asked for a heartbeat, sixteen times
 //! over until `Settings::lost` has passed; then it is lost, and asked every `quiet` from there on.
 
 use super::settings::Settings;
 use crate::time::{Duration, Instant};
 
 /// Questions between `quiet` and `lost`.
-const QUESTIONS: u64 = 8;
+const QUESTIONS: u64 = 16;
+
+/// How long after one question the next one is asked, while an answer is urgent.
+pub(crate) fn tick(settings: &Settings) -> Duration {
+    let span = settings
+        .lost
+        .as_micros()
+        .saturating_sub(settings.quiet.as_micros());
+    Duration::from_micros((span / QUESTIONS).max(1))
+}
 
 /// What is known of a neighbour's being alive.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +24,8 @@ pub(crate) struct Neighbour {
     /// When it was heard last, or when this relay was switched on.
     heard: Instant,
     lost: bool,
+    /// Whether it has been heard at all.
+    met: bool,
 }
 
 /// What follows from a silence.
@@ -31,12 +42,19 @@ impl Neighbour {
         Self {
             heard: now,
             lost: false,
+            met: false,
         }
+    }
+
+    /// Whether it has been heard and is not lost.
+    pub(crate) const fn is_there(&self) -> bool {
+        self.met && !self.lost
     }
 
     /// A frame has come; whether it had been lost until then.
     pub(crate) fn heard(&mut self, now: Instant) -> bool {
         self.heard = now;
+        self.met = true;
         core::mem::take(&mut self.lost)
     }
 
@@ -48,11 +66,7 @@ impl Neighbour {
         let look_again = if self.lost {
             now + settings.quiet
         } else {
-            let span = settings
-                .lost
-                .as_micros()
-                .saturating_sub(settings.quiet.as_micros());
-            (now + Duration::from_micros((span / QUESTIONS).max(1))).min(self.heard + settings.lost)
+            (now + tick(settings)).min(self.heard + settings.lost)
         };
         Silence { lost, look_again }
     }

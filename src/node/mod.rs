@@ -11,7 +11,12 @@
 //! | [`sample`] | the interference that a relay measures |
 //! | `repeats` | how long an answer is awaited, and when a pass is sent again |
 //! | [`liveness`] | when a neighbour counts as lost |
+//! | [`beside`] | which node is taken for the neighbour on one side |
+//! | [`members`] | which view of the chain was agreed on, and when a new one is called for |
+//! | `incoming`, `outgoing` | what a message does; what there is to say |
+//! | `forming` | hails, calls and new views |
 //! | [`timers`] | every timer, in one table |
+//! | `steering` | the setpoint on its way to the agreed place |
 //! | [`event`] | what the firmware is told |
 //! | [`stats`] | what was counted |
 //!
@@ -20,66 +25,66 @@
 
 mod adjust;
 mod align;
+pub mod beside;
 pub mod event;
 pub mod exchange;
+mod forming;
+mod incoming;
 mod lead;
 pub mod liveness;
+pub mod members;
+mod outgoing;
 mod repeats;
 pub mod sample;
 pub mod settings;
 mod share;
 mod side;
 pub mod stats;
+mod steering;
 pub mod timers;
 
-use crate::mission::{Heading, Mission, Profile};
+use crate::guard::Guard;
+use crate::mission::{Mission, Profile};
 use crate::sir::Placement;
 use crate::time::{Duration, Instant};
-use crate::wire::digest::digest;
-use crate::wire::message::Message;
 
+use beside::{Beside, CANDIDATES};
 use event::{Event, Pending};
 use exchange::{Next, Phase};
-use liveness::{Neighbour, Silence};
+use members::Members;
 use repeats::Repeats;
 use sample::{Meter, Sample};
-use settings::{Identity, Settings};
-use share::{ADJUST, ALTITUDE, Own, Share};
+use settings::{Identity, Settings, Wiring};
+use share::{Own, Share};
 pub use side::Side;
 use stats::{Stats, bump};
+use steering::guard;
 use timers::{Timer, Timers};
 
 /// How long a relay rests between two portions of a computation, so that a caller's loop gets its turn.
-const PAUSE: Duration = Duration::from_millis(1);
+const PAUSE: Duration = Duration::from_micros(250);
 
-/// What waits to be sent to one neighbour, apart from passes and what comes back of them.
-#[derive(Clone, Copy, Debug, Default)]
-struct Signs {
-    /// A heartbeat that asks for one in return.
-    ask: bool,
-    /// A heartbeat in return.
-    answer: bool,
-}
+/// Whether this crate was built to re-form the chain. Without it, none of its code is reached.
+pub(crate) const MEMBERSHIP: bool = cfg!(feature = "membership");
 
-/// One neighbour and what is owed to it.
-#[derive(Clone, Debug)]
-struct Link {
-    neighbour: Neighbour,
-    signs: Signs,
-}
+/// Whether it was built to guard setpoints.
+pub(crate) const GUARD: bool = cfg!(feature = "guard");
+
+/// A pass whose digest is so many views off is of the same mission.
+const VIEWS: u16 = 64;
 
 /// A relay's share of the protocol.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
     mission: Mission,
-    digest: u16,
     settings: Settings,
-    index: u16,
+    members: Members,
     share: Share,
     meter: Meter,
+    guard: Option<Guard>,
     timers: Timers,
-    upstream: Option<Link>,
-    downstream: Option<Link>,
+    upstream: Beside,
+    downstream: Beside,
     onward_due: bool,
     back_due: bool,
     busy_due: bool,
@@ -98,11 +103,10 @@ impl Node {
         now: Instant,
     ) -> Self {
         let relays = mission.relays();
-        let link = |present: bool| {
-            present.then(|| Link {
-                neighbour: Neighbour::new(now),
-                signs: Signs::default(),
-            })
+        let after = if identity.index < relays {
+            identity.index.saturating_add(1)
+        } else {
+            0
         };
         let leader = identity.index == mission.leader();
         let profile = settings.profile.unwrap_or(mission.config().common);
@@ -114,15 +118,15 @@ impl Node {
         let [a, b, ..] = random.to_le_bytes();
         let low = u16::from_le_bytes([a, b]);
         let mut node = Self {
+            members: Members::new(&mission, identity.index),
             mission,
-            digest: digest(&mission),
             settings,
-            index: identity.index,
             share: Share::new(&mission, leader, low, profile),
             meter: Meter::new(settings.measure),
+            guard: guard(&settings, identity.index, after, seed, now),
             timers: Timers::new(),
-            upstream: link(identity.index > 1),
-            downstream: link(identity.index < relays),
+            upstream: Beside::new(identity.index.saturating_sub(1), now),
+            downstream: Beside::new(after, now),
             onward_due: false,
             back_due: false,
             busy_due: false,
@@ -131,108 +135,77 @@ impl Node {
             stats: Stats::default(),
         };
         for side in [Side::Upstream, Side::Downstream] {
-            if node.link(side).is_some() {
+            if node.beside(side).node() != 0 {
                 node.timers.set(side.timer(), now + settings.quiet);
             }
         }
         if leader {
             node.timers.set(Timer::Work, now + PAUSE);
+        } else if MEMBERSHIP {
+            // Until then the first pass should have come, were this the beginning.
+            let first = settings.hop_time.times(2 * u32::from(relays));
+            node.timers.set(Timer::Call, now + settings.quiet + first);
         }
         node
     }
 
-    fn link(&mut self, side: Side) -> Option<&mut Link> {
+    const fn beside(&mut self, side: Side) -> &mut Beside {
         match side {
-            Side::Upstream => self.upstream.as_mut(),
-            Side::Downstream => self.downstream.as_mut(),
+            Side::Upstream => &mut self.upstream,
+            Side::Downstream => &mut self.downstream,
         }
     }
 
-    /// Which neighbour node `sender` is. Neither Tx nor Rx runs this protocol, so they are none.
+    /// On which side node `sender` is, if it may have something to say to this relay: a neighbour, or one that might become
+    /// one. Neither Tx nor Rx runs this protocol, so they are none.
     pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
-        if sender.checked_add(1) == Some(self.index) {
-            self.upstream.as_ref().map(|_| Side::Upstream)
-        } else if self.index.checked_add(1) == Some(sender) {
-            self.downstream.as_ref().map(|_| Side::Downstream)
-        } else {
-            None
+        let own = self.members.node;
+        let near = sender.abs_diff(own) <= if self.seeks() { CANDIDATES } else { 1 };
+        if !near || sender == own || sender < 1 || sender > self.members.all {
+            return None;
         }
+        Some(if sender < own {
+            Side::Upstream
+        } else {
+            Side::Downstream
+        })
+    }
+
+    /// Whether others than the neighbours of the mission can be heard.
+    fn seeks(&self) -> bool {
+        MEMBERSHIP && self.settings.wiring == Wiring::Shared
     }
 
     /// The relay's share, and what it needs to know of the relay.
     fn parts(&mut self) -> (&mut Share, Own<'_>) {
+        let onward = match Side::onward(self.mission.heading()) {
+            Side::Upstream => &self.upstream,
+            Side::Downstream => &self.downstream,
+        };
         let own = Own {
             mission: &self.mission,
             settings: &self.settings,
-            digest: self.digest,
-            index: self.index,
+            mission_digest: self.members.digest,
+            view: self.members.view,
+            index: self.members.index,
+            end: onward.is_end(),
             measured_per_w: self.meter.published(),
         };
         (&mut self.share, own)
-    }
-
-    /// A message from the neighbour at `side`, intact and addressed to this relay. Bounded by 16 reaches.
-    #[inline(never)]
-    pub(crate) fn handle_message(&mut self, now: Instant, side: Side, message: &Message<'_>) {
-        let quiet = self.settings.quiet;
-        let Some(link) = self.link(side) else { return };
-        let back = link.neighbour.heard(now);
-        self.timers.set(side.timer(), now + quiet);
-        if back {
-            self.pending.raise(Event::NeighbourBack(side));
-        }
-        if message
-            .mission()
-            .is_some_and(|digest| digest != self.digest)
-        {
-            bump(&mut self.stats.mission);
-            self.pending.raise(Event::MissionMismatch(side));
-            return;
-        }
-        if let Message::Heartbeat { answer, .. } = message {
-            if let Some(link) = self.link(side)
-                && *answer
-            {
-                link.signs.answer = true;
-            }
-            return;
-        }
-        let heading = self.mission.heading();
-        let wanted = if message.is_onward() {
-            Side::back(heading)
-        } else {
-            Side::onward(heading)
-        };
-        if side != wanted {
-            bump(&mut self.stats.misdirected);
-            return;
-        }
-        let (share, own) = self.parts();
-        let next = match message {
-            Message::Sweep(sweep) => share.on_sweep(own, sweep),
-            Message::Verdict(answer) => share.on_verdict(own, answer),
-            Message::Wave(wave) if ALTITUDE => share.on_wave(own, wave),
-            Message::Trace(trace) if ALTITUDE => share.on_trace(own, *trace),
-            Message::Token(token) if ADJUST => share.on_token(own, token),
-            Message::Moved(moved) if ADJUST => share.on_moved(own, moved),
-            Message::Busy { sweep } => {
-                if self.share.phase() == Phase::Waiting && *sweep == self.share.number() {
-                    // It has arrived: what is missing is the answer, and that may take its time.
-                    self.repeats.heard();
-                    let patience = self.patience();
-                    self.timers.set(Timer::Repeat, now + patience);
-                }
-                return;
-            }
-            _ => return,
-        };
-        self.proceed(now, next);
     }
 
     /// Does what the relay's share asks for.
     fn proceed(&mut self, now: Instant, next: Next) {
         let mut moved = false;
         match next {
+            Next::Nothing => return,
+            Next::Foreign if !MEMBERSHIP => bump(&mut self.stats.stale),
+            Next::Formed { .. } if !MEMBERSHIP => return,
+            Next::Foreign => {
+                bump(&mut self.stats.stale);
+                self.call(now);
+            }
+            Next::Formed { granted } => return self.formed(now, granted),
             Next::Stale => bump(&mut self.stats.stale),
             Next::Work { moved: to } => {
                 moved = to;
@@ -268,7 +241,7 @@ impl Node {
                 self.timers.stop(Timer::Repeat);
                 self.timers.stop(Timer::Work);
                 let back = Side::back(self.mission.heading());
-                self.back_due = self.link(back).is_some();
+                self.back_due = self.beside(back).node() != 0;
                 if agreed {
                     self.pending.raise(Event::Converged);
                 }
@@ -279,14 +252,16 @@ impl Node {
             }
         }
         if moved {
-            self.pending.raise(Event::SetpointChanged);
+            if self.guard.is_none() {
+                self.pending.raise(Event::SetpointChanged);
+            }
             // What is measured from now on is measured elsewhere.
             self.meter.restart();
         }
         self.stats.sweeps = self.share.sweeps();
     }
 
-    /// Handles every timer that has run out by `now`. Each is stopped first and set again only to a later time, so four
+    /// Handles every timer that has run out by `now`. Each is stopped first and set again only to a later time, so six
     /// rounds at most; the work is that of one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         while let Some(timer) = self.timers.expired(now) {
@@ -305,13 +280,17 @@ impl Node {
                 }
                 Timer::Upstream => self.silence(now, Side::Upstream),
                 Timer::Downstream => self.silence(now, Side::Downstream),
+                Timer::Remind => self.remind(now),
+                Timer::Call if MEMBERSHIP => self.call_again(now),
+                Timer::Call => {}
             }
         }
+        self.steer(now);
     }
 
     /// One measurement, by a relay that measures.
     pub(crate) fn handle_sample(&mut self, sample: Sample) {
-        let at = self.share.setpoint().filter(|_| self.index == 1);
+        let at = self.share.setpoint().filter(|_| self.members.index == 1);
         if !self.meter.take(&self.mission, at, sample) {
             bump(&mut self.stats.samples_refused);
         }
@@ -319,66 +298,20 @@ impl Node {
 
     /// The leader begins again, at `now`; nobody else has anything to begin.
     pub(crate) fn restart(&mut self, now: Instant) {
-        if self.index == self.mission.leader() {
+        if self.members.index == self.mission.leader() && self.share.phase() != Phase::Cut {
             self.share.restart();
             self.proceed(now, Next::Work { moved: false });
         }
     }
 
     fn silence(&mut self, now: Instant, side: Side) {
-        let settings = self.settings;
-        let Some(link) = self.link(side) else { return };
-        let Silence { lost, look_again } = link.neighbour.silent(now, &settings);
-        link.signs.ask = true;
-        self.timers.set(side.timer(), look_again);
-        if lost {
+        let (settings, seeks) = (self.settings, self.seeks());
+        let quiet = self.beside(side).silent(now, &settings, seeks);
+        self.timers.set(side.timer(), quiet.look_again);
+        if quiet.lost {
             self.pending.raise(Event::NeighbourLost(side));
         }
-    }
-
-    /// The next message to send, and to which neighbour. Call until there is none.
-    pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, Message<'_>)> {
-        let heading = self.mission.heading();
-        let (onward, backward) = (Side::onward(heading), Side::back(heading));
-        if core::mem::take(&mut self.onward_due) && self.share.phase() == Phase::Waiting {
-            let patience = self.patience();
-            self.timers.set(Timer::Repeat, now + patience);
-            let (share, own) = self.parts();
-            return share.onward(own).map(|message| (onward, message));
-        }
-        if core::mem::take(&mut self.back_due) && self.share.has_answer() {
-            let (share, own) = self.parts();
-            return share.back(own).map(|message| (backward, message));
-        }
-        if core::mem::take(&mut self.busy_due) {
-            let sweep = self.share.number();
-            return Some((backward, Message::Busy { sweep }));
-        }
-        let mission = self.digest;
-        for side in [Side::Upstream, Side::Downstream] {
-            let Some(link) = self.link(side) else {
-                continue;
-            };
-            let Signs { ask, answer } = core::mem::take(&mut link.signs);
-            if ask || answer {
-                let heartbeat = Message::Heartbeat {
-                    mission,
-                    answer: ask,
-                };
-                return Some((side, heartbeat));
-            }
-        }
-        None
-    }
-
-    /// How long what comes back of a pass sent now may take.
-    fn patience(&mut self) -> Duration {
-        let hops = u32::from(match self.mission.heading() {
-            Heading::TowardRx => self.mission.relays().saturating_sub(self.index),
-            Heading::TowardTx => self.index.saturating_sub(1),
-        });
-        let hop_time = self.settings.hop_time;
-        self.repeats.patience(hop_time, hops, self.share.is_slow())
+        self.review(now);
     }
 
     pub(crate) fn poll_event(&mut self) -> Option<Event> {
@@ -389,7 +322,8 @@ impl Node {
         self.timers.next()
     }
 
-    pub(crate) fn setpoint(&self) -> Option<Placement> {
+    /// Where to be in the end.
+    pub(crate) const fn agreed(&self) -> Option<Placement> {
         self.share.setpoint()
     }
 
@@ -405,8 +339,13 @@ impl Node {
         &self.mission
     }
 
-    pub(crate) fn index(&self) -> u16 {
-        self.index
+    pub(crate) const fn members(&self) -> &Members {
+        &self.members
+    }
+
+    /// The neighbours toward Tx and toward Rx.
+    pub(crate) fn neighbours(&self) -> [Option<u16>; 2] {
+        [&self.upstream, &self.downstream].map(|side| Some(side.node()).filter(|node| *node != 0))
     }
 
     pub(crate) fn profile(&self) -> Profile {

@@ -44,7 +44,10 @@ impl Repeats {
             again => answer.min(2 << u32::from(again).min(16)),
         };
         let patience = hop_time.times(hops).as_micros();
-        Duration::from_micros(patience.saturating_add(u64::from(self.draw()) % (patience / 8 + 1)))
+        // A part of the eighth by multiplication: there is no division of this width on a Cortex-M.
+        let eighth = (patience / 8 + 1).min(u64::from(u32::MAX));
+        let random = (u64::from(self.draw()) * eighth) >> 32;
+        Duration::from_micros(patience.saturating_add(random))
     }
 
     /// A xorshift generator (Marsaglia 2003, 13-17-5): only timing depends on it, never a placement.

@@ -1,9 +1,11 @@
 //! Who a relay is and how it behaves, checked once when it is switched on.
 
+use crate::guard::confines::Confines;
 use crate::mission::{Mission, Profile};
 use crate::placement::local::Local;
 use crate::placement::search::Schedule;
 use crate::time::Duration;
+use crate::wire::auth::Auth;
 
 /// Which relay this is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -90,6 +92,8 @@ pub struct Settings {
     pub predict: bool,
     /// Two links or one channel.
     pub wiring: Wiring,
+    /// Whether frames carry a tag, and only frames with the right one count. All relays of a network must agree on that.
+    pub auth: Option<Auth>,
     /// The longest that a sweep (100 bytes) takes from one relay's `poll_transmit` to the next one's, its computing included;
     /// above 0. For messages that take longer it is multiplied.
     pub hop_time: Duration,
@@ -97,6 +101,12 @@ pub struct Settings {
     pub quiet: Duration,
     /// After this long without one it counts as lost; above `quiet`.
     pub lost: Duration,
+    /// Whether a part of the chain goes on without the others only if it is the larger one: half of the last chain with its
+    /// leader, or more. Without that, the two parts of a chain that is split, but still flies, would get in each other's way.
+    pub quorum: bool,
+    /// Whether setpoints lead to the agreed place only as far as the neighbours have made room, and inside which box. The relay
+    /// then has to be told where it is: `Relay::handle_position`.
+    pub guard: Option<Confines>,
 }
 
 impl Default for Settings {
@@ -110,9 +120,12 @@ impl Default for Settings {
             schedule: Schedule::Bracketed,
             predict: true,
             wiring: Wiring::Pair,
+            auth: None,
             hop_time: Duration::from_millis(30),
             quiet: Duration::from_millis(5_000),
             lost: Duration::from_millis(15_000),
+            quorum: true,
+            guard: None,
         }
     }
 }
@@ -136,8 +149,12 @@ pub enum SetupError {
     Measure,
     /// `hop_time` is zero.
     HopTime,
+    /// `auth.epoch` is zero.
+    Epoch,
     /// `quiet` is zero, or `lost` not above it.
     Silence,
+    /// A number of `guard` is not within its range, or the crate was built without the feature for it.
+    Guard,
 }
 
 impl core::fmt::Display for SetupError {
@@ -154,7 +171,9 @@ impl core::fmt::Display for SetupError {
                 "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000"
             }
             Self::HopTime => "hop_time must be above 0",
+            Self::Epoch => "auth.epoch must be above 0, and above that of every start before",
             Self::Silence => "quiet must be above 0 and lost above quiet",
+            Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, hover of 0 to 1e3, and its feature",
         })
     }
 }
@@ -206,8 +225,18 @@ pub(crate) fn check(
     if settings.hop_time.as_micros() == 0 {
         return Err(SetupError::HopTime);
     }
+    #[cfg(feature = "auth")]
+    if settings.auth.is_some_and(|auth| auth.epoch == 0) {
+        return Err(SetupError::Epoch);
+    }
     if settings.quiet.as_micros() == 0 || settings.lost <= settings.quiet {
         return Err(SetupError::Silence);
+    }
+    if settings
+        .guard
+        .is_some_and(|confines| !cfg!(feature = "guard") || !confines.is_valid())
+    {
+        return Err(SetupError::Guard);
     }
     Ok(())
 }

@@ -25,6 +25,14 @@ pub struct Stats {
     pub crc: u32,
     /// Intact frames of another version of the format.
     pub version: u32,
+    /// Frames with the right tag by which a node makes itself known; of one that proves nothing else is made.
+    pub hellos: u32,
+    /// Intact frames without a tag, at a relay that asks for one.
+    pub unsigned: u32,
+    /// Intact frames whose tag is wrong: by no member, altered, or of another epoch.
+    pub forged: u32,
+    /// Frames with the right tag that had been taken before, or were too old to tell.
+    pub replayed: u32,
     /// Intact frames that hold no message, or one with a number out of range.
     pub malformed: u32,
     /// Intact frames of another network.
@@ -35,6 +43,10 @@ pub struct Stats {
     pub misdirected: u32,
     /// Messages of another mission.
     pub mission: u32,
+    /// Passes, and answers to them, of another view of the chain.
+    pub view: u32,
+    /// New views of the chain that this relay has agreed to.
+    pub views: u32,
     /// Messages of a pass that is over.
     pub stale: u32,
     /// Samples of the interference that were no use: not a number, out of range, or without anything to measure for.
@@ -49,11 +61,15 @@ impl Stats {
             self.truncated,
             self.crc,
             self.version,
+            self.unsigned,
+            self.forged,
+            self.replayed,
             self.malformed,
             self.foreign,
             self.misaddressed,
             self.misdirected,
             self.mission,
+            self.view,
             self.stale,
         ]
         .into_iter()

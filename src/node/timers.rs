@@ -13,13 +13,19 @@ pub(crate) enum Timer {
     Upstream,
     /// The neighbour toward Rx has been silent.
     Downstream,
+    /// A new view that was called for has not come.
+    Call,
+    /// What the guard has said may have been lost.
+    Remind,
 }
 
-const ALL: [Timer; 4] = [
+const ALL: [Timer; 6] = [
     Timer::Work,
     Timer::Repeat,
     Timer::Upstream,
     Timer::Downstream,
+    Timer::Call,
+    Timer::Remind,
 ];
 
 /// When each timer runs out, if it runs.
@@ -29,6 +35,8 @@ pub(crate) struct Timers {
     repeat: Option<Instant>,
     upstream: Option<Instant>,
     downstream: Option<Instant>,
+    call: Option<Instant>,
+    remind: Option<Instant>,
 }
 
 impl Timers {
@@ -38,6 +46,8 @@ impl Timers {
             repeat: None,
             upstream: None,
             downstream: None,
+            call: None,
+            remind: None,
         }
     }
 
@@ -47,6 +57,8 @@ impl Timers {
             Timer::Repeat => &mut self.repeat,
             Timer::Upstream => &mut self.upstream,
             Timer::Downstream => &mut self.downstream,
+            Timer::Call => &mut self.call,
+            Timer::Remind => &mut self.remind,
         }
     }
 
@@ -60,10 +72,17 @@ impl Timers {
 
     /// When the next timer runs out.
     pub(crate) fn next(&self) -> Option<Instant> {
-        [self.work, self.repeat, self.upstream, self.downstream]
-            .into_iter()
-            .flatten()
-            .min()
+        [
+            self.work,
+            self.repeat,
+            self.upstream,
+            self.downstream,
+            self.call,
+            self.remind,
+        ]
+        .into_iter()
+        .flatten()
+        .min()
     }
 
     /// A timer that has run out by `now`, stopped before it is handed out: handling it cannot make it come again at once.

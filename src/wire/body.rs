@@ -5,8 +5,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::forming::Forming;
 use super::message::{Answer, Message, MessageError, Moved, Sweep, Token, Trace, Turn, Wave};
 use crate::field::is_upsilon;
+use crate::guard::Fence;
 use crate::mission::Profile;
 use crate::placement::PerTarget;
 use crate::placement::coded::{PLACES, WIDTH};
@@ -22,24 +24,24 @@ const FARTHEST_M: f32 = 2e9;
 
 /// Which pass, of which mission.
 #[derive(Clone, Copy, Serialize, Deserialize)]
-struct Pass {
+pub(super) struct Pass {
     number: [u8; 2],
     mission: [u8; 2],
 }
 
 impl Pass {
-    const fn new(number: u16, mission: u16) -> Self {
+    pub(super) const fn new(number: u16, mission: u16) -> Self {
         Self {
             number: number.to_le_bytes(),
             mission: mission.to_le_bytes(),
         }
     }
 
-    const fn number(self) -> u16 {
+    pub(super) const fn number(self) -> u16 {
         u16::from_le_bytes(self.number)
     }
 
-    const fn mission(self) -> u16 {
+    pub(super) const fn mission(self) -> u16 {
         u16::from_le_bytes(self.mission)
     }
 }
@@ -94,6 +96,11 @@ enum Body<'a> {
         sir: f32,
     },
     Moved(Pass, At, bool, f32),
+    Hail(Forming),
+    Roster(Forming),
+    Count(Forming),
+    /// The number is that of the talk; its echo, the number of the fence, where it is, where the sender is to be.
+    Fence(Pass, [u8; 2], [u8; 2], f32, f32),
 }
 
 impl Body<'_> {
@@ -113,6 +120,8 @@ impl Body<'_> {
             Self::Trace(_, Some(_)) => 8,
             Self::Token { .. } => 28,
             Self::Moved(..) => 18,
+            Self::Hail(_) | Self::Roster(_) | Self::Count(_) => 12,
+            Self::Fence(..) => 17,
         }
     }
 }
@@ -182,6 +191,16 @@ impl<'a> Message<'a> {
                 at(moved.place),
                 moved.any,
                 moved.worst,
+            ),
+            Self::Hail(hail) => Body::Hail(Forming::of_hail(hail)),
+            Self::Roster(roster) => Body::Roster(Forming::of_roster(roster)),
+            Self::Count(count) => Body::Count(Forming::of_count(count)),
+            Self::Fence { mission, fence } => Body::Fence(
+                Pass::new(fence.tie, *mission),
+                fence.echo.to_le_bytes(),
+                fence.number.to_le_bytes(),
+                fence.x_m,
+                fence.target_m,
             ),
         };
         postcard::to_slice(&body, buffer)
@@ -292,6 +311,15 @@ fn checked(body: Body<'_>) -> Option<Message<'_>> {
             any,
             worst: sir_in_range(worst)?,
         }),
+        Body::Hail(forming) if cfg!(feature = "membership") => Message::Hail(forming.hail()?),
+        Body::Roster(forming) if cfg!(feature = "membership") => Message::Roster(forming.roster()?),
+        Body::Count(forming) if cfg!(feature = "membership") => Message::Count(forming.count()?),
+        Body::Fence(pass, echo, number, x_m, target_m) if cfg!(feature = "guard") => {
+            Message::Fence {
+                mission: pass.mission(),
+                fence: fence(pass.number(), echo, number, x_m, target_m)?,
+            }
+        }
         // Of a method that this relay was built without.
         _ => return None,
     })
@@ -309,6 +337,18 @@ fn sweep(targets: Targets, measured_per_w: Option<f32>, reaches: PerTarget) -> O
         measured_per_w,
         reaches,
     })
+}
+
+/// The fence of these parts, if they are in range.
+fn fence(tie: u16, echo: [u8; 2], number: [u8; 2], x_m: f32, target_m: f32) -> Option<Fence> {
+    let fence = Fence {
+        tie,
+        echo: u16::from_le_bytes(echo),
+        number: u16::from_le_bytes(number),
+        x_m,
+        target_m,
+    };
+    fence.is_valid().then_some(fence)
 }
 
 /// A turn as one byte and three numbers, all of them 0 where they mean nothing.

@@ -1,5 +1,6 @@
 //! One frame: header, body, CRC; then COBS and a zero byte that ends it.
 
+use super::auth::{Signer, TAG};
 use super::crc::Crc32c;
 use super::message::{MAX_BODY, Message, MessageError};
 
@@ -13,13 +14,19 @@ pub const HEADER: usize = 10;
 const CHECK: usize = 4;
 
 /// The longest frame before COBS.
-pub const MAX_DECODED: usize = HEADER + MAX_BODY + CHECK;
+pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG + CHECK;
 
 /// The longest frame on the wire: COBS adds one byte to anything shorter than 254, the delimiter is another.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
 
 /// The longest frame of a sweep on the wire: sixteen targets.
-pub const MAX_SWEEP: usize = 100;
+pub const MAX_SWEEP: usize = 100 + TAG;
+
+/// Flag: a tag follows the body.
+const SIGNED: u16 = 0x1000;
+
+/// Flag: the body is a hello. Only with a tag.
+const HELLO: u16 = 0x2000;
 
 /// The largest node number an address can hold; 4095 is kept for a broadcast.
 pub const MAX_NODE: u16 = 4094;
@@ -73,45 +80,109 @@ impl core::error::Error for FrameError {}
 ///
 /// Work linear in the length of the frame, at most [`MAX_FRAME`] bytes.
 pub fn encode(header: Header, message: &Message<'_>, out: &mut FrameBuf) -> usize {
+    let len = body(out).and_then(|body| message.encode(body));
+    close(header, 0, len, None, out)
+}
+
+/// As [`encode`], with a tag.
+#[cfg(feature = "auth")]
+pub(crate) fn encode_signed(
+    header: Header,
+    message: &Message<'_>,
+    signer: Signer<'_>,
+    out: &mut FrameBuf,
+) -> usize {
+    let len = body(out).and_then(|body| message.encode(body));
+    close(header, SIGNED, len, Some(signer), out)
+}
+
+/// The frame of a hello, with its tag.
+#[cfg(feature = "auth")]
+pub(crate) fn encode_hello(
+    header: Header,
+    hello: &[u8],
+    signer: Signer<'_>,
+    out: &mut FrameBuf,
+) -> usize {
+    let place = body(out).and_then(|body| body.get_mut(..hello.len()));
+    let len = place.map(|place| {
+        place.copy_from_slice(hello);
+        hello.len()
+    });
+    close(header, SIGNED | HELLO, len, Some(signer), out)
+}
+
+/// Where the body goes. The first byte and the last are for COBS and the delimiter.
+fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
+    out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
+}
+
+/// Puts everything else around the first `body` bytes of the body.
+fn close(
+    header: Header,
+    flags: u16,
+    body: Option<usize>,
+    signer: Option<Signer<'_>>,
+    out: &mut FrameBuf,
+) -> usize {
+    let Some(body) = body else { return 0 };
     if header.sender > MAX_NODE || header.destination > MAX_NODE {
         return 0;
     }
-    // The first byte and the last are for COBS and the delimiter.
     let Some(plain) = out.get_mut(1..=MAX_DECODED) else {
         return 0;
     };
-    let Some((head, rest)) = plain.split_first_chunk_mut::<HEADER>() else {
+    let Some(head) = plain.first_chunk_mut::<HEADER>() else {
         return 0;
     };
     let [a, b] = (u16::from(VERSION) << 12 | header.sender).to_le_bytes();
-    let [c, d] = header.destination.to_le_bytes();
+    let [c, d] = (flags | header.destination).to_le_bytes();
     let [e, f] = header.network.to_le_bytes();
     let [g, h, i, j] = header.counter.to_le_bytes();
     *head = [a, b, c, d, e, f, g, h, i, j];
-    let Some(body) = rest
-        .split_at_mut_checked(MAX_BODY)
-        .and_then(|(body, _)| message.encode(body))
-    else {
-        return 0;
-    };
-    let checked = HEADER + body;
+    let mut checked = HEADER + body;
+    if let Some(signer) = signer {
+        let tag = signer.tag(plain.get(..checked).unwrap_or_default());
+        checked = put(plain, checked, tag);
+    }
     let mut crc = Crc32c::new();
     crc.update(plain.get(..checked).unwrap_or_default());
-    if let Some(place) = plain.get_mut(checked..checked + CHECK) {
-        place.copy_from_slice(&crc.finish().to_le_bytes());
-    }
-    stuff(out, checked + CHECK)
+    let len = put(plain, checked, crc.finish().to_le_bytes());
+    stuff(out, len)
 }
 
-/// The header and the body in `plain`, a frame without COBS and delimiter.
+/// Puts `bytes` at `at`, and says where they end.
+fn put<const N: usize>(plain: &mut [u8], at: usize, bytes: [u8; N]) -> usize {
+    if let Some(place) = plain.get_mut(at..at + N) {
+        place.copy_from_slice(&bytes);
+    }
+    at + N
+}
+
+/// An intact frame, taken apart.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Opened<'a> {
+    /// Who sends it to whom.
+    pub header: Header,
+    /// The body, which is a message unless the frame is a hello.
+    pub body: &'a [u8],
+    /// Header and body: what the tag is of.
+    pub signed: &'a [u8],
+    /// The tag, if there is one. Whether it is right is not known yet.
+    pub tag: Option<[u8; TAG]>,
+    /// Whether the body is a hello.
+    pub hello: bool,
+}
+
+/// Takes apart `plain`, a frame without COBS and delimiter.
 ///
 /// Whether the frame is meant for this node is the receiver's to say, before it decodes the body.
 ///
 /// # Errors
 /// [`FrameError`] says what is wrong; the CRC is looked at first, so every other error is one of an intact frame.
-pub fn open(plain: &[u8]) -> Result<(Header, &[u8]), FrameError> {
+pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     let (checked, check) = plain.split_last_chunk::<CHECK>().ok_or(FrameError::Short)?;
-    let (head, body) = checked
+    let (head, rest) = checked
         .split_first_chunk::<HEADER>()
         .ok_or(FrameError::Short)?;
     let mut crc = Crc32c::new();
@@ -121,25 +192,48 @@ pub fn open(plain: &[u8]) -> Result<(Header, &[u8]), FrameError> {
     }
     let [a, b, c, d, e, f, g, h, i, j] = *head;
     let first = u16::from_le_bytes([a, b]);
-    let destination = u16::from_le_bytes([c, d]);
-    if first >> 12 != u16::from(VERSION) || destination >> 12 != 0 {
+    let second = u16::from_le_bytes([c, d]);
+    let flags = second & 0xF000;
+    let known =
+        flags == 0 || cfg!(feature = "auth") && (flags == SIGNED || flags == SIGNED | HELLO);
+    if first >> 12 != u16::from(VERSION) || !known {
         return Err(FrameError::Version);
     }
-    let header = Header {
-        network: u16::from_le_bytes([e, f]),
-        sender: first & 0x0FFF,
-        destination,
-        counter: u32::from_le_bytes([g, h, i, j]),
+    let (signed, body, tag) = if flags == 0 {
+        (checked, rest, None)
+    } else {
+        let (signed, tag) = checked.split_last_chunk::<TAG>().ok_or(FrameError::Short)?;
+        let body = signed.get(HEADER..).ok_or(FrameError::Short)?;
+        (signed, body, Some(*tag))
     };
-    Ok((header, body))
+    Ok(Opened {
+        header: Header {
+            network: u16::from_le_bytes([e, f]),
+            sender: first & 0x0FFF,
+            destination: second & 0x0FFF,
+            counter: u32::from_le_bytes([g, h, i, j]),
+        },
+        body,
+        signed,
+        tag,
+        hello: flags & HELLO != 0,
+    })
 }
 
-/// The header and the message in `plain`: [`open`], then [`Message::decode`].
+/// The header and the message in `plain`: [`open`], then [`Message::decode`]. Of a tag it says nothing.
 ///
 /// # Errors
-/// [`FrameError`] says what is wrong.
+/// [`FrameError`] says what is wrong; a hello is no message.
 pub fn decode(plain: &[u8]) -> Result<(Header, Message<'_>), FrameError> {
-    let (header, body) = open(plain)?;
+    let Opened {
+        header,
+        body,
+        hello,
+        ..
+    } = open(plain)?;
+    if hello {
+        return Err(FrameError::Message(MessageError::Encoding));
+    }
     let message = Message::decode(body).map_err(FrameError::Message)?;
     Ok((header, message))
 }

@@ -1,5 +1,6 @@
 //! What neighbours say to each other. `body` has how they say it, `FORMAT.md` the byte tables.
 
+use crate::guard::Fence;
 use crate::mission::Profile;
 use crate::placement::PerTarget;
 use crate::placement::coded::{PLACES, WIDTH};
@@ -44,6 +45,19 @@ pub enum Message<'a> {
     Token(Token),
     /// Back: who has moved where.
     Moved(Moved),
+    /// Either way, also to nodes that are no neighbours: who the sender takes for its neighbour, and which view it holds.
+    Hail(Hail),
+    /// Onward: who is there, for a new view of the chain.
+    Roster(Roster),
+    /// Back: how many there are.
+    Count(Count),
+    /// Either way: the fence between two neighbours.
+    Fence {
+        /// [`super::digest::digest`] of the sender's mission, as it was loaded.
+        mission: u16,
+        /// What the sender says of it.
+        fence: Fence,
+    },
 }
 
 impl Message<'_> {
@@ -53,17 +67,35 @@ impl Message<'_> {
             Self::Sweep(sweep) => Some(sweep.mission),
             Self::Verdict(answer) => Some(answer.mission),
             Self::Busy { .. } => None,
-            Self::Heartbeat { mission, .. } => Some(*mission),
+            Self::Heartbeat { mission, .. } | Self::Fence { mission, .. } => Some(*mission),
             Self::Wave(wave) => Some(wave.mission),
             Self::Trace(trace) => Some(trace.mission),
             Self::Token(token) => Some(token.mission),
             Self::Moved(moved) => Some(moved.mission),
+            Self::Hail(hail) => Some(hail.mission),
+            Self::Roster(roster) => Some(roster.mission),
+            Self::Count(count) => Some(count.mission),
         }
+    }
+
+    /// Whether its digest is that of the mission as it was loaded, and not that of a view of the chain.
+    pub(crate) const fn is_of_any_view(&self) -> bool {
+        matches!(
+            self,
+            Self::Heartbeat { .. }
+                | Self::Hail(_)
+                | Self::Roster(_)
+                | Self::Count(_)
+                | Self::Fence { .. }
+        )
     }
 
     /// Whether it is a pass, which goes onward.
     pub const fn is_onward(&self) -> bool {
-        matches!(self, Self::Sweep(_) | Self::Wave(_) | Self::Token(_))
+        matches!(
+            self,
+            Self::Sweep(_) | Self::Wave(_) | Self::Token(_) | Self::Roster(_)
+        )
     }
 }
 
@@ -170,6 +202,70 @@ pub struct Moved {
     pub any: bool,
     /// SIR of the worst hop after the sender, linear.
     pub worst: f32,
+}
+
+/// What one node tells another about the chain as it sees it.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "four flags of the wire format"
+)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Hail {
+    /// [`super::digest::digest`] of the sender's mission, as it was loaded.
+    pub mission: u16,
+    /// The largest number of a view that the sender has heard of.
+    pub newest: u16,
+    /// The node that it takes for its neighbour on this side; 0 for none.
+    pub neighbour: u16,
+    /// Whether it asks for a hail in return.
+    pub ask: bool,
+    /// Whether it asks for a new view.
+    pub form: bool,
+    /// Whether it has been switched on and has had no part in anything yet.
+    pub fresh: bool,
+    /// Whether it can hear a node on its other side, or needs none there.
+    pub ready: bool,
+}
+
+/// The call for a new view, as one relay hands it to the next.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Roster {
+    /// [`super::digest::digest`] of the sender's mission, as it was loaded.
+    pub mission: u16,
+    /// The number of the new view, above that of every agreed one.
+    pub view: u16,
+    /// How many relays it has come through, the sender included: 1 to 1000.
+    pub place: u16,
+    /// The newest view that any of them has agreed to.
+    pub before: Before,
+}
+
+/// A view of the chain that a new one follows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Before {
+    /// Its number; 0 is the chain as the mission has it.
+    pub view: u16,
+    /// How many relays were in it, 1 to 1000.
+    pub relays: u16,
+    /// Whether its leader is among those that the call has come through.
+    pub leader: bool,
+}
+
+/// What came of the call for a new view, as it travels back.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Count {
+    /// [`super::digest::digest`] of the sender's mission, as it was loaded.
+    pub mission: u16,
+    /// The number of the view.
+    pub view: u16,
+    /// The sender's place, from 1 at the one that has called: 1 to 1000.
+    pub place: u16,
+    /// How many relays there are, 1 to 1000; `None` if they are too few to go on without the others.
+    pub relays: Option<u16>,
 }
 
 /// Why a body is no message.

@@ -1,9 +1,16 @@
 //! Bytes on the link: [`deframe`] cuts the byte stream at delimiters and undoes COBS, [`frame`] checks integrity and holds
-//! the addresses, [`message`] is what neighbours say, [`digest`] how they tell missions apart. `FORMAT.md` beside this file has byte tables and examples.
+//! the addresses, [`message`] is what neighbours say, [`digest`] how they tell missions apart, [`auth`] how they tell
+//! members from others. `FORMAT.md` beside this file has byte tables and examples.
 
+pub mod auth;
+#[cfg(feature = "auth")]
+mod blake2s;
 mod body;
 pub mod crc;
 pub mod deframe;
 pub mod digest;
+mod forming;
 pub mod frame;
 pub mod message;
+#[cfg(feature = "auth")]
+pub(crate) mod session;

@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::{Parser, ValueEnum};
 use host_tests::command::{self, Failure};
 use host_tests::firmware::block::Flight;
-use host_tests::firmware::config::{ADDRESS, LEN};
+use host_tests::firmware::config::{ADDRESS, LEN, Secret};
+use host_tests::firmware::key;
 use host_tests::scenario::{Interference, Scenario};
 use uav_relay::{Adjust, Local, Measure};
 
@@ -41,6 +43,13 @@ struct Options {
     /// In a field: the relay measures it too, and believes this many samples at a place, 100 to 1000000
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     samples: Option<u32>,
+    /// File with the network's key, 64 hexadecimal digits; without one the frames of this relay are not signed
+    #[arg(long, value_name = "FILE")]
+    key_file: Option<PathBuf>,
+    /// The least epoch to sign with, 1 to 4294967294, above any that a relay of this index has signed with by this key: it rises
+    /// by itself from there. Without it the seconds of this machine's clock
+    #[arg(long, value_name = "E", requires = "key_file", value_parser = clap::value_parser!(u32).range(1..=0xFFFF_FFFE))]
+    epoch: Option<u32>,
     /// File to write the block to
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -102,18 +111,38 @@ fn run(options: &Options) -> Result<String, String> {
     };
     let flight = Flight::new(&scenario, uavs, options.tolerance, network)
         .map_err(|error| format!("{name}: {error}"))?;
+    let secret = secret(options)?;
     let block = flight
         .by(method)
+        .signed(secret)
         .measuring(measure(options, &scenario)?)
         .block(index)
         .map_err(|error| format!("{name}: {error}"))?;
     let file = &options.out;
     std::fs::write(file, block)
         .map_err(|error| format!("{}: --out cannot be written: {error}", file.display()))?;
+    if secret.is_none() {
+        eprintln!("no --key-file: frames are not signed, and anybody can send some");
+    }
     Ok(format!(
         "{}: relay {index} of {uavs}, network {network}; {LEN} bytes for {ADDRESS:#010x}",
         file.display()
     ))
+}
+
+fn secret(options: &Options) -> Result<Option<Secret>, String> {
+    let Some(file) = &options.key_file else {
+        return Ok(None);
+    };
+    let seconds = || {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
+        u32::try_from(since.as_secs()).ok()
+    };
+    let epoch = options.epoch.or_else(seconds);
+    Ok(Some(Secret {
+        key: key::load(file)?,
+        epoch: epoch.ok_or("--epoch: is needed where the clock says no time")?,
+    }))
 }
 
 fn measure(options: &Options, scenario: &Scenario) -> Result<Option<Measure>, String> {

@@ -4,7 +4,9 @@ use std::fmt;
 
 use uav_relay::{Identity, Interference, Measure, Method, Mission, Profile};
 
-use super::config::{Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, read, write};
+use super::config::{
+    Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, Secret, read, secret, write,
+};
 use crate::brief::{self, Refusal};
 use crate::scenario::{AirGround, ChannelSpec, Scenario};
 
@@ -43,6 +45,9 @@ impl fmt::Display for BlockError {
             Self::Config(ConfigError::Measure) => {
                 f.write_str("samples must be within 100 to 1000000, i_max_w within 1e-30 to 1e6")
             }
+            Self::Config(ConfigError::Secret) => {
+                f.write_str("the key must not be all 0, the epoch within 1 to 4294967294")
+            }
             Self::Config(ConfigError::Mission(error)) => error.fmt(f),
             Self::Config(ConfigError::Channel(error)) => error.fmt(f),
             Self::Config(_) | Self::Changed => f.write_str("the block does not say the mission"),
@@ -61,6 +66,7 @@ pub struct Flight {
     held: Vec<u16>,
     method: Method,
     measure: Option<Measure>,
+    secret: Option<Secret>,
     network: u16,
 }
 
@@ -89,6 +95,7 @@ impl Flight {
             held: brief::held(scenario, uavs),
             method: Method::Align,
             measure: None,
+            secret: None,
             network,
         })
     }
@@ -101,6 +108,11 @@ impl Flight {
     /// The same, with relays that measure the interference.
     pub fn measuring(self, measure: Option<Measure>) -> Self {
         Self { measure, ..self }
+    }
+
+    /// The same, with frames that are signed.
+    pub fn signed(self, secret: Option<Secret>) -> Self {
+        Self { secret, ..self }
     }
 
     /// The mission.
@@ -140,11 +152,13 @@ impl Flight {
             method: self.method,
             measure: self.measure,
         };
-        let block = write(&config, &self.numbers);
-        match read(&block, Box::leak(Box::new(EMPTY))) {
-            Ok(read) if read == config => Ok(block),
-            Ok(_) => Err(BlockError::Changed),
-            Err(error) => Err(BlockError::Config(error)),
+        let block = write(&config, &self.numbers, self.secret);
+        let read = read(&block, Box::leak(Box::new(EMPTY))).map_err(BlockError::Config)?;
+        let secret = secret(&block).map_err(BlockError::Config)?;
+        if (read, secret) == (config, self.secret) {
+            Ok(block)
+        } else {
+            Err(BlockError::Changed)
         }
     }
 }

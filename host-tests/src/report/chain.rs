@@ -1,13 +1,19 @@
 //! The report of a simulated chain.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 use uav_relay::placement::promise::is_most;
 use uav_relay::{Interference, Mission};
 
+use super::attack::AttackReport;
+use super::left::{LostReport, left, lost};
+use super::recovery::{self, RecoveryReport, recoveries};
+use super::timeline::{self, MomentReport};
 use super::{RelayReport, db, hop_sirs};
-use crate::sim::outcome::{Ending, Outcome};
+use crate::sim::outcome::{Ending, Outcome, Turning};
+use crate::sim::setup::Setup;
 
 /// What happened to frames.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
@@ -40,7 +46,7 @@ pub struct SilenceReport {
 pub struct ChainReport {
     /// The method, as on the command line.
     pub method: String,
-    /// Number of relays.
+    /// Number of relays asked for.
     pub uavs: u16,
     /// What went wrong, if anything.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -48,7 +54,7 @@ pub struct ChainReport {
     /// The most that could be had, where nothing could be placed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
-    /// SIR of the worst hop, linear; absent unless every relay has its place.
+    /// SIR of the worst hop, linear; absent unless every relay of the chain has its place.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// The same in dB.
@@ -63,7 +69,7 @@ pub struct ChainReport {
     /// SIR of the chain before Algorithm 2 and after each of its rounds, linear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rounds: Vec<f64>,
-    /// The relays that have a place, from the transmitter on.
+    /// The relays of the chain, from the transmitter on, if all of them have a place.
     pub relays: Vec<RelayReport>,
     /// SIR at the receiver, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -84,6 +90,24 @@ pub struct ChainReport {
     /// Whose silence was noticed by whom.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub silences: Vec<SilenceReport>,
+    /// `shared` where the relays talk by one radio channel; absent where each has a link to either neighbour.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<&'static str>,
+    /// How many relays are in the chain at the end, where that is not what it began with, or might not have been.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left: Option<u16>,
+    /// The relays that are not, where they were last.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<LostReport>,
+    /// What happened when, if anything did but that the chain converged.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub timeline: Vec<MomentReport>,
+    /// How long it took each time the chain formed anew.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub recovery: Vec<RecoveryReport>,
+    /// What an attack came to, if there was one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub attack: Option<AttackReport>,
     /// Seed of every random draw.
     pub seed: u64,
 }
@@ -91,23 +115,29 @@ pub struct ChainReport {
 impl ChainReport {
     /// The report of a run.
     pub fn new(method: &str, mission: &Mission, outcome: &Outcome, seed: u64) -> Self {
-        let places: Option<Vec<_>> = outcome
-            .relays
+        let chain = left(outcome);
+        let timeline = timeline::timeline(&outcome.moments);
+        let places: Option<Vec<_>> = chain
             .iter()
-            .map(|relay| Some((relay.setpoint?, relay.profile)))
+            .map(|(_, relay)| Some((relay.setpoint?, relay.profile)))
             .collect();
         let places = places.unwrap_or_default();
         let sirs = hop_sirs(mission, &places);
         let worst = sirs.iter().copied().reduce(f64::min);
-        let relays = super::relays(&places, &sirs);
+        let mut relays = super::relays(&places, &sirs);
+        for (report, (node, _)) in relays.iter_mut().zip(&chain) {
+            report.index = *node;
+        }
+        let flown = u16::try_from(chain.len()).unwrap_or(u16::MAX);
         let rx_sir = sirs.last().copied();
         let injected = outcome.injected;
-        let target = outcome.relays.first().and_then(|head| head.target);
+        let target = chain.first().and_then(|(_, head)| head.target);
         let promised = match (mission.interference(), target, places.first()) {
             (Interference::Field(_), Some(target), Some((head, _))) => {
                 let common = mission.config().common;
                 let equals = places.iter().all(|(_, profile)| *profile == common);
-                Some(equals && is_most(mission, target, head.x_m))
+                let flown = mission.with_relays(flown).unwrap_or(*mission);
+                Some(equals && is_most(&flown, target, head.x_m))
             }
             _ => None,
         };
@@ -142,6 +172,12 @@ impl ChainReport {
                     .sum(),
             },
             silences: silences(outcome),
+            channel: None,
+            left: (!timeline.is_empty()).then_some(flown),
+            lost: lost(outcome, &chain),
+            recovery: recoveries(&outcome.moments, mission.relays()),
+            timeline,
+            attack: None,
             seed,
         }
     }
@@ -173,18 +209,32 @@ impl ChainReport {
                 rejected: 0,
             },
             silences: Vec::new(),
+            channel: None,
+            left: None,
+            lost: Vec::new(),
+            timeline: Vec::new(),
+            recovery: Vec::new(),
+            attack: None,
             seed,
         }
     }
 
     /// The report as a table to read, and what it cost.
     pub fn table(&self) -> String {
-        let mut text = super::hops_table(&self.relays, self.rx_sir);
+        let mut text = super::hops_table(&self.relays, &self.lost, self.rx_sir);
         if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
             _ = writeln!(
                 text,
                 "worst hop: SIR {sir:.6} ({sir_db:.3} dB) with {} relays by `{}`",
-                self.uavs, self.method
+                self.relays_left(),
+                self.method
+            );
+        }
+        if self.channel.is_some() {
+            _ = writeln!(
+                text,
+                "by one radio channel that relays up to {} away hear",
+                Setup::RADIO_REACH
             );
         }
         match self.promised {
@@ -226,40 +276,58 @@ impl ChainReport {
                 self.seed
             );
         }
-        for silence in &self.silences {
-            _ = writeln!(
-                text,
-                "relay {} noticed at {:.3} s that relay {} is silent",
-                silence.noticed_by, silence.at_s, silence.silent
-            );
+        if let Some(attack) = &self.attack {
+            text += &attack.text();
         }
+        text += &timeline::text(&self.timeline);
+        text += &recovery::text(&self.recovery);
         text
+    }
+
+    /// How many relays, of how many.
+    fn relays_left(&self) -> String {
+        match self.left {
+            Some(left) if left < self.uavs => format!("{left} of {}", self.uavs),
+            _ => self.uavs.to_string(),
+        }
     }
 }
 
-fn seconds(at: uav_relay::Instant) -> f64 {
+/// Virtual time since the start, s.
+pub(super) fn seconds(at: uav_relay::Instant) -> f64 {
     at.as_micros() as f64 / 1e6
 }
 
 /// Who noticed the relays that really went silent; over a bad link a living one may be missed for a while as well.
 fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
-    let noticed = outcome
-        .noticed
-        .iter()
-        .map(|(&(by, side), &at)| SilenceReport {
-            silent: match side {
-                uav_relay::Side::Upstream => by.saturating_sub(1),
-                uav_relay::Side::Downstream => by.saturating_add(1),
-            },
-            noticed_by: by,
-            at_s: seconds(at),
-        });
     let killed = |index: u16| {
         let at = usize::from(index).checked_sub(1);
         at.and_then(|at| outcome.relays.get(at))
             .is_some_and(|relay| relay.killed.is_some())
     };
-    noticed.filter(|silence| killed(silence.silent)).collect()
+    let mut silences: BTreeMap<(u16, u16), f64> = BTreeMap::new();
+    for moment in &outcome.moments {
+        let Some(other) = moment.other else {
+            continue;
+        };
+        match moment.what {
+            Turning::Lost(_) if killed(other) => {
+                silences.insert((moment.relay, other), seconds(moment.at));
+            }
+            Turning::Found(_) => {
+                silences.remove(&(moment.relay, other));
+            }
+            _ => {}
+        }
+    }
+    let reports = silences
+        .into_iter()
+        .map(|((noticed_by, silent), at_s)| SilenceReport {
+            silent,
+            noticed_by,
+            at_s,
+        });
+    reports.collect()
 }
 
 fn error(method: &str, outcome: &Outcome) -> Option<String> {
@@ -281,6 +349,10 @@ fn error(method: &str, outcome: &Outcome) -> Option<String> {
                 silent.join(", ")
             ))
         }
+        Ending::Cut => Some(
+            "the chain is cut: too few relays can reach each other to go on without the others"
+                .to_owned(),
+        ),
         Ending::OutOfTime => Some(format!(
             "the chain had not settled after {:.0} s",
             seconds(outcome.ended)

@@ -158,7 +158,7 @@ impl PlanReport {
 
     /// The report as a table to read.
     pub fn table(&self) -> String {
-        let mut text = super::hops_table(&self.relays, self.rx_sir);
+        let mut text = super::hops_table(&self.relays, &[], self.rx_sir);
         let (Some(uavs), Some(sir), Some(sir_db)) = (self.uavs, self.sir, self.sir_db) else {
             return text;
         };

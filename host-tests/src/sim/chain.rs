@@ -1,6 +1,12 @@
 //! The relays, connected, run until they hold their places.
 
+mod air;
 mod ending;
+mod flight;
+mod story;
+mod strike;
+
+pub use flight::FlightSpec;
 
 use std::collections::BTreeMap;
 
@@ -8,11 +14,15 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::node::settings::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Event, Identity, Instant, Method, Placement, Port, Relay, Sample, Settings};
+use uav_relay::{Identity, Instant, Method, Placement, Relay, Sample, Settings};
 
+use flight::Flight;
+
+use super::attack::{Attacker, Struck};
 use super::faults::Injected;
+use super::forge::NETWORK;
 use super::link::Line;
-use super::outcome::{Ending, Outcome, RelayEnd};
+use super::outcome::{Ending, Outcome, RelayEnd, Turning};
 use super::queue::{Happening, Queue};
 use super::setup::Setup;
 
@@ -23,9 +33,17 @@ const MOST_HAPPENINGS: u64 = 400_000_000;
 #[derive(Debug)]
 struct Member {
     relay: Relay,
+    /// Its number in the mission, from 1.
+    node: u16,
     /// Its lines: toward Tx (or to all), toward Rx.
     lines: [Line; 2],
     killed: Option<Instant>,
+    /// How often it has been switched on.
+    starts: u32,
+    /// Passes that it has begun before it was switched on last.
+    swept: u32,
+    /// Its neighbours toward Tx and Rx when it was heard last.
+    beside: [Option<u16>; 2],
     /// The wake-up in the queue that counts: the earliest one. Any other is void.
     wake: Option<Instant>,
 }
@@ -42,8 +60,10 @@ pub struct Chain {
     happenings: u64,
     /// How often a relay has taken a place.
     holding: usize,
-    /// Kills that are still to come.
-    kills_ahead: usize,
+    /// Kills, boots, partitions and strikes that are still to come.
+    ahead: usize,
+    attacker: Option<Attacker>,
+    flight: Option<Flight>,
 }
 
 impl Chain {
@@ -55,25 +75,15 @@ impl Chain {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let mut members = Vec::new();
         for index in 1..=setup.mission.relays() {
-            let own = setup.profiles.iter().find(|(of, _)| *of == index);
-            let settings = Settings {
-                profile: own.map(|(_, profile)| *profile),
-                hold_altitude: setup.held.contains(&index),
-                hop_time: setup.link.hop_time(),
-                ..setup.settings
-            };
-            let identity = Identity { network: 1, index };
-            let relay = Relay::new(
-                setup.mission,
-                identity,
-                settings,
-                rng.random(),
-                Instant::ZERO,
-            )?;
+            let relay = switched_on(&setup, index, 1, rng.random(), Instant::ZERO)?;
             members.push(Member {
-                relay,
+                node: index,
                 lines: [Line::default(); 2],
                 killed: None,
+                starts: 1,
+                swept: 0,
+                beside: relay.neighbours(),
+                relay,
                 wake: None,
             });
         }
@@ -81,7 +91,19 @@ impl Chain {
         for &(index, at) in &setup.kills {
             queue.put(at, usize::from(index.saturating_sub(1)), Happening::Kill);
         }
-        let kills_ahead = setup.kills.len();
+        for &(index, at) in &setup.boots {
+            queue.put(at, usize::from(index.saturating_sub(1)), Happening::Boot);
+        }
+        let mut ahead = setup.kills.len() + setup.boots.len();
+        for partition in &setup.partitions {
+            for at in [Some(partition.from), partition.until]
+                .into_iter()
+                .flatten()
+            {
+                queue.put(at, 0, Happening::Part);
+                ahead += 1;
+            }
+        }
         let mut chain = Self {
             setup,
             members,
@@ -97,25 +119,29 @@ impl Chain {
                 ended: Instant::ZERO,
                 injected: Injected::default(),
                 noticed: BTreeMap::new(),
+                struck: Struck::default(),
+                moments: Vec::new(),
+                nearest_m: f64::INFINITY,
                 unsafe_setpoints: 0,
             },
             now: Instant::ZERO,
             happenings: 0,
             holding: 0,
-            kills_ahead,
+            ahead,
+            attacker: None,
+            flight: None,
         };
+        chain.expect_an_attack();
+        chain.take_off();
         for index in 0..chain.members.len() {
             chain.drain(index);
         }
         Ok(chain)
     }
 
-    /// Sweeps the head has begun and virtual time so far.
+    /// Sweeps that have begun and virtual time so far.
     pub fn progress(&self) -> (u32, Instant) {
-        let sweeps = self
-            .leader()
-            .map_or(0, |leader| leader.relay.stats().sweeps);
-        (sweeps, self.now)
+        (self.sweeps(), self.now)
     }
 
     /// Runs up to `happenings` happenings; whether the run has ended.
@@ -198,29 +224,46 @@ impl Chain {
                 profile: member.relay.profile(),
                 stats: *member.relay.stats(),
                 killed: member.killed,
+                index: member.relay.index(),
+                relays: member.relay.mission().relays(),
+                view: member.relay.view(),
             })
             .collect();
         self.outcome
     }
 
-    /// The relay that begins the passes.
-    fn leader(&self) -> Option<&Member> {
-        let index = usize::from(self.setup.mission.leader());
-        self.members.get(index.checked_sub(1)?)
-    }
-
     fn happen(&mut self, index: usize, happening: Happening) {
         let now = self.now;
+        if matches!(
+            happening,
+            Happening::Kill | Happening::Boot | Happening::Part | Happening::Strike(_)
+        ) {
+            self.ahead -= 1;
+        }
         let Some(member) = self.members.get_mut(index) else {
             return;
         };
-        if member.killed.is_some() {
-            return;
-        }
         match happening {
+            Happening::Fly => return self.fly(),
+            Happening::Part => return self.tell_of_partitions(),
+            Happening::Strike(kind) => return self.strike(kind),
+            Happening::Boot => {
+                let (start, seed) = (member.starts + 1, self.rng.random());
+                let Ok(relay) = switched_on(&self.setup, member.node, start, seed, now) else {
+                    return;
+                };
+                member.swept += member.relay.stats().sweeps;
+                member.starts = start;
+                member.beside = relay.neighbours();
+                member.relay = relay;
+                member.killed = None;
+                member.wake = None;
+                self.tell(index, Turning::Booted, None);
+            }
+            _ if member.killed.is_some() => return,
             Happening::Kill => {
                 member.killed = Some(now);
-                self.kills_ahead -= 1;
+                self.tell(index, Turning::Silent, None);
                 return;
             }
             Happening::Bytes { port, bytes } => {
@@ -252,22 +295,11 @@ impl Chain {
             let bytes = frame.get(..transmit.len).unwrap_or_default();
             self.transmit(index, transmit.port, bytes);
         }
+        self.listen(index);
         let Some(member) = self.members.get_mut(index) else {
             return;
         };
-        let by = u16::try_from(index + 1).unwrap_or(u16::MAX);
-        while let Some(event) = member.relay.poll_event() {
-            match event {
-                Event::NeighbourLost(side) => {
-                    self.outcome.noticed.insert((by, side), now);
-                }
-                Event::NeighbourBack(side) => {
-                    self.outcome.noticed.remove(&(by, side));
-                }
-                Event::Converged => self.holding += 1,
-                _ => {}
-            }
-        }
+        let by = member.node;
         if let Some(place) = member.relay.setpoint() {
             let config = self.setup.mission.config();
             let end = config.distance_m;
@@ -287,7 +319,8 @@ impl Chain {
         {
             // Algorithm 2 moves only what makes the worse of two hops better.
             debug_assert!(
-                self.outcome.rounds.last().is_none_or(|last| sir >= *last),
+                self.attacker.is_some()
+                    || self.outcome.rounds.last().is_none_or(|last| sir >= *last),
                 "round {done} has made the chain worse"
             );
             self.outcome.rounds.push(sir);
@@ -296,60 +329,34 @@ impl Chain {
             && member.wake.is_none_or(|wake| at < wake)
         {
             // The contract of a relay: drained, it never wants to be called at once.
-            debug_assert!(at > now, "relay {} would spin", index + 1);
+            assert!(at > now, "relay {} would spin", index + 1);
             member.wake = Some(at);
             self.queue.put(at, index, Happening::Wake);
         }
     }
+}
 
-    /// Puts a frame on a link.
-    fn transmit(&mut self, index: usize, port: Port, frame: &[u8]) {
-        self.outcome.messages += 1;
-        self.outcome.bytes += frame.len() as u64;
-        let Some(member) = self.members.get_mut(index) else {
-            return;
-        };
-        let line = if port == Port::Downstream {
-            &mut member.lines[1]
-        } else {
-            &mut member.lines[0]
-        };
-        let arrives = line.send(self.now, frame.len(), &self.setup.link);
-        let before = index.checked_sub(1);
-        let (receivers, into) = match port {
-            Port::Upstream => ([before, None, None, None], Port::Downstream),
-            Port::Downstream => ([Some(index + 1), None, None, None], Port::Upstream),
-            // A radio is heard two relays away.
-            Port::Shared => (
-                [
-                    before,
-                    index.checked_sub(2),
-                    Some(index + 1),
-                    Some(index + 2),
-                ],
-                Port::Shared,
-            ),
-        };
-        let late_by = self.setup.link.hop_time();
-        for receiver in receivers
-            .into_iter()
-            .flatten()
-            .filter(|&receiver| receiver < self.members.len())
-        {
-            let arrivals =
-                self.setup
-                    .faults
-                    .inject(frame, &mut self.rng, &mut self.outcome.injected);
-            for arrival in arrivals {
-                let late = late_by.times(u32::try_from(arrival.late).unwrap_or(u32::MAX));
-                let happening = Happening::Bytes {
-                    port: into,
-                    bytes: arrival.bytes,
-                };
-                self.queue.put(arrives + late, receiver, happening);
-            }
-        }
-    }
+/// Relay `index` (from 1) of the run, switched on at `now` for the `start`th time.
+fn switched_on(
+    setup: &Setup,
+    index: u16,
+    start: u32,
+    seed: u32,
+    now: Instant,
+) -> Result<Relay, SetupError> {
+    let own = setup.profiles.iter().find(|(of, _)| *of == index);
+    let settings = Settings {
+        profile: own.map(|(_, profile)| *profile),
+        hold_altitude: setup.held.contains(&index),
+        hop_time: setup.link.hop_time(),
+        auth: setup.proof(start).or(setup.settings.auth),
+        ..setup.settings
+    };
+    let identity = Identity {
+        network: NETWORK,
+        index,
+    };
+    Relay::new(setup.mission, identity, settings, seed, now)
 }
 
 /// Runs `setup` to the end.

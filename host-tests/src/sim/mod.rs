@@ -4,12 +4,15 @@
 //! | --- | --- |
 //! | [`link`] | one direction of a serial link: baud rate, latency |
 //! | [`faults`] | what may happen to a frame on its way |
+//! | [`attack`], [`forge`] | what an attacker does, and the frames it makes up |
 //! | [`queue`] | what happens when, in order |
 //! | [`setup`], [`outcome`] | what a chain is run with, and what came of it |
 //! | [`chain`] | the relays, connected, run until they hold their places |
 
+pub mod attack;
 pub mod chain;
 pub mod faults;
+pub mod forge;
 pub mod link;
 pub mod outcome;
 pub mod queue;

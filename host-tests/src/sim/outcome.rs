@@ -4,7 +4,57 @@ use std::collections::BTreeMap;
 
 use uav_relay::{Instant, Placement, Profile, Side, Stats};
 
+use super::attack::Struck;
 use super::faults::Injected;
+
+/// Something worth a line in the story of a run.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Turning {
+    /// A relay went silent.
+    Silent,
+    /// It was switched on again.
+    Booted,
+    /// It lost its neighbour at that side.
+    Lost(Side),
+    /// It heard a neighbour at that side again, or another one.
+    Found(Side),
+    /// It agreed to a new view: its number, its place there, and how many relays there are.
+    Reformed {
+        /// Number of the view.
+        view: u16,
+        /// The relay's place, from 1 at Tx.
+        index: u16,
+        /// How many relays.
+        relays: u16,
+    },
+    /// Its part of the chain is too small to go on.
+    Cut,
+    /// It took its place in an agreement.
+    Converged,
+    /// No target can be met.
+    Infeasible,
+    /// From here on it and those before it do not hear those after it.
+    Parted,
+    /// They hear each other again.
+    Healed,
+}
+
+/// A turning and whose it was.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Moment {
+    /// When.
+    pub at: Instant,
+    /// Which relay, from 1.
+    pub relay: u16,
+    /// What.
+    pub what: Turning,
+    /// The neighbour that was lost or found, from 1.
+    pub other: Option<u16>,
+    /// The target that the relay holds its place for, linear.
+    pub target: Option<f32>,
+    /// Passes that it has begun so far.
+    pub sweeps: u32,
+}
 
 /// How a run ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -15,6 +65,8 @@ pub enum Ending {
     Infeasible,
     /// Relays went silent, and every neighbour of theirs has noticed.
     Broken,
+    /// No part of the chain is large enough to go on without the others.
+    Cut,
     /// The deadline, or the limit on the work of a run.
     OutOfTime,
 }
@@ -30,8 +82,14 @@ pub struct RelayEnd {
     pub profile: Profile,
     /// Its counters.
     pub stats: Stats,
-    /// When it went silent, if it did.
+    /// When it went silent, if it did and was not switched on again.
     pub killed: Option<Instant>,
+    /// Its place in the chain as it knows it, from 1 at Tx, of how many, and the number of that view.
+    pub index: u16,
+    /// How many relays there are.
+    pub relays: u16,
+    /// Number of the view.
+    pub view: u16,
 }
 
 /// What came of a run.
@@ -53,8 +111,14 @@ pub struct Outcome {
     pub ended: Instant,
     /// What was done to frames.
     pub injected: Injected,
+    /// What became of an attacker's frames.
+    pub struck: Struck,
     /// Who misses whom: by the index from 1 of the one that noticed and the side, since when.
     pub noticed: BTreeMap<(u16, Side), Instant>,
+    /// The story of the run.
+    pub moments: Vec<Moment>,
+    /// The least distance that two drones ever had, m; infinite where their flight was not simulated.
+    pub nearest_m: f64,
     /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.
     pub unsafe_setpoints: u64,
 }

@@ -5,6 +5,8 @@ use std::collections::BinaryHeap;
 
 use uav_relay::{Instant, Port};
 
+use super::attack::Strike;
+
 /// Something that happens to one relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Happening {
@@ -17,8 +19,16 @@ pub enum Happening {
     },
     /// It may have something to do.
     Wake,
-    /// It goes silent for good.
+    /// All drones fly on for a step.
+    Fly,
+    /// It goes silent.
     Kill,
+    /// It is switched on again.
+    Boot,
+    /// A partition begins or ends.
+    Part,
+    /// The attacker sends a frame to one of the relays.
+    Strike(Strike),
 }
 
 /// One happening, at its time. Equal times keep the order in which they were put in.

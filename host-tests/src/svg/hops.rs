@@ -43,10 +43,17 @@ pub(super) struct Hop {
 pub(super) fn of(picture: &Picture, frame: &Frame) -> Vec<Hop> {
     let worst = worst(picture).and_then(decibels);
     let last = picture.nodes.len() + 1;
+    if last > 1 && (1..last).all(|node| picture.left_out.contains(&node)) {
+        return Vec::new();
+    }
     let ends = placed(picture).chain([(last, (length(picture), 0.0))]);
     let mut hops = Vec::new();
-    let mut before = (0, (0.0, 0.0));
-    for (number, place) in ends {
+    let mut before = (0, (0.0, 0.0), 0);
+    // Those that are not in the chain any more are passed by.
+    let out = &picture.left_out;
+    for (node, place) in ends.filter(|(node, _)| !out.contains(node)) {
+        let passed = out.iter().filter(|other| (1..node).contains(other));
+        let number = node.saturating_sub(passed.count());
         // Past a relay without a place no line is known.
         if number == before.0 + 1 {
             let decibels = picture.hop_sir.get(number - 1).copied().and_then(decibels);
@@ -61,12 +68,10 @@ pub(super) fn of(picture: &Picture, frame: &Frame) -> Vec<Hop> {
                 line: [frame.at(before.1), frame.at(place)],
                 decibels,
                 colour,
-                silent: [number - 1, number]
-                    .iter()
-                    .any(|node| picture.lost.contains(node)),
+                silent: picture.lost.contains(&node) || picture.lost.contains(&before.2),
             });
         }
-        before = (number, place);
+        before = (number, place, node);
     }
     hops
 }

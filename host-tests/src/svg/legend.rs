@@ -17,10 +17,12 @@ pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
     canvas.text((24.0, row + 3.6), "start", "Numbers at hops: SIR in dB");
     canvas.disc((197.0, row), 4.0, "relay");
     canvas.text((210.0, row + 3.6), "start", "relay");
-    if !picture.lost.is_empty() {
+    let silent = !picture.lost.is_empty();
+    if silent || !picture.left_out.is_empty() {
         canvas.disc((273.0, row), 4.0, "relay lost");
         cross(canvas, (273.0, row), 5.5);
-        canvas.text((286.0, row + 3.6), "start", "silent");
+        let words = if silent { "silent" } else { "lost" };
+        canvas.text((286.0, row + 3.6), "start", words);
     }
     if !picture.interferers.is_empty() {
         canvas.shape(

@@ -5,6 +5,7 @@
 
 mod axis;
 mod canvas;
+mod events;
 mod hops;
 mod labels;
 mod legend;
@@ -36,10 +37,14 @@ pub struct Picture {
     pub interferers: Vec<(f64, f64, f64)>,
     /// The relays from Tx to Rx: place along x and altitude, both in metres. One that is not finite is left out.
     pub nodes: Vec<(f64, f64)>,
-    /// Linear SIR of every hop, N + 1 of them, above 0; any other value is drawn grey and without a number.
+    /// Linear SIR of every hop, one more than there are relays in the chain, above 0; any other value is drawn grey and without a number.
     pub hop_sir: Vec<f64>,
     /// The relays that went silent, each 1 to N: they are crossed out, and their hops are dashed.
     pub lost: Vec<usize>,
+    /// The relays that are not in the chain any more, each 1 to N: they are crossed out, and the hops pass them by.
+    pub left_out: Vec<usize>,
+    /// What happened to the chain: when, s, and in a few words. In order.
+    pub events: Vec<(f64, String)>,
 }
 
 /// Draws the chain as an SVG document.
@@ -49,7 +54,7 @@ pub struct Picture {
 #[must_use]
 pub fn draw(picture: &Picture) -> String {
     let frame = frame(picture);
-    let mut canvas = Canvas::new(WIDTH, HEIGHT);
+    let mut canvas = Canvas::new(WIDTH, HEIGHT + events::height(picture));
     let mut labels = Labels::inside((LEFT, TOP), (RIGHT, BOTTOM));
     let hops = hops::of(picture, &frame);
     canvas.describe(&format!("Relay chain: {}", summary(picture)));
@@ -63,6 +68,7 @@ pub fn draw(picture: &Picture) -> String {
     hops::label(&mut canvas, &mut labels, &hops);
     nodes::label(&mut canvas, &mut labels, &frame, picture);
     legend::draw(&mut canvas, picture);
+    events::draw(&mut canvas, picture);
     canvas.finish()
 }
 
@@ -127,10 +133,26 @@ fn frame(picture: &Picture) -> Frame {
 fn summary(picture: &Picture) -> String {
     let sir = worst(picture).map_or_else(|| "unknown".to_owned(), both_units);
     format!(
-        "{}, N = {}, chain SIR {sir}",
+        "{}, {}, chain SIR {sir}",
         picture.title_method,
-        picture.nodes.len()
+        count(picture)
     )
+}
+
+/// How many relays there are, and of how many.
+fn count(picture: &Picture) -> String {
+    let all = picture.nodes.len();
+    if picture.left_out.is_empty() {
+        format!("N = {all}")
+    } else {
+        let left = (1..=all).filter(|number| !picture.left_out.contains(number));
+        format!("{} of {all}", left.count())
+    }
+}
+
+/// Whether a relay is crossed out.
+fn is_gone(picture: &Picture, number: usize) -> bool {
+    picture.lost.contains(&number) || picture.left_out.contains(&number)
 }
 
 /// An SIR both linear and in dB.
@@ -144,14 +166,17 @@ fn both_units(sir: f64) -> String {
 }
 
 fn title(canvas: &mut Canvas, picture: &Picture) {
-    let count = picture.nodes.len();
-    let relays = if count == 1 { "relay" } else { "relays" };
+    let relays = if picture.nodes.len() == 1 {
+        "relay"
+    } else {
+        "relays"
+    };
     let method: String = picture.title_method.chars().take(50).collect();
     let middle = f64::midpoint(LEFT, RIGHT);
     canvas.text(
         (middle, 18.0),
         "title",
-        &format!("{method}, N = {count} {relays}"),
+        &format!("{method}, {} {relays}", count(picture)),
     );
     let sir = worst(picture).map_or_else(|| "unknown".to_owned(), both_units);
     canvas.subscripted(

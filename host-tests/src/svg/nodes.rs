@@ -3,7 +3,7 @@
 use super::axis::{Frame, round_step};
 use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
-use super::{Picture, length, placed};
+use super::{Picture, is_gone, length, placed};
 
 /// Height of a relay's number.
 const SIZE: f64 = 9.0;
@@ -33,9 +33,11 @@ pub(super) fn relays(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pi
     let rim = (0.3 * radius).min(1.1);
     for (number, (x, h)) in placed(picture) {
         let at = frame.at((x, h));
-        let lost = picture.lost.contains(&number);
-        let (class, note) = if lost {
+        let lost = is_gone(picture, number);
+        let (class, note) = if picture.lost.contains(&number) {
             ("relay lost", ", silent")
+        } else if lost {
+            ("relay lost", ", not in the chain any more")
         } else {
             ("relay", "")
         };
@@ -65,20 +67,14 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
     let radius = radius(picture, frame);
     let step = round_step((picture.nodes.len() as f64 / 12.0).max(1.0));
     let mut shown: Vec<_> = placed(picture)
-        .filter(|(number, _)| (*number as f64) % step < 0.5 || picture.lost.contains(number))
+        .filter(|(number, _)| (*number as f64) % step < 0.5 || is_gone(picture, *number))
         .collect();
-    shown.sort_by_key(|(number, _)| !picture.lost.contains(number));
+    shown.sort_by_key(|(number, _)| !is_gone(picture, *number));
     for (number, place) in shown {
         let (x, y) = frame.at(place);
         let words = number.to_string();
         let size = (width(&words, SIZE) + 2.0, SIZE);
-        let down = radius.max(2.0)
-            + 0.5 * SIZE
-            + if picture.lost.contains(&number) {
-                4.5
-            } else {
-                2.5
-            };
+        let down = radius.max(2.0) + 0.5 * SIZE + if is_gone(picture, number) { 4.5 } else { 2.5 };
         let sideways = radius + 0.5 * size.0 + 2.5;
         let places = [
             (x, y + down),

@@ -4,6 +4,7 @@ use host_tests::sim::faults::Faults;
 
 use crate::chain::{BAD_DAY, paper, simulated};
 use crate::fleet::{Fleet, Image};
+use crate::log::Line;
 
 #[test]
 fn five_on_one_radio_settle_where_the_simulated_chain_does() {
@@ -16,4 +17,40 @@ fn five_on_one_radio_settle_where_the_simulated_chain_does() {
         assert!(counters.counter("overheard").unwrap() > 0, "{counters:?}");
         assert_eq!(counters.counter("misaddressed"), Some(0), "{counters:?}");
     }
+}
+
+/// The process of drone 3 is ended. The others find each other, count themselves, and take the places that a chain of four
+/// has, to the bit.
+#[test]
+fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
+    let flight = paper(5);
+    let mut fleet = Fleet::of(Image::Radio, &flight, Faults::default(), 3);
+    assert_eq!(fleet.places(), simulated(&flight));
+    let before = fleet.lines.len();
+    fleet.kill(3);
+    let left = [1, 2, 4, 5];
+    let formed = simulated(&paper(4));
+    // Each logs that it has been counted, then its new place, then the agreement.
+    let story = |lines: &[Line], drone: u16, place: &(u32, u32)| {
+        let mut new = lines[before..].iter().filter(|line| line.drone == drone);
+        let counted = new.find(|line| line.text == "event Reformed")?;
+        new.find(|line| line.setpoint() == Some(*place))?;
+        let agreed = new.find(|line| line.text == "event Converged")?;
+        Some(agreed.at - counted.at)
+    };
+    fleet.wait("chain of four", |lines| {
+        left.iter()
+            .zip(&formed)
+            .all(|(drone, place)| story(lines, *drone, place).is_some())
+    });
+    for (drone, place) in left.iter().zip(&formed) {
+        let took = story(&fleet.lines, *drone, place).unwrap();
+        println!("drone {drone}: agreed {took} us after it was counted");
+    }
+    // Nobody was lost but drone 3.
+    let lost = |drone| {
+        let mut lines = fleet.of_drone(drone);
+        lines.any(|line| line.text.contains("Lost"))
+    };
+    assert_eq!([1, 2, 4, 5].map(lost), [false, true, true, false]);
 }

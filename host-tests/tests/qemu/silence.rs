@@ -122,6 +122,19 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
     }
 }
 
+#[test]
+fn a_drone_with_half_a_secret_takes_no_part_and_says_why() {
+    let good = paper(3).block(2).unwrap().to_vec();
+    let blocks = [with(&good, 244, &[1]), with(&good, 248, &[1])];
+    let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
+    fleet.wait("word from every drone", |lines| lines.len() >= 4);
+    for drone in [1, 2] {
+        let texts: Vec<&str> = fleet.of_drone(drone).map(|line| &line.text[..]).collect();
+        let refused = "configuration refused: key or epoch, without the other or out of range";
+        assert_eq!(texts, ["relay 2 of 3, network 7", refused]);
+    }
+}
+
 /// `block` with `bytes` at `at`, and the CRC that belongs to it.
 fn with(block: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
     let mut block = block.to_vec();

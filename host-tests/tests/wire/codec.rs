@@ -3,6 +3,7 @@
 
 use crc::{CRC_32_ISCSI, Crc};
 use serde::Deserialize;
+use uav_relay::guard::Fence;
 use uav_relay::placement::PerTarget;
 use uav_relay::placement::ladder::Ladder;
 use uav_relay::placement::levels::Levels;
@@ -10,7 +11,8 @@ use uav_relay::placement::verdict::Verdict;
 use uav_relay::placement::wave::{Choice, Rungs};
 use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{
-    Answer, Message, MessageError, Moved, Sweep, Token, Trace, Turn, Wave,
+    Answer, Before, Count, Hail, Message, MessageError, Moved, Roster, Sweep, Token, Trace, Turn,
+    Wave,
 };
 use uav_relay::{Local, Placement, Profile};
 
@@ -89,6 +91,43 @@ pub(crate) enum Said {
         any: bool,
         worst: f32,
     },
+    Hail(Forming),
+    Roster(Forming),
+    Count(Forming),
+    Fence {
+        number: u16,
+        mission: u16,
+        echo: u16,
+        fence: u16,
+        x_m: f32,
+        target_m: f32,
+    },
+}
+
+/// What the three messages by which a chain forms anew have in common.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+pub(crate) struct Forming {
+    /// Of a view.
+    pub(crate) number: u16,
+    pub(crate) mission: u16,
+    /// Three numbers, in the order in which they are sent.
+    pub(crate) numbers: [u16; 3],
+    pub(crate) flags: u8,
+}
+
+impl Forming {
+    fn body(self, tag: u8) -> Vec<u8> {
+        let mut out = vec![tag];
+        for word in [self.number, self.mission].iter().chain(&self.numbers) {
+            out.extend(word.to_le_bytes());
+        }
+        out.push(self.flags);
+        out
+    }
+
+    fn flag(self, bit: u8) -> bool {
+        self.flags >> bit & 1 == 1
+    }
 }
 
 impl Said {
@@ -234,6 +273,23 @@ impl Said {
                 out.push(u8::from(*any));
                 reals(&mut out, &[*worst]);
             }
+            Self::Hail(forming) => out = forming.body(9),
+            Self::Roster(forming) => out = forming.body(10),
+            Self::Count(forming) => out = forming.body(11),
+            Self::Fence {
+                number,
+                mission,
+                echo,
+                fence,
+                x_m,
+                target_m,
+            } => {
+                out.push(12);
+                for word in [number, mission, echo, fence] {
+                    out.extend(word.to_le_bytes());
+                }
+                reals(&mut out, &[*x_m, *target_m]);
+            }
         }
         out
     }
@@ -371,6 +427,48 @@ impl Said {
                 any,
                 worst,
             }),
+            Self::Hail(forming) => Message::Hail(Hail {
+                mission: forming.mission,
+                newest: forming.number,
+                neighbour: forming.numbers[0],
+                ask: forming.flag(0),
+                form: forming.flag(1),
+                fresh: forming.flag(2),
+                ready: forming.flag(3),
+            }),
+            Self::Roster(forming) => Message::Roster(Roster {
+                mission: forming.mission,
+                view: forming.number,
+                place: forming.numbers[0],
+                before: Before {
+                    view: forming.numbers[2],
+                    relays: forming.numbers[1],
+                    leader: forming.flag(0),
+                },
+            }),
+            Self::Count(forming) => Message::Count(Count {
+                mission: forming.mission,
+                view: forming.number,
+                place: forming.numbers[0],
+                relays: Some(forming.numbers[1]).filter(|&relays| relays > 0),
+            }),
+            Self::Fence {
+                number,
+                mission,
+                echo,
+                fence,
+                x_m,
+                target_m,
+            } => Message::Fence {
+                mission,
+                fence: Fence {
+                    tie: number,
+                    echo,
+                    number: fence,
+                    x_m,
+                    target_m,
+                },
+            },
         }
     }
 
@@ -388,6 +486,7 @@ impl Said {
         }
     }
 
+    #[expect(clippy::too_many_lines, reason = "an arm for each message")]
     fn in_range(&self) -> bool {
         match self {
             Self::Sweep {
@@ -476,6 +575,23 @@ impl Said {
                 worst,
                 ..
             } => is_place(*x_m) && is_altitude(*altitude_m) && is_sir(*worst),
+            Self::Hail(Forming { numbers, flags, .. }) => {
+                numbers[0] <= 1000 && numbers[1..] == [0, 0] && *flags <= 15
+            }
+            Self::Roster(Forming { numbers, flags, .. }) => {
+                let counts = &numbers[..2];
+                counts.iter().all(|count| (1..=1000).contains(count)) && *flags <= 1
+            }
+            Self::Count(Forming { numbers, flags, .. }) => {
+                let [place, relays, unused] = *numbers;
+                (1..=1000).contains(&place) && relays <= 1000 && unused == 0 && *flags == 0
+            }
+            Self::Fence {
+                number,
+                x_m,
+                target_m,
+                ..
+            } => *number != 0 && x_m.abs() <= 1e7 && target_m.abs() <= 1e7,
         }
     }
 }
@@ -647,7 +763,27 @@ impl Reader<'_> {
                 any: self.bool()?,
                 worst: self.real()?,
             },
+            9 => Said::Hail(self.forming()?),
+            10 => Said::Roster(self.forming()?),
+            11 => Said::Count(self.forming()?),
+            12 => Said::Fence {
+                number: self.word()?,
+                mission: self.word()?,
+                echo: self.word()?,
+                fence: self.word()?,
+                x_m: self.real()?,
+                target_m: self.real()?,
+            },
             _ => return None,
+        })
+    }
+
+    fn forming(&mut self) -> Option<Forming> {
+        Some(Forming {
+            number: self.word()?,
+            mission: self.word()?,
+            numbers: [self.word()?, self.word()?, self.word()?],
+            flags: self.byte()?,
         })
     }
 }

@@ -106,7 +106,7 @@ impl Frame {
 /// The vectors of the file.
 pub(crate) fn vectors() -> Vectors {
     let vectors: Vectors = serde_json::from_str(include_str!("../data/vectors.json")).unwrap();
-    assert!(vectors.frames.len() >= 40 && vectors.ladders.len() >= 10);
+    assert!(vectors.frames.len() >= 53 && vectors.ladders.len() >= 10);
     assert!(vectors.rungs.len() >= 8 && vectors.levels.len() >= 10 && vectors.places.len() >= 15);
     vectors
 }
@@ -271,6 +271,29 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
     };
     assert_eq!(longest(true), Some(100));
     assert_eq!(longest(false), Some(237));
+}
+
+#[test]
+fn the_vectors_hold_every_hail_roster_and_count() {
+    let frames = vectors().frames;
+    let some = |what: fn(&Said) -> bool| {
+        assert!(frames.iter().any(|vector| what(&vector.message)));
+    };
+    for flags in [0, 5, 9, 11, 15] {
+        assert!(
+            frames
+                .iter()
+                .any(|vector| matches!(vector.message, Said::Hail(hail) if hail.flags == flags))
+        );
+    }
+    some(|said| matches!(said, Said::Hail(hail) if hail.numbers[0] == 1000));
+    some(|said| matches!(said, Said::Roster(roster) if roster.flags == 0));
+    some(|said| {
+        let most = [1000, 1000, u16::MAX];
+        matches!(said, Said::Roster(roster) if roster.numbers == most && roster.flags == 1)
+    });
+    some(|said| matches!(said, Said::Count(count) if count.numbers[1] == 0));
+    some(|said| matches!(said, Said::Count(count) if count.numbers[..2] == [1000, 1000]));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::{Instant, Port, Wiring};
 
-use super::codec::{Said, plain, wire};
+use super::codec::{Forming, Said, plain, wire};
 use super::config;
 use super::receive::{NETWORK, drain, relay};
 use super::strategies::{messages, sweeps};
@@ -41,7 +41,15 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
             number, mission, ..
         } => (*number, *mission) = (as_number, as_mission),
         Said::Busy { number } => *number = as_number,
-        Said::Heartbeat { mission, .. } => *mission = as_mission,
+        // The number of a fence is that of a talk, never 0.
+        Said::Heartbeat { mission, .. } | Said::Fence { mission, .. } => *mission = as_mission,
+        Said::Hail(forming) | Said::Roster(forming) | Said::Count(forming) => {
+            *forming = Forming {
+                number: as_number,
+                mission: as_mission,
+                ..*forming
+            };
+        }
     }
     said
 }

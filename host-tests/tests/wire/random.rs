@@ -2,6 +2,7 @@
 
 use proptest::collection::vec;
 use proptest::prelude::*;
+use uav_relay::wire::auth::TAG;
 use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message, MessageError};
 
@@ -48,6 +49,8 @@ proptest! {
             Said::Trace { .. } => 24,
             Said::Token { .. } => 44,
             Said::Moved { .. } => 34,
+            Said::Hail(_) | Said::Roster(_) | Said::Count(_) => 28,
+            Said::Fence { .. } => 33,
         };
         prop_assert!(len <= most && most <= MAX_FRAME);
         prop_assert_eq!(frame[..len].iter().position(|&byte| byte == 0), Some(len - 1));
@@ -67,6 +70,8 @@ proptest! {
             Said::Trace { choice, .. } => if choice.is_some() { 24 } else { 22 },
             Said::Token { .. } => 44,
             Said::Moved { .. } => 34,
+            Said::Hail(_) | Said::Roster(_) | Said::Count(_) => 28,
+            Said::Fence { .. } => 33,
         };
         prop_assert_eq!(len, expected);
     }
@@ -86,8 +91,8 @@ proptest! {
         let mut frame = [0; MAX_FRAME];
         prop_assert_eq!(frame::encode(head, &sweep.message(), &mut frame), 104);
         prop_assert_eq!(frame::encode(head, &wave.message(), &mut frame), 237);
-        prop_assert_eq!(MAX_FRAME, 237);
-        prop_assert_eq!(only_frame(&frame).len(), 235);
+        prop_assert_eq!(MAX_FRAME, 237 + TAG);
+        prop_assert_eq!(only_frame(&frame[..237]).len(), 235);
     }
 
     #[test]
@@ -119,7 +124,7 @@ proptest! {
     fn any_bytes_with_a_good_crc_are_read_or_refused_as_the_rules_say(
         bytes in vec(any::<u8>(), 0..240),
         version in prop_oneof![3 => Just(Some(0x10)), 1 => Just(None)],
-        flags in prop_oneof![3 => Just(Some(0)), 1 => Just(None)],
+        flags in prop_oneof![3 => Just(Some(0)), 1 => Just(Some(0x10)), 1 => Just(None)],
         body in proptest::option::of(bodies()),
     ) {
         let mut bytes = bytes;
@@ -134,10 +139,15 @@ proptest! {
         }
         let expected = if bytes.len() < 10 {
             Err(FrameError::Short)
-        } else if bytes[1] >> 4 != 1 || bytes[3] >> 4 != 0 {
+        } else if bytes[1] >> 4 != 1 || ![0, 1, 3].contains(&(bytes[3] >> 4)) {
             Err(FrameError::Version)
         } else {
-            Said::read(&bytes[10..]).map_err(FrameError::Message)
+            let tag = if bytes[3] >> 4 == 0 { 0 } else { TAG };
+            match bytes[10..].len().checked_sub(tag) {
+                None => Err(FrameError::Short),
+                Some(_) if bytes[3] >> 4 == 3 => Err(FrameError::Message(MessageError::Encoding)),
+                Some(body) => Said::read(&bytes[10..10 + body]).map_err(FrameError::Message),
+            }
         };
         let sealed = sealed(bytes.clone());
         let read = frame::decode(&sealed);
@@ -146,6 +156,7 @@ proptest! {
             Ok(said) => {
                 let (head, message) = read.unwrap();
                 prop_assert_eq!(message, said.message());
+                bytes[3] &= 0x0F;
                 prop_assert_eq!(codec::header(head), &bytes[..10]);
             }
         }
@@ -169,10 +180,10 @@ fn the_draws_reach_messages_and_both_refusals() {
 
     let mut runner = TestRunner::new(config(1));
     // Of each tag: messages, wrongly encoded, out of range. Every busy and every heartbeat is in range.
-    let mut seen = [[0; 3]; 10];
-    for _ in 0..8000 {
+    let mut seen = [[0; 3]; 13];
+    for _ in 0..16_000 {
         let body = bodies().new_tree(&mut runner).unwrap().current();
-        let tag = body.first().map_or(9, |&tag| usize::from(tag.min(9)));
+        let tag = body.first().map_or(12, |&tag| usize::from(tag.min(12)));
         let what = match Said::read(&body) {
             Ok(_) => 0,
             Err(MessageError::Encoding) => 1,
@@ -183,7 +194,7 @@ fn the_draws_reach_messages_and_both_refusals() {
     println!("{seen:?}");
     for (tag, [good, encoding, value]) in seen.into_iter().enumerate() {
         assert!(encoding > 50, "{tag}");
-        assert!(good > 50 || tag == 9, "{tag}");
-        assert!(value > 5 || [2, 3, 9].contains(&tag), "{tag}");
+        assert!(good > 50 || tag == 12, "{tag}");
+        assert!(value > 5 || [2, 3, 12].contains(&tag), "{tag}");
     }
 }

@@ -8,7 +8,7 @@ use uav_relay::placement::{PerTarget, verdict::Verdict};
 use uav_relay::wire::frame::{self, FrameError, Header, MAX_FRAME};
 use uav_relay::wire::message::{Answer, MAX_BODY, Message, MessageError, Wave};
 
-use super::codec::{Said, plain, sealed};
+use super::codec::{Forming, Said, plain, sealed};
 use super::golden::vectors;
 use super::strategies::pad;
 
@@ -112,6 +112,14 @@ fn moved() -> Said {
     }
 }
 
+/// In range as a hail and as a count.
+const FORMING: Forming = Forming {
+    number: 1,
+    mission: 2,
+    numbers: [1, 0, 0],
+    flags: 0,
+};
+
 #[test]
 fn other_versions_and_flags_are_refused_before_the_body_is_read() {
     let good = plain(HEADER, &sweep().body());
@@ -119,18 +127,17 @@ fn other_versions_and_flags_are_refused_before_the_body_is_read() {
         for at in [1, 3] {
             let mut bad = good[..good.len() - 4].to_vec();
             bad[at] = bad[at] & 0x0F | nibble << 4;
-            let expected = nibble == u8::from(at == 1);
-            let sealed_bad = sealed(bad.clone());
-            let read = frame::decode(&sealed_bad);
-            assert_eq!(read.is_ok(), expected, "byte {at}: {nibble}");
+            // With a tag the last bytes are not the body's, and a hello is no message.
+            let (read, short) = match (at, nibble) {
+                (1, 1) | (3, 0) => (Ok(()), ENCODING),
+                (3, 1 | 3) => (Err(ENCODING), FrameError::Short),
+                _ => (Err(FrameError::Version), FrameError::Version),
+            };
+            let whole = sealed(bad.clone());
+            assert_eq!(frame::decode(&whole).map(|_| ()), read, "{at}: {nibble}");
             bad.truncate(10);
             bad.push(0xFF);
-            let error = if expected {
-                ENCODING
-            } else {
-                FrameError::Version
-            };
-            assert_eq!(frame::decode(&sealed(bad)), Err(error));
+            assert_eq!(frame::decode(&sealed(bad)), Err(short), "{at}: {nibble}");
         }
     }
 }
@@ -147,7 +154,7 @@ fn bodies_that_are_no_message_are_refused() {
             let longer = [&body[..], &[extra]].concat();
             assert_eq!(verdict_on(&longer), Err(ENCODING), "{}", vector.name);
         }
-        for tag in 9..=u8::MAX {
+        for tag in 13..=u8::MAX {
             let mut other = body.clone();
             other[0] = tag;
             assert_eq!(verdict_on(&other), Err(ENCODING), "{}", vector.name);
@@ -217,6 +224,9 @@ fn padded_varints_are_refused() {
         trace(Some([1, 2])).body(),
         token(0, 0.0, 0, 0).body(),
         moved().body(),
+        Said::Hail(FORMING).body(),
+        Said::Roster(FORMING).body(),
+        Said::Count(FORMING).body(),
     ] {
         let mut padded = body.clone();
         pad(&mut padded, true, 0);
@@ -442,6 +452,48 @@ fn a_turn_is_written_in_one_way() {
                 grid || columns == 0 && rows == 0
             );
             assert_eq!(sound(1, 0.0, columns, rows), columns == 0 && rows == 0);
+        }
+    }
+}
+
+/// Which of 0 to 65535 a message takes at `at` of a body of 12 bytes; the others are out of range and nothing else.
+fn taken(mut body: Vec<u8>, at: usize) -> Vec<u16> {
+    let fits = |number: &u16| {
+        body[at..at + 2].copy_from_slice(&number.to_le_bytes());
+        let read = verdict_on(&body);
+        assert!(matches!(read, Ok(()) | Err(VALUE)), "{read:?}");
+        read.is_ok()
+    };
+    (0..=u16::MAX).filter(fits).collect()
+}
+
+#[test]
+fn a_chain_has_up_to_a_thousand_relays_and_what_a_message_does_not_use_is_zero() {
+    let hail = Said::Hail(FORMING).body();
+    let roster = Said::Roster(Forming {
+        numbers: [1, 1, 0],
+        ..FORMING
+    });
+    let roster = roster.body();
+    let count = Said::Count(FORMING).body();
+    let any: Vec<u16> = (0..=u16::MAX).collect();
+    let (from_0, from_1) = (any[..=1000].to_vec(), any[1..=1000].to_vec());
+    for (body, numbers, flags) in [
+        (&hail, [&from_0, &vec![0], &vec![0]], 16),
+        (&roster, [&from_1, &from_1, &any], 2),
+        (&count, [&from_1, &from_0, &vec![0]], 1),
+    ] {
+        for (at, numbers) in [5, 7, 9].into_iter().zip(numbers) {
+            assert_eq!(&taken(body.clone(), at), numbers, "tag {}, {at}", body[0]);
+        }
+        for at in [1, 3] {
+            assert_eq!(taken(body.clone(), at), any, "tag {}, {at}", body[0]);
+        }
+        for byte in 0..=u8::MAX {
+            let mut body = body.clone();
+            body[11] = byte;
+            let expected = if byte < flags { Ok(()) } else { Err(VALUE) };
+            assert_eq!(verdict_on(&body), expected, "tag {}: {byte}", body[0]);
         }
     }
 }

@@ -13,7 +13,7 @@ use uav_relay::{
     Band, Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, Relay, Wiring,
 };
 
-use super::codec::{Said, plain, wire};
+use super::codec::{Forming, Said, plain, wire};
 use super::config;
 use super::lies::renamed;
 use super::receive::{FIELD, NETWORK, counted, drain, paper, relay_of};
@@ -38,6 +38,10 @@ const WEAK: Field = Field::new(&[FieldPoint {
     upsilon_per_w: 1e32,
 }]);
 
+/// The number of the first pass of a leader's life, and of the one after it.
+pub(crate) const FIRST: u16 = 64;
+pub(crate) const SECOND: u16 = 65;
+
 /// The paper's scenario with other interference, between 20 m and 300 m.
 fn mission(interference: Interference) -> MissionConfig {
     MissionConfig {
@@ -55,7 +59,7 @@ fn source() -> MissionConfig {
 }
 
 /// The stream of one frame to relay `own` from the side of `port`.
-fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
+pub(crate) fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
     let header = Header {
         network: NETWORK,
         sender: if port == Port::Upstream {
@@ -70,7 +74,7 @@ fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
 }
 
 /// What `relay` sends at `now`: ports, and bodies as the rules read them.
-fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
+pub(crate) fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
     let mut out = Vec::new();
     let mut buffer = [0; MAX_FRAME];
     while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
@@ -83,7 +87,7 @@ fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
 }
 
 /// Lets time pass until `relay` has no work to do, at most a second; what it sends on the way.
-fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> {
+pub(crate) fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> {
     let mut out = sent(relay, *now);
     for _ in 0..1000 {
         *now = *now + Duration::from_millis(1);
@@ -94,7 +98,7 @@ fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> {
 }
 
 /// One message of each tag, of this pass.
-fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
+pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     let x_m = 400.0;
     let altitude_m = 20.0;
     let (anchor, power_w) = (1.0, 1.0);
@@ -168,6 +172,24 @@ fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             any: true,
             worst: 1.0,
         },
+        Said::Hail(Forming {
+            number,
+            mission,
+            numbers: [4, 0, 0],
+            flags: 0,
+        }),
+        Said::Roster(Forming {
+            number,
+            mission,
+            numbers: [3, 8, 0],
+            flags: 1,
+        }),
+        Said::Count(Forming {
+            number,
+            mission,
+            numbers: [5, 8, 0],
+            flags: 0,
+        }),
     ]
 }
 
@@ -197,12 +219,12 @@ fn a_message_from_the_wrong_side_for_the_heading_is_misdirected_and_nothing_else
             let (mut relay, from, to) = relay_4(config);
             let mut now = Instant::ZERO;
             if with_place {
-                placed(&mut relay, (from, to), &mut now, 7);
+                placed(&mut relay, (from, to), &mut now, FIRST);
             }
-            for said in one_of_each(8, digest(relay.mission())) {
+            for said in one_of_each(SECOND, digest(relay.mission())) {
                 let wrong = match said.body()[0] {
-                    0 | 4 | 5 | 7 => to,
-                    1 | 2 | 6 | 8 => from,
+                    0 | 4 | 5 | 7 | 10 => to,
+                    1 | 2 | 6 | 8 | 11 => from,
                     _ => continue,
                 };
                 let mut after = relay.clone();
@@ -224,8 +246,8 @@ fn a_message_from_the_wrong_side_for_the_heading_is_misdirected_and_nothing_else
 fn a_message_of_another_mission_is_ignored_from_either_side() {
     for config in [source(), mission(Interference::Field(FIELD))] {
         let (relay, from, to) = relay_4(config);
-        let other = digest(relay.mission()) ^ 1;
-        for said in one_of_each(8, other) {
+        let other = digest(relay.mission()) ^ 0x4000;
+        for said in one_of_each(FIRST, other) {
             if matches!(said, Said::Busy { .. }) {
                 continue;
             }
@@ -245,7 +267,7 @@ fn a_sweep_goes_the_way_of_the_mission_and_its_verdict_back() {
     for config in [source(), mission(Interference::Field(FIELD))] {
         for kind in [0, 4] {
             let (mut relay, from, to) = relay_4(config);
-            let kinds = one_of_each(3, digest(relay.mission()));
+            let kinds = one_of_each(FIRST, digest(relay.mission()));
             let now = Instant::ZERO;
             relay.handle_bytes(now, from, &framed(4, from, &kinds[kind]));
             let out = sent(&mut relay, now);
@@ -253,7 +275,9 @@ fn a_sweep_goes_the_way_of_the_mission_and_its_verdict_back() {
                 (
                     port,
                     Said::Sweep {
-                        number: 3, reaches, ..
+                        number: FIRST,
+                        reaches,
+                        ..
                     },
                 ),
             ] = &out[..]
@@ -263,7 +287,10 @@ fn a_sweep_goes_the_way_of_the_mission_and_its_verdict_back() {
             assert_eq!(*port, to);
             assert_eq!(reaches[0] > 400.0, to == Port::Downstream, "a step onward");
             relay.handle_bytes(now, from, &framed(4, from, &kinds[kind]));
-            assert_eq!(sent(&mut relay, now), [(from, Said::Busy { number: 3 })]);
+            assert_eq!(
+                sent(&mut relay, now),
+                [(from, Said::Busy { number: FIRST })]
+            );
             relay.handle_bytes(now, to, &framed(4, to, &kinds[1]));
             let out = sent(&mut relay, now);
             assert_eq!(out, [(from, kinds[1].clone())]);
@@ -277,15 +304,18 @@ fn a_sweep_goes_the_way_of_the_mission_and_its_verdict_back() {
 fn a_wave_goes_onward_and_its_trace_back() {
     let (mut relay, from, to) = relay_4(source());
     let mut now = Instant::ZERO;
-    let kinds = one_of_each(3, digest(relay.mission()));
+    let kinds = one_of_each(FIRST, digest(relay.mission()));
     relay.handle_bytes(now, from, &framed(4, from, &kinds[5]));
     let out = settle(&mut relay, &mut now);
-    let Some((port, Said::Wave { number: 3, .. })) = out.first() else {
+    let Some((port, Said::Wave { number: FIRST, .. })) = out.first() else {
         panic!("{out:?}");
     };
     assert_eq!(*port, to);
     relay.handle_bytes(now, from, &framed(4, from, &kinds[5]));
-    assert_eq!(sent(&mut relay, now), [(from, Said::Busy { number: 3 })]);
+    assert_eq!(
+        sent(&mut relay, now),
+        [(from, Said::Busy { number: FIRST })]
+    );
     relay.handle_bytes(now, to, &framed(4, to, &kinds[6]));
     assert_eq!(sent(&mut relay, now), [(from, kinds[6].clone())]);
     assert!(relay.setpoint().is_some_and(|place| place.x_m > 375.0));
@@ -296,12 +326,12 @@ fn a_wave_goes_onward_and_its_trace_back() {
 fn a_token_goes_onward_and_what_came_of_it_back() {
     let (mut relay, from, to) = relay_4(source());
     let mut now = Instant::ZERO;
-    placed(&mut relay, (from, to), &mut now, 2);
-    let kinds = one_of_each(3, digest(relay.mission()));
+    placed(&mut relay, (from, to), &mut now, FIRST);
+    let kinds = one_of_each(SECOND, digest(relay.mission()));
     relay.handle_bytes(now, from, &framed(4, from, &kinds[7]));
     let out = settle(&mut relay, &mut now);
     assert!(
-        matches!(out[0], (port, Said::Token { number: 3, .. }) if port == to),
+        matches!(out[0], (port, Said::Token { number: SECOND, .. }) if port == to),
         "{out:?}"
     );
     relay.handle_bytes(now, to, &framed(4, to, &kinds[8]));
@@ -310,7 +340,7 @@ fn a_token_goes_onward_and_what_came_of_it_back() {
         (
             port,
             Said::Moved {
-                number: 3,
+                number: SECOND,
                 any: true,
                 worst,
                 ..
@@ -333,18 +363,22 @@ fn what_is_not_awaited_or_does_not_fit_is_stale() {
             let (mut relay, from, to) = relay_4(config);
             let digest = digest(relay.mission());
             if with_sweep {
-                relay.handle_bytes(now, from, &framed(4, from, &one_of_each(3, digest)[0]));
+                relay.handle_bytes(now, from, &framed(4, from, &one_of_each(FIRST, digest)[0]));
                 drain(&mut relay, now);
             }
             // An answer to another pass, or of another kind; a token for a relay without a place; a pass that is over.
-            let mut stale = vec![(from, renamed(one_of_each(3, digest)[7].clone(), 4, digest))];
+            let mut stale = vec![(from, one_of_each(SECOND, digest)[7].clone())];
             for kind in [1, 6, 8] {
-                let number = if with_sweep && kind != 1 { 3 } else { 4 };
+                let number = if with_sweep && kind != 1 {
+                    FIRST
+                } else {
+                    SECOND
+                };
                 stale.push((to, one_of_each(number, digest)[kind].clone()));
             }
             if with_sweep {
                 for kind in [0, 4, 5, 7] {
-                    stale.push((from, one_of_each(2, digest)[kind].clone()));
+                    stale.push((from, one_of_each(FIRST - 1, digest)[kind].clone()));
                 }
             }
             for (port, said) in stale {
@@ -363,8 +397,8 @@ fn what_is_not_awaited_or_does_not_fit_is_stale() {
 fn what_comes_from_beyond_rx_is_of_no_use() {
     let (mut relay, from, to) = relay_4(source());
     let mut now = Instant::ZERO;
-    placed(&mut relay, (from, to), &mut now, 2);
-    let mut kinds = one_of_each(3, digest(relay.mission()));
+    placed(&mut relay, (from, to), &mut now, FIRST);
+    let mut kinds = one_of_each(SECOND, digest(relay.mission()));
     for said in &mut kinds {
         if let Said::Token { x_m, .. } | Said::Moved { x_m, .. } = said {
             *x_m = 1000.0_f32.next_up();
@@ -373,14 +407,14 @@ fn what_comes_from_beyond_rx_is_of_no_use() {
     let mut after = relay.clone();
     after.handle_bytes(now, from, &framed(4, from, &kinds[7]));
     assert_eq!(counted(after.stats()), ["received", "stale"]);
-    let token = one_of_each(3, digest(relay.mission()))[7].clone();
+    let token = one_of_each(SECOND, digest(relay.mission()))[7].clone();
     relay.handle_bytes(now, from, &framed(4, from, &token));
     settle(&mut relay, &mut now);
     relay.handle_bytes(now, to, &framed(4, to, &kinds[8]));
     assert_eq!(counted(relay.stats()), ["received", "stale"]);
 
     let (mut relay, from, to) = relay_4(mission(Interference::Field(FIELD)));
-    let mut sweep = one_of_each(3, digest(relay.mission()))[0].clone();
+    let mut sweep = one_of_each(FIRST, digest(relay.mission()))[0].clone();
     if let Said::Sweep { reaches, .. } = &mut sweep {
         reaches[0] = 1000.0_f32.next_up();
     }
@@ -397,10 +431,10 @@ fn what_comes_from_beyond_rx_is_of_no_use() {
 fn waves_and_tokens_are_stale_in_a_field() {
     let (mut relay, from, to) = relay_4(mission(Interference::Field(FIELD)));
     let mut now = Instant::ZERO;
-    placed(&mut relay, (from, to), &mut now, 2);
+    placed(&mut relay, (from, to), &mut now, FIRST);
     for kind in [5, 7] {
         let mut after = relay.clone();
-        let kinds = one_of_each(3, digest(relay.mission()));
+        let kinds = one_of_each(SECOND, digest(relay.mission()));
         after.handle_bytes(now, from, &framed(4, from, &kinds[kind]));
         assert_eq!(counted(after.stats()), ["received", "stale"]);
         assert_eq!(settle(&mut after, &mut now.clone()), []);
@@ -483,6 +517,13 @@ fn tamed(said: Said) -> Said {
             mission,
             choice: choice.map(|[_, level]| [0, level % 2]),
         },
+        Said::Roster(forming) => {
+            let [_, relays, view] = forming.numbers;
+            Said::Roster(Forming {
+                numbers: [3, relays.min(8), view],
+                ..forming
+            })
+        }
         other => other,
     }
 }
@@ -498,7 +539,7 @@ fn the_smallest_targets_are_met_in_a_field() {
         for own in [4, 1] {
             let mut relay = relay_of(mission(Interference::Field(field)), own, Wiring::Pair);
             let now = Instant::ZERO;
-            let mut sweep = one_of_each(3, digest(relay.mission()))[0].clone();
+            let mut sweep = one_of_each(FIRST, digest(relay.mission()))[0].clone();
             if let Said::Sweep { anchor: own, .. } = &mut sweep {
                 *own = anchor;
             }
@@ -539,8 +580,8 @@ struct Step {
     /// Whether it comes from the side that it should come from.
     right_side: bool,
     right_mission: bool,
-    /// Its number, if it is not the next pass or the answer to the last one.
-    number: Option<u16>,
+    /// How far its number is from that of the next pass, or of the last one that it answers.
+    off: i16,
     tame: bool,
     /// For how long the relay is left alone afterwards.
     wait_ms: u64,
@@ -555,17 +596,17 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         messages(),
         mostly(),
         mostly(),
-        prop_oneof![4 => Just(None), 1 => (0..20_u16).prop_map(Some)],
+        prop_oneof![4 => Just(0), 1 => -20..20_i16],
         prop_oneof![3 => Just(true), 1 => Just(false)],
         waits,
         any::<bool>(),
     );
     let step = drawn.prop_map(
-        |(said, right_side, right_mission, number, tame, wait_ms, answered)| Step {
+        |(said, right_side, right_mission, off, tame, wait_ms, answered)| Step {
             said,
             right_side,
             right_mission,
-            number,
+            off,
             tame,
             wait_ms,
             answered,
@@ -575,7 +616,8 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 }
 
 /// Leads a relay of 8 by any messages, from a place or from none: it must be drained at any time, asleep until later, its
-/// setpoint between Tx and Rx and within the band. `expected` names what must have moved the setpoint at times.
+/// setpoint between Tx and Rx and within the band, its place in the chain one of those that there are. `expected` names what
+/// must have happened at times: what moved the setpoint, and new views.
 fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
     let seen: Cell<BTreeMap<&str, u32>> = Cell::new(BTreeMap::new());
     let (from, to) = match mission.interference {
@@ -588,25 +630,45 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
             let digest = digest(relay.mission());
             let mut now = Instant::ZERO;
             if with_place && own == 4 {
-                placed(&mut relay, (from, to), &mut now, 0);
+                placed(&mut relay, (from, to), &mut now, FIRST);
             }
             let mut counts = seen.take();
             let mut place = relay.setpoint();
-            let mut pass = 0;
+            let mut begun = place.is_some();
+            let mut pass = if begun { FIRST } else { 0 };
+            let mut view = 0;
             for step in steps {
+                if relay.view() != view {
+                    *counts.entry("view").or_insert(0) += 1;
+                    (view, begun) = (relay.view(), false);
+                }
                 let kind = step.said.body()[0];
-                let onward = [0, 4, 5, 7].contains(&kind);
-                pass += u16::from(onward);
-                let number = step.number.unwrap_or(pass);
-                let said = renamed(step.said, number, digest ^ u16::from(!step.right_mission));
-                let said = if step.tame { tamed(said) } else { said };
+                let onward = [0, 4, 5, 7, 10].contains(&kind);
                 let port = if onward == step.right_side { from } else { to };
+                if onward && kind != 10 {
+                    pass = if begun {
+                        pass + 1
+                    } else {
+                        (pass / 64 + 1) * 64
+                    };
+                    begun |= port == from && step.right_mission && step.off == 0;
+                }
+                let (number, mission) = match kind {
+                    9..=11 => (view.wrapping_add(1), digest),
+                    3 => (0, digest),
+                    _ => (pass, digest.wrapping_add(view)),
+                };
+                let number = number.wrapping_add_signed(step.off);
+                let wrong = if step.right_mission { 0 } else { 0x4000 };
+                let said = renamed(step.said, number, mission ^ wrong);
+                let said = if step.tame { tamed(said) } else { said };
                 let answer = match kind {
                     0 | 4 => 1,
                     5 => 6,
+                    10 => 11,
                     _ => 8,
                 };
-                let answer = one_of_each(number, digest)[answer].clone();
+                let answer = one_of_each(number, mission)[answer].clone();
                 let mut heard = vec![(port, said)];
                 if onward && step.answered {
                     heard.push((to, answer));
@@ -619,6 +681,7 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                         relay.handle_bytes(now, *port, &framed(own, *port, said));
                     }
                     drain(&mut relay, now);
+                    prop_assert!((1..=relay.mission().relays()).contains(&relay.index()));
                     if let Some(at) = relay.setpoint() {
                         prop_assert!((0.0..=1000.0).contains(&at.x_m), "{at:?}");
                         prop_assert!((20.0..=300.0).contains(&at.altitude_m), "{at:?}");
@@ -653,16 +716,16 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
 
 #[test]
 fn any_messages_leave_a_relay_in_bounds() {
-    led_by_anything(source(), 4, &["verdict", "trace", "turn"]);
+    led_by_anything(source(), 4, &["verdict", "trace", "turn", "view"]);
     led_by_anything(source(), 1, &[]);
-    led_by_anything(source(), 8, &["work"]);
+    led_by_anything(source(), 8, &["work", "view"]);
 }
 
 #[test]
 fn any_messages_leave_a_relay_in_a_field_in_bounds() {
     let field = mission(Interference::Field(FIELD));
-    led_by_anything(field, 4, &["verdict"]);
-    led_by_anything(field, 1, &["sweep at the last"]);
+    led_by_anything(field, 4, &["verdict", "view"]);
+    led_by_anything(field, 1, &["sweep at the last", "view"]);
     led_by_anything(field, 8, &[]);
     let wild = mission(Interference::Field(WILD));
     led_by_anything(wild, 4, &[]);

@@ -6,7 +6,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay::wire::frame::Header;
 
-use super::codec::{Said, plain, sealed, targets, wire};
+use super::codec::{Forming, Said, plain, sealed, targets, wire};
 
 /// The largest node number.
 const MAX_NODE: u16 = 4094;
@@ -299,6 +299,64 @@ fn moves() -> BoxedStrategy<Said> {
         .boxed()
 }
 
+/// How many relays, or which of them: small numbers mostly.
+fn counts(least: u16) -> BoxedStrategy<u16> {
+    prop_oneof![4 => least..=9, 1 => least..=1000, 1 => Just(least), 1 => Just(1000)].boxed()
+}
+
+/// A hail, a roster, a count or a fence.
+fn formings() -> BoxedStrategy<Said> {
+    let views = || prop_oneof![4 => 0..8_u16, 1 => any::<u16>()];
+    let hail = (views(), any::<u16>(), counts(0), 0..16_u8).prop_map(
+        |(number, mission, neighbour, flags)| {
+            Said::Hail(Forming {
+                number,
+                mission,
+                numbers: [neighbour, 0, 0],
+                flags,
+            })
+        },
+    );
+    let places = (counts(1), counts(1), views());
+    let roster = (views(), any::<u16>(), places, 0..2_u8).prop_map(
+        |(number, mission, (place, relays, before), flags)| {
+            Said::Roster(Forming {
+                number,
+                mission,
+                numbers: [place, relays, before],
+                flags,
+            })
+        },
+    );
+    let count = (views(), any::<u16>(), counts(1), counts(0)).prop_map(
+        |(number, mission, place, relays)| {
+            Said::Count(Forming {
+                number,
+                mission,
+                numbers: [place, relays, 0],
+                flags: 0,
+            })
+        },
+    );
+    let fence = (
+        1..=u16::MAX,
+        any::<[u16; 3]>(),
+        metres(-1e7).prop_map(|x_m| x_m.min(1e7)),
+        metres(-1e7).prop_map(|x_m| x_m.min(1e7)),
+    )
+        .prop_map(
+            |(number, [mission, echo, fence], x_m, target_m)| Said::Fence {
+                number,
+                mission,
+                echo,
+                fence,
+                x_m,
+                target_m,
+            },
+        );
+    prop_oneof![hail, roster, count, fence].boxed()
+}
+
 /// A message in range.
 pub(crate) fn messages() -> BoxedStrategy<Said> {
     let verdicts = (
@@ -324,6 +382,7 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         1 => traces(),
         2 => tokens(),
         2 => moves(),
+        3 => formings(),
     ]
     .boxed()
 }
@@ -358,6 +417,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
                 5 => &[5, 9, 14, 18, 23],
                 7 => &[5, 9, 13, 18, 24],
                 8 => &[5, 9, 14],
+                9..=11 => &[5, 7],
                 _ => &[1],
             };
             let at = starts[at.index(starts.len())];
@@ -383,6 +443,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
                 6 => &[5, 6, 7],
                 7 => &[17, 22, 23],
                 8 => &[13],
+                9..=11 => &[5, 6, 7, 8, 9, 10, 11],
                 _ => &[0],
             };
             let at = bytes[at.index(bytes.len())];
@@ -396,7 +457,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         pad(&mut body, tag, more);
         body
     });
-    let tagged = (0..12_u8, vec(any::<u8>(), 0..=220)).prop_map(|(tag, mut body)| {
+    let tagged = (0..15_u8, vec(any::<u8>(), 0..=220)).prop_map(|(tag, mut body)| {
         body.insert(0, tag);
         body
     });

@@ -4,6 +4,7 @@
 use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
+use uav_relay::wire::frame::MAX_DECODED;
 use uav_relay::{Instant, Port, Relay, Wiring};
 
 use super::codec::wire;
@@ -40,7 +41,7 @@ pub(crate) fn unstuffed(mut stuffed: &[u8]) -> Outcome {
         }
         stuffed = rest;
     }
-    if plain.len() > 235 {
+    if plain.len() > MAX_DECODED {
         Err(DeframeError::Oversized)
     } else if whole {
         Ok(plain)
@@ -116,7 +117,7 @@ fn the_tail_of_an_oversized_frame_is_never_a_frame() {
         let bytes = std::iter::repeat_n([0x64; 100], len / 100 + 1).flatten();
         bytes.take(len).collect()
     };
-    for len in 238..=800 {
+    for len in MAX_DECODED + 3..=800 {
         for before in [data_runs(len), vec![1; len], vec![0xFF; len], vec![2; len]] {
             let stream = [&before[..], &good, &good].concat();
             let outcomes = deframed(&stream);
@@ -132,10 +133,13 @@ fn the_tail_of_an_oversized_frame_is_never_a_frame() {
 
 #[test]
 fn the_longest_frame_fits_and_one_byte_more_does_not() {
-    for zeros in 0..=236 {
-        for len in [97, 98, 99, 100, 234, 235, 236, 237] {
+    for zeros in 0..=MAX_DECODED + 1 {
+        for len in [97, 98, 99, 100]
+            .into_iter()
+            .chain(MAX_DECODED - 1..MAX_DECODED + 3)
+        {
             let plain: Vec<u8> = (0..len).map(|k| u8::from(k >= zeros)).collect();
-            let expected = if len <= 235 {
+            let expected = if len <= MAX_DECODED {
                 Ok(plain.clone())
             } else {
                 Err(DeframeError::Oversized)
@@ -177,12 +181,12 @@ proptest! {
     #![proptest_config(config(3000))]
 
     #[test]
-    fn what_cobs_encodes_is_decoded(plain in vec(prop_oneof![Just(0), any::<u8>()], 0..=235)) {
+    fn what_cobs_encodes_is_decoded(plain in vec(prop_oneof![Just(0), any::<u8>()], 0..=243)) {
         prop_assert_eq!(deframed(&wire(&plain)), [Ok(plain)]);
     }
 
     #[test]
-    fn what_cobs_decodes_is_decoded_the_same(stuffed in vec(1..=u8::MAX, 1..=235)) {
+    fn what_cobs_decodes_is_decoded_the_same(stuffed in vec(1..=u8::MAX, 1..=243)) {
         let small: Vec<u8> = stuffed.iter().map(|byte| (byte - 1) % 9 + 1).collect();
         for stuffed in [stuffed, small] {
             let expected = cobs::decode_vec(&stuffed).map_err(|_| DeframeError::Truncated);

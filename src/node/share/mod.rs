@@ -1,14 +1,16 @@
 //! A relay's share of every algorithm: what it does with a pass, and with what comes back of it.
 //!
 //! [`exchange`](super::exchange) has the state table. What a pass carries is one of three: targets (`sweeps`), targets and
-//! altitude levels (`waves`), or a token (`turns`).
+//! altitude levels (`waves`), or a token (`turns`). The call for a new view (`roll`) is a pass like them.
 
+mod roll;
 mod sweeps;
 mod turns;
 mod waves;
 
 use core::task::Poll;
 
+use super::MEMBERSHIP;
 use super::adjust::Turning;
 use super::align::Sweeping;
 use super::exchange::{Exchange, Next, Phase};
@@ -24,13 +26,18 @@ use crate::placement::pass::origins;
 use crate::placement::search::{Infeasible, Schedule, Search};
 use crate::placement::wave::{Choice, Wave};
 use crate::sir::Placement;
-use crate::wire::message::{self, Answer, Message, Moved, Sweep, Token, Trace};
+use crate::wire::message::{self, Answer, Count, Message, Moved, Roster, Sweep, Token, Trace};
+
+use roll::Rolling;
 
 /// Hops of the prediction in one call of `work`: 16 reaches each.
 const HOPS_AT_ONCE: u16 = 16;
 
+/// The same in a field, where a reach takes twice the work.
+const FIELD_HOPS_AT_ONCE: u16 = 8;
+
 /// Hops evaluated in one call of `work` on a pass of altitude levels, and 64 more at most.
-const LEVELS_AT_ONCE: u16 = 256;
+const LEVELS_AT_ONCE: u16 = 32;
 
 /// Places weighed in one call of `work` in Algorithm 2, and a row of 24 more at most.
 const PLACES_AT_ONCE: u16 = 600;
@@ -44,13 +51,24 @@ pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 pub(crate) struct Own<'a> {
     pub(crate) mission: &'a Mission,
     pub(crate) settings: &'a Settings,
-    pub(crate) digest: u16,
+    /// The digest of the mission as it was loaded.
+    pub(crate) mission_digest: u16,
+    /// Number of the view that it has agreed to.
+    pub(crate) view: u16,
+    /// Its place among the relays of that view, 1 next to Tx.
     pub(crate) index: u16,
+    /// Whether nobody comes after it on a pass.
+    pub(crate) end: bool,
     /// Upsilon as it measures it where it stands, 1/W.
     pub(crate) measured_per_w: Option<f32>,
 }
 
 impl Own<'_> {
+    /// The digest that the passes of this view bear.
+    const fn digest(self) -> u16 {
+        self.mission_digest.wrapping_add(self.view)
+    }
+
     fn is_last(&self) -> bool {
         self.mission.after(self.index).is_none()
     }
@@ -76,6 +94,7 @@ enum Pass {
     Sweep(Sweeping),
     Wave,
     Turn(Turning),
+    Roll(Rolling),
 }
 
 /// A relay's share of the algorithms.
@@ -109,10 +128,7 @@ impl Share {
         profile: Profile,
     ) -> Self {
         Self {
-            exchange: Exchange {
-                phase: if leader { Phase::Planning } else { Phase::Idle },
-                number,
-            },
+            exchange: Exchange::new(if leader { Phase::Planning } else { Phase::Idle }, number),
             pass: Pass::Sweep(Sweeping::new(Ladder::single(1.0))),
             wave: Wave::new(mission),
             choice: None,
@@ -140,7 +156,7 @@ impl Share {
 
     /// Goes on with a computation: the relay's own share of the current pass, or the leader's next pass.
     ///
-    /// Bounded by 16 hops of 16 reaches, 320 hops of a wave, or 624 places of Algorithm 2.
+    /// Bounded by 16 hops of 16 reaches, half as many in a field, 96 hops of a wave, or 624 places of Algorithm 2.
     pub(crate) fn work(&mut self, own: Own<'_>) -> Next {
         if self.exchange.phase == Phase::Waiting {
             return match &self.pass {
@@ -173,7 +189,11 @@ impl Share {
                         mission.config().common
                     }
                 };
-                let ladder = match planner.step(mission, profile_of, HOPS_AT_ONCE) {
+                let hops = match mission.field() {
+                    None => HOPS_AT_ONCE,
+                    Some(_) => FIELD_HOPS_AT_ONCE,
+                };
+                let ladder = match planner.step(mission, profile_of, hops) {
                     Ok(None) => return Ok(false),
                     Ok(Some(agreed)) => Some(agreed.ladder),
                     // The others may hold something else: let their answers decide.
@@ -278,7 +298,7 @@ impl Share {
     }
 
     fn begin(&mut self) {
-        self.exchange.number = self.exchange.number.wrapping_add(1);
+        self.exchange.begin();
         self.sweeps = self.sweeps.saturating_add(1);
     }
 
@@ -287,7 +307,7 @@ impl Share {
         if self.exchange.phase != Phase::Waiting {
             return None;
         }
-        let (number, mission) = (self.exchange.number, own.digest);
+        let (number, mission) = (self.exchange.number, own.digest());
         match &self.pass {
             Pass::Sweep(sweeping) => Some(Message::Sweep(Sweep {
                 number,
@@ -315,6 +335,12 @@ impl Share {
                     sir: turning.sir,
                 })
             }),
+            Pass::Roll(rolling) if MEMBERSHIP => Some(Message::Roster(Roster {
+                mission: own.mission_digest,
+                view: rolling.view,
+                place: rolling.place,
+                before: rolling.before,
+            })),
             _ => None,
         }
     }
@@ -326,7 +352,7 @@ impl Share {
 
     /// Whether the current pass is one on which relays compute for a while.
     pub(crate) const fn is_slow(&self) -> bool {
-        !matches!(self.pass, Pass::Sweep(_))
+        matches!(self.pass, Pass::Wave | Pass::Turn(_))
     }
 
     /// What to hand back, once it is known.
@@ -334,7 +360,7 @@ impl Share {
         if !self.exchange.is_answered() {
             return None;
         }
-        let (number, mission) = (self.exchange.number, own.digest);
+        let (number, mission) = (self.exchange.number, own.digest());
         match &self.pass {
             Pass::Sweep(sweeping) => Some(Message::Verdict(Answer {
                 number,
@@ -355,12 +381,27 @@ impl Share {
                     worst: turning.worst,
                 })
             }),
+            Pass::Roll(rolling) if MEMBERSHIP => Some(Message::Count(Count {
+                mission: own.mission_digest,
+                view: rolling.view,
+                place: rolling.place,
+                relays: rolling.relays,
+            })),
             _ => None,
         }
     }
 
+    /// The number of the current pass.
     pub(crate) const fn number(&self) -> u16 {
-        self.exchange.number
+        match &self.pass {
+            Pass::Roll(rolling) => rolling.view,
+            _ => self.exchange.number,
+        }
+    }
+
+    /// Whether no pass and no view has been taken part in yet.
+    pub(crate) fn is_fresh(&self) -> bool {
+        self.exchange.phase == Phase::Idle
     }
 
     pub(crate) const fn phase(&self) -> Phase {

@@ -1,7 +1,7 @@
 //! A relay's share of a sweep (Algorithms 1 and 4), and of its verdict.
 
 use super::super::align::Sweeping;
-use super::super::exchange::{Arrival, Next, Phase};
+use super::super::exchange::{Next, Phase};
 use super::super::lead::{Lead, Rounds};
 use super::super::settings::Method;
 use super::{ADJUST, ALTITUDE, Own, Pass, Share};
@@ -16,12 +16,11 @@ impl Share {
     /// A sweep from the relay before.
     pub(crate) fn on_sweep(&mut self, own: Own<'_>, sweep: &Sweep) -> Next {
         let same = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.ladder == sweep.ladder);
-        match self.exchange.arrival(sweep.number, same) {
-            Arrival::Again => return self.exchange.again(),
-            Arrival::Straggler => return Next::Stale,
-            Arrival::New => {}
+        let arrival = self.exchange.arrival(sweep.number, same);
+        if let Some(next) = arrival.refused(self.exchange) {
+            return next;
         }
-        self.exchange.number = sweep.number;
+        self.exchange.take(sweep.number);
         let behind = Behind {
             profile: sweep.profile,
             measured_per_w: sweep.measured_per_w,

@@ -3,7 +3,7 @@
 use core::task::Poll;
 
 use super::super::adjust::Turning;
-use super::super::exchange::{Arrival, Next, Phase};
+use super::super::exchange::{Next, Phase};
 use super::super::lead::Lead;
 use super::{Own, PLACES_AT_ONCE, Pass, Share};
 use crate::placement::local::Beside;
@@ -13,10 +13,9 @@ impl Share {
     /// The token, from the relay before.
     pub(crate) fn on_token(&mut self, own: Own<'_>, token: &Token) -> Next {
         let same = matches!(&self.pass, Pass::Turn(turning) if turning.turn == token.turn);
-        match self.exchange.arrival(token.number, same) {
-            Arrival::Again => return self.exchange.again(),
-            Arrival::Straggler => return Next::Stale,
-            Arrival::New => {}
+        let arrival = self.exchange.arrival(token.number, same);
+        if let Some(next) = arrival.refused(self.exchange) {
+            return next;
         }
         if self.setpoint.is_none()
             || own.mission.interferer().is_none()
@@ -25,7 +24,7 @@ impl Share {
             // A relay without a place has none to tell, and nobody stands beyond Rx.
             return Next::Stale;
         }
-        self.exchange.number = token.number;
+        self.exchange.take(token.number);
         let before = Beside {
             place: token.place,
             apart_m: own.mission.config().min_separation_m,

@@ -1,6 +1,6 @@
 //! A relay's share of a wave of altitude levels, and of what was chosen of it.
 
-use super::super::exchange::{Arrival, Next, Phase};
+use super::super::exchange::{Next, Phase};
 use super::super::lead::Lead;
 use super::{LEVELS_AT_ONCE, Own, Pass, Share};
 use crate::placement::levels::{Gained, Levels, TUBE};
@@ -26,12 +26,11 @@ impl Share {
             return Next::Stale;
         }
         let same = matches!(self.pass, Pass::Wave) && self.wave.is_of(wave.rungs);
-        match self.exchange.arrival(wave.number, same) {
-            Arrival::Again => return self.exchange.again(),
-            Arrival::Straggler => return Next::Stale,
-            Arrival::New => {}
+        let arrival = self.exchange.arrival(wave.number, same);
+        if let Some(next) = arrival.refused(self.exchange) {
+            return next;
         }
-        self.exchange.number = wave.number;
+        self.exchange.take(wave.number);
         self.exchange.phase = Phase::Waiting;
         self.pass = Pass::Wave;
         let levels = self.levels(own, wave.levels.count());

@@ -1,5 +1,6 @@
 //! `cargo chain`: simulated relays, each running the on-board code, find their places over simulated serial links.
 
+mod hostile;
 mod options;
 
 use std::io::IsTerminal as _;
@@ -10,15 +11,15 @@ use clap::{Parser as _, ValueEnum as _};
 use host_tests::brief::{self, Refusal};
 use host_tests::command::{self, Failure, narrow};
 use host_tests::random::beta::beta_w;
-use host_tests::report::ChainReport;
+use host_tests::report::{AttackReport, ChainReport, timeline};
 use host_tests::scenario::{Interference, Scenario};
 use host_tests::sim::chain::Chain;
 use host_tests::sim::faults::Faults;
-use host_tests::sim::outcome::Outcome;
+use host_tests::sim::outcome::{Outcome, RelayEnd};
 use host_tests::sim::setup::Setup;
 use host_tests::svg::{self, Picture};
 use indicatif::{ProgressBar, ProgressStyle};
-use uav_relay::{Measure, Mission, Schedule};
+use uav_relay::{Measure, Mission, Placement, Schedule, Wiring};
 
 use options::{Method, Options};
 
@@ -57,8 +58,15 @@ fn run(options: &Options) -> Result<(), Failure> {
     let mut setup = setup(options, mission);
     setup.profiles = profiles;
     setup.held = brief::held(&scenario, options.uavs);
-    let outcome = fly(options, &scenario, setup)?;
-    let report = ChainReport::new(&method, &mission, &outcome, options.seed);
+    let outcome = fly(options, &scenario, setup.clone())?;
+    let mut report = ChainReport::new(&method, &mission, &outcome, options.seed);
+    report.channel = (setup.settings.wiring == Wiring::Shared).then_some("shared");
+    if setup.attack.take().is_some() {
+        let auth = setup.auth;
+        let attack = AttackReport::new(auth, &outcome, &fly(options, &scenario, setup)?);
+        report.error = report.error.or_else(|| attack.harm());
+        report.attack = Some(attack);
+    }
     if let Some(file) = &options.svg {
         let picture = picture(&method, &mission, &scenario, &outcome, &report);
         command::write(file, &svg::draw(&picture))?;
@@ -72,17 +80,7 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         let line = format!("--closed-loop: there is nothing to measure with --method {method}");
         return Err(Failure::input(line));
     }
-    if let Some(kill) = options
-        .kill
-        .iter()
-        .find(|kill| !(1..=options.uavs).contains(&kill.index))
-    {
-        let line = format!(
-            "--kill {}@..: relay must be within 1 to {}",
-            kill.index, options.uavs
-        );
-        return Err(Failure::input(line));
-    }
+    options.hostile.agree(options)?;
     let is_field = matches!(scenario.interference, Interference::Field(_));
     if options.method.is_for_fields() != is_field {
         let line = if is_field {
@@ -134,11 +132,7 @@ fn setup(options: &Options, mission: Mission) -> Setup {
     };
     setup.settings.predict = !options.no_predict;
     setup.seed = options.seed;
-    setup.kills = options
-        .kill
-        .iter()
-        .map(|kill| (kill.index, kill.at))
-        .collect();
+    options.hostile.prepare(&mut setup);
     setup.faults = Faults {
         loss: options.loss,
         corrupt: options.corrupt,
@@ -217,21 +211,32 @@ fn picture(
 ) -> Picture {
     let mut hop_sir: Vec<f64> = report.relays.iter().map(|relay| relay.sir).collect();
     hop_sir.extend(report.rx_sir);
+    let silent = (1..)
+        .zip(&outcome.relays)
+        .filter(|(_, relay)| relay.killed.is_some());
+    let left_out: Vec<usize> = report.lost.iter().map(|relay| relay.index.into()).collect();
+    let lost = silent
+        .map(|(index, _)| index)
+        .filter(|index| !left_out.contains(index))
+        .collect();
+    let place = |relay: &RelayEnd| {
+        let at = |place: Placement| (f64::from(place.x_m), f64::from(place.altitude_m));
+        relay.setpoint.map_or((f64::NAN, f64::NAN), at)
+    };
+    let nodes = if report.relays.is_empty() && report.lost.is_empty() {
+        Vec::new()
+    } else {
+        outcome.relays.iter().map(place).collect()
+    };
     Picture {
         title_method: method.to_owned(),
         distance_m: f64::from(mission.config().distance_m),
         interferers: scenario.sources(),
-        nodes: report
-            .relays
-            .iter()
-            .map(|relay| (relay.x_m, relay.h_m))
-            .collect(),
+        nodes,
         hop_sir,
-        lost: (1..)
-            .zip(&outcome.relays)
-            .filter(|(_, relay)| relay.killed.is_some())
-            .map(|(index, _)| index)
-            .collect(),
+        lost,
+        left_out,
+        events: timeline::words(&report.timeline),
     }
 }
 

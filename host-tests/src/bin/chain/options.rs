@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::{Parser, ValueEnum};
 use host_tests::command::{narrow, number};
 
+use crate::hostile::Hostile;
+
 /// N simulated relays exchange real frames over simulated serial links until they hold the places that make the worst hop
 /// as good as it can be.
 #[derive(Parser, Debug)]
@@ -53,9 +55,6 @@ pub(crate) struct Options {
     /// The head does not solve the chain beforehand; it brackets from scratch
     #[arg(long)]
     pub(crate) no_predict: bool,
-    /// Relay I goes silent S virtual seconds after the start; repeatable
-    #[arg(long, value_name = "I@S", value_parser = kill)]
-    pub(crate) kill: Vec<Kill>,
     /// Seed of every random draw; the same seed gives the same run, byte for byte
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(crate) seed: u64,
@@ -65,6 +64,8 @@ pub(crate) struct Options {
     /// Draw the chain in the x-h plane, with each hop's SIR
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) hostile: Hostile,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -90,13 +91,6 @@ impl Method {
     }
 }
 
-/// One `--kill`.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Kill {
-    pub(crate) index: u16,
-    pub(crate) at: uav_relay::Instant,
-}
-
 fn probability(text: &str) -> Result<f64, String> {
     number(text, 0.0, 0.9)
 }
@@ -108,22 +102,5 @@ fn grid(text: &str) -> Result<uav_relay::Local, String> {
     Ok(uav_relay::Local::Grid {
         columns: side(columns)?,
         rows: side(rows)?,
-    })
-}
-
-fn kill(text: &str) -> Result<Kill, String> {
-    let form = "must be I@S, a relay (1 to N) and seconds after the start (0 to 1e6)";
-    let (index, seconds) = text.split_once('@').ok_or(form)?;
-    let index = index.parse().map_err(|_| form)?;
-    let seconds = number(seconds, 0.0, 1e6).map_err(|_| form)?;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "within 0 to 1e12"
-    )]
-    let micros = (seconds * 1e6) as u64;
-    Ok(Kill {
-        index,
-        at: uav_relay::Instant::from_micros(micros),
     })
 }

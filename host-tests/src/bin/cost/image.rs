@@ -16,41 +16,76 @@ const RELAY: &str = "stm32f405";
 
 pub(crate) fn of_the_relay_image() -> Result<Vec<Row>, String> {
     let (flash_with_log, ram_with_log) = sizes(&build(RELAY, &["--features", "defmt"])?)?;
-    let alone = build(RELAY, &["--no-default-features"])?;
-    let (flash_alone, ram_alone) = sizes(&alone)?;
-    let (thread_alone, handler_alone) = stack(&alone)?;
-    let relay = build(RELAY, &[])?;
-    let (flash, ram) = sizes(&relay)?;
-    let (thread, handler) = stack(&relay)?;
-    Ok(vec![
-        row(
-            "flash of the relay image, Algorithm 1 alone",
-            "bytes",
-            flash_alone,
-            Some(32 * 1024),
-        ),
-        row("its static RAM", "bytes", ram_alone, Some(4 * 1024)),
-        row(
-            "its stack, bound: thread and one interrupt",
-            "bytes",
-            thread_alone + handler_alone,
-            Some(2 * 1024),
-        ),
-        row(
-            "flash of the relay image, all methods",
-            "bytes",
-            flash,
-            Some(46 * 1024),
-        ),
-        row("its static RAM", "bytes", ram, Some(4_608)),
+    let mut rows = Vec::new();
+    for &(what, features, [flash, ram, stack]) in IMAGES {
+        rows.extend(of(what, features, flash, ram, stack)?);
+    }
+    rows.extend([
+        row("its flash with defmt", "bytes", flash_with_log, None),
+        row("its static RAM with defmt", "bytes", ram_with_log, None),
+    ]);
+    Ok(rows)
+}
+
+/// What an image is called, its features, and its budgets: flash, static RAM, stack.
+type Image = (&'static str, &'static [&'static str], [u64; 3]);
+
+const IMAGES: &[Image] = &[
+    (
+        "flash of the relay image, Algorithm 1 alone",
+        &["--no-default-features"],
+        [32 * 1024, 4 * 1024, 2 * 1024],
+    ),
+    (
+        "flash of that with `auth`",
+        &["--no-default-features", "--features", "auth"],
+        [40 * 1024, 6 * 1024, 2 * 1024],
+    ),
+    (
+        "flash of that with `auth` and `membership`",
+        &["--no-default-features", "--features", "auth,membership"],
+        [44 * 1024, 6 * 1024, 2 * 1024],
+    ),
+    (
+        "flash of that with `auth`, `membership` and `guard`",
+        &[
+            "--no-default-features",
+            "--features",
+            "auth,membership,guard",
+        ],
+        [48 * 1024, 6 * 1024, 2_304],
+    ),
+    (
+        "flash of the relay image, everything and `auth`",
+        &["--features", "auth"],
+        [62 * 1024, 6 * 1024, 3_328],
+    ),
+    (
+        "flash of the relay image, everything but `auth`",
+        &[],
+        [57 * 1024, 6 * 1024, 3 * 1024],
+    ),
+];
+
+fn of(
+    what: &'static str,
+    features: &[&str],
+    flash: u64,
+    ram: u64,
+    stack: u64,
+) -> Result<[Row; 3], String> {
+    let image = build(RELAY, features)?;
+    let (flash_taken, ram_taken) = sizes(&image)?;
+    let (thread, handler) = deepest_stack(&image)?;
+    Ok([
+        row(what, "bytes", flash_taken, Some(flash)),
+        row("its static RAM", "bytes", ram_taken, Some(ram)),
         row(
             "its stack, bound: thread and one interrupt",
             "bytes",
             thread + handler,
-            Some(2_560),
+            Some(stack),
         ),
-        row("its flash with defmt", "bytes", flash_with_log, None),
-        row("its static RAM with defmt", "bytes", ram_with_log, None),
     ])
 }
 
@@ -109,7 +144,7 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
 }
 
 /// The deepest stack of the thread, from the entry that `Reset` calls, and of an interrupt on top of it: its frame with the FPU's registers is 104 bytes.
-pub(crate) fn stack(elf: &Path) -> Result<(u64, u64), String> {
+pub(crate) fn deepest_stack(elf: &Path) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
     let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
     let objdump = llvm_tool("llvm-objdump").ok_or(missing)?;
@@ -145,9 +180,10 @@ pub(crate) fn stack(elf: &Path) -> Result<(u64, u64), String> {
     Ok((thread, EXCEPTION_FRAME + handler))
 }
 
-/// Links the relay image with a panic handler that cannot be linked; and, as a control, one that does panic.
+/// Links the relay image, with `auth` and without, with a panic handler that cannot be linked; and, as a control, one that does
+/// panic.
 pub(crate) fn no_panic() -> Result<(), String> {
-    let link = |flags: &[&str]| {
+    let link = |features: &[&str], flags: &[&str]| {
         let arguments = [
             "rustc",
             "-p",
@@ -158,13 +194,21 @@ pub(crate) fn no_panic() -> Result<(), String> {
             TARGET,
             "--example",
             RELAY,
-            "--",
         ];
-        run(Command::new("cargo").args(arguments).args(flags))
+        run(Command::new("cargo")
+            .args(arguments)
+            .args(features)
+            .arg("--")
+            .args(flags))
     };
-    link(&["--cfg", "prove_no_panic"])
-        .map_err(|error| format!("a panic is reachable in the relay image: {error}"))?;
-    match link(&["--cfg", "prove_no_panic", "--cfg", "panic_on_purpose"]) {
+    for features in [&[][..], &["--features", "auth"]] {
+        link(features, &["--cfg", "prove_no_panic"])
+            .map_err(|error| format!("a panic is reachable in the relay image: {error}"))?;
+    }
+    match link(
+        &[],
+        &["--cfg", "prove_no_panic", "--cfg", "panic_on_purpose"],
+    ) {
         Ok(_) => Err("a panic put there on purpose was linked: the proof proves nothing".into()),
         Err(error) if error.contains("a_panic_is_reachable") => Ok(()),
         Err(error) => Err(format!("the control failed for another reason: {error}")),

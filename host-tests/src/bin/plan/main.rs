@@ -71,7 +71,7 @@ fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
             .map(|(place, _)| (f64::from(place.x_m), f64::from(place.altitude_m)))
             .collect(),
         hop_sir: plan.sirs.clone(),
-        lost: Vec::new(),
+        ..Picture::default()
     }
 }
 

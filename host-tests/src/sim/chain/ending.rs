@@ -1,31 +1,67 @@
 //! When a run is over.
 
-use uav_relay::{Phase, Side};
+use uav_relay::{Phase, Side, Wiring};
 
 use super::super::outcome::Ending;
-use super::Chain;
+use super::{Chain, Member};
 
 impl Chain {
     pub(super) fn ending(&self) -> Option<Ending> {
-        let killed = self.members.iter().any(|member| member.killed.is_some());
-        if killed && self.kills_ahead == 0 {
-            return self.all_noticed().then_some(Ending::Broken);
-        }
-        if self.kills_ahead > 0 {
+        if self.ahead > 0 {
             return None;
         }
-        if self
-            .leader()
-            .is_some_and(|leader| leader.relay.phase() == Phase::Infeasible)
-        {
+        let killed = self.members.iter().any(|member| member.killed.is_some());
+        if killed && self.setup.settings.wiring == Wiring::Pair {
+            return self.all_noticed().then_some(Ending::Broken);
+        }
+        let phases = || {
+            let living = self.members.iter().filter(|member| member.killed.is_none());
+            living.map(|member| member.relay.phase())
+        };
+        let busy = |phase| matches!(phase, Phase::Planning | Phase::Waiting | Phase::Idle);
+        if phases().any(busy) && !phases().any(|phase| phase == Phase::Infeasible) {
+            return None;
+        }
+        let parts = self.parts();
+        if is_cut(&parts) {
+            return Some(Ending::Cut);
+        }
+        let counted = parts.iter().filter(|part| is_counted(part));
+        let largest = counted.max_by_key(|part| part.len())?;
+        let is_in =
+            |part: &[&Member], phase| part.iter().any(|member| member.relay.phase() == phase);
+        if is_in(largest, Phase::Infeasible) {
             return Some(Ending::Infeasible);
         }
-        let settled = self.holding >= self.members.len()
-            && self
-                .members
-                .iter()
-                .all(|member| member.relay.phase() == Phase::Holding);
-        settled.then_some(Ending::Settled)
+        let settled = self.holding >= largest.len() && holds(largest) && self.has_arrived();
+        let others = parts
+            .iter()
+            .filter(|part| !std::ptr::eq(*part, largest))
+            .all(|part| is_in(part, Phase::Cut));
+        (settled && others).then_some(Ending::Settled)
+    }
+
+    /// The living relays that can hear each other, part by part.
+    fn parts(&self) -> Vec<Vec<&Member>> {
+        let mut parts: Vec<Vec<&Member>> = Vec::new();
+        let mut last: Option<usize> = None;
+        for (index, member) in self.members.iter().enumerate() {
+            if member.killed.is_some() {
+                continue;
+            }
+            match parts.last_mut() {
+                Some(part)
+                    if last.is_some_and(|last| {
+                        index - last <= self.setup.radio_reach && !self.are_parted(last, index)
+                    }) =>
+                {
+                    part.push(member);
+                }
+                _ => parts.push(vec![member]),
+            }
+            last = Some(index);
+        }
+        parts
     }
 
     /// Whether every living neighbour of a silent relay has noticed.
@@ -48,4 +84,39 @@ impl Chain {
                 before && noticed(silent + 1, Side::Upstream)
             })
     }
+}
+
+/// Whether the relays of `part` have been counted as they are.
+fn is_counted(part: &[&Member]) -> bool {
+    part.iter().zip(1_u16..).all(|(member, index)| {
+        member.relay.index() == index && usize::from(member.relay.mission().relays()) == part.len()
+    })
+}
+
+/// Whether no part can go on: each is at most half of what it was, its leader knows, and nobody is left to be found in it.
+fn is_cut(parts: &[Vec<&Member>]) -> bool {
+    parts.iter().all(|part| {
+        let nodes = part.iter().map(|member| Some(member.node));
+        let before = [None].into_iter().chain(nodes.clone());
+        let after = nodes.skip(1).chain([None]);
+        let closed = part
+            .iter()
+            .zip(before.zip(after))
+            .all(|(member, (before, after))| member.relay.neighbours() == [before, after]);
+        let cut = part.iter().any(|member| member.relay.phase() == Phase::Cut);
+        let newest = part.iter().max_by_key(|member| member.relay.view());
+        let before = newest.map_or(0, |member| member.relay.mission().relays());
+        closed && cut && 2 * part.len() <= usize::from(before)
+    })
+}
+
+/// Whether all hold their places for the same target.
+fn holds(part: &[&Member]) -> bool {
+    let target = |member: &&Member| member.relay.target().map(f32::to_bits);
+    part.iter()
+        .all(|member| member.relay.phase() == Phase::Holding)
+        && part.windows(2).all(|pair| match pair {
+            [one, other] => target(one) == target(other),
+            _ => true,
+        })
 }

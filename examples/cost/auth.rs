@@ -1,0 +1,89 @@
+//! What tags cost, and a sweep whose frames have them.
+
+use core::hint::black_box;
+use cortex_m_semihosting::hprintln;
+use uav_relay::FrameBuf;
+use uav_relay::Instant;
+use uav_relay::Mission;
+use uav_relay::Phase;
+use uav_relay::Port;
+use uav_relay::Relay;
+use uav_relay::Settings;
+use uav_relay::wire::auth::{Auth, Key};
+use uav_relay::wire::frame::MAX_FRAME;
+
+use super::counter::{instructions, relay, sends};
+use super::missions::mission;
+
+const KEY: Key = Key::new([0xA5; 32]);
+
+/// One tag of a frame with a body of this many bytes, as the sender makes it and the receiver again.
+fn tag(body: usize) -> u32 {
+    const LONGEST: [u8; 231] = [0x5A; 231];
+    let signed = black_box(LONGEST.get(..10 + body).unwrap_or_default());
+    instructions(|| KEY.tag(1 << 32, 2 << 32, signed))
+}
+
+/// Bytes to and fro between two relays, until neither has anything to say.
+fn settle(upper: &mut Relay, lower: &mut Relay, now: Instant) {
+    loop {
+        let (down, up) = (sends(upper, now), sends(lower, now));
+        if let Some((frame, len)) = down {
+            lower.handle_bytes(now, Port::Upstream, frame.get(..len).unwrap_or_default());
+        }
+        if let Some((frame, len)) = up {
+            upper.handle_bytes(now, Port::Downstream, frame.get(..len).unwrap_or_default());
+        }
+        if down.is_none() && up.is_none() {
+            return;
+        }
+    }
+}
+
+/// A full sweep through a middle relay, and a frame that is refused there.
+pub(crate) fn auth() {
+    const THREE: Mission = mission(3);
+    hprintln!("tag_32 {}", tag(32));
+    hprintln!("tag_84 {}", tag(84));
+    hprintln!("tag_221 {}", tag(221));
+    let settings = Settings {
+        predict: false,
+        auth: Some(Auth { key: KEY, epoch: 1 }),
+        ..Settings::default()
+    };
+    let mut head = relay(1, settings, THREE);
+    let mut middle = relay(2, settings, THREE);
+    let mut tail = relay(3, settings, THREE);
+    let start = Instant::ZERO;
+    // Who is there is known before the first pass: the hellos of the tail go first.
+    settle(&mut middle, &mut tail, start);
+    settle(&mut head, &mut middle, start);
+    settle(&mut middle, &mut tail, start);
+    let mut now = start;
+    while head.phase() == Phase::Planning {
+        now = head.poll_timeout().unwrap_or(now);
+        head.handle_timeout(now);
+    }
+    let Some((frame, len)) = sends(&mut head, now) else {
+        return;
+    };
+    let bytes = frame.get(..len).unwrap_or_default();
+    hprintln!("signed_sweep_bytes {}", len);
+    let mut sent = None;
+    let through = instructions(|| {
+        middle.handle_bytes(now, Port::Upstream, bytes);
+        let mut out: FrameBuf = [0; MAX_FRAME];
+        sent = middle.poll_transmit(now, &mut out);
+        black_box(&out);
+    });
+    hprintln!("signed_sweep {}", through);
+    hprintln!(
+        "passed_on {}",
+        u32::from(sent.is_some_and(|sent| sent.len > 90))
+    );
+    // The same once more is a replay: its tag is right, and that takes longest to find out.
+    let before = middle.stats().replayed;
+    let refused = instructions(|| middle.handle_bytes(now, Port::Upstream, bytes));
+    hprintln!("refused {}", refused);
+    hprintln!("replayed {}", middle.stats().replayed - before);
+}

@@ -1,0 +1,48 @@
+//! The number that rises at every start, in a file.
+//!
+//! It is on the disk before it is used: written beside the file, synced, and put in its place. So a loss of power at any moment
+//! leaves the number of the start before, or the next one, and no number is used twice.
+
+use std::fs::{File, rename};
+use std::io::{ErrorKind, Write as _};
+use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// The epoch of this start: one more than `file` says, and written there. Without a file it is the seconds of the clock, so that
+/// a file that is lost does not begin again from 1.
+///
+/// # Errors
+/// One line that names the file and what is wrong.
+pub(crate) fn next(file: &Path) -> Result<u32, String> {
+    let named = |error: &str| format!("--epoch-file {}: {error}", file.display());
+    let last = match std::fs::read_to_string(file) {
+        Ok(text) => text.trim().parse().ok(),
+        Err(error) if error.kind() == ErrorKind::NotFound => Some(seconds()),
+        Err(error) => return Err(named(&format!("cannot be read: {error}"))),
+    };
+    let last: u32 = last.ok_or_else(|| named("must hold a number within 0 to 4294967294"))?;
+    let epoch = last
+        .checked_add(1)
+        .ok_or_else(|| named("there is no epoch after that"))?;
+    keep(file, epoch).map_err(|error| named(&format!("cannot be written: {error}")))?;
+    Ok(epoch)
+}
+
+fn keep(file: &Path, epoch: u32) -> std::io::Result<()> {
+    let mut beside = file.as_os_str().to_owned();
+    beside.push(".new");
+    let mut new = File::create(&beside)?;
+    writeln!(new, "{epoch}")?;
+    new.sync_all()?;
+    rename(&beside, file)?;
+    // The name too has to be on the disk.
+    let folder = file
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
+}
+
+fn seconds() -> u32 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| u32::try_from(since.as_secs()).unwrap_or(0))
+}

@@ -1,0 +1,37 @@
+//! The network's key, from a file: 64 hexadecimal digits, as `openssl rand -hex 32` writes them.
+
+use std::path::Path;
+
+/// Reads the key in `file`.
+///
+/// # Errors
+/// One line that names the file and what is wrong with it; never what is in it.
+pub fn load(file: &Path) -> Result<[u8; 32], String> {
+    let named = |error: &str| format!("--key-file {}: {error}", file.display());
+    let text = std::fs::read_to_string(file)
+        .map_err(|error| named(&format!("cannot be read: {error}")))?;
+    parse(&text).map_err(named)
+}
+
+/// The key in `text`; white space around it does not count.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn parse(text: &str) -> Result<[u8; 32], &'static str> {
+    let text = text.trim();
+    if !text.bytes().all(|digit| digit.is_ascii_hexdigit()) {
+        return Err("must be hexadecimal digits and nothing else");
+    }
+    let mut key = [0; 32];
+    if text.len() != 2 * key.len() {
+        return Err("must be 64 hexadecimal digits, as of `openssl rand -hex 32`");
+    }
+    for (byte, at) in key.iter_mut().zip((0..).step_by(2)) {
+        let digits = text.get(at..at + 2).unwrap_or_default();
+        *byte = u8::from_str_radix(digits, 16).unwrap_or_default();
+    }
+    if key == [0; 32] {
+        return Err("must not be all 0");
+    }
+    Ok(key)
+}

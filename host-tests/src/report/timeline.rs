@@ -1,0 +1,236 @@
+//! The story of a run, moment by moment for programs and in a few lines for people.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use super::chain::seconds;
+use crate::sim::outcome::{Moment, Turning};
+
+/// One moment.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct MomentReport {
+    /// When, s of virtual time.
+    pub at_s: f64,
+    /// Whose, by its number in the mission, from 1. Of a partition it is the last relay before it.
+    pub relay: u16,
+    /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted` or `healed`.
+    pub what: &'static str,
+    /// The neighbour that was lost or found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub other: Option<u16>,
+    /// Number of the view that was formed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub view: Option<u16>,
+    /// How many relays it has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relays: Option<u16>,
+    /// The target agreed on, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir: Option<f64>,
+}
+
+impl MomentReport {
+    fn of(moment: &Moment) -> Self {
+        let (what, view, relays) = match moment.what {
+            Turning::Silent => ("silent", None, None),
+            Turning::Booted => ("on", None, None),
+            Turning::Lost(_) => ("lost", None, None),
+            Turning::Found(_) => ("found", None, None),
+            Turning::Reformed { view, relays, .. } => ("formed", Some(view), Some(relays)),
+            Turning::Cut => ("cut", None, None),
+            Turning::Converged => ("converged", None, None),
+            Turning::Infeasible => ("infeasible", None, None),
+            Turning::Parted => ("parted", None, None),
+            Turning::Healed => ("healed", None, None),
+        };
+        let sir = moment.target.filter(|_| what == "converged");
+        Self {
+            at_s: seconds(moment.at),
+            relay: moment.relay,
+            what,
+            other: moment.other,
+            view,
+            relays,
+            sir: sir.map(f64::from),
+        }
+    }
+}
+
+/// The moments of a run; none if all it did was to converge.
+pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
+    let plain = |moment: &Moment| matches!(moment.what, Turning::Converged | Turning::Infeasible);
+    if moments.iter().all(plain) {
+        return Vec::new();
+    }
+    moments.iter().map(MomentReport::of).collect()
+}
+
+/// What several relays did in common.
+#[derive(Clone, PartialEq, Debug)]
+struct Group {
+    first_s: f64,
+    last_s: f64,
+    /// Who, in the order in which they did; a pair of neighbours that found each other, in order from Tx.
+    relays: Vec<u16>,
+    sample: MomentReport,
+}
+
+/// Seconds between two moments that belong together, at most: a neighbour may notice a silence so much later than another.
+const TOGETHER_S: f64 = 10.0;
+
+/// The story in groups, by the time that counts: the last one's where all have to agree, else the first one's.
+fn groups(timeline: &[MomentReport]) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for moment in timeline {
+        // What came before another view has nothing to do with what came after it.
+        let open = groups
+            .iter()
+            .rposition(|group| group.sample.what == "formed" && moment.what == "converged")
+            .unwrap_or(0);
+        let mut known = groups.iter_mut().skip(open).rev();
+        let same =
+            known.find(|group| moment.at_s - group.last_s <= TOGETHER_S && belongs(moment, group));
+        if let Some(group) = same {
+            group.last_s = moment.at_s;
+            if !group.relays.contains(&moment.relay) {
+                group.relays.push(moment.relay);
+            }
+        } else {
+            groups.push(Group {
+                first_s: moment.at_s,
+                last_s: moment.at_s,
+                relays: vec![moment.relay],
+                sample: moment.clone(),
+            });
+        }
+    }
+    groups.sort_by(|one, other| one.at_s().total_cmp(&other.at_s()));
+    groups
+}
+
+fn belongs(moment: &MomentReport, group: &Group) -> bool {
+    let one = &group.sample;
+    if one.what != moment.what {
+        return false;
+    }
+    match one.what {
+        "lost" => one.other == moment.other,
+        // Each of two neighbours finds the other.
+        "found" => {
+            one.other == Some(moment.relay) && moment.other == Some(one.relay)
+                || (one.relay, one.other) == (moment.relay, moment.other)
+        }
+        "formed" => one.view == moment.view,
+        // What is the same to the bit.
+        "converged" => one.sir.map(f64::to_bits) == moment.sir.map(f64::to_bits),
+        "silent" | "on" => one.at_s.to_bits() == moment.at_s.to_bits(),
+        "cut" => true,
+        _ => false,
+    }
+}
+
+impl Group {
+    fn at_s(&self) -> f64 {
+        match self.sample.what {
+            "formed" | "converged" => self.last_s,
+            _ => self.first_s,
+        }
+    }
+
+    /// What happened, in a few words, for a picture.
+    fn words(&self) -> String {
+        let who = list(&self.relays);
+        let one = &self.sample;
+        match one.what {
+            "silent" => format!("{who} silent"),
+            "on" => format!("{who} on again"),
+            "lost" => format!("{} is missed", one.other.unwrap_or_default()),
+            "found" => format!("{} meets {}", one.relay, one.other.unwrap_or_default()),
+            "formed" => format!("formed: {}", one.relays.unwrap_or_default()),
+            "converged" => format!("SIR {:.3}", one.sir.unwrap_or_default()),
+            "parted" => format!("parted after {}", one.relay),
+            "healed" => format!("joined after {}", one.relay),
+            other => other.to_owned(),
+        }
+    }
+
+    /// What happened, as a line of text.
+    fn line(&self) -> String {
+        let many = self.relays.len() > 1;
+        let who = format!(
+            "{} {}",
+            if many { "relays" } else { "relay" },
+            list(&self.relays)
+        );
+        let one = &self.sample;
+        let other = one.other.unwrap_or_default();
+        let relay = one.relay;
+        match one.what {
+            "silent" => format!("{who} went silent"),
+            "on" => format!("{who} switched on again"),
+            "lost" => format!("{who} lost relay {other}"),
+            "found" if many => format!("{who} found each other"),
+            "found" => format!("{who} found relay {other}"),
+            "formed" => format!(
+                "formed anew: {} relays, view {}",
+                one.relays.unwrap_or_default(),
+                one.view.unwrap_or_default()
+            ),
+            "cut" => format!("{who} cut off: too few to go on without the others"),
+            "converged" => format!(
+                "converged: {} relays, SIR {:.3}",
+                self.relays.len(),
+                one.sir.unwrap_or_default()
+            ),
+            "parted" => format!("relays 1 to {relay} and the others do not hear each other"),
+            "healed" => format!("relays 1 to {relay} and the others hear each other again"),
+            _ => "no target can be met".to_owned(),
+        }
+    }
+}
+
+/// "3", "3 and 5", "1, 2 and 5", "3 to 9".
+pub(super) fn list(relays: &[u16]) -> String {
+    let mut sorted = relays.to_vec();
+    sorted.sort_unstable();
+    match sorted.as_slice() {
+        [] => String::new(),
+        [one] => one.to_string(),
+        [first, .., last] if sorted.len() > 2 && usize::from(last - first) + 1 == sorted.len() => {
+            format!("{first} to {last}")
+        }
+        [rest @ .., last] => {
+            let rest: Vec<String> = rest.iter().map(u16::to_string).collect();
+            format!("{} and {last}", rest.join(", "))
+        }
+    }
+}
+
+/// Lines at either end of a long story.
+const ENDS: usize = 20;
+
+/// The story as text: a line for each thing that happened, the middle of a very long one left out.
+pub(super) fn text(timeline: &[MomentReport]) -> String {
+    let groups = groups(timeline);
+    let mut text = String::new();
+    for (number, group) in groups.iter().enumerate() {
+        if number >= ENDS && groups.len() > 2 * ENDS && number + ENDS < groups.len() {
+            if number == ENDS {
+                _ = writeln!(text, "{:>12}  {} more", "...", groups.len() - 2 * ENDS);
+            }
+            continue;
+        }
+        _ = writeln!(text, "{:>10.3} s  {}", group.at_s(), group.line());
+    }
+    text
+}
+
+/// The same for a picture: seconds, and a few words.
+pub fn words(timeline: &[MomentReport]) -> Vec<(f64, String)> {
+    groups(timeline)
+        .iter()
+        .filter(|group| group.sample.what != "found")
+        .map(|group| (group.at_s(), group.words()))
+        .collect()
+}

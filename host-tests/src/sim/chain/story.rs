@@ -1,0 +1,96 @@
+//! The story of a run: what is worth a line in it.
+
+use uav_relay::{Event, Side};
+
+use super::super::outcome::{Moment, Turning};
+use super::{Chain, Member};
+
+impl Chain {
+    /// Takes out what relay `index` (from 0) has to tell its firmware.
+    pub(super) fn listen(&mut self, index: usize) {
+        while let Some(member) = self.members.get_mut(index)
+            && let Some(event) = member.relay.poll_event()
+        {
+            let by = member.node;
+            let at = |side| usize::from(side == Side::Downstream);
+            let (what, other) = match event {
+                Event::NeighbourLost(side) => {
+                    self.outcome.noticed.insert((by, side), self.now);
+                    // It may have let go of it already.
+                    let lost = member.beside.get(at(side)).copied().flatten();
+                    (Turning::Lost(side), lost)
+                }
+                Event::NeighbourBack(side) => {
+                    self.outcome.noticed.remove(&(by, side));
+                    let found = member.relay.neighbours().get(at(side)).copied().flatten();
+                    (Turning::Found(side), found)
+                }
+                Event::Converged => {
+                    self.holding += 1;
+                    (Turning::Converged, None)
+                }
+                Event::Reformed => {
+                    // What Algorithm 2 had come to was another chain's.
+                    self.outcome.rounds.clear();
+                    let what = Turning::Reformed {
+                        view: member.relay.view(),
+                        index: member.relay.index(),
+                        relays: member.relay.mission().relays(),
+                    };
+                    (what, None)
+                }
+                Event::Cut => (Turning::Cut, None),
+                Event::Infeasible => (Turning::Infeasible, None),
+                _ => continue,
+            };
+            self.tell(index, what, other);
+        }
+        if let Some(member) = self.members.get_mut(index) {
+            member.beside = member.relay.neighbours();
+        }
+    }
+
+    /// Adds a line about relay `index` (from 0).
+    pub(super) fn tell(&mut self, index: usize, what: Turning, other: Option<u16>) {
+        let Some(member) = self.members.get(index) else {
+            return;
+        };
+        self.outcome.moments.push(Moment {
+            at: self.now,
+            relay: member.node,
+            what,
+            other,
+            target: member.relay.target(),
+            sweeps: member.begun(),
+        });
+    }
+
+    /// A partition begins or ends now.
+    pub(super) fn tell_of_partitions(&mut self) {
+        let relays = self.setup.mission.relays();
+        for partition in self.setup.partitions.clone() {
+            if !(1..relays).contains(&partition.after) {
+                // That parts nobody.
+                continue;
+            }
+            let last = usize::from(partition.after).saturating_sub(1);
+            if partition.from == self.now {
+                self.tell(last, Turning::Parted, None);
+            } else if partition.until == Some(self.now) {
+                self.tell(last, Turning::Healed, None);
+            }
+        }
+    }
+
+    /// Passes that all relays together have begun: their leaders, and those that led before them.
+    pub(super) fn sweeps(&self) -> u32 {
+        self.members.iter().map(Member::begun).sum()
+    }
+}
+
+impl Member {
+    /// Passes that it has begun.
+    fn begun(&self) -> u32 {
+        self.swept + self.relay.stats().sweeps
+    }
+}

@@ -1,0 +1,116 @@
+//! An attacker's frames come in.
+
+use rand::RngExt;
+use uav_relay::{Duration, Port, Wiring};
+
+use super::super::attack::{Attacker, Strike, fate};
+use super::super::forge::{Way, destination, forge};
+use super::super::queue::Happening;
+use super::{Chain, Member};
+
+/// How long an attacker that has heard nothing yet waits.
+const WAIT: Duration = Duration::from_millis(10);
+
+impl Chain {
+    /// Sets up the attacker that `setup` asks for.
+    pub(super) fn expect_an_attack(&mut self) {
+        let Some(attack) = self.setup.attack else {
+            return;
+        };
+        let mut attacker = Attacker::new(attack, self.setup.seed);
+        for (at, kind) in attacker.plan(&self.setup.link) {
+            self.queue.put(at, 0, Happening::Strike(kind));
+            self.ahead += 1;
+        }
+        self.attacker = Some(attacker);
+    }
+
+    /// One frame of the attacker's arrives at a living relay; nothing if there is none, or nothing to send again.
+    pub(super) fn strike(&mut self, kind: Strike) {
+        let now = self.now;
+        let Some(mut attacker) = self.attacker.take() else {
+            return;
+        };
+        let frame = match kind {
+            Strike::Forge => {
+                let way = self.way(&mut attacker);
+                let heard = attacker.recall(now);
+                let heard = heard.as_ref().map(|heard| heard.bytes.as_slice());
+                let bytes = forge(&self.setup.mission, way, heard, &mut attacker.rng);
+                Some((self.port(way), bytes))
+            }
+            Strike::Replay => attacker
+                .recall(now)
+                .map(|recorded| (recorded.port, recorded.bytes)),
+        };
+        match frame {
+            Some((port, bytes)) => {
+                let astray = kind == Strike::Replay && attacker.rng.random_range(0..4) == 0;
+                let to = destination(&bytes).filter(|_| !astray);
+                if let Some(to) = self.reached(to, &mut attacker) {
+                    self.hit(to, kind, port, &bytes);
+                }
+            }
+            None if now < attacker.attack.until => {
+                self.queue.put(now + WAIT, 0, Happening::Strike(kind));
+                self.ahead += 1;
+            }
+            None => {}
+        }
+        self.attacker = Some(attacker);
+    }
+
+    /// From one relay to another that might listen to it.
+    fn way(&self, attacker: &mut Attacker) -> Way {
+        let relays = self.setup.mission.relays();
+        let reach = match self.setup.settings.wiring {
+            Wiring::Pair => 1,
+            Wiring::Shared => 4,
+        };
+        let to = attacker.rng.random_range(1..=relays);
+        let off = attacker.rng.random_range(1..=reach);
+        let before = attacker.rng.random::<bool>() && off < to || to + off > relays;
+        Way {
+            from: if before {
+                to.saturating_sub(off).max(1)
+            } else {
+                to + off
+            },
+            to,
+        }
+    }
+
+    fn port(&self, way: Way) -> Port {
+        match self.setup.settings.wiring {
+            Wiring::Shared => Port::Shared,
+            Wiring::Pair if way.from < way.to => Port::Upstream,
+            Wiring::Pair => Port::Downstream,
+        }
+    }
+
+    /// Relay `to` (from 1), or any other that lives if that one does not; counted from 0.
+    fn reached(&self, to: Option<u16>, attacker: &mut Attacker) -> Option<usize> {
+        let living = |member: &Member| member.killed.is_none();
+        let meant = to.and_then(|to| usize::from(to).checked_sub(1));
+        let meant = meant.filter(|index| self.members.get(*index).is_some_and(living));
+        meant.or_else(|| {
+            let count = self.members.iter().filter(|member| living(member)).count();
+            let pick = attacker.rng.random_range(0..count.max(1));
+            let all = self.members.iter().enumerate();
+            let picked = |(_, member): &(usize, &Member)| living(member);
+            all.filter(picked).nth(pick).map(|(index, _)| index)
+        })
+    }
+
+    /// The frame comes in, and what it is taken for is written down.
+    fn hit(&mut self, index: usize, kind: Strike, port: Port, bytes: &[u8]) {
+        let Some(member) = self.members.get_mut(index) else {
+            return;
+        };
+        let before = *member.relay.stats();
+        member.relay.handle_bytes(self.now, port, bytes);
+        let name = fate(&before, member.relay.stats());
+        *self.outcome.struck.counted.entry((kind, name)).or_default() += 1;
+        self.drain(index);
+    }
+}

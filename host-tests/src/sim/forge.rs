@@ -1,0 +1,244 @@
+//! Forged frames: what somebody can make who knows the format, the mission and all that was ever said, but not the key.
+
+use rand::{Rng, RngExt};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::node::settings::SetupError;
+use uav_relay::wire::auth::TAG;
+use uav_relay::wire::crc::Crc32c;
+use uav_relay::wire::deframe::Deframer;
+use uav_relay::wire::digest::digest;
+use uav_relay::wire::frame::{self, HEADER, Header, MAX_FRAME};
+use uav_relay::wire::message::{Before, Count, Hail, Message, Roster};
+use uav_relay::{Auth, Identity, Instant, Key, Mission, Relay, Settings, Wiring};
+
+/// The network that every simulated relay belongs to.
+pub(super) const NETWORK: u16 = 1;
+
+/// Flags in the second word of a frame: a tag follows, the body is a hello.
+const SIGNED: u8 = 0x10;
+const HELLO: u8 = 0x20;
+
+/// Bytes of the CRC.
+const CHECK: usize = 4;
+
+/// Bytes of the body of a hello.
+const HELLO_BODY: usize = 17;
+
+/// Where a forged frame says it comes from, and where it goes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Way {
+    pub(super) from: u16,
+    pub(super) to: u16,
+}
+
+/// A frame of a kind drawn at random: a lie without a tag, one with a guessed tag, a recorded frame with one byte altered and
+/// its CRC made good, a hello with a guessed tag, or the hello of a relay that has another key.
+pub(super) fn forge(
+    mission: &Mission,
+    way: Way,
+    heard: Option<&[u8]>,
+    rng: &mut ChaCha8Rng,
+) -> Vec<u8> {
+    let heard = heard.and_then(unsealed);
+    match (rng.random_range(0..6), heard) {
+        (0, heard) => lie(mission, way, heard, rng),
+        (1, heard) => {
+            let lie = lie(mission, way, heard, rng);
+            let mut plain = unsealed(&lie).unwrap_or_default();
+            flag(&mut plain, SIGNED);
+            plain.extend(rng.random::<[u8; TAG]>());
+            sealed(plain)
+        }
+        (2 | 3, Some(plain)) => sealed(altered(plain, rng)),
+        (4, _) => stranger(mission, way, rng)
+            .ok()
+            .filter(|said| !said.is_empty())
+            .unwrap_or_else(|| guessed_hello(mission, way, rng)),
+        _ => guessed_hello(mission, way, rng),
+    }
+}
+
+/// One byte after the first eight of the header is another: of the counter, the body or the tag.
+fn altered(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
+    let at = rng.random_range(HEADER - 2..plain.len().max(HEADER));
+    if let Some(byte) = plain.get_mut(at) {
+        *byte ^= rng.random_range(1..=u8::MAX);
+    }
+    plain
+}
+
+/// A message without a tag that is well-formed, of this mission, and wrong: made up, or a pass that was heard, twisted.
+fn lie(mission: &Mission, way: Way, heard: Option<Vec<u8>>, rng: &mut ChaCha8Rng) -> Vec<u8> {
+    let twisted = heard.and_then(|plain| twisted(plain, rng));
+    twisted.unwrap_or_else(|| made_up(mission, way, rng))
+}
+
+/// A sweep or a verdict that was heard, from the same relay to the same, as if it were of one of the next passes and said
+/// something else.
+fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
+    let whole = with_check(plain);
+    let (header, message) = frame::decode(&whole).ok()?;
+    let later = |number: u16, rng: &mut ChaCha8Rng| number.wrapping_add(rng.random_range(0..=8));
+    let message = match message {
+        Message::Sweep(mut sweep) => {
+            sweep.number = later(sweep.number, rng);
+            // A lot would be noticed at the end of the chain; a little is agreed to.
+            let share = if rng.random() {
+                rng.random_range(0.2..1.2)
+            } else {
+                rng.random_range(0.999..1.001)
+            };
+            sweep.reaches.iter_mut().for_each(|reach| *reach *= share);
+            Message::Sweep(sweep)
+        }
+        Message::Verdict(mut answer) => {
+            answer.number = later(answer.number, rng);
+            answer.verdict.commit = Some(0);
+            Message::Verdict(answer)
+        }
+        _ => return None,
+    };
+    let mut frame = [0; MAX_FRAME];
+    let len = frame::encode(header, &message, &mut frame);
+    Some(frame.get(..len)?.to_vec())
+}
+
+/// A message that needs nothing to have been heard.
+fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
+    let digest = digest(mission);
+    let view = rng.random_range(1..=40);
+    let message = match rng.random_range(0..5) {
+        0 => Message::Heartbeat {
+            mission: digest,
+            answer: true,
+        },
+        1 => Message::Busy {
+            sweep: rng.random(),
+        },
+        2 => Message::Hail(Hail {
+            mission: digest,
+            newest: view,
+            neighbour: way.to,
+            ask: true,
+            form: true,
+            fresh: rng.random(),
+            ready: true,
+        }),
+        3 => Message::Roster(Roster {
+            mission: digest,
+            view,
+            place: rng.random_range(1..=mission.relays()),
+            before: Before {
+                view: 0,
+                relays: mission.relays(),
+                leader: true,
+            },
+        }),
+        _ => Message::Count(Count {
+            mission: digest,
+            view,
+            place: rng.random_range(1..=mission.relays()),
+            relays: rng
+                .random::<bool>()
+                .then(|| rng.random_range(1..=mission.relays())),
+        }),
+    };
+    let mut frame = [0; MAX_FRAME];
+    let len = frame::encode(header(way, rng), &message, &mut frame);
+    frame.get(..len).unwrap_or_default().to_vec()
+}
+
+/// A hello whose nonces and tag are random.
+fn guessed_hello(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
+    let mut plain = unsealed(&made_up(mission, way, rng)).unwrap_or_default();
+    plain.truncate(HEADER);
+    flag(&mut plain, SIGNED | HELLO);
+    let mut rest = [0; HELLO_BODY + TAG];
+    rng.fill_bytes(&mut rest);
+    if let Some(asks) = rest.get_mut(HELLO_BODY - 1) {
+        *asks = 1;
+    }
+    plain.extend(rest);
+    sealed(plain)
+}
+
+/// What a relay with another key says first: a hello with the right tag, for the wrong key. Empty if it is alone.
+fn stranger(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Result<Vec<u8>, SetupError> {
+    let settings = Settings {
+        wiring: Wiring::Shared,
+        auth: Some(Auth {
+            key: Key::new(rng.random()),
+            epoch: rng.random_range(1..=9),
+        }),
+        ..Settings::default()
+    };
+    let identity = Identity {
+        network: NETWORK,
+        index: way.from,
+    };
+    let mut relay = Relay::new(*mission, identity, settings, rng.random(), Instant::ZERO)?;
+    let mut frame = [0; MAX_FRAME];
+    let mut said = Vec::new();
+    // One hello to each neighbour; the last is as good as the first.
+    while let Some(transmit) = relay.poll_transmit(Instant::ZERO, &mut frame) {
+        said = frame.get(..transmit.len).unwrap_or_default().to_vec();
+    }
+    Ok(said)
+}
+
+/// The node that a frame is for; `None` if it is no frame.
+pub(super) fn destination(bytes: &[u8]) -> Option<u16> {
+    let plain = unsealed(bytes)?;
+    let [_, _, low, high, ..] = *plain.first_chunk::<HEADER>()?;
+    Some(u16::from_le_bytes([low, high]) & 0x0FFF)
+}
+
+fn header(way: Way, rng: &mut ChaCha8Rng) -> Header {
+    Header {
+        network: NETWORK,
+        sender: way.from,
+        destination: way.to,
+        counter: rng.random(),
+    }
+}
+
+/// Sets flags in a header.
+fn flag(plain: &mut [u8], flags: u8) {
+    if let Some(byte) = plain.get_mut(3) {
+        *byte |= flags;
+    }
+}
+
+/// A frame without COBS and CRC; `None` if it is none.
+fn unsealed(bytes: &[u8]) -> Option<Vec<u8>> {
+    let mut deframer = Deframer::new();
+    for &byte in bytes {
+        if let Some(frame) = deframer.push(byte) {
+            let plain = frame.ok()?;
+            return plain
+                .split_last_chunk::<CHECK>()
+                .map(|(plain, _)| plain.to_vec());
+        }
+    }
+    None
+}
+
+/// A frame with its CRC, COBS and delimiter. At most 249 bytes go in.
+fn sealed(plain: Vec<u8>) -> Vec<u8> {
+    let plain = with_check(plain);
+    let mut bytes = Vec::with_capacity(plain.len() + 2);
+    for run in plain.split(|byte| *byte == 0) {
+        bytes.push(u8::try_from(run.len() + 1).unwrap_or(u8::MAX));
+        bytes.extend(run);
+    }
+    bytes.push(0);
+    bytes
+}
+
+/// A frame with its CRC.
+fn with_check(mut plain: Vec<u8>) -> Vec<u8> {
+    let mut crc = Crc32c::new();
+    crc.update(&plain);
+    plain.extend(crc.finish().to_le_bytes());
+    plain
+}

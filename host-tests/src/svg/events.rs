@@ -1,0 +1,88 @@
+//! What happened to the chain, as a strip below the picture: one sign for each event, evenly spaced, whenever it was.
+
+use super::canvas::Canvas;
+use super::{HEIGHT, Picture, WIDTH};
+
+/// Height of the strip.
+const STRIP: f64 = 84.0;
+
+/// The line of events below the rest of the picture.
+const LINE: f64 = HEIGHT + 48.0;
+
+/// From either edge to the first and the last event.
+const MARGIN: f64 = 52.0;
+
+/// Events that there is room for.
+const MOST: usize = 8;
+
+/// Characters of one event's words that there is room for.
+const LONGEST: usize = 18;
+
+/// Height of the strip of this picture: none where nothing happened.
+pub(super) fn height(picture: &Picture) -> f64 {
+    if picture.events.is_empty() {
+        0.0
+    } else {
+        STRIP
+    }
+}
+
+/// Draws the strip, if anything happened.
+pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
+    if picture.events.is_empty() {
+        return;
+    }
+    let events = shown(&picture.events);
+    canvas.text(
+        (24.0, HEIGHT + 9.0),
+        "start",
+        "What happened, not to scale:",
+    );
+    canvas.line((24.0, LINE), (WIDTH - 24.0, LINE), "time");
+    let gaps = (events.len() as f64 - 1.0).max(1.0);
+    for (place, (time, words)) in events.iter().enumerate() {
+        let x = MARGIN + place as f64 * (WIDTH - 2.0 * MARGIN) / gaps;
+        // Neighbours stand below and above the line in turn.
+        let (first, second) = if place % 2 == 0 {
+            (LINE + 16.0, LINE + 27.0)
+        } else {
+            (LINE - 20.0, LINE - 9.0)
+        };
+        canvas.disc((x, LINE), 2.5, "ground");
+        canvas.text((x, first), "bold event", time);
+        canvas.text((x, second), "event", words);
+    }
+}
+
+/// Time and words of the events, those in the middle of too many in one.
+fn shown(events: &[(f64, String)]) -> Vec<(String, String)> {
+    let mut shown: Vec<(String, String)> = events
+        .iter()
+        .map(|(time, words)| (seconds(*time), shortened(words)))
+        .collect();
+    if shown.len() > MOST {
+        let (before, after) = (MOST / 2, MOST - MOST / 2 - 1);
+        let more = shown.len() - before - after;
+        let last = shown.split_off(shown.len() - after);
+        shown.truncate(before);
+        shown.push(("...".to_owned(), format!("{more} more")));
+        shown.extend(last);
+    }
+    shown
+}
+
+fn seconds(time: f64) -> String {
+    if time.is_finite() {
+        format!("{:.3} s", time + 0.0)
+    } else {
+        "unknown".to_owned()
+    }
+}
+
+fn shortened(words: &str) -> String {
+    if words.chars().count() <= LONGEST {
+        return words.to_owned();
+    }
+    let start: String = words.chars().take(LONGEST - 3).collect();
+    start + "..."
+}

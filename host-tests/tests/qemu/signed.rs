@@ -1,0 +1,85 @@
+//! Emulated drones whose frames are signed.
+
+use host_tests::firmware::block::Flight;
+use host_tests::firmware::config::Secret;
+use host_tests::sim::faults::Faults;
+
+use crate::chain::{BAD_DAY, paper, simulated};
+use crate::fleet::{Fleet, Image};
+use crate::log::Line;
+
+const KEY: [u8; 32] = *b"what five drones have, no others";
+
+fn signed(flight: &Flight, key: [u8; 32]) -> Flight {
+    let secret = Secret { key, epoch: 77 };
+    flight.clone().signed(Some(secret))
+}
+
+#[test]
+fn five_that_sign_settle_where_the_simulated_chain_does() {
+    let plain = paper(5);
+    let flight = signed(&plain, KEY);
+    for (image, faults) in [
+        (Image::Wires, Faults::default()),
+        (Image::Wires, BAD_DAY),
+        (Image::Radio, BAD_DAY),
+    ] {
+        let mut fleet = Fleet::of(image, &flight, faults, 1);
+        assert_eq!(fleet.places(), simulated(&plain), "{image:?}");
+        for drone in 1..=5 {
+            let counters = fleet.counters(drone);
+            for name in ["unsigned", "malformed"] {
+                assert_eq!(counters.counter(name), Some(0), "{}", counters.text);
+            }
+            assert!(counters.counter("hellos").unwrap() > 0);
+            // The emulator has no flash that can be written, and the drone notices.
+            let mut lines = fleet.of_drone(drone).skip(1);
+            assert_eq!(
+                lines.next().unwrap().text,
+                "frames are signed, epoch 77; it cannot be kept: for a test bench only"
+            );
+        }
+    }
+}
+
+/// One drone was given another key, and one none.
+#[test]
+fn a_drone_without_the_key_takes_no_part() {
+    let flight = paper(4);
+    let blocks: Vec<Vec<u8>> = (1..=4)
+        .map(|index| {
+            let flight = match index {
+                3 => signed(&flight, [1; 32]),
+                4 => flight.clone(),
+                _ => signed(&flight, KEY),
+            };
+            flight.block(index).unwrap().to_vec()
+        })
+        .collect();
+    let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
+    fleet.wait("neighbours that are lost", |lines| {
+        let lost = |drone, text| {
+            let mut lines = lines.iter().filter(|line: &&Line| line.drone == drone);
+            lines.any(|line| line.text == text)
+        };
+        lost(2, "event NeighbourLost(Downstream)")
+            && lost(3, "event NeighbourLost(Downstream)")
+            && lost(4, "event NeighbourLost(Upstream)")
+    });
+    assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));
+    let counters = [1, 2, 3, 4].map(|drone| fleet.counters(drone));
+    let counter = |drone: usize, name| counters[drone - 1].counter(name).unwrap();
+    assert_eq!(counter(1, "forged"), 0);
+    assert!(counter(1, "hellos") > 0);
+    assert!(counter(2, "forged") > 0 && counter(3, "forged") > 0);
+    assert!(counter(3, "unsigned") > 0);
+    assert!(
+        counter(4, "version") > 0,
+        "it does not know what a tag is for"
+    );
+    let said = fleet.of_drone(4).nth(1).unwrap();
+    assert_eq!(
+        said.text,
+        "no key: frames are not signed, and anybody can send some"
+    );
+}

@@ -1,0 +1,71 @@
+//! Chains that have lost relays, and the strip of what happened to them.
+
+use host_tests::svg::{Picture, draw};
+use roxmltree::Document;
+
+use super::{SIZE, all, extent, has_text, level, number, tip};
+
+#[test]
+fn hops_pass_by_relays_that_are_not_in_the_chain_any_more() {
+    let mut picture = level(8);
+    picture.left_out = vec![3, 8];
+    picture.hop_sir.truncate(7);
+    let svg = draw(&picture);
+    let document = Document::parse(&svg).unwrap();
+    assert_eq!(all(&document, "line", "hop").len(), 7);
+    assert_eq!(all(&document, "circle", "relay").len(), 8);
+    assert_eq!(all(&document, "line", "cross").len(), 6);
+    assert!(has_text(&document, "lost") && has_text(&document, "align, 6 of 8 relays"));
+    let relays = all(&document, "circle", "relay");
+    let hops = all(&document, "line", "hop");
+    let third = hops
+        .iter()
+        .find(|hop| tip(hop).starts_with("hop 3:"))
+        .unwrap();
+    assert_eq!(number(third, "x1"), number(&relays[1], "cx"));
+    assert_eq!(number(third, "x2"), number(&relays[3], "cx"));
+    assert!(
+        hops.iter()
+            .all(|hop| !hop.attribute("style").unwrap().contains("dasharray"))
+    );
+    // Nobody is left: then there is no chain to draw.
+    picture.left_out = (1..=8).collect();
+    picture.hop_sir.clear();
+    let svg = draw(&picture);
+    let document = Document::parse(&svg).unwrap();
+    assert_eq!(all(&document, "line", "hop").len(), 0);
+    assert!(has_text(&document, "align, 0 of 8 relays"));
+}
+
+#[test]
+fn what_happened_stands_in_a_strip_below_that_is_there_only_then() {
+    let event = |number: u32| (f64::from(number), format!("what number {number} of all"));
+    for (count, shown) in [(1, 1), (2, 2), (8, 8), (9, 8), (1000, 8)] {
+        let picture = Picture {
+            events: (1..=count).map(event).collect(),
+            ..level(8)
+        };
+        let svg = draw(&picture);
+        let document = Document::parse(&svg).unwrap();
+        let size = document.root_element().attribute("viewBox").unwrap();
+        let height: f64 = size.rsplit(' ').next().unwrap().parse().unwrap();
+        assert!(height > SIZE.1);
+        let texts = all(&document, "text", "event");
+        assert_eq!(texts.len(), 2 * shown);
+        assert!(
+            has_text(&document, "1.000 s") && has_text(&document, "What happened, not to scale:")
+        );
+        if count > 8 {
+            assert!(has_text(&document, &format!("{} more", count - 7)));
+        }
+        assert!(has_text(&document, &format!("{count}.000 s")));
+        let extents: Vec<[f64; 4]> = texts.iter().map(|text| extent(text, 10.0)).collect();
+        for (index, a) in extents.iter().enumerate() {
+            assert!(a[0] >= 0.0 && a[1] <= SIZE.0 && a[3] <= height, "{a:?}");
+            for b in &extents[..index] {
+                let apart = a[1] <= b[0] || b[1] <= a[0] || a[3] <= b[2] || b[3] <= a[2];
+                assert!(apart, "{a:?} covers {b:?} of {count}");
+            }
+        }
+    }
+}

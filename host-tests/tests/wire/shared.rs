@@ -1,0 +1,103 @@
+//! On a channel that all hear: who is heard, and how two relays become neighbours.
+
+use uav_relay::wire::digest::digest;
+use uav_relay::{Instant, Port, Relay, Wiring};
+
+use super::codec::Said;
+use super::forming::{ASKS, FORMS, FRESH, READY, between, forming, soon};
+use super::receive::{counted, relay};
+use super::sequence::{FIRST, one_of_each, sent};
+
+/// On a channel that all hear, hails come from up to four nodes away; anything else from a node that is no neighbour is
+/// counted as misaddressed and answered by a hail, which says who the neighbours are.
+#[test]
+fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
+    let now = Instant::ZERO;
+    for sender in 0..=14_u16 {
+        let mut near = relay_of_12(6);
+        let mission = digest(near.mission());
+        let hail = Said::Hail(forming(0, mission, [0, 0, 0], ASKS));
+        near.handle_bytes(now, Port::Shared, &between(sender, 6, &hail));
+        let heard = (1..=12).contains(&sender) && (1..=4).contains(&sender.abs_diff(6));
+        let neighbour = if sender < 6 { 5 } else { 7 };
+        let answer = |from| Said::Hail(forming(0, mission, [from, 0, 0], FRESH));
+        if heard {
+            assert_eq!(counted(near.stats()), ["received"], "{sender}");
+        } else {
+            assert_eq!(counted(near.stats()), ["misaddressed"], "{sender}");
+        }
+        let out = sent(&mut near, now);
+        let own = if sender == neighbour {
+            // It says that it takes nobody: courted until it says otherwise.
+            assert_eq!(out.len(), 1);
+            continue;
+        } else {
+            answer(neighbour)
+        };
+        let expected = heard.then_some((Port::Shared, own));
+        assert_eq!(out, expected.into_iter().collect::<Vec<_>>(), "{sender}");
+
+        let mut near = relay_of_12(6);
+        let sweep = &one_of_each(FIRST, mission)[0];
+        near.handle_bytes(now, Port::Shared, &between(sender, 6, sweep));
+        assert_eq!(counted(near.stats()), ["misaddressed"], "{sender}");
+        let expected = heard.then_some((Port::Shared, answer(neighbour)));
+        assert_eq!(
+            sent(&mut near, now),
+            expected.into_iter().collect::<Vec<_>>(),
+            "{sender}"
+        );
+        assert_eq!(near.setpoint(), None);
+    }
+}
+
+/// Relay `own` of 12 on a shared channel.
+fn relay_of_12(own: u16) -> Relay {
+    relay(own, 12, Wiring::Shared)
+}
+
+/// A neighbour that takes nobody is courted; what is said to it waits until it takes this relay again. If it has heard of a
+/// newer view by then, one of the two has missed something.
+#[test]
+fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
+    let now = Instant::ZERO;
+    for (newest, calls) in [(0, false), (5, true)] {
+        let mut relay = relay_of_12(6);
+        let mission = digest(relay.mission());
+        let hail = |neighbour| Said::Hail(forming(newest, mission, [neighbour, 0, 0], 0));
+        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hail(0)));
+        assert!(soon(&mut relay, now).is_empty(), "{newest}");
+        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hail(6)));
+        // Somebody is on its other side now.
+        let flags = ASKS | FORMS | FRESH | READY;
+        let call = Said::Hail(forming(newest, mission, [5, 0, 0], flags));
+        let expected = calls.then_some((Port::Shared, call));
+        assert_eq!(
+            soon(&mut relay, now),
+            expected.into_iter().collect::<Vec<_>>()
+        );
+    }
+}
+
+/// What waits for an answer is not said to a neighbour that takes another, and is said again once it takes this relay.
+#[test]
+fn a_pass_waits_for_a_neighbour_that_takes_another() {
+    let now = Instant::ZERO;
+    let mut relay = relay_of_12(6);
+    let mission = digest(relay.mission());
+    let hail = |neighbour| Said::Hail(forming(0, mission, [neighbour, 0, 0], 0));
+    relay.handle_bytes(now, Port::Shared, &between(7, 6, &hail(5)));
+    let sweep = &one_of_each(FIRST, mission)[0];
+    relay.handle_bytes(now, Port::Shared, &between(5, 6, sweep));
+    assert_eq!(counted(relay.stats()), ["received"]);
+    assert_eq!(sent(&mut relay, now), []);
+    relay.handle_bytes(now, Port::Shared, &between(7, 6, &hail(6)));
+    let out = sent(&mut relay, now);
+    assert!(
+        matches!(
+            &out[..],
+            [(Port::Shared, Said::Sweep { number: FIRST, .. })]
+        ),
+        "{out:?}"
+    );
+}

@@ -1,0 +1,189 @@
+//! What a message does: who it is from, which mission and view it is of, and then the relay's share.
+
+use super::event::Event;
+use super::exchange::{Next, Phase};
+use super::share::{ADJUST, ALTITUDE};
+use super::stats::bump;
+use super::timers::Timer;
+use super::{GUARD, MEMBERSHIP, Node, Side, VIEWS};
+use crate::time::Instant;
+use crate::wire::message::Message;
+
+impl Node {
+    /// Node `from` at `side` has made itself known, for the first time if `first`: then what waits for an answer from there is
+    /// said again.
+    #[cfg(feature = "auth")]
+    pub(crate) fn meet(&mut self, now: Instant, side: Side, from: u16, first: bool) {
+        if self.beside(side).node() != from {
+            if first {
+                // What was to be said to it before could not be read there.
+                self.owe_hail(side, from, true);
+            }
+            return;
+        }
+        self.hear(now, side);
+        if first
+            && side == Side::onward(self.mission.heading())
+            && self.share.phase() == Phase::Waiting
+        {
+            self.onward_due = true;
+        }
+    }
+
+    /// A message from node `from` at `side`, intact and addressed to this relay; whether it was one to say to this relay.
+    /// Bounded by 16 reaches.
+    #[inline(never)]
+    pub(crate) fn handle_message(
+        &mut self,
+        now: Instant,
+        side: Side,
+        from: u16,
+        message: &Message<'_>,
+    ) -> bool {
+        let taken = self.beside(side).node() == from;
+        if taken {
+            self.hear(now, side);
+        }
+        if MEMBERSHIP && let Message::Hail(hail) = message {
+            if self.is_of_mission(side, hail.mission) {
+                self.on_hail(now, side, from, *hail);
+                self.steer(now);
+            }
+            return true;
+        }
+        if !taken {
+            self.owe_hail(side, from, false);
+            return false;
+        }
+        if self.seeks() {
+            // Nobody says anything else to a node that it has not taken.
+            self.told(now, side, true);
+        }
+        if let Some(told) = message.mission()
+            && !message.is_of_any_view()
+            && told != self.digest()
+            && MEMBERSHIP
+        {
+            let off = told.wrapping_sub(self.digest());
+            if off.min(off.wrapping_neg()) <= VIEWS {
+                bump(&mut self.stats.view);
+                if message.is_onward() {
+                    self.call(now);
+                }
+                self.owe_hail(side, from, false);
+                return true;
+            }
+        }
+        let digest = if message.is_of_any_view() {
+            self.members.digest
+        } else {
+            self.digest()
+        };
+        if message.mission().is_some_and(|told| told != digest) {
+            self.refuse_mission(side);
+            return true;
+        }
+        self.handle(now, side, message);
+        self.steer(now);
+        true
+    }
+
+    /// The digest that passes bear in the view agreed on.
+    const fn digest(&self) -> u16 {
+        self.members.digest.wrapping_add(self.members.view)
+    }
+
+    fn is_of_mission(&mut self, side: Side, digest: u16) -> bool {
+        let same = digest == self.members.digest;
+        if !same {
+            self.refuse_mission(side);
+        }
+        same
+    }
+
+    fn refuse_mission(&mut self, side: Side) {
+        bump(&mut self.stats.mission);
+        self.pending.raise(Event::MissionMismatch(side));
+    }
+
+    /// A sign of life from the neighbour at `side`.
+    pub(crate) fn hear(&mut self, now: Instant, side: Side) {
+        let quiet = self.settings.quiet;
+        let beside = self.beside(side);
+        let back = beside.heard(now);
+        if beside.is_mutual() {
+            self.timers.set(side.timer(), now + quiet);
+        }
+        if back {
+            self.pending.raise(Event::NeighbourBack(side));
+        }
+    }
+
+    /// A message of this mission, and of this view if it is of one, from the neighbour at `side`.
+    fn handle(&mut self, now: Instant, side: Side, message: &Message<'_>) {
+        if let Message::Heartbeat { answer, .. } = message {
+            self.beside(side).signs.answer |= *answer;
+            return;
+        }
+        if GUARD && let Message::Fence { fence, .. } = message {
+            let from = self.beside(side).node();
+            if let Some(guard) = &mut self.guard {
+                guard.hear(side, from, fence);
+            }
+            return;
+        }
+        if !message.is_of_any_view() && !self.beside(side).is_agreed() {
+            // It has not been counted with this relay yet.
+            bump(&mut self.stats.stale);
+            return;
+        }
+        let heading = self.mission.heading();
+        let wanted = if message.is_onward() {
+            Side::back(heading)
+        } else {
+            Side::onward(heading)
+        };
+        if side != wanted {
+            bump(&mut self.stats.misdirected);
+            return;
+        }
+        let all = self.members.all;
+        let (share, own) = self.parts();
+        let next = match message {
+            Message::Sweep(sweep) => share.on_sweep(own, sweep),
+            Message::Verdict(answer) => share.on_verdict(own, answer),
+            Message::Wave(wave) if ALTITUDE => share.on_wave(own, wave),
+            Message::Trace(trace) if ALTITUDE => share.on_trace(own, *trace),
+            Message::Token(token) if ADJUST => share.on_token(own, token),
+            Message::Moved(moved) if ADJUST => share.on_moved(own, moved),
+            // A chain has no more relays than its mission.
+            Message::Roster(roster) if MEMBERSHIP && roster.place >= all => Next::Stale,
+            Message::Count(count) if MEMBERSHIP && count.relays.is_some_and(|n| n > all) => {
+                Next::Stale
+            }
+            Message::Roster(roster) if MEMBERSHIP => {
+                self.members.heard_of(roster.view);
+                self.beside(side).called(false);
+                let (share, own) = self.parts();
+                let next = share.on_roster(own, roster);
+                if next == Next::Foreign {
+                    // Whoever calls has to take a higher number.
+                    self.members.heard_of(self.members.newest.saturating_add(1));
+                }
+                next
+            }
+            Message::Count(count) if MEMBERSHIP => share.on_count(count),
+            Message::Busy { sweep } => {
+                if self.share.phase() == Phase::Waiting && *sweep == self.share.number() {
+                    // It has arrived: what is missing is the answer, and that may take its time.
+                    self.repeats.heard();
+                    let patience = self.patience();
+                    self.timers.set(Timer::Repeat, now + patience);
+                }
+                return;
+            }
+            _ => return,
+        };
+        self.proceed(now, next);
+    }
+}

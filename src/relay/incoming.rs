@@ -1,0 +1,74 @@
+//! What a relay does with a frame that has come in: checked, addressed and only then read.
+
+use super::Port;
+use crate::node::stats::bump;
+use crate::node::{Node, Side};
+use crate::time::Instant;
+use crate::wire::frame::{self, FrameError, Opened};
+use crate::wire::message::Message;
+
+/// One frame, decoded from COBS: whether it is intact, and by which neighbour for this relay.
+pub(super) fn addressed<'a>(
+    node: &mut Node,
+    network: u16,
+    port: Port,
+    plain: &'a [u8],
+) -> Option<(Side, Opened<'a>)> {
+    let own = node.members().node;
+    let stats = &mut node.stats;
+    let frame = match frame::open(plain) {
+        Ok(opened) => opened,
+        Err(error) => {
+            bump(match error {
+                FrameError::Short => &mut stats.truncated,
+                FrameError::Crc => &mut stats.crc,
+                FrameError::Version => &mut stats.version,
+                FrameError::Message(_) => &mut stats.malformed,
+            });
+            return None;
+        }
+    };
+    let header = frame.header;
+    if header.network != network {
+        bump(&mut stats.foreign);
+        return None;
+    }
+    if header.destination != own && port == Port::Shared {
+        bump(&mut stats.overheard);
+        return None;
+    }
+    let through = match port {
+        Port::Upstream => Some(Side::Upstream),
+        Port::Downstream => Some(Side::Downstream),
+        Port::Shared => None,
+    };
+    let side = node
+        .side_of(header.sender)
+        .filter(|side| through.is_none_or(|through| through == *side))
+        .filter(|_| header.destination == own);
+    if side.is_none() {
+        bump(&mut node.stats.misaddressed);
+    }
+    side.map(|side| (side, frame))
+}
+
+/// A frame from a neighbour, at a relay that asks for no tag.
+pub(super) fn receive(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
+    if frame.tag.is_some() {
+        return bump(&mut node.stats.version);
+    }
+    read(node, now, side, frame);
+}
+
+/// A frame whose body counts, if it is one to say to this relay.
+pub(super) fn read(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
+    let Ok(message) = Message::decode(frame.body) else {
+        return bump(&mut node.stats.malformed);
+    };
+    let counter = if node.handle_message(now, side, frame.header.sender, &message) {
+        &mut node.stats.received
+    } else {
+        &mut node.stats.misaddressed
+    };
+    bump(counter);
+}

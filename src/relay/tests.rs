@@ -1,0 +1,47 @@
+//! The end of the counter, which no test gets to by sending.
+
+use super::Relay;
+use crate::mission::tests::paper;
+use crate::wire::auth::{Auth, Key};
+use crate::wire::frame::MAX_FRAME;
+use crate::{Identity, Instant, Mission, Settings};
+
+fn relay(auth: Option<Auth>) -> Relay {
+    let mission = Mission::try_new(paper(2)).unwrap();
+    let identity = Identity {
+        network: 7,
+        index: 1,
+    };
+    let settings = Settings {
+        auth,
+        ..Settings::default()
+    };
+    Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
+}
+
+/// A counter that came again would let an old frame be taken for a new one: better to fall silent.
+#[test]
+fn a_relay_that_signs_falls_silent_when_its_counter_is_used_up() {
+    let auth = Auth {
+        key: Key::new([1; 32]),
+        epoch: 1,
+    };
+    let mut frame = [0; MAX_FRAME];
+    for (auth, silent) in [(Some(auth), true), (None, false)] {
+        let mut relay = relay(auth);
+        relay.counter = u32::MAX - 1;
+        let mut counters = 0;
+        for seconds in 0..100 {
+            let now = Instant::from_millis(1_000 * seconds);
+            relay.handle_timeout(now);
+            while relay.poll_transmit(now, &mut frame).is_some() {
+                counters += 1;
+            }
+        }
+        if silent {
+            assert_eq!((counters, relay.counter), (1, u32::MAX));
+        } else {
+            assert!(counters > 2 && relay.counter < 1000, "it wraps");
+        }
+    }
+}

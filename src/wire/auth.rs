@@ -1,0 +1,190 @@
+//! What makes a frame one of a member's, and a fresh one: the tag, and which counters have been seen.
+//!
+//! The tag is keyed BLAKE2s (RFC 7693) over the nonces of both ends, the header and the body, with a digest of eight bytes. A MAC and not
+//! a cipher: whoever can see the drones knows where they are, and a MAC keeps its promise even if a counter is ever used twice,
+//! which a stream cipher does not.
+
+#[cfg(feature = "auth")]
+use super::blake2s::mac;
+
+/// Bytes of a tag; none in a build without the feature `auth`.
+pub const TAG: usize = if cfg!(feature = "auth") { 8 } else { 0 };
+
+/// The secret that the members of a network share.
+#[cfg(feature = "auth")]
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Key([u8; 32]);
+
+#[cfg(feature = "auth")]
+impl Key {
+    /// A key of 256 random bits. A password is none.
+    pub const fn new(bytes: [u8; 32]) -> Self {
+        Self(bytes)
+    }
+
+    /// The tag of `signed`, header and body of a frame, for the nonces of its sender and its receiver. Two to five blocks of
+    /// BLAKE2s.
+    pub fn tag(&self, sender: u64, receiver: u64, signed: &[u8]) -> [u8; TAG] {
+        let both = u128::from(receiver) << 64 | u128::from(sender);
+        mac(&self.0, &both.to_le_bytes(), signed)
+    }
+}
+
+#[cfg(feature = "auth")]
+impl core::fmt::Debug for Key {
+    /// Without the bytes: keys do not belong into logs.
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("Key(..)")
+    }
+}
+
+#[cfg(all(feature = "auth", feature = "defmt"))]
+impl defmt::Format for Key {
+    fn format(&self, fmt: defmt::Formatter<'_>) {
+        defmt::write!(fmt, "Key(..)");
+    }
+}
+
+/// How a relay proves who it is, and that its frames are of today.
+#[cfg(feature = "auth")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Auth {
+    /// The network's secret.
+    pub key: Key,
+    /// Larger at every start of this relay, from 1: a number kept in flash and raised before it is used, or the seconds of a
+    /// clock that never runs backward. With an epoch that has been used before, frames of that time are taken again.
+    pub epoch: u32,
+}
+
+/// How a relay would prove who it is; there is none without the feature `auth`.
+#[cfg(not(feature = "auth"))]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Auth {}
+
+/// The nonces of the two ends of a link. Each is an epoch and, below it, how many links the relay has begun since.
+#[cfg(feature = "auth")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) struct Nonces {
+    pub(crate) sender: u64,
+    /// 0 in a hello whose sender does not know it yet.
+    pub(crate) receiver: u64,
+}
+
+#[cfg(feature = "auth")]
+impl Nonces {
+    /// As the other end sees them.
+    pub(crate) const fn turned(self) -> Self {
+        Self {
+            sender: self.receiver,
+            receiver: self.sender,
+        }
+    }
+}
+
+/// What makes the tags of the frames from one node to another.
+#[cfg(feature = "auth")]
+#[derive(Clone, Copy)]
+pub(crate) struct Signer<'a> {
+    pub(crate) key: &'a Key,
+    pub(crate) nonces: Nonces,
+}
+
+#[cfg(feature = "auth")]
+impl Signer<'_> {
+    pub(crate) fn tag(self, signed: &[u8]) -> [u8; TAG] {
+        let Nonces { sender, receiver } = self.nonces;
+        self.key.tag(sender, receiver, signed)
+    }
+}
+
+/// What would make tags; there is none without the feature `auth`.
+#[cfg(not(feature = "auth"))]
+#[derive(Clone, Copy)]
+pub(crate) struct Signer<'a>(core::convert::Infallible, core::marker::PhantomData<&'a ()>);
+
+#[cfg(not(feature = "auth"))]
+impl Signer<'_> {
+    pub(crate) const fn tag(self, _: &[u8]) -> [u8; TAG] {
+        match self.0 {}
+    }
+}
+
+/// Whether two tags are the same, in a time that does not tell where they differ.
+#[cfg(feature = "auth")]
+pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
+    u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
+}
+
+/// Which counters of one sender have been taken: the newest, and those up to 63 below it.
+#[cfg(feature = "auth")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[repr(C, packed(4))] // 12 bytes, of which a relay keeps eight times
+pub(crate) struct Window {
+    /// One more than the largest counter taken.
+    next: u32,
+    /// Bit i: `next` - 1 - i has been taken.
+    taken: u64,
+}
+
+#[cfg(feature = "auth")]
+impl Window {
+    /// Takes `counter`, once: `false` if it has been taken before, or is too old to tell. `u32::MAX` is never taken.
+    pub(crate) const fn take(&mut self, counter: u32) -> bool {
+        let Some(next) = counter.checked_add(1) else {
+            return false;
+        };
+        if next > self.next {
+            let ahead = next - self.next;
+            self.taken = if ahead < 64 { self.taken << ahead } else { 0 } | 1;
+            self.next = next;
+            return true;
+        }
+        let behind = self.next - next;
+        if behind >= 64 || self.taken >> behind & 1 == 1 {
+            return false;
+        }
+        self.taken |= 1 << behind;
+        true
+    }
+}
+
+#[cfg(feature = "auth")]
+#[cfg(test)]
+mod tests {
+    use super::Window;
+    use std::collections::BTreeSet;
+
+    extern crate std;
+
+    #[test]
+    fn every_counter_is_taken_at_most_once_and_late_ones_up_to_63_behind() {
+        let mut state = 1_u32;
+        let mut random = |below: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % below
+        };
+        let (mut window, mut seen, mut largest, mut late) =
+            (Window::default(), BTreeSet::new(), 0_u32, 0);
+        for _ in 0..200_000 {
+            let counter = (largest + random(40)).saturating_sub(random(120));
+            let fresh = !seen.contains(&counter) && (seen.is_empty() || counter + 63 >= largest);
+            assert_eq!(window.take(counter), fresh, "{counter} after {largest}");
+            if fresh {
+                seen.insert(counter);
+                late += u32::from(counter < largest);
+                largest = largest.max(counter);
+            }
+        }
+        assert!(late > 1000 && seen.len() > 10_000);
+    }
+
+    #[test]
+    fn the_last_counter_is_never_taken() {
+        let mut window = Window::default();
+        assert!(!window.take(u32::MAX));
+        assert!(window.take(u32::MAX - 1) && !window.take(u32::MAX - 1));
+        assert!(!window.take(0), "far too old");
+    }
+}

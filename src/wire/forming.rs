@@ -1,0 +1,113 @@
+//! The wire form of the messages by which a chain is formed: a view's number, three numbers and a byte of flags.
+
+use serde::{Deserialize, Serialize};
+
+use super::body::Pass;
+use super::message::{Before, Count, Hail, Roster};
+use crate::mission::MAX_RELAYS;
+
+/// What a hail, a roster and a count have in common; what the numbers mean depends, and those that mean nothing are 0.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(super) struct Forming {
+    /// The number is that of a view.
+    pass: Pass,
+    one: [u8; 2],
+    other: [u8; 2],
+    more: [u8; 2],
+    flags: u8,
+}
+
+impl Forming {
+    const fn new(pass: Pass, numbers: [u16; 3], flags: u8) -> Self {
+        let [one, other, more] = numbers;
+        Self {
+            pass,
+            one: one.to_le_bytes(),
+            other: other.to_le_bytes(),
+            more: more.to_le_bytes(),
+            flags,
+        }
+    }
+
+    /// The numbers, of which the first two are of relays and the last of a view, and the flags.
+    fn parts(self) -> Option<(u16, u16, u16, u8)> {
+        let one = u16::from_le_bytes(self.one);
+        let other = u16::from_le_bytes(self.other);
+        let more = u16::from_le_bytes(self.more);
+        (one <= MAX_RELAYS && other <= MAX_RELAYS).then_some((one, other, more, self.flags))
+    }
+
+    /// The neighbour; flags from bit 0: asks for a hail, asks for a new view, fresh, ready.
+    pub(super) fn of_hail(hail: &Hail) -> Self {
+        let flags = [hail.ask, hail.form, hail.fresh, hail.ready]
+            .into_iter()
+            .rev()
+            .fold(0, |flags, flag| flags << 1 | u8::from(flag));
+        Self::new(
+            Pass::new(hail.newest, hail.mission),
+            [hail.neighbour, 0, 0],
+            flags,
+        )
+    }
+
+    pub(super) fn hail(self) -> Option<Hail> {
+        let (neighbour, 0, 0, flags @ 0..=0x0F) = self.parts()? else {
+            return None;
+        };
+        Some(Hail {
+            mission: self.pass.mission(),
+            newest: self.pass.number(),
+            neighbour,
+            ask: flags & 1 != 0,
+            form: flags & 2 != 0,
+            fresh: flags & 4 != 0,
+            ready: flags & 8 != 0,
+        })
+    }
+
+    /// The sender's place; size and number of the view before; whether its leader is there.
+    pub(super) fn of_roster(roster: &Roster) -> Self {
+        Self::new(
+            Pass::new(roster.view, roster.mission),
+            [roster.place, roster.before.relays, roster.before.view],
+            u8::from(roster.before.leader),
+        )
+    }
+
+    pub(super) fn roster(self) -> Option<Roster> {
+        let (place @ 1.., relays @ 1.., view, leader @ 0..=1) = self.parts()? else {
+            return None;
+        };
+        Some(Roster {
+            mission: self.pass.mission(),
+            view: self.pass.number(),
+            place,
+            before: Before {
+                view,
+                relays,
+                leader: leader == 1,
+            },
+        })
+    }
+
+    /// The sender's place; how many relays, 0 for too few.
+    pub(super) fn of_count(count: &Count) -> Self {
+        Self::new(
+            Pass::new(count.view, count.mission),
+            [count.place, count.relays.unwrap_or(0), 0],
+            0,
+        )
+    }
+
+    pub(super) fn count(self) -> Option<Count> {
+        let (place @ 1.., relays, 0, 0) = self.parts()? else {
+            return None;
+        };
+        Some(Count {
+            mission: self.pass.mission(),
+            view: self.pass.number(),
+            place,
+            relays: (relays > 0).then_some(relays),
+        })
+    }
+}

@@ -1,0 +1,275 @@
+//! Which frames a relay takes, and how it signs its own: one session with each node it talks to.
+//!
+//! For each node it talks to, a relay has a *nonce*: its epoch, and how many such entries it has made since it was switched
+//! on. A frame's tag covers the sender's nonce toward the receiver and the receiver's toward the sender, so a frame that was
+//! recorded before either of them was switched on, or had forgotten the other, is worth nothing. What a relay has to know
+//! for that, the other's nonce, comes in a *hello*: a frame whose body is the sender's nonce, the receiver's as far as the
+//! sender knows it, and whether the sender still lacks the proof that the receiver is there.
+//!
+//! | a hello with the right tag and | does |
+//! | --- | --- |
+//! | a nonce below the one known, or a counter that has been taken | nothing; it is counted as a replay |
+//! | a nonce above the one known | the node has been switched on since: a new session begins |
+//! | this relay's own nonce | it is proof that the node is there now |
+//! | a question, and none of that to learn by it here | nothing but the answer |
+//!
+//! A question that begins a session, that has not this relay's nonce, or that comes from a node already proven to be there is
+//! answered by one hello; nothing else is. So whatever is played at a relay, it says at most one hello for each frame that
+//! comes in, and with something else to say one in place of that.
+//!
+//! A recorded hello can be new to a relay only where the relay has just been switched on or had forgotten its sender. What
+//! it brings is no proof, as a recorded one can not have this relay's new nonce: it is no sign of life, nothing is sent on
+//! its account but a hello, and a nonce of the past is overtaken by the true one, which is larger. So it does no lasting
+//! harm: until the true hello comes there was nothing to be said to that node anyway.
+
+use super::auth::{Auth, Nonces, Signer, TAG, Window, is_same};
+use super::frame::Opened;
+
+/// Bytes of the body of a hello.
+pub(crate) const HELLO: usize = 17;
+
+/// Nodes that a relay remembers at once.
+const PEERS: usize = 8;
+
+/// One node that this relay talks to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Peer {
+    node: u16,
+    /// Whether a hello is to be sent.
+    hello: bool,
+    /// Whether it has shown this relay's nonce: it is there, and both know each other.
+    proven: bool,
+    /// When it was last used, on the session's own clock.
+    used: u32,
+    /// The lower half of this relay's nonce toward it; the upper one is the epoch.
+    own: u32,
+    /// The largest nonce it has shown, 0 before any.
+    other: u64,
+    taken: Window,
+}
+
+impl Peer {
+    /// The nonces of what is sent to it.
+    const fn nonces(&self, epoch: u32) -> Nonces {
+        Nonces {
+            sender: (epoch as u64) << 32 | self.own as u64,
+            receiver: self.other,
+        }
+    }
+}
+
+/// What an authenticated relay knows of the nodes it talks to.
+#[derive(Clone, Debug)]
+pub(crate) struct Session {
+    auth: Auth,
+    /// Entries made since the start.
+    made: u32,
+    /// Counts uses of entries, wrapping.
+    clock: u32,
+    /// Nodes whose entries are kept.
+    pinned: [Option<u16>; 2],
+    peers: heapless::Vec<Peer, PEERS>,
+}
+
+/// What a frame turned out to be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Checked {
+    /// A member's, and new: its body counts. Whether it is the first proof that the node is there.
+    Fresh { first: bool },
+    /// A hello, new, and proof that the node is there; whether it is the first.
+    Hello { first: bool },
+    /// A hello with the right tag that proves nothing: it may have been recorded.
+    Unproven,
+    /// Without a tag.
+    Unsigned,
+    /// With a tag that is wrong, for these nonces at least.
+    Forged,
+    /// A member's, taken before or too old to tell.
+    Replayed,
+}
+
+impl Session {
+    /// A session that knows nobody.
+    pub(crate) const fn new(auth: Auth) -> Self {
+        Self {
+            auth,
+            made: 0,
+            clock: 0,
+            pinned: [None; 2],
+            peers: heapless::Vec::new(),
+        }
+    }
+
+    /// Keeps the entries of `nodes`, the present neighbours, and no others; those without one are greeted.
+    pub(crate) fn pin(&mut self, nodes: [Option<u16>; 2]) {
+        self.pinned = nodes;
+        for node in nodes.into_iter().flatten() {
+            if self.find(node).is_none() {
+                self.greet(node);
+            }
+        }
+    }
+
+    /// Owes a hello to node `to`, with a new entry if there is none, and takes it for unproven until it has answered.
+    pub(crate) fn greet(&mut self, to: u16) {
+        self.make(to);
+        if let Some(peer) = self.touch(to) {
+            peer.hello = true;
+            peer.proven = false;
+        }
+    }
+
+    /// A node that a hello is to be sent to: it then has been.
+    pub(crate) fn take_hello(&mut self) -> Option<u16> {
+        let peer = self.peers.iter_mut().find(|peer| peer.hello)?;
+        peer.hello = false;
+        Some(peer.node)
+    }
+
+    /// Whether node `to` can read what it is sent.
+    pub(crate) fn knows(&self, to: u16) -> bool {
+        self.find(to).is_some_and(|peer| peer.proven)
+    }
+
+    /// The body of a hello to node `to`.
+    pub(crate) fn hello(&self, to: u16) -> [u8; HELLO] {
+        let mut body = [0; HELLO];
+        if let Some(peer) = self.find(to) {
+            let Nonces { sender, receiver } = peer.nonces(self.auth.epoch);
+            let told = sender.to_le_bytes().into_iter();
+            let told = told.chain(receiver.to_le_bytes());
+            let told = told.chain([u8::from(!peer.proven)]);
+            for (place, byte) in body.iter_mut().zip(told) {
+                *place = byte;
+            }
+        }
+        body
+    }
+
+    /// What signs frames to node `to`.
+    pub(crate) fn signer(&mut self, to: u16) -> Signer<'_> {
+        let epoch = self.auth.epoch;
+        let nonces = self
+            .touch(to)
+            .map_or_else(Nonces::default, |peer| peer.nonces(epoch));
+        self.with(nonces)
+    }
+
+    const fn with(&self, nonces: Nonces) -> Signer<'_> {
+        Signer {
+            key: &self.auth.key,
+            nonces,
+        }
+    }
+
+    /// Checks an intact frame that says it is from node `sender`. Work: that of one tag.
+    pub(crate) fn check(&mut self, sender: u16, frame: &Opened<'_>) -> Checked {
+        let Some(told) = frame.tag else {
+            return Checked::Unsigned;
+        };
+        if frame.hello {
+            return self.meet(sender, frame, told).unwrap_or(Checked::Forged);
+        }
+        let epoch = self.auth.epoch;
+        let Some(nonces) = self.find(sender).map(|peer| peer.nonces(epoch).turned()) else {
+            return Checked::Forged;
+        };
+        if nonces.sender == 0 || !is_same(self.with(nonces).tag(frame.signed), told) {
+            return Checked::Forged;
+        }
+        let Some(peer) = self.touch(sender) else {
+            return Checked::Forged;
+        };
+        if !peer.taken.take(frame.header.counter) {
+            return Checked::Replayed;
+        }
+        let first = !peer.proven;
+        peer.proven = true;
+        Checked::Fresh { first }
+    }
+
+    /// A hello; `None` if its tag is wrong.
+    fn meet(&mut self, sender: u16, frame: &Opened<'_>, told: [u8; TAG]) -> Option<Checked> {
+        let (other, rest) = frame.body.split_first_chunk::<8>()?;
+        let (known, &[asks @ (0 | 1)]) = rest.split_first_chunk::<8>()? else {
+            return None;
+        };
+        let nonces = Nonces {
+            sender: u64::from_le_bytes(*other),
+            receiver: u64::from_le_bytes(*known),
+        };
+        if nonces.sender == 0 || !is_same(self.with(nonces).tag(frame.signed), told) {
+            return None;
+        }
+        self.make(sender);
+        let epoch = self.auth.epoch;
+        let peer = self.touch(sender)?;
+        let begins = nonces.sender > peer.other;
+        if begins {
+            peer.other = nonces.sender;
+            peer.taken = Window::default();
+            peer.proven = false;
+        }
+        let proof = nonces.receiver == peer.nonces(epoch).sender;
+        // A node that has shown this relay's nonce does not forget it without a new one of its own.
+        let old = nonces.sender < peer.other || peer.proven && !proof;
+        if old || !peer.taken.take(frame.header.counter) {
+            return Some(Checked::Replayed);
+        }
+        peer.hello |= asks == 1 && (begins || !proof || peer.proven);
+        if !proof {
+            return Some(Checked::Unproven);
+        }
+        let first = !peer.proven;
+        peer.proven = true;
+        Some(Checked::Hello { first })
+    }
+
+    fn find(&self, node: u16) -> Option<&Peer> {
+        self.peers.iter().find(|peer| peer.node == node)
+    }
+
+    /// The entry of `node`, used now.
+    fn touch(&mut self, node: u16) -> Option<&mut Peer> {
+        self.clock = self.clock.wrapping_add(1);
+        let peer = self.peers.iter_mut().find(|peer| peer.node == node)?;
+        peer.used = self.clock;
+        Some(peer)
+    }
+
+    /// Makes an entry for `node` if it has none: in a full table in place of one that is neither pinned nor proven, if there is
+    /// such a one, and of those the one that was not used for longest. After four billion of them there are no more: a nonce
+    /// is never used twice.
+    fn make(&mut self, node: u16) {
+        if self.find(node).is_some() {
+            return;
+        }
+        let Some(made) = self.made.checked_add(1) else {
+            return;
+        };
+        self.made = made;
+        let peer = Peer {
+            node,
+            hello: false,
+            proven: false,
+            used: self.clock,
+            own: made,
+            other: 0,
+            taken: Window::default(),
+        };
+        if let Err(peer) = self.peers.push(peer) {
+            let (pinned, clock) = (self.pinned, self.clock);
+            let oldest = self
+                .peers
+                .iter_mut()
+                .filter(|peer| !pinned.contains(&Some(peer.node)))
+                .max_by_key(|peer| (!peer.proven, clock.wrapping_sub(peer.used)));
+            if let Some(place) = oldest {
+                *place = peer;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

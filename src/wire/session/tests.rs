@@ -1,0 +1,287 @@
+//! Two sessions that say hello to each other, and a table that is too small for all who do.
+
+use super::{Checked, HELLO, PEERS, Session};
+use crate::wire::auth::{Auth, Key};
+use crate::wire::frame::{self, FrameBuf, Header, MAX_FRAME};
+use crate::wire::message::Message;
+
+extern crate std;
+use std::vec::Vec;
+
+/// [`PEERS`] as node numbers count.
+const ROOM: u16 = 8;
+
+const KEY: Key = Key::new([0xA5; 32]);
+
+/// Node 1 of epoch 5.
+fn session() -> Session {
+    Session::new(Auth { key: KEY, epoch: 5 })
+}
+
+/// A frame without COBS.
+type Plain = Vec<u8>;
+
+fn plain(frame: &FrameBuf, len: usize) -> Plain {
+    let mut deframer = crate::wire::deframe::Deframer::new();
+    let decoded = frame[..len].iter().find_map(|&byte| {
+        let plain = deframer.push(byte)?;
+        Some(plain.unwrap().to_vec())
+    });
+    decoded.unwrap()
+}
+
+/// What `from`, of node `addresses.0`, sends to node `addresses.1`: a hello, or busy.
+fn frame(from: &mut Session, addresses: (u16, u16), hello: bool, counter: u32) -> Plain {
+    let (sender, destination) = addresses;
+    let header = Header {
+        network: 7,
+        sender,
+        destination,
+        counter,
+    };
+    let mut out = [0; MAX_FRAME];
+    let body = from.hello(destination);
+    let signer = from.signer(destination);
+    let len = if hello {
+        frame::encode_hello(header, &body, signer, &mut out)
+    } else {
+        frame::encode_signed(header, &Message::Busy { sweep: 1 }, signer, &mut out)
+    };
+    plain(&out, len)
+}
+
+fn check(session: &mut Session, plain: &[u8]) -> Checked {
+    let opened = frame::open(plain).unwrap();
+    session.check(opened.header.sender, &opened)
+}
+
+/// Hands over the hellos that both owe each other, and how many those were; `counters` of `one` and `other`.
+fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
+    let [(one, a), (other, b)] = ends;
+    let mut said = 0;
+    loop {
+        let (first, second) = (one.take_hello(), other.take_hello());
+        let frames = [
+            first.map(|to| (to, frame(one, (a, to), true, counters[0]))),
+            second.map(|to| (to, frame(other, (b, to), true, counters[1]))),
+        ];
+        counters[0] += u32::from(first.is_some());
+        counters[1] += u32::from(second.is_some());
+        let [from_one, from_other] = frames;
+        if let Some((to, plain)) = &from_one
+            && *to == b
+        {
+            check(other, plain);
+        }
+        if let Some((_, plain)) = &from_other {
+            check(one, plain);
+        }
+        if from_one.is_none() && from_other.is_none() {
+            return said;
+        }
+        said += u32::from(from_one.is_some()) + u32::from(from_other.is_some());
+    }
+}
+
+/// Session of node `node`, epoch `epoch`, that has met node 1's `own`.
+fn met(own: &mut Session, node: u16, epoch: u32, counters: &mut [u32; 2]) -> Session {
+    let mut other = Session::new(Auth { key: KEY, epoch });
+    other.greet(1);
+    counters[1] = 0;
+    meet([(own, 1), (&mut other, node)], counters);
+    assert!(own.knows(node) && other.knows(1), "{node}");
+    other
+}
+
+#[test]
+fn three_hellos_make_a_link_known_and_four_where_they_cross() {
+    for crossing in [false, true] {
+        let (mut one, mut other) = (session(), session());
+        one.greet(2);
+        if crossing {
+            other.greet(1);
+        }
+        let said = meet([(&mut one, 1), (&mut other, 2)], &mut [0; 2]);
+        assert_eq!(said, if crossing { 4 } else { 3 });
+        assert!(one.knows(2) && other.knows(1));
+        // Nothing is owed any more.
+        assert_eq!((one.take_hello(), other.take_hello()), (None, None));
+    }
+}
+
+/// Whichever hello is lost: whoever is left in doubt asks again, and is answered.
+#[test]
+fn a_lost_hello_leaves_nobody_in_doubt_for_good() {
+    for lost in 0..4 {
+        let (mut one, mut other) = (session(), session());
+        one.greet(2);
+        let mut counters = [0_u32; 2];
+        let mut number = 0;
+        for _ in 0..20 {
+            for from_one in [true, false] {
+                let (from, to, ends, counter) = if from_one {
+                    (&mut one, &mut other, (1, 2), &mut counters[0])
+                } else {
+                    (&mut other, &mut one, (2, 1), &mut counters[1])
+                };
+                // As a relay that has something to say.
+                if from.find(ends.1).is_some() && !from.knows(ends.1) {
+                    from.greet(ends.1);
+                }
+                if let Some(node) = from.take_hello() {
+                    let plain = frame(from, (ends.0, node), true, *counter);
+                    *counter += 1;
+                    if number != lost {
+                        check(to, &plain);
+                    }
+                    number += 1;
+                }
+            }
+        }
+        assert!(one.knows(2) && other.knows(1), "without hello {lost}");
+        assert!(number < 8, "{number} hellos without {lost}");
+    }
+}
+
+#[test]
+fn a_body_of_a_hello_says_who_is_known() {
+    let mut own = session();
+    assert_eq!(own.hello(2), [0; HELLO]);
+    own.greet(2);
+    own.greet(3);
+    assert_eq!(
+        own.hello(2)[..],
+        [1, 0, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1]
+    );
+    assert_eq!(own.hello(3)[..8], [2, 0, 0, 0, 5, 0, 0, 0]);
+    let mut counters = [0; 2];
+    own.take_hello();
+    own.take_hello();
+    met(&mut own, 2, 9, &mut counters);
+    assert_eq!(
+        own.hello(2)[..],
+        [1, 0, 0, 0, 5, 0, 0, 0, 1, 0, 0, 0, 9, 0, 0, 0, 0]
+    );
+}
+
+/// The neighbours stay, of the others the one that was used last; and what was recorded before is worth nothing after.
+#[test]
+fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
+    let mut own = session();
+    own.pin([Some(2), Some(3)]);
+    let mut counters = [0; 2];
+    let mut neighbour = met(&mut own, 2, 1, &mut counters);
+    met(&mut own, 3, 1, &mut counters);
+    let mut forgotten = met(&mut own, 20, 1, &mut counters);
+    let recorded = frame(&mut forgotten, (20, 1), false, 50);
+    assert_eq!(check(&mut own, &recorded), Checked::Fresh { first: false });
+    assert_eq!(check(&mut own, &recorded), Checked::Replayed);
+    let to_it = frame(&mut own, (1, 20), false, 1000);
+    forgotten.greet(1);
+    let hello = frame(&mut forgotten, (20, 1), true, 51);
+    for node in 30..30 + ROOM {
+        met(&mut own, node, 1, &mut counters);
+    }
+    assert_eq!(own.peers.len(), PEERS);
+    assert_eq!(PEERS, usize::from(ROOM));
+    assert!(own.knows(2) && own.knows(3) && !own.knows(20) && !own.knows(30));
+    assert!(own.knows(29 + ROOM));
+    assert_eq!(check(&mut own, &recorded), Checked::Forged);
+    // A recorded hello makes an entry, and is no proof: that has another nonce.
+    assert_eq!(check(&mut own, &hello), Checked::Unproven);
+    assert!(!own.knows(20));
+    assert_eq!(check(&mut own, &recorded), Checked::Forged);
+    assert_eq!(own.take_hello(), Some(20));
+    let asked = frame(&mut own, (1, 20), true, 2000);
+    assert_eq!(
+        check(&mut forgotten, &asked),
+        Checked::Hello { first: true }
+    );
+    assert_eq!(check(&mut forgotten, &to_it), Checked::Forged);
+    let mut counters = [2001, 52];
+    meet([(&mut own, 1), (&mut forgotten, 20)], &mut counters);
+    assert!(own.knows(20) && forgotten.knows(1));
+    let fresh = frame(&mut forgotten, (20, 1), false, 90);
+    assert_eq!(check(&mut own, &fresh), Checked::Fresh { first: false });
+    assert_eq!(check(&mut own, &recorded), Checked::Forged);
+    let still = frame(&mut neighbour, (2, 1), false, 90);
+    assert_eq!(check(&mut own, &still), Checked::Fresh { first: false });
+}
+
+/// Hellos recorded of many nodes take the place of those only that have proven nothing.
+#[test]
+fn recorded_hellos_do_not_drive_out_who_is_known() {
+    let mut hellos = Vec::new();
+    for node in 100..200 {
+        let mut stranger = Session::new(Auth { key: KEY, epoch: 1 });
+        stranger.greet(1);
+        hellos.push(frame(&mut stranger, (node, 1), true, 0));
+    }
+    let mut own = session();
+    own.pin([Some(2), Some(3)]);
+    let mut counters = [0; 2];
+    for node in 2..=ROOM {
+        met(&mut own, node, 1, &mut counters);
+    }
+    for _ in 0..3 {
+        for hello in &hellos {
+            assert_eq!(check(&mut own, hello), Checked::Unproven);
+            assert!(own.take_hello().is_some());
+            assert_eq!(own.take_hello(), None, "one for one");
+        }
+    }
+    for node in 2..=ROOM {
+        assert!(own.knows(node));
+    }
+}
+
+/// A node that was switched on again without a word, or has forgotten this one, is not heard, and hears nothing; greeted, it is
+/// met again.
+#[test]
+fn a_greeting_mends_what_only_one_end_knows() {
+    let mut own = session();
+    let mut counters = [0; 2];
+    met(&mut own, 2, 1, &mut counters);
+    let mut anew = Session::new(Auth { key: KEY, epoch: 2 });
+    let unread = frame(&mut own, (1, 2), false, 1000);
+    assert_eq!(check(&mut anew, &unread), Checked::Forged);
+    assert!(own.knows(2));
+    own.greet(2);
+    assert!(!own.knows(2));
+    let mut counters = [1001, 0];
+    meet([(&mut own, 1), (&mut anew, 2)], &mut counters);
+    assert!(own.knows(2) && anew.knows(1));
+}
+
+#[test]
+fn a_hello_of_another_length_is_forged() {
+    let mut own = session();
+    own.greet(2);
+    let header = Header {
+        network: 7,
+        sender: 2,
+        destination: 1,
+        counter: 0,
+    };
+    let mut other = session();
+    other.greet(1);
+    for len in [0, 8, 16, 18, 40] {
+        let mut body = other.hello(1).to_vec();
+        body.resize(len, 0);
+        let mut out = [0; MAX_FRAME];
+        let len = frame::encode_hello(header, &body, other.signer(1), &mut out);
+        assert_eq!(check(&mut own, &plain(&out, len)), Checked::Forged);
+    }
+}
+
+/// A nonce is never used twice.
+#[test]
+fn after_the_last_nonce_nobody_new_is_met() {
+    let mut own = session();
+    own.made = u32::MAX - 1;
+    own.greet(2);
+    own.greet(3);
+    assert_eq!(own.take_hello(), Some(2));
+    assert_eq!(own.take_hello(), None);
+    assert_eq!(own.hello(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
+}
