@@ -1,0 +1,129 @@
+//! A million attacks on a chain that settles, holds, settles again and is rebooted: none is taken, nothing is changed.
+
+use std::collections::BTreeMap;
+
+use uav_relay::{Instant, Phase, Wiring};
+
+use super::kinds::{Attack, Attacker, KINDS, Kind, raised};
+use super::net::{Deed, Net};
+
+/// A relay in the middle is rebooted, the chain agrees again; then its neighbours are, then the leader.
+const DEEDS: [(u64, Deed); 6] = [
+    (6_000, Deed::Reboot(4)),
+    (6_500, Deed::Restart),
+    (18_000, Deed::Reboot(5)),
+    (18_000, Deed::Reboot(8)),
+    (18_500, Deed::Restart),
+    (30_000, Deed::Reboot(1)),
+];
+
+const END: Instant = Instant::from_millis(44_000);
+
+fn attacked(
+    net: &mut Net,
+    attacker: &mut Attacker,
+    count: u64,
+) -> BTreeMap<(Kind, &'static str), u64> {
+    let mut table = BTreeMap::new();
+    let mut kinds = KINDS.iter().cycle();
+    let mut done = 0;
+    while done < count {
+        let kind = *kinds.next().unwrap();
+        let Some(Attack {
+            to,
+            port,
+            wire,
+            raises,
+        }) = attacker.attack(net, kind)
+        else {
+            continue;
+        };
+        let before = net.stats(to);
+        let sent = net.give(to, port, &wire);
+        let after = net.stats(to);
+        assert_eq!(
+            raised(&before, &after),
+            Some(raises),
+            "{kind:?} at {:?}: {wire:02x?}",
+            net.now
+        );
+        assert_eq!(sent, 0, "{kind:?} has been answered");
+        assert_eq!(
+            before.rejected() + 1 - u32::from(raises == "overheard"),
+            after.rejected()
+        );
+        *table.entry((kind, raises)).or_default() += 1;
+        done += 1;
+    }
+    table
+}
+
+fn under_attack(wiring: Wiring, count: u64) {
+    let mut calm = Net::new(8, wiring, &DEEDS);
+    calm.run(END);
+    assert!(
+        calm.relays
+            .iter()
+            .all(|relay| relay.phase() == Phase::Holding)
+    );
+    let share = count / calm.happenings;
+
+    let mut net = Net::new(8, wiring, &DEEDS);
+    let mut attacker = Attacker::new(1);
+    let mut table: BTreeMap<(Kind, &'static str), u64> = BTreeMap::new();
+    let mut left = count;
+    loop {
+        let more = net.step(END);
+        let now = if more { share } else { left };
+        for (of, number) in attacked(&mut net, &mut attacker, now) {
+            *table.entry(of).or_default() += number;
+        }
+        left -= now;
+        if !more {
+            break;
+        }
+    }
+    for ((kind, raises), number) in &table {
+        println!("{number:8} {kind:?}: {raises}");
+    }
+    for kind in KINDS {
+        let of_it: u64 = table
+            .iter()
+            .filter(|((of, _), _)| *of == kind)
+            .map(|(_, number)| number)
+            .sum();
+        assert!(of_it > count / 100, "{kind:?}: {of_it}");
+    }
+    assert_eq!(table.values().sum::<u64>(), count);
+    // Not a byte that was sent is another one, and nothing was taken but what members sent.
+    assert_eq!(net.heard, calm.heard);
+    assert_eq!(net.bits(), calm.bits());
+    assert!(net.bits().iter().all(Option::is_some));
+    for index in 1..=8 {
+        let (stats, calm) = (net.stats(index), calm.stats(index));
+        assert_eq!(stats.received, net.genuine[usize::from(index) - 1]);
+        assert_eq!(
+            (stats.received, stats.hellos, stats.sent),
+            (calm.received, calm.hellos, calm.sent)
+        );
+        assert_eq!(stats.malformed, 0, "only what is authentic is read");
+    }
+}
+
+/// The number of attacks, a million by default.
+fn count() -> u64 {
+    std::env::var("COUNT")
+        .ok()
+        .and_then(|count| count.parse().ok())
+        .unwrap_or(1_000_000)
+}
+
+#[test]
+fn a_million_attacks_change_nothing() {
+    under_attack(Wiring::Pair, count());
+}
+
+#[test]
+fn nor_do_they_on_a_shared_channel() {
+    under_attack(Wiring::Shared, count() / 10);
+}

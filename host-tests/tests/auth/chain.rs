@@ -1,0 +1,178 @@
+//! Authenticated chains settle at the very places of others, through a bad day and reboots too.
+
+use host_tests::brief;
+use host_tests::random::seed;
+use host_tests::scenario::Scenario;
+use host_tests::sim::chain::run;
+use host_tests::sim::faults::Faults;
+use host_tests::sim::outcome::{Ending, Outcome};
+use host_tests::sim::setup::Setup;
+use uav_relay::{
+    Adjust, Auth, Identity, Instant, Key, Method, Phase, Relay, Settings, Stats, Wiring,
+};
+
+use super::net::{Deed, KEY, NETWORK, Net, mission};
+
+fn settle(setup: Setup) -> Outcome {
+    let outcome = run(setup).unwrap();
+    assert_eq!(outcome.ending, Ending::Settled);
+    assert_eq!(outcome.unsafe_setpoints, 0);
+    outcome
+}
+
+fn signed(mut setup: Setup) -> Setup {
+    setup.settings.auth = Some(Auth {
+        key: Key::new(KEY),
+        epoch: 1,
+    });
+    setup
+}
+
+#[test]
+fn places_are_the_same_and_only_hellos_are_added() {
+    for relays in [1, 2, 3, 8, 50, 200] {
+        for setup in [
+            Setup::new(mission(relays)),
+            Setup::on_shared_channel(mission(relays)),
+        ] {
+            let plain = settle(setup.clone());
+            let outcome = settle(signed(setup));
+            assert_eq!(outcome.bits(), plain.bits());
+            let sum = |of: fn(&Stats) -> u32| -> u64 {
+                outcome
+                    .relays
+                    .iter()
+                    .map(|relay| u64::from(of(&relay.stats)))
+                    .sum()
+            };
+            let links = u64::from(relays - 1);
+            assert_eq!(sum(|stats| stats.received), 2 * links);
+            assert_eq!(
+                sum(|stats| stats.forged + stats.replayed + stats.unsigned),
+                0
+            );
+            let hellos = outcome.messages - 2 * links;
+            println!(
+                "N = {relays}: {hellos} hellos, {} bytes after {}",
+                outcome.bytes, plain.bytes
+            );
+            assert!(sum(|stats| stats.hellos) <= hellos);
+            // Three make a link known at both ends; two that cross take four, and the head has something to say before that.
+            assert!((3 * links..=4 * links + 3).contains(&hellos));
+        }
+    }
+}
+
+#[test]
+fn a_bad_day_moves_nobody() {
+    let first = seed(1);
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        let mut setup = Setup::new(mission(8));
+        setup.settings.wiring = wiring;
+        let expected = settle(setup.clone()).bits();
+        setup.faults = Faults::BAD_DAY;
+        let mut setup = signed(setup);
+        for seed in first..first + 100 {
+            setup.seed = seed;
+            let outcome = settle(setup.clone());
+            assert_eq!(outcome.bits(), expected, "seed {seed}");
+            let unsigned: u32 = outcome
+                .relays
+                .iter()
+                .map(|relay| relay.stats.unsigned)
+                .sum();
+            assert_eq!(unsigned, 0, "a damaged frame is none of the format");
+        }
+    }
+}
+
+#[test]
+fn other_methods_choose_the_same() {
+    let scenario = Scenario {
+        altitude_max_m: 300.0,
+        ..Scenario::default()
+    };
+    let mut setup = Setup::new(brief::mission(&scenario, 5, 1e-4).unwrap().0);
+    for method in [
+        Method::Altitude,
+        Method::Adjust(Adjust {
+            rounds: 20,
+            ..Adjust::default()
+        }),
+    ] {
+        setup.settings.method = method;
+        assert_eq!(
+            settle(signed(setup.clone())).bits(),
+            settle(setup.clone()).bits()
+        );
+    }
+}
+
+/// A relay in flight that is switched off and on, with the next epoch, is one of the chain again; so is the leader.
+#[test]
+fn whoever_is_rebooted_rejoins() {
+    let deeds = [
+        (3_000, Deed::Reboot(4)),
+        (4_000, Deed::Restart),
+        (8_000, Deed::Reboot(1)),
+    ];
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        let mut net = Net::new(8, wiring, &deeds);
+        net.run(Instant::from_millis(2_999));
+        let places = net.bits();
+        assert!(places.iter().all(Option::is_some));
+        net.run(Instant::from_millis(3_999));
+        assert_eq!(net.bits()[3], None, "the relay begins anew");
+        for end in [7_999, 12_000] {
+            net.run(Instant::from_millis(end));
+            assert_eq!(net.bits(), places);
+            assert!(
+                net.relays
+                    .iter()
+                    .all(|relay| relay.phase() == Phase::Holding)
+            );
+        }
+        let mut setup = Setup::new(mission(8));
+        setup.settings.wiring = wiring;
+        let simulated = settle(setup).bits();
+        let without_target =
+            |place: &Option<(u32, u32, u32)>| place.map(|(x, altitude, _)| (x, altitude));
+        assert_eq!(
+            places.iter().map(without_target).collect::<Vec<_>>(),
+            simulated
+        );
+    }
+}
+
+/// A neighbour with another key, or with none, is not heard, and both count why.
+#[test]
+fn a_stranger_is_not_heard() {
+    let stranger = Key::new([1; 32]);
+    for auth in [
+        None,
+        Some(Auth {
+            key: stranger,
+            epoch: 1,
+        }),
+    ] {
+        let settings = Settings {
+            auth,
+            ..Settings::default()
+        };
+        let identity = Identity {
+            network: NETWORK,
+            index: 2,
+        };
+        let mut net = Net::new(2, Wiring::Pair, &[]);
+        *net.relay(2) = Relay::new(mission(2), identity, settings, 1, Instant::ZERO).unwrap();
+        net.run(Instant::from_millis(14_000));
+        let (head, tail) = (net.stats(1), net.stats(2));
+        assert_eq!((head.received, tail.received), (0, 0));
+        assert_eq!(net.bits(), [None, None]);
+        if auth.is_none() {
+            assert!(head.unsigned > 0 && tail.version > 0, "{head:?} {tail:?}");
+        } else {
+            assert!(head.forged > 0 && tail.forged > 0, "{head:?} {tail:?}");
+        }
+    }
+}

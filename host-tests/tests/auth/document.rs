@@ -1,0 +1,95 @@
+//! What `FORMAT.md` works out for frames with a tag, byte by byte.
+
+use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings};
+
+use super::frames::{Plain, SIGNED, hello, nonce, plain};
+use super::net::{NETWORK, mission};
+
+const DOCUMENT: &str = include_str!("../../../src/wire/FORMAT.md");
+
+fn key() -> [u8; 32] {
+    std::array::from_fn(|byte| u8::try_from(byte).unwrap())
+}
+
+fn bytes(text: &str) -> Vec<u8> {
+    text.split_whitespace()
+        .map(|byte| u8::from_str_radix(byte, 16).unwrap())
+        .collect()
+}
+
+/// The bytes of the table of the section, without the CRC at its end, and the frame on the wire.
+fn worked(name: &str) -> (Vec<u8>, Vec<u8>) {
+    let title = format!("### Worked: {name}\n");
+    let section = DOCUMENT.split(&title).nth(1).unwrap();
+    let mut table = Vec::new();
+    for row in section
+        .lines()
+        .skip_while(|line| !line.starts_with("| ---"))
+        .skip(1)
+        .take_while(|line| line.starts_with('|'))
+    {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        assert_eq!(cells[1], table.len().to_string(), "{row}");
+        table.extend(bytes(cells[2].trim_matches('`')));
+    }
+    table.truncate(table.len() - 4);
+    let block = section.split("```").nth(1).unwrap();
+    (table, bytes(block.strip_prefix("text").unwrap()))
+}
+
+#[test]
+fn the_worked_frames_are_what_the_rules_say() {
+    let (a, b) = (nonce(5, 1), nonce(9, 2));
+    let mut heartbeat = Plain::new(NETWORK, 1, 2, SIGNED, 2);
+    heartbeat.0.extend([3, 0x3C, 0x5A, 1]);
+    let frames = [
+        (
+            "a hello",
+            hello((NETWORK, 1, 2), 0, [a, 0], true).signed(&key(), [a, 0]),
+        ),
+        (
+            "its answer",
+            hello((NETWORK, 2, 1), 0, [b, a], true).signed(&key(), [b, a]),
+        ),
+        ("a heartbeat with a tag", heartbeat.signed(&key(), [a, b])),
+    ];
+    for (name, frame) in frames {
+        let (table, wire) = worked(name);
+        assert_eq!(table, frame.0, "{name}");
+        assert_eq!(wire, frame.wire(), "{name}");
+        assert_eq!(plain(&wire), frame, "{name}");
+    }
+}
+
+/// And they are what relays take: relay 2 of 3, which greets relay 1 first, has its first nonce there and not its second.
+#[test]
+fn the_worked_hello_is_taken_and_the_crate_makes_the_same_tags() {
+    let settings = Settings {
+        auth: Some(Auth {
+            key: Key::new(key()),
+            epoch: 9,
+        }),
+        ..Settings::default()
+    };
+    let identity = Identity {
+        network: NETWORK,
+        index: 2,
+    };
+    let mut relay = Relay::new(mission(3), identity, settings, 1, Instant::ZERO).unwrap();
+    let (_, wire) = worked("a hello");
+    relay.handle_bytes(Instant::ZERO, Port::Upstream, &wire);
+    assert_eq!(relay.stats().hellos, 1);
+    let (table, _) = worked("a heartbeat with a tag");
+    let (signed, tag) = table.split_at(table.len() - 8);
+    assert_eq!(Key::new(key()).tag(nonce(5, 1), nonce(9, 2), signed), tag);
+}
+
+/// The lengths that the document names.
+#[test]
+fn the_lengths_of_the_document_are_those_of_the_crate() {
+    let (table, wire) = worked("a hello");
+    assert_eq!((table.len(), wire.len()), (10 + 17 + 8, 41));
+    assert_eq!(uav_relay::wire::frame::MAX_DECODED, 243);
+    assert_eq!(uav_relay::wire::frame::MAX_FRAME, 245);
+    assert_eq!(uav_relay::wire::auth::TAG, 8);
+}

@@ -1,0 +1,179 @@
+//! Counters and epochs at their limits, with frames that only somebody who has the key can make.
+
+use uav_relay::node::settings::SetupError;
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings, Stats, Wiring};
+
+use super::frames::{Plain, SIGNED, hello, nonce, plain};
+use super::kinds::raised;
+use super::net::{KEY, NETWORK, mission, relay};
+
+const NOW: Instant = Instant::from_millis(5);
+
+/// Relay 2 of 3, and somebody who has the key and says to be relay 1.
+struct Link {
+    relay: Relay,
+    nonces: [u64; 2],
+}
+
+impl Link {
+    /// Both know each other.
+    fn new() -> Self {
+        let mut relay = relay(3, 2, Wiring::Pair, (4, Instant::ZERO));
+        let mut out = [0; MAX_FRAME];
+        let mut own = None;
+        while let Some(transmit) = relay.poll_transmit(NOW, &mut out) {
+            if transmit.port == Port::Upstream {
+                own = Some(plain(&out[..transmit.len]).nonces()[0]);
+            }
+        }
+        let nonces = [nonce(9, 1), own.unwrap()];
+        assert_eq!(nonces[1], nonce(4, 1), "the first link of epoch 4");
+        let mut link = Self { relay, nonces };
+        assert_eq!(link.hello(0, nonces), Some("hellos"));
+        link
+    }
+
+    fn give(&mut self, frame: &Plain) -> Option<&'static str> {
+        let before: Stats = *self.relay.stats();
+        self.relay.handle_bytes(NOW, Port::Upstream, &frame.wire());
+        raised(&before, self.relay.stats())
+    }
+
+    fn hello(&mut self, counter: u32, nonces: [u64; 2]) -> Option<&'static str> {
+        let hello = hello((NETWORK, 1, 2), counter, nonces, false);
+        self.give(&hello.signed(&KEY, nonces))
+    }
+
+    /// A heartbeat with this counter.
+    fn say(&mut self, counter: u32) -> Option<&'static str> {
+        let mut frame = Plain::new(NETWORK, 1, 2, SIGNED, counter);
+        frame.0.extend([3, 0, 0, 0]);
+        let nonces = self.nonces;
+        self.give(&frame.signed(&KEY, nonces))
+    }
+}
+
+#[test]
+fn a_counter_63_behind_is_taken_once_and_64_behind_never() {
+    let mut link = Link::new();
+    for (counter, raises) in [
+        (1_000, "received"),
+        (1_000, "replayed"),
+        (937, "received"),
+        (937, "replayed"),
+        (936, "replayed"),
+        (0, "replayed"),
+        (999, "received"),
+        (1_001, "received"),
+        (938, "received"),
+        (937, "replayed"),
+    ] {
+        assert_eq!(link.say(counter), Some(raises), "{counter}");
+    }
+}
+
+#[test]
+fn the_last_counter_is_never_taken_and_nothing_comes_after() {
+    let mut link = Link::new();
+    assert_eq!(link.say(u32::MAX), Some("replayed"));
+    assert_eq!(link.say(u32::MAX - 1), Some("received"));
+    assert_eq!(link.say(u32::MAX), Some("replayed"));
+    assert_eq!(link.say(0), Some("replayed"));
+    // A new session begins from 0.
+    link.nonces[0] = nonce(10, 1);
+    assert_eq!(link.hello(0, link.nonces), Some("hellos"));
+    assert_eq!(link.say(1), Some("received"));
+}
+
+#[test]
+fn a_hello_counts_its_counter_too() {
+    let mut link = Link::new();
+    assert_eq!(link.say(0), Some("replayed"));
+    assert_eq!(link.say(7), Some("received"));
+    assert_eq!(link.hello(7, link.nonces), Some("replayed"));
+    assert_eq!(link.hello(8, link.nonces), Some("hellos"));
+}
+
+#[test]
+fn nonces_only_rise() {
+    let mut link = Link::new();
+    let own = link.nonces[1];
+    for (theirs, raises) in [
+        (nonce(9, 2), "hellos"),
+        (nonce(9, 1), "replayed"),
+        (nonce(8, u32::MAX), "replayed"),
+        (nonce(10, 0), "hellos"),
+        (nonce(9, u32::MAX), "replayed"),
+        (nonce(u32::MAX, u32::MAX), "hellos"),
+    ] {
+        assert_eq!(link.hello(3, [theirs, own]), Some(raises), "{theirs:#x}");
+    }
+    assert_eq!(link.hello(4, [0, own]), Some("forged"), "0 is nobody's");
+}
+
+#[test]
+fn what_is_signed_for_other_nonces_is_forged() {
+    let mut link = Link::new();
+    let [theirs, own] = link.nonces;
+    for nonces in [
+        [theirs + 1, own],
+        [theirs, own + 1],
+        [own, theirs],
+        [0, 0],
+        [theirs, 0],
+    ] {
+        link.nonces = nonces;
+        assert_eq!(link.say(5), Some("forged"), "{nonces:x?}");
+    }
+    link.nonces = [theirs, own];
+    assert_eq!(link.say(5), Some("received"));
+}
+
+/// What the documentation of `Auth::epoch` warns of: with an epoch that has been used before, a relay is not heard until its
+/// counter is past where it was, and what was sent to it then can be played back.
+#[test]
+fn an_epoch_used_twice_is_no_fresh_start() {
+    let mut link = Link::new();
+    for counter in 1..=100 {
+        assert_eq!(link.say(counter), Some("received"));
+    }
+    // The same epoch, and so the same nonce: the counter begins again.
+    assert_eq!(link.hello(0, link.nonces), Some("replayed"));
+    assert_eq!(link.say(1), Some("replayed"));
+    assert_eq!(link.say(101), Some("received"));
+    // Relay 2 is switched on again with the epoch it had: frame 50 was taken, and is again.
+    let mut again = Link::new();
+    assert_eq!(again.say(50), Some("received"));
+}
+
+#[test]
+fn epoch_0_is_refused() {
+    let settings = Settings {
+        auth: Some(Auth {
+            key: Key::new(KEY),
+            epoch: 0,
+        }),
+        ..Settings::default()
+    };
+    let identity = Identity {
+        network: NETWORK,
+        index: 1,
+    };
+    let relay = Relay::new(mission(2), identity, settings, 1, Instant::ZERO);
+    assert_eq!(relay.err(), Some(SetupError::Epoch));
+}
+
+/// Keys do not belong into logs.
+#[test]
+fn a_key_is_not_shown() {
+    let shown = format!("{:?}", relay(3, 2, Wiring::Pair, (4, Instant::ZERO)));
+    assert!(shown.contains("Key(..)"));
+    assert!(
+        !shown.contains(
+            &format!("{:?}", &KEY[..4])
+                .trim_matches(['[', ']'])
+                .to_owned()
+        )
+    );
+}

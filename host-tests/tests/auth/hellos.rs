@@ -1,0 +1,172 @@
+//! What recorded hellos can do: at most delay a first contact until the true one comes.
+
+use rand::seq::IndexedRandom;
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{Event, Instant, Port, Side, Wiring};
+
+use super::frames::plain;
+use super::kinds::{Attacker, raised};
+use super::net::{Deed, Heard, Net, relay};
+
+fn is_hello(heard: &Heard) -> bool {
+    plain(&heard.wire).is_hello()
+}
+
+/// At every moment, and above all while relays get to know each other again.
+#[test]
+fn recorded_hellos_at_any_time_change_no_place() {
+    let mut deeds = vec![(6_000, Deed::Reboot(4))];
+    for second in 7..30 {
+        let index = 1 + second * 5 % 8;
+        deeds.push((1_000 * second, Deed::Reboot(u16::try_from(index).unwrap())));
+    }
+    deeds.push((31_000, Deed::Restart));
+    let end = Instant::from_millis(40_000);
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        let mut calm = Net::new(8, wiring, &deeds);
+        calm.run(end);
+        let mut net = Net::new(8, wiring, &deeds);
+        let mut attacker = Attacker::new(2);
+        let (mut answered, mut taken, mut refused) = (0, 0, 0);
+        while net.step(end) {
+            for _ in 0..20 {
+                let heard = net.heard.choose(&mut attacker.rng).unwrap().clone();
+                if !is_hello(&heard) || !net.has_arrived(&heard) {
+                    continue;
+                }
+                let Heard { from, to, wire, .. } = heard;
+                let before = net.stats(to);
+                let sent = net.give(to, net.port(from, to), &wire);
+                match raised(&before, &net.stats(to)) {
+                    Some("replayed") => {
+                        assert_eq!(sent, 0);
+                        refused += 1;
+                    }
+                    Some("hellos") => {
+                        // One that has been taken is answered by one at most.
+                        assert!(sent <= 1);
+                        answered += sent;
+                        taken += 1;
+                    }
+                    other => panic!("{other:?}"),
+                }
+            }
+        }
+        println!("{taken} taken for new, {answered} answered, {refused} refused");
+        assert!(taken > 0 && answered > 0 && refused > 1_000);
+        assert_eq!(net.bits(), calm.bits());
+        assert!(net.bits().iter().all(Option::is_some));
+        for index in 1..=8 {
+            assert_eq!(
+                net.stats(index).received,
+                net.genuine[usize::from(index) - 1]
+            );
+        }
+    }
+}
+
+/// A relay that has just been switched on takes each recorded hello once, for what it may be; the true one overtakes them all.
+#[test]
+fn a_flood_of_recorded_hellos_is_answered_once_each_and_overtaken() {
+    let mut net = Net::new(2, Wiring::Pair, &[]);
+    for life in 2..=9 {
+        net.run(Instant::from_millis(u64::from(life) * 1_000));
+        net.reboot(1, life);
+    }
+    net.run(Instant::from_millis(10_000));
+    let recorded: Vec<Vec<u8>> = net
+        .heard
+        .iter()
+        .filter(|heard| heard.to == 2 && is_hello(heard))
+        .map(|heard| heard.wire.clone())
+        .collect();
+    net.reboot(2, 2);
+    let (mut answers, mut taken) = (0, 0);
+    for round in 0..100 {
+        for wire in &recorded {
+            let before = net.stats(2);
+            let sent = net.give(2, Port::Upstream, wire);
+            let new = raised(&before, &net.stats(2)) == Some("hellos");
+            assert!(!new || round == 0, "taken twice");
+            assert!(sent <= usize::from(new));
+            taken += usize::from(new);
+            answers += sent;
+        }
+    }
+    println!(
+        "{} recorded, {taken} taken, {answers} answers to {}",
+        recorded.len(),
+        100 * recorded.len()
+    );
+    assert!((9..=recorded.len()).contains(&taken));
+    assert_eq!(net.stats(2).received, 0);
+    // Had the flood not been, it would be the same: the leader has the chain agree, and relay 2 holds its place.
+    net.relay(1).restart(Instant::from_millis(10_000));
+    net.run(Instant::from_millis(12_000));
+    assert!(net.bits().iter().all(Option::is_some));
+    assert!(net.stats(2).received > 0);
+}
+
+/// The true hello comes while the relay believes a recorded one, and the answer to that is lost.
+#[test]
+fn a_relay_that_believes_a_recorded_hello_finds_out_by_itself() {
+    let mut net = Net::new(2, Wiring::Pair, &[]);
+    net.run(Instant::from_millis(1_000));
+    let old = net
+        .heard
+        .iter()
+        .find(|heard| heard.to == 2 && is_hello(heard))
+        .unwrap()
+        .wire
+        .clone();
+    net.reboot(1, 2);
+    net.run(Instant::from_millis(2_000));
+    let start = Instant::from_millis(2_000);
+    let mut fresh = relay(2, 2, Wiring::Pair, (2, start));
+    let mut lost = [0; MAX_FRAME];
+    fresh.handle_bytes(start, Port::Upstream, &old);
+    while fresh.poll_transmit(start, &mut lost).is_some() {}
+    *net.relay(2) = fresh;
+    net.genuine[1] = 0;
+    net.lives[1] = 2;
+    // Nobody has anything to say until somebody asks for a sign of life; that brings hellos, the next one an answer.
+    net.run(Instant::from_millis(14_000));
+    assert!(net.is_proven(1, 2) && net.is_proven(2, 1));
+    assert_eq!(net.stats(2).received, net.genuine[1]);
+}
+
+/// Recorded hellos keep nobody alive.
+#[test]
+fn a_silent_neighbour_is_lost_whatever_is_played_back() {
+    let mut net = Net::new(2, Wiring::Pair, &[]);
+    for life in 2..=60 {
+        net.run(Instant::from_millis(u64::from(life) * 1_000));
+        net.reboot(2, life);
+    }
+    let mut recorded = net
+        .heard
+        .iter()
+        .filter(|heard| heard.to == 1 && is_hello(heard))
+        .map(|heard| heard.wire.clone());
+    let mut lonely = relay(2, 1, Wiring::Pair, (2, Instant::ZERO));
+    let mut frame = [0; MAX_FRAME];
+    let mut lost_after = None;
+    for ms in 0..20_000 {
+        let now = Instant::from_millis(ms);
+        if ms % 300 == 0
+            && let Some(wire) = recorded.next()
+        {
+            lonely.handle_bytes(now, Port::Downstream, &wire);
+        }
+        lonely.handle_timeout(now);
+        while lonely.poll_transmit(now, &mut frame).is_some() {}
+        while let Some(event) = lonely.poll_event() {
+            if event == Event::NeighbourLost(Side::Downstream) {
+                lost_after.get_or_insert(ms);
+            }
+            assert!(!matches!(event, Event::NeighbourBack(_)));
+        }
+    }
+    assert!(lonely.stats().hellos > 40, "{:?}", lonely.stats());
+    assert_eq!(lost_after, Some(15_000));
+}

@@ -1,0 +1,327 @@
+//! The attacks, and which counter each has to raise, by `FORMAT.md` alone.
+
+use host_tests::random::seed;
+use rand::seq::IndexedRandom;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::{Port, Stats};
+
+use super::frames::{HEADER, HELLO, Plain, SIGNED, TAG, hello, nonce, plain};
+use super::net::{Heard, NETWORK, Net};
+
+/// A way to get a frame taken.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(crate) enum Kind {
+    /// Recorded since both ends were switched on.
+    Replayed,
+    /// Recorded before either end was.
+    FromBefore,
+    /// Bits flipped anywhere.
+    Flipped,
+    /// A field of the header changed.
+    Header,
+    /// A tag cut off, and the flag that says there is one.
+    Stripped,
+    /// A tag that is too short.
+    Truncated,
+    RandomTag,
+    /// Signed properly, by another key.
+    OtherKey,
+    /// A hello by another key, with a larger epoch.
+    ForgedHello,
+    RecordedHello,
+    /// Random bytes.
+    Noise,
+    /// A valid message of any kind, without a tag.
+    Bare,
+    /// A valid message of any kind, with a tag of random bytes.
+    Dressed,
+}
+
+pub(crate) const KINDS: [Kind; 13] = [
+    Kind::Replayed,
+    Kind::FromBefore,
+    Kind::Flipped,
+    Kind::Header,
+    Kind::Stripped,
+    Kind::Truncated,
+    Kind::RandomTag,
+    Kind::OtherKey,
+    Kind::ForgedHello,
+    Kind::RecordedHello,
+    Kind::Noise,
+    Kind::Bare,
+    Kind::Dressed,
+];
+
+/// One attack: where, with what, and the counter that it raises.
+pub(crate) struct Attack {
+    pub(crate) to: u16,
+    pub(crate) port: Port,
+    pub(crate) wire: Vec<u8>,
+    pub(crate) raises: &'static str,
+}
+
+/// Counters by name, of those that an attack may raise or must not.
+pub(crate) fn counters(stats: &Stats) -> [(&'static str, u32); 12] {
+    [
+        ("received", stats.received),
+        ("hellos", stats.hellos),
+        ("overheard", stats.overheard),
+        ("oversized", stats.oversized),
+        ("truncated", stats.truncated),
+        ("crc", stats.crc),
+        ("version", stats.version),
+        ("unsigned", stats.unsigned),
+        ("forged", stats.forged),
+        ("replayed", stats.replayed),
+        ("foreign", stats.foreign),
+        ("misaddressed", stats.misaddressed),
+    ]
+}
+
+/// Which of them has gone up, by one; `malformed` and the rest would be `None`.
+pub(crate) fn raised(before: &Stats, after: &Stats) -> Option<&'static str> {
+    let (mut name, mut ups) = (None, 0);
+    for ((of, before), (_, after)) in counters(before).into_iter().zip(counters(after)) {
+        if after != before {
+            name = Some(of);
+            ups += after - before;
+        }
+    }
+    name.filter(|_| ups == 1)
+}
+
+/// What an intact frame raises at relay `to`, if its tag is wrong.
+fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
+    let flags = frame.flags();
+    if frame.version() != 1 || ![0, SIGNED, SIGNED | HELLO].contains(&flags) {
+        return "version";
+    }
+    if flags != 0 && frame.0.len() < HEADER + TAG {
+        return "truncated";
+    }
+    if frame.network() != NETWORK {
+        return "foreign";
+    }
+    if port == Port::Shared && frame.destination() != to {
+        return "overheard";
+    }
+    let sender = frame.sender();
+    // On a shared channel the four nearest on either side may have something to say.
+    let far = if port == Port::Shared { 4 } else { 1 };
+    let there = (1..=relays).contains(&sender) && sender.abs_diff(to) <= far;
+    let before = port != Port::Downstream && there && sender < to;
+    let after = port != Port::Upstream && there && sender > to;
+    if frame.destination() != to || !(before || after) {
+        return "misaddressed";
+    }
+    if flags == 0 { "unsigned" } else { "forged" }
+}
+
+/// Whoever sends the attacks.
+pub(crate) struct Attacker {
+    pub(crate) rng: ChaCha8Rng,
+    /// Valid frames of every message, unsigned.
+    messages: Vec<Plain>,
+}
+
+impl Attacker {
+    pub(crate) fn new(stream: u64) -> Self {
+        let text = include_str!("../data/vectors.json");
+        let vectors: serde_json::Value = serde_json::from_str(text).unwrap();
+        let messages: Vec<Plain> = vectors["frames"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|frame| {
+                let hex = frame["body"].as_str().unwrap().replace(' ', "");
+                let byte = |at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap();
+                Plain((0..hex.len()).step_by(2).map(byte).collect())
+            })
+            .collect();
+        let mut kinds: Vec<u8> = messages.iter().map(|message| message.0[0]).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        assert_eq!(kinds, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed(1));
+        rng.set_stream(stream);
+        Self { rng, messages }
+    }
+
+    /// An attack of `kind` on the net as it is now, if what that takes has been heard.
+    pub(crate) fn attack(&mut self, net: &Net, kind: Kind) -> Option<Attack> {
+        let heard = net.heard.choose(&mut self.rng)?.clone();
+        let Heard { from, to, .. } = heard;
+        // Mostly where such a frame belongs.
+        let port = if self.rng.random_bool(0.9) {
+            net.port(from, to)
+        } else {
+            *[Port::Upstream, Port::Downstream]
+                .choose(&mut self.rng)
+                .filter(|_| net.port(from, to) != Port::Shared)
+                .unwrap_or(&Port::Shared)
+        };
+        if kind == Kind::Noise {
+            return Some(self.noise(to, port));
+        }
+        let (frame, right) = self.frame(net, kind, &heard)?;
+        let raises = match refused(&frame, to, port, net.len()) {
+            "forged" => right,
+            other => other,
+        };
+        Some(Attack {
+            to,
+            port,
+            wire: frame.wire(),
+            raises,
+        })
+    }
+
+    /// The frame of an attack, and what it raises where its addresses are right.
+    fn frame(&mut self, net: &Net, kind: Kind, heard: &Heard) -> Option<(Plain, &'static str)> {
+        let Heard {
+            from,
+            to,
+            lives,
+            wire,
+            ..
+        } = heard;
+        let (from, to) = (*from, *to);
+        let now = (net.life(from), net.life(to));
+        let recorded = plain(wire);
+        let is_hello = recorded.is_hello();
+        let frame = match kind {
+            Kind::Replayed | Kind::FromBefore => {
+                let fits = (kind == Kind::Replayed) == (*lives == now);
+                // What is still under way has not been taken there.
+                let usable = fits && !is_hello && net.has_arrived(heard);
+                let raises = if net.is_of_now(heard) {
+                    "replayed"
+                } else {
+                    "forged"
+                };
+                return usable.then_some((recorded, raises));
+            }
+            Kind::RecordedHello => {
+                let usable = is_hello && net.is_proven(from, to) && net.has_arrived(heard);
+                return usable.then_some((recorded, "replayed"));
+            }
+            Kind::Flipped => self.flipped(recorded),
+            Kind::Header => self.header(recorded),
+            Kind::Stripped => {
+                let mut frame = recorded;
+                frame.0.truncate(frame.0.len() - TAG);
+                frame.set(2, to);
+                frame
+            }
+            Kind::Truncated => {
+                let mut frame = recorded;
+                let cut = self.rng.random_range(1..=TAG + 4);
+                frame.0.truncate(frame.0.len() - cut);
+                frame
+            }
+            Kind::RandomTag => {
+                let mut frame = recorded;
+                let tag = frame.0.len() - TAG;
+                self.rng.fill_bytes(&mut frame.0[tag..]);
+                frame
+            }
+            Kind::OtherKey => {
+                let body = self.messages.choose(&mut self.rng)?.0.clone();
+                let mut frame = Plain::new(NETWORK, from, to, SIGNED, self.counter(&recorded));
+                frame.0.extend(body);
+                frame.signed(&self.rng.random(), [nonce(now.0, 1), nonce(now.1, 1)])
+            }
+            Kind::ForgedHello => {
+                let epoch = now.0 + self.rng.random_range(0..3);
+                let nonces = [nonce(epoch, self.rng.random_range(0..9)), nonce(now.1, 1)];
+                let asks = self.rng.random();
+                hello((NETWORK, from, to), self.counter(&recorded), nonces, asks)
+                    .signed(&self.rng.random(), nonces)
+            }
+            Kind::Bare | Kind::Dressed => {
+                let flags = if kind == Kind::Bare { 0 } else { SIGNED };
+                let body = self.messages.choose(&mut self.rng)?.0.clone();
+                let mut frame = Plain::new(NETWORK, from, to, flags, self.counter(&recorded));
+                frame.0.extend(body);
+                if kind == Kind::Dressed {
+                    frame.0.extend(self.rng.random::<[u8; TAG]>());
+                }
+                frame
+            }
+            Kind::Noise => return None,
+        };
+        Some((frame, "forged"))
+    }
+
+    /// A counter that is old, new, or anything.
+    fn counter(&mut self, recorded: &Plain) -> u32 {
+        match self.rng.random_range(0..3) {
+            0 => recorded.counter(),
+            1 => recorded
+                .counter()
+                .saturating_add(self.rng.random_range(1..100)),
+            _ => self.rng.random(),
+        }
+    }
+
+    fn flipped(&mut self, mut frame: Plain) -> Plain {
+        let original = frame.clone();
+        while frame == original {
+            for _ in 0..self.rng.random_range(1..=8) {
+                let at = self.rng.random_range(0..frame.0.len());
+                frame.0[at] ^= 1 << self.rng.random_range(0..8);
+            }
+        }
+        frame
+    }
+
+    fn header(&mut self, mut frame: Plain) -> Plain {
+        let original = frame.clone();
+        let number = |rng: &mut ChaCha8Rng| {
+            if rng.random() {
+                rng.random_range(0..10)
+            } else {
+                rng.random_range(0..4096)
+            }
+        };
+        while frame == original {
+            match self.rng.random_range(0..6) {
+                0 => frame.set(0, 0x1000 | number(&mut self.rng)),
+                1 => frame.set(2, original.flags() | number(&mut self.rng)),
+                2 => {
+                    let counter = self.counter(&original);
+                    frame.0[6..10].copy_from_slice(&counter.to_le_bytes());
+                }
+                3 => frame.set(4, self.rng.random()),
+                4 => frame.set(
+                    2,
+                    self.rng.random_range(0..16) << 12 | original.destination(),
+                ),
+                _ => frame.set(0, self.rng.random_range(0..16) << 12 | original.sender()),
+            }
+        }
+        frame
+    }
+
+    /// Random bytes, with a CRC or without; what they raise is what the rules for a stream say.
+    fn noise(&mut self, to: u16, port: Port) -> Attack {
+        let len = self.rng.random_range(1..300);
+        let bytes: Vec<u8> = (0..len).map(|_| self.rng.random()).collect();
+        let mut wire = cobs::encode_vec(&bytes);
+        wire.push(0);
+        let most = uav_relay::wire::frame::MAX_DECODED;
+        let raises = match len {
+            ..14 => "truncated",
+            _ if len > most => "oversized",
+            _ => "crc",
+        };
+        Attack {
+            to,
+            port,
+            wire,
+            raises,
+        }
+    }
+}
