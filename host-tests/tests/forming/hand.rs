@@ -1,0 +1,159 @@
+//! Relays on perfect wires that take no time, so that a test may hold up, lose and look at every frame.
+
+use std::collections::VecDeque;
+
+use host_tests::brief::of_link;
+use host_tests::reference::Link;
+use host_tests::reference::joint::{self, Place};
+use uav_relay::wire::deframe::Deframer;
+use uav_relay::wire::frame::{self, MAX_FRAME};
+use uav_relay::wire::message::{Message, Turn};
+use uav_relay::{Band, Identity, Instant, Mission, MissionConfig, Phase, Port, Relay, Settings};
+
+/// A frame on its way: to which relay, counted from 0, through which port, and its bytes.
+pub(crate) struct Flying {
+    pub(crate) to: usize,
+    pub(crate) port: Port,
+    pub(crate) bytes: Vec<u8>,
+}
+
+impl Flying {
+    /// Whether it is a message of Algorithm 2's last round.
+    pub(crate) fn is_stop(&self) -> bool {
+        self.is(|message| matches!(message, Message::Token(token) if token.turn == Turn::Stop))
+    }
+
+    pub(crate) fn is(&self, what: impl Fn(&Message<'_>) -> bool) -> bool {
+        let mut deframer = Deframer::new();
+        self.bytes.iter().any(|&byte| match deframer.push(byte) {
+            Some(Ok(plain)) => what(&frame::decode(plain).unwrap().1),
+            _ => false,
+        })
+    }
+}
+
+pub(crate) struct Chain {
+    link: Link,
+    mission: Mission,
+    settings: Settings,
+    pub(crate) relays: Vec<Relay>,
+    pub(crate) now: Instant,
+    pub(crate) flying: VecDeque<Flying>,
+}
+
+impl Chain {
+    /// The paper's link, whose relays may choose altitudes within `band` and begin at `altitude_m`.
+    pub(crate) fn new(relays: usize, altitude_m: f64, band: Band, settings: Settings) -> Self {
+        let mut link = Link {
+            y_i: 150.0,
+            min_separation_m: 4.0,
+            ..Link::paper(relays)
+        };
+        for relay in &mut link.relays {
+            relay.altitude_m = altitude_m;
+        }
+        let (mission, _) = of_link(&link, 1e-4).unwrap();
+        let config = MissionConfig {
+            band,
+            ..*mission.config()
+        };
+        let mut chain = Self {
+            link,
+            mission: Mission::try_new(config).unwrap(),
+            settings,
+            relays: Vec::new(),
+            now: Instant::ZERO,
+            flying: VecDeque::new(),
+        };
+        for (at, seed) in (0..relays).zip(0..) {
+            let relay = chain.switched_on(at, seed);
+            chain.relays.push(relay);
+        }
+        chain
+    }
+
+    fn switched_on(&self, at: usize, seed: u32) -> Relay {
+        let index = u16::try_from(at).unwrap() + 1;
+        let identity = Identity { network: 1, index };
+        Relay::new(self.mission, identity, self.settings, seed, self.now).unwrap()
+    }
+
+    /// Relay `at` forgets everything.
+    pub(crate) fn reboot(&mut self, at: usize, seed: u32) {
+        self.relays[at] = self.switched_on(at, seed);
+    }
+
+    /// The next frame arrives, or time passes until the next timer.
+    pub(crate) fn step(&mut self) {
+        if let Some(Flying { to, port, bytes }) = self.flying.pop_front() {
+            self.relays[to].handle_bytes(self.now, port, &bytes);
+        } else {
+            let next = self.relays.iter().filter_map(Relay::poll_timeout).min();
+            self.now = next.unwrap().max(self.now);
+        }
+        for (at, relay) in self.relays.iter_mut().enumerate() {
+            relay.handle_timeout(self.now);
+            let mut frame = [0; MAX_FRAME];
+            while let Some(transmit) = relay.poll_transmit(self.now, &mut frame) {
+                let (to, port) = match transmit.port {
+                    Port::Downstream => (at + 1, Port::Upstream),
+                    _ => (at - 1, Port::Downstream),
+                };
+                let bytes = frame[..transmit.len].to_vec();
+                self.flying.push_back(Flying { to, port, bytes });
+            }
+        }
+    }
+
+    /// Steps until `done`, at most `limit_ms` of the chain's time; how long it took, ms.
+    pub(crate) fn until(&mut self, limit_ms: u64, done: impl Fn(&Self) -> bool) -> Option<u64> {
+        let begun = self.now;
+        let took = |chain: &Self| chain.now.since(begun).as_micros().div_ceil(1000);
+        while !done(self) {
+            self.step();
+            if took(self) > limit_ms {
+                return None;
+            }
+        }
+        Some(took(self))
+    }
+
+    /// Whether all relays hold, in the same view, and nothing is on its way.
+    pub(crate) fn holds(&self) -> bool {
+        let view = self.relays[0].view();
+        let holds = |relay: &Relay| relay.phase() == Phase::Holding && relay.view() == view;
+        self.relays.iter().all(holds)
+    }
+
+    /// By how much the SIR of the chain as it stands is above what its relays have agreed to, as a part of it, and how far the
+    /// nearest two relays are from each other, m.
+    pub(crate) fn margin(&self) -> (f64, f64) {
+        let at = |relay: &Relay| relay.setpoint().unwrap();
+        let places: Vec<Place> = self
+            .relays
+            .iter()
+            .map(at)
+            .map(|at| Place {
+                x_m: f64::from(at.x_m),
+                altitude_m: f64::from(at.altitude_m),
+            })
+            .collect();
+        let apart = |pair: &[Place]| {
+            (pair[1].x_m - pair[0].x_m).hypot(pair[1].altitude_m - pair[0].altitude_m)
+        };
+        let nearest = places.windows(2).map(apart).fold(f64::INFINITY, f64::min);
+        let targets = self.relays.iter().map(|relay| relay.target().unwrap());
+        let most = f64::from(targets.fold(0.0, f32::max));
+        (
+            joint::sir(&self.link, &places).unwrap() / most - 1.0,
+            nearest,
+        )
+    }
+}
+
+/// A band of one altitude, and a wide one.
+pub(crate) const LOW: Band = Band::at(20.0);
+pub(crate) const WIDE: Band = Band {
+    least_m: 20.0,
+    most_m: 300.0,
+};

@@ -1,0 +1,101 @@
+//! A frame of a life, or of a view, that is over comes late.
+
+use uav_relay::wire::message::Message;
+use uav_relay::{Adjust, Local, Method, Settings};
+
+use crate::hand::{Chain, LOW, WIDE};
+
+/// The first pass of a leader's life is held up, the leader is rebooted, and the chain goes through Algorithm 2: when the pass
+/// comes after all, no relay leaves its place for it.
+#[test]
+fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
+    let method = Method::Adjust(Adjust {
+        rounds: 50,
+        explore_m: 30.0,
+        local: Local::Fine,
+    });
+    let settings = Settings {
+        method,
+        ..Settings::default()
+    };
+    for held in 1..4 {
+        for seed in 1..=20 {
+            let mut chain = Chain::new(4, 100.0, WIDE, settings);
+            let at_held = |chain: &Chain| chain.flying.iter().any(|frame| frame.to == held);
+            chain.until(5_000, at_held).unwrap();
+            let late = chain.flying.pop_back().unwrap();
+            chain.reboot(0, seed);
+            // It comes when the chain turns for the last time.
+            let stops = |chain: &Chain| {
+                let mut flying = chain.flying.iter();
+                flying.any(|frame| frame.to == held && frame.is_stop())
+            };
+            let reached = chain.until(600_000, stops);
+            assert!(reached.is_some(), "relay {}, seed {seed}", held + 1);
+            chain.flying.push_front(late);
+            let settled = chain.until(60_000, Chain::holds);
+            assert!(settled.is_some(), "relay {}, seed {seed}", held + 1);
+            let (above, _) = chain.margin();
+            assert!(above >= -2e-4, "relay {}, seed {seed}: {above}", held + 1);
+        }
+    }
+}
+
+/// A call for a view that is held up until a newer one is in force changes nothing.
+#[test]
+fn a_roster_of_an_old_view_changes_nothing() {
+    let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
+    chain.until(5_000, Chain::holds).unwrap();
+    chain.reboot(1, 3);
+    let calls = |chain: &Chain| {
+        let mut flying = chain.flying.iter();
+        flying.any(|frame| frame.to == 2 && frame.is(|m| matches!(m, Message::Roster(_))))
+    };
+    chain.until(10_000, calls).unwrap();
+    // Lost on its way, it is sent again; and the relay before is rebooted once more, for a second view.
+    let late = chain.flying.pop_back().unwrap();
+    chain.until(10_000, Chain::holds).unwrap();
+    assert_eq!(chain.relays[2].view(), 1);
+    chain.reboot(1, 4);
+    let second = |chain: &Chain| chain.holds() && chain.relays[2].view() == 2;
+    chain.until(10_000, second).unwrap();
+    let before: Vec<_> = chain
+        .relays
+        .iter()
+        .map(uav_relay::Relay::setpoint)
+        .collect();
+    let stale = chain.relays[2].stats().stale;
+    chain.flying.push_front(late);
+    chain.step();
+    assert_eq!(chain.relays[2].stats().stale, stale + 1);
+    for _ in 0..200 {
+        chain.step();
+        assert!(second(&chain));
+    }
+    let after: Vec<_> = chain
+        .relays
+        .iter()
+        .map(uav_relay::Relay::setpoint)
+        .collect();
+    assert_eq!(after, before);
+}
+
+/// A relay that hears of a newer view than its own, from a neighbour that it could not talk to, calls for one.
+#[test]
+fn a_relay_that_hears_of_a_newer_view_than_its_own_calls() {
+    let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
+    chain.until(5_000, Chain::holds).unwrap();
+    chain.reboot(1, 3);
+    // The tail has agreed to the new view, and its count is lost for good: the others are rebooted.
+    let agreed = |chain: &Chain| chain.relays[2].view() == 1;
+    chain.until(10_000, agreed).unwrap();
+    chain.flying.clear();
+    chain.reboot(0, 8);
+    chain.reboot(1, 9);
+    // Passes of view 0 are none of the tail's; it says so, and the number of the next view is above that of its own.
+    let took = chain.until(10_000, |chain| chain.holds() && chain.relays[0].view() == 2);
+    println!("{took:?} ms");
+    assert!(took.is_some());
+    assert!(chain.relays[2].stats().view > 0);
+    assert!(chain.margin().0 >= -2e-4);
+}

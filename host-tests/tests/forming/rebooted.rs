@@ -1,0 +1,107 @@
+//! A relay, or the leader, is switched on again while the others go on.
+
+use uav_relay::{Method, Phase, Settings};
+
+use crate::hand::{Chain, LOW, WIDE};
+
+/// A leader that comes back with any number, just behind the chain's as well, is heard, and the chain agrees again: within a
+/// second, where `hop_time` is 30 ms.
+#[test]
+fn a_rebooted_leader_is_answered_whatever_its_seed() {
+    // With a prediction the chain agrees in one pass; without, in several, and numbers may be just behind those.
+    for predict in [true, false] {
+        let settings = Settings {
+            predict,
+            ..Settings::default()
+        };
+        let mut longest = (0, 0);
+        let mut insisted = 0;
+        for seed in 0..2_000 {
+            let mut chain = Chain::new(2, 20.0, LOW, settings);
+            chain.until(5_000, Chain::holds).unwrap();
+            let before = chain.relays[1].setpoint();
+            chain.reboot(0, seed);
+            let took = chain.until(1_000, Chain::holds);
+            let took = took.unwrap_or_else(|| panic!("seed {seed} is never answered"));
+            longest = longest.max((took, seed));
+            insisted += u32::from(chain.relays[1].stats().stale >= 4);
+            assert_eq!(chain.relays[1].setpoint(), before, "seed {seed}");
+        }
+        println!("predict {predict}: at most {longest:?} (ms, seed); {insisted} insisted");
+        assert!(predict || insisted > 0, "no number was just behind");
+    }
+}
+
+/// The middle one of three forgets everything while the second pass of the leader's life is under way. Of that it has missed
+/// the beginning: it gets its place by a new view.
+#[test]
+fn a_relay_rebooted_in_the_midst_of_a_pass_gets_a_place_by_a_new_view() {
+    let settings = Settings {
+        predict: false,
+        ..Settings::default()
+    };
+    for rebooted in 1..3 {
+        let mut chain = Chain::new(3, 20.0, LOW, settings);
+        let second = |chain: &Chain| chain.relays[0].stats().sweeps == 2;
+        chain.until(1_000, second).unwrap();
+        assert!(!chain.holds());
+        chain.flying.clear();
+        chain.reboot(rebooted, 77);
+        let took = chain.until(5_000, Chain::holds);
+        println!("relay {}: {took:?} ms", rebooted + 1);
+        assert!(took.is_some(), "relay {}", rebooted + 1);
+        for (relay, index) in chain.relays.iter().zip(1..) {
+            assert_eq!((relay.view(), relay.index()), (1, index));
+            assert_eq!(relay.mission().relays(), 3);
+        }
+        assert!(chain.margin().0 >= -2e-4);
+    }
+}
+
+/// One that is rebooted when all is agreed, and hears nothing, calls by itself.
+#[test]
+fn a_relay_rebooted_in_a_settled_chain_gets_a_place_by_a_new_view() {
+    for rebooted in 1..4 {
+        let mut chain = Chain::new(4, 20.0, LOW, Settings::default());
+        chain.until(5_000, Chain::holds).unwrap();
+        chain.reboot(rebooted, 5);
+        // `quiet`, and two hops for each relay.
+        let took = chain.until(5_000 + 2 * 4 * 30 + 500, Chain::holds);
+        println!("relay {}: {took:?} ms", rebooted + 1);
+        assert!(took.is_some_and(|ms| ms > 5_000), "{took:?}");
+        assert!(chain.relays.iter().all(|relay| relay.view() == 1));
+        assert!(chain.margin().0 >= -2e-4);
+    }
+}
+
+/// The agreement on altitudes is under way, its answer is lost, and a relay forgets what it had chosen: it must not join it
+/// with another altitude than it was agreed for.
+#[test]
+fn a_relay_rebooted_in_the_agreement_on_altitudes_still_meets_the_target() {
+    let settings = Settings {
+        method: Method::Altitude,
+        ..Settings::default()
+    };
+    let mut longest = 0;
+    for altitude_m in [20.0, 22.0, 30.0, 60.0, 220.0] {
+        for relays in 3..=6 {
+            for rebooted in 1..relays - 1 {
+                let name = format!("{relays} relays at {altitude_m} m, {}", rebooted + 1);
+                let mut chain = Chain::new(relays, altitude_m, WIDE, settings);
+                let tail = |chain: &Chain| chain.relays[relays - 1].phase() == Phase::Holding;
+                // The tail agrees twice: on Algorithm 1's places, and in the end.
+                chain.until(60_000, tail).unwrap();
+                chain.until(60_000, |chain| !tail(chain)).unwrap();
+                chain.until(60_000, tail).unwrap();
+                chain.flying.clear();
+                chain.reboot(rebooted, 99);
+                let took = chain.until(60_000, Chain::holds);
+                longest = longest.max(took.unwrap_or_else(|| panic!("{name}: stuck")));
+                let (above, apart_m) = chain.margin();
+                assert!(above >= -2e-4, "{name}: {above}");
+                assert!(apart_m >= 4.0 * (1.0 - 1e-5), "{name}: {apart_m} m");
+            }
+        }
+    }
+    println!("at most {longest} ms");
+}

@@ -1,0 +1,116 @@
+//! Drones that fly: with a guard no two of them ever come nearer than the separation, whatever is lost, late or silent.
+
+use host_tests::sim::chain::FlightSpec;
+use host_tests::sim::faults::Faults;
+use host_tests::sim::outcome::Ending;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::guard::confines::Confines;
+use uav_relay::{Duration, MissionConfig};
+
+use super::*;
+
+const SEPARATION_M: f32 = 5.0;
+
+/// What a place may be off by rounding, m: places are f32 of up to 1 km.
+const ROUNDING_M: f64 = 2e-3;
+
+/// Eight drones in order along x, at least the separation apart, each with its own speed.
+fn flight(rng: &mut ChaCha8Rng) -> FlightSpec {
+    let mut x_m = 0.0;
+    let start = (0..8)
+        .map(|_| {
+            x_m += f64::from(SEPARATION_M) + 0.01 + rng.random_range(0.0..60.0_f64);
+            (x_m, 20.0)
+        })
+        .collect();
+    FlightSpec {
+        start,
+        speed_mps: (0..8).map(|_| rng.random_range(0.5..15.0)).collect(),
+        step: Duration::from_millis(200),
+    }
+}
+
+fn guarded(rng: &mut ChaCha8Rng) -> Setup {
+    let config = MissionConfig {
+        min_separation_m: SEPARATION_M,
+        ..*mission(8).config()
+    };
+    let mission = Mission::try_new(config).unwrap();
+    let mut setup = Setup::on_shared_channel(mission);
+    setup.settings.guard = Some(Confines::of(&mission, config.common));
+    setup.flight = Some(flight(rng));
+    setup.seed = rng.random();
+    setup
+}
+
+#[test]
+fn without_losses_all_arrive_and_none_come_close() {
+    for seed in 1..=40 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut setup = guarded(&mut rng);
+        setup.faults.loss = rng.random_range(0.0..0.5);
+        setup.deadline = seconds(2_000);
+        let outcome = run(setup.clone()).unwrap();
+        let nearest = outcome.nearest_m;
+        println!(
+            "{seed}: {:?} after {} s, nearest {nearest} m",
+            outcome.ending,
+            outcome.ended.as_micros() / 1_000_000
+        );
+        assert_eq!(outcome.ending, Ending::Settled, "SEED={seed}");
+        assert!(
+            nearest >= f64::from(SEPARATION_M) - ROUNDING_M,
+            "SEED={seed}"
+        );
+        assert_eq!(outcome.unsafe_setpoints, 0, "SEED={seed}");
+    }
+}
+
+#[test]
+fn a_drone_that_falls_silent_and_hovers_is_not_flown_into() {
+    for seed in 1..=200 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut setup = guarded(&mut rng);
+        setup.faults = Faults {
+            loss: rng.random_range(0.0..0.4),
+            corrupt: rng.random_range(0.0..0.2),
+            duplicate: rng.random_range(0.0..0.2),
+            reorder: rng.random_range(0.0..0.2),
+        };
+        for _ in 0..rng.random_range(1..=3) {
+            let relay = rng.random_range(1..=8);
+            let at = rng.random_range(0..90_000);
+            setup.kills.push((relay, Instant::from_millis(at)));
+            if rng.random_bool(0.5) {
+                let back = at + rng.random_range(100..90_000);
+                setup.boots.push((relay, Instant::from_millis(back)));
+            }
+        }
+        go_on_until(&mut setup, seconds(240));
+        setup.deadline = seconds(241);
+        let outcome = run(setup.clone()).unwrap();
+        assert!(
+            outcome.nearest_m >= f64::from(SEPARATION_M) - ROUNDING_M,
+            "SEED={seed}: {} m, {:?} {:?}",
+            outcome.nearest_m,
+            setup.kills,
+            setup.boots
+        );
+        assert_eq!(outcome.unsafe_setpoints, 0, "SEED={seed}");
+    }
+}
+
+/// The same without a guard: the test can fail.
+#[test]
+fn without_a_guard_some_come_close() {
+    let close = (1..=40).any(|seed| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut setup = guarded(&mut rng);
+        setup.settings.guard = None;
+        setup.deadline = seconds(2_000);
+        let outcome = run(setup).unwrap();
+        outcome.nearest_m < f64::from(SEPARATION_M) - ROUNDING_M
+    });
+    assert!(close);
+}

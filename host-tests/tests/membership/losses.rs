@@ -1,0 +1,187 @@
+//! Relays that are lost on a good channel, and come back.
+
+use host_tests::brief::of_stochastic_link;
+use host_tests::reference::Station;
+use host_tests::reference::stochastic::StochasticLink;
+use host_tests::sim::outcome::Ending;
+use uav_relay::{Adjust, Band, Local, Method, MissionConfig};
+
+use super::*;
+
+/// Who loses a neighbour last, and when the chain has settled after that; sweeps in between, the call for the view included.
+fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
+    let lost = |what| matches!(what, Turning::Lost(_));
+    let last = outcome
+        .moments
+        .iter()
+        .filter(|moment| lost(moment.what))
+        .map(|moment| moment.at)
+        .max()
+        .unwrap();
+    let all: u32 = outcome.relays.iter().map(|relay| relay.stats.sweeps).sum();
+    (outcome.ended.since(last), all - sweeps_before)
+}
+
+fn sets_of_up_to_three(of: u16) -> Vec<Vec<u16>> {
+    let mut sets = Vec::new();
+    for one in 1..=of {
+        sets.push(vec![one]);
+        for other in one + 1..=of {
+            sets.push(vec![one, other]);
+            sets.extend((other + 1..=of).map(|third| vec![one, other, third]));
+        }
+    }
+    sets
+}
+
+#[test]
+fn any_one_two_or_three_of_eight_may_be_lost_at_once() {
+    let mut slowest = Duration::from_millis(0);
+    let mut most = 0;
+    for gone in sets_of_up_to_three(8) {
+        let mut setup = paper(8);
+        setup.kills = gone.iter().map(|index| (*index, seconds(20))).collect();
+        setup.deadline = seconds(120);
+        let outcome = run(setup.clone()).unwrap();
+        assert_eq!(outcome.ending, Ending::Settled, "{gone:?} lost");
+        let left = left(&outcome);
+        judge(&setup, &outcome, &left).unwrap_or_else(|what| panic!("{gone:?} lost: {what}"));
+        let (took, sweeps) = recovery(&outcome, 1);
+        slowest = slowest.max(took);
+        most = most.max(sweeps);
+        for index in left {
+            assert_eq!(views(&outcome, index), 1, "{gone:?} lost: views of {index}");
+        }
+    }
+    println!(
+        "settled within {} ms of the last detection, by at most {most} sweeps",
+        ms(slowest)
+    );
+    // An end of the chain is sought for as long as a silent neighbour is asked: `lost` less `quiet`. The rest is calls,
+    // counting and sweeps.
+    assert!(ms(slowest) < 10_000 + 2_000);
+    assert!(most <= 6);
+}
+
+#[test]
+fn a_relay_that_comes_back_takes_its_place_again() {
+    for index in 1..=8 {
+        // Before anybody has noticed; just when they do; long after.
+        for off in [1_000, 9_990, 10_020, 60_000] {
+            let mut setup = paper(8);
+            setup.kills = vec![(index, seconds(20))];
+            setup.boots = vec![(index, Instant::from_millis(20_000 + off))];
+            setup.deadline = seconds(200);
+            let outcome = run(setup.clone()).unwrap();
+            assert_eq!(outcome.ending, Ending::Settled, "{index} off for {off} ms");
+            judge(&setup, &outcome, &[1, 2, 3, 4, 5, 6, 7, 8])
+                .unwrap_or_else(|what| panic!("{index} off for {off} ms: {what}"));
+        }
+    }
+}
+
+#[test]
+fn all_of_them_are_switched_on_again_one_after_the_other() {
+    let mut setup = paper(8);
+    for index in 1..=8 {
+        let at = 20 + 40 * u64::from(index);
+        setup.kills.push((index, seconds(at)));
+        setup.boots.push((index, seconds(at + 3)));
+    }
+    setup.deadline = seconds(700);
+    let outcome = run(setup.clone()).unwrap();
+    assert_eq!(outcome.ending, Ending::Settled);
+    judge(&setup, &outcome, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
+}
+
+#[test]
+fn one_after_the_other_until_two_are_left() {
+    let mut setup = paper(8);
+    let order = [4, 1, 8, 5, 3, 7];
+    setup.kills = (1..)
+        .zip(order)
+        .map(|(n, index)| (index, seconds(60 * n)))
+        .collect();
+    setup.deadline = seconds(600);
+    let outcome = run(setup.clone()).unwrap();
+    assert_eq!(outcome.ending, Ending::Settled);
+    judge(&setup, &outcome, &[2, 6]).unwrap();
+}
+
+#[test]
+fn over_two_wires_a_break_is_reported_and_a_reboot_is_mended() {
+    let mut setup = Setup::new(mission(8));
+    setup.kills = vec![(4, seconds(20))];
+    let outcome = run(setup).unwrap();
+    assert_eq!(outcome.ending, Ending::Broken);
+    assert!(
+        outcome
+            .relays
+            .iter()
+            .all(|relay| relay.view == 0 && relay.setpoint.is_some())
+    );
+    for index in 1..=8 {
+        let mut setup = Setup::new(mission(8));
+        setup.kills = vec![(index, seconds(20))];
+        setup.boots = vec![(index, seconds(21))];
+        setup.deadline = seconds(100);
+        let outcome = run(setup.clone()).unwrap();
+        assert_eq!(outcome.ending, Ending::Settled, "{index}");
+        judge(&setup, &outcome, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
+    }
+}
+
+#[test]
+fn a_chain_in_a_field_forms_anew_from_the_other_end() {
+    let link = StochasticLink {
+        distance_m: 1_000.0,
+        tx_w: 80.0,
+        mu_los: 1.0,
+        eta: 3.0,
+        upsilon: vec![(0.0, 2e4), (400.0, 5e3), (1_000.0, 4e4)],
+        relays: vec![
+            Station {
+                altitude_m: 20.0,
+                power_w: 1.0
+            };
+            8
+        ],
+    };
+    for gone in sets_of_up_to_three(8) {
+        let mut setup = Setup::on_shared_channel(of_stochastic_link(&link, 2.0).unwrap());
+        setup.kills = gone.iter().map(|index| (*index, seconds(20))).collect();
+        setup.deadline = seconds(120);
+        let outcome = run(setup.clone()).unwrap();
+        assert_eq!(outcome.ending, Ending::Settled, "{gone:?} lost");
+        judge(&setup, &outcome, &left(&outcome)).unwrap_or_else(|what| panic!("{gone:?}: {what}"));
+    }
+}
+
+#[test]
+fn a_chain_that_chooses_altitudes_or_takes_turns_forms_anew() {
+    let band = Band {
+        least_m: 20.0,
+        most_m: 300.0,
+    };
+    let config = MissionConfig {
+        band,
+        ..*mission(5).config()
+    };
+    let adjust = Adjust {
+        rounds: 20,
+        explore_m: 30.0,
+        local: Local::Fine,
+    };
+    for method in [Method::Altitude, Method::Adjust(adjust)] {
+        for index in 1..=5 {
+            let mut setup = Setup::on_shared_channel(Mission::try_new(config).unwrap());
+            setup.settings.method = method;
+            setup.kills = vec![(index, seconds(60))];
+            setup.deadline = seconds(400);
+            let outcome = run(setup.clone()).unwrap();
+            assert_eq!(outcome.ending, Ending::Settled, "{method:?}, {index} lost");
+            judge(&setup, &outcome, &left(&outcome))
+                .unwrap_or_else(|what| panic!("{method:?}, {index} lost: {what}"));
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! Chains that are split in two, and links that come and go.
+
+use host_tests::sim::outcome::Ending;
+
+use super::*;
+
+/// Which part goes on when eight relays are split after `after`: half with its leader, or more.
+fn goes_on(after: u16) -> Vec<u16> {
+    if after >= 4 {
+        (1..=after).collect()
+    } else {
+        (after + 1..=8).collect()
+    }
+}
+
+#[test]
+fn of_a_split_chain_the_larger_part_goes_on_and_the_other_holds() {
+    for after in 1..8 {
+        let mut setup = paper(8);
+        setup.partitions = vec![Partition {
+            after,
+            from: seconds(20),
+            until: None,
+        }];
+        setup.deadline = seconds(120);
+        let before = alone(&setup, &[1, 2, 3, 4, 5, 6, 7, 8]).0;
+        let outcome = run(setup.clone()).unwrap();
+        assert_eq!(outcome.ending, Ending::Settled, "after {after}");
+        let on = goes_on(after);
+        judge(&setup, &outcome, &on).unwrap_or_else(|what| panic!("after {after}: {what}"));
+        for index in (1..=8).filter(|index| !on.contains(index)) {
+            let at = usize::from(index) - 1;
+            assert_eq!(outcome.bits()[at], before[at], "{index} has left its place");
+        }
+    }
+}
+
+#[test]
+fn without_the_rule_of_the_larger_part_both_go_on() {
+    let mut setup = paper(8);
+    setup.settings.quorum = false;
+    setup.partitions = vec![Partition {
+        after: 5,
+        from: seconds(20),
+        until: None,
+    }];
+    go_on_until(&mut setup, seconds(60));
+    setup.deadline = seconds(61);
+    let outcome = run(setup.clone()).unwrap();
+    judge(&setup, &outcome, &[1, 2, 3, 4, 5]).unwrap();
+    judge(&setup, &outcome, &[6, 7, 8]).unwrap();
+}
+
+#[test]
+fn a_split_chain_heals() {
+    for after in 1..8 {
+        for healed in [22, 31, 45, 100] {
+            let mut setup = paper(8);
+            setup.partitions = vec![Partition {
+                after,
+                from: seconds(20),
+                until: Some(seconds(healed)),
+            }];
+            setup.deadline = seconds(healed + 120);
+            let outcome = run(setup.clone()).unwrap();
+            assert_eq!(
+                outcome.ending,
+                Ending::Settled,
+                "after {after} until {healed} s"
+            );
+            judge(&setup, &outcome, &[1, 2, 3, 4, 5, 6, 7, 8])
+                .unwrap_or_else(|what| panic!("after {after} until {healed} s: {what}"));
+        }
+    }
+}
+
+/// Ten minutes of a link that is down and up for `half` seconds each: how often the chain forms anew, at most.
+fn flaps(half: u64, after: u16) -> usize {
+    let mut setup = paper(8);
+    for n in 0..600 / (2 * half) {
+        setup.partitions.push(Partition {
+            after,
+            from: seconds(20 + 2 * half * n),
+            until: Some(seconds(20 + 2 * half * n + half)),
+        });
+    }
+    setup.deadline = seconds(620 + 600);
+    let outcome = run(setup.clone()).unwrap();
+    assert_eq!(outcome.ending, Ending::Settled, "{half} s, after {after}");
+    judge(&setup, &outcome, &[1, 2, 3, 4, 5, 6, 7, 8])
+        .unwrap_or_else(|what| panic!("{half} s, after {after}: {what}"));
+    (1..=8).map(|index| views(&outcome, index)).max().unwrap()
+}
+
+#[test]
+fn a_link_that_comes_and_goes_disturbs_the_chain_less_and_less() {
+    for half in [1, 4, 8, 14, 16, 20, 30, 50] {
+        let views: Vec<_> = (1..8).map(|after| flaps(half, after)).collect();
+        println!(
+            "down and up for {half} s each: the chain forms anew {views:?} times in ten minutes"
+        );
+        // Away for less than it takes to be lost, nothing happens. Else it is taken back after 15, 30, 60, 120, 240 s of
+        // being heard, which soon is longer than it stays: at most two for each.
+        let most = if half < 10 { 0 } else { 10 };
+        assert!(
+            views.iter().all(|views| *views <= most),
+            "{half} s: {views:?}"
+        );
+    }
+}
+
+#[test]
+fn nothing_happens_to_a_chain_that_has_settled_on_a_good_channel() {
+    let mut setup = paper(8);
+    setup.kills = vec![(3, seconds(20))];
+    go_on_until(&mut setup, seconds(3_600));
+    setup.deadline = seconds(3_601);
+    let outcome = run(setup.clone()).unwrap();
+    let last = outcome.moments.last().unwrap().at;
+    assert!(last < seconds(40), "{last:?}");
+    judge(&setup, &outcome, &[1, 2, 4, 5, 6, 7, 8]).unwrap();
+}

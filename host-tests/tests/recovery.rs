@@ -1,0 +1,144 @@
+//! How fast a chain recovers from the loss of one relay, by its length and by which one is lost.
+//!
+//! `cargo test --release -p host-tests --test recovery -- --nocapture` prints the table of the README.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs
+)]
+
+use host_tests::brief::of_link;
+use host_tests::reference::Link;
+use host_tests::report::ChainReport;
+use host_tests::report::recovery::RecoveryReport;
+use host_tests::sim::chain::run;
+use host_tests::sim::outcome::{Ending, Outcome};
+use host_tests::sim::setup::Setup;
+use uav_relay::Instant;
+
+/// When the relay goes silent: long after the chain has settled.
+const AT_S: u64 = 60;
+
+/// A chain of `relays` on one radio channel that loses relay `lost`.
+fn losing(relays: u16, lost: u16) -> Setup {
+    let (mission, _) = of_link(&Link::paper(usize::from(relays)), 1e-4).unwrap();
+    let mut setup = Setup::on_shared_channel(mission);
+    setup.kills = vec![(lost, Instant::from_millis(1_000 * AT_S))];
+    setup.deadline = Instant::from_millis(1_000 * (AT_S + 600));
+    setup
+}
+
+/// What came of it, and the report of it.
+fn recovered(setup: Setup) -> (Outcome, ChainReport) {
+    let mission = setup.mission;
+    let outcome = run(setup).unwrap();
+    let report = ChainReport::new("align", &mission, &outcome, 1);
+    (outcome, report)
+}
+
+/// The one recovery of a run that lost `lost` and settled without it.
+fn only(report: &ChainReport, relays: u16, lost: u16) -> RecoveryReport {
+    let [one] = report.recovery.as_slice() else {
+        panic!("{:?}", report.recovery);
+    };
+    assert_eq!(
+        (one.lost.as_slice(), one.back.as_slice(), one.relays),
+        (&[lost][..], &[][..], relays - 1)
+    );
+    assert_eq!(report.left, Some(relays - 1));
+    one.clone()
+}
+
+/// Head, middle and tail.
+fn places(relays: u16) -> Vec<(&'static str, u16)> {
+    let mut places = vec![
+        ("head", 1),
+        ("middle", relays.div_ceil(2)),
+        ("tail", relays),
+    ];
+    places.dedup_by_key(|(_, lost)| *lost);
+    places
+}
+
+#[test]
+fn one_loss_is_noticed_within_15_s_and_costs_six_sweeps_at_most() {
+    println!("| N | lost | noticed after | formed anew after | at the new places after | sweeps |");
+    println!("| --- | --- | --- | --- | --- | --- |");
+    for relays in [2, 4, 8, 16, 32, 100] {
+        for (name, lost) in places(relays) {
+            let (outcome, report) = recovered(losing(relays, lost));
+            if (relays, lost) == (2, 1) {
+                assert_eq!(outcome.ending, Ending::Cut);
+                println!(
+                    "| 2 | head | {:.1} s | never: the other one holds its place | | |",
+                    detected(&report)
+                );
+                continue;
+            }
+            assert_eq!(outcome.ending, Ending::Settled, "{name} of {relays}");
+            let one = only(&report, relays, lost);
+            let since = |at_s: Option<f64>| at_s.unwrap() - one.happened_s.unwrap();
+            let [noticed, formed, converged] =
+                [one.detected_s, Some(one.formed_s), one.converged_s].map(since);
+            let sweeps = one.sweeps.unwrap();
+            println!(
+                "| {relays} | {name} | {noticed:.1} s | {formed:.2} s | {converged:.2} s | {sweeps} |"
+            );
+            assert!(noticed <= 15.0, "{name} of {relays}: {noticed}");
+            assert!((1..=6).contains(&sweeps), "{name} of {relays}: {sweeps}");
+            // A neighbour beyond is found at once; that there is none takes as long as the silence did.
+            let search = if lost == 1 || lost == relays {
+                10.1
+            } else {
+                0.1
+            };
+            let round_trips = 0.05 * f64::from(relays);
+            assert!(
+                converged - noticed <= search + round_trips,
+                "{name} of {relays}: {converged}"
+            );
+        }
+    }
+}
+
+/// When the loss was noticed, from when it happened, s.
+fn detected(report: &ChainReport) -> f64 {
+    let lost = report.timeline.iter().find(|moment| moment.what == "lost");
+    lost.unwrap().at_s - AT_S as f64
+}
+
+/// What the chain that is left agrees on is what a chain of so many agrees on from the start, to the bit.
+#[test]
+fn the_chain_that_is_left_is_as_good_as_a_new_one() {
+    for (relays, lost) in [(4, 2), (8, 1), (8, 4), (8, 8), (16, 9)] {
+        let (outcome, _) = recovered(losing(relays, lost));
+        let mut left = outcome.bits();
+        left.remove(usize::from(lost) - 1);
+        let mut fresh = losing(relays - 1, 1);
+        fresh.kills.clear();
+        assert_eq!(left, run(fresh).unwrap().bits(), "relay {lost} of {relays}");
+    }
+}
+
+/// Without a quorum the one that is left of two goes on alone.
+#[test]
+fn without_a_quorum_the_last_relay_goes_on() {
+    let mut setup = losing(2, 1);
+    setup.settings.quorum = false;
+    let (outcome, report) = recovered(setup);
+    assert_eq!(outcome.ending, Ending::Settled);
+    assert_eq!(only(&report, 2, 1).view, 1);
+}
+
+/// With tags it is the same chain, after a hello more.
+#[test]
+fn tags_change_nothing_but_the_time() {
+    let (bare, _) = recovered(losing(8, 4));
+    let mut setup = losing(8, 4);
+    setup.auth = true;
+    let (tagged, report) = recovered(setup);
+    assert_eq!(tagged.ending, Ending::Settled);
+    assert_eq!(tagged.bits(), bare.bits());
+    assert!(only(&report, 8, 4).sweeps.unwrap() <= 6);
+}
