@@ -6,6 +6,7 @@ pub mod cases;
 pub mod command;
 pub mod figures;
 pub mod firmware;
+pub mod fuzzing;
 pub mod plan;
 pub mod random;
 pub mod reference;

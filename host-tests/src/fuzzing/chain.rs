@@ -1,0 +1,373 @@
+//! A chain of two to four relays on links that lose, double, reorder and damage what is sent.
+
+mod agreement;
+
+use std::collections::VecDeque;
+
+use uav_relay::wire::auth::Auth;
+use uav_relay::{Duration, Instant, Mission, Placement, Port, Sample, Settings, Wiring};
+
+use super::input::Input;
+use super::setting;
+use super::watch::{Sent, Watched};
+
+/// Operations in one run: some milliseconds of computing.
+const MOST_OPERATIONS: usize = 256;
+
+/// Relays, at most.
+const MOST_RELAYS: u8 = 4;
+
+/// Frames under way to one relay; one more, and the oldest is lost.
+const MOST_UNDER_WAY: usize = 24;
+
+/// Rounds of deliveries and wake-ups in one operation.
+const MOST_ROUNDS: u8 = 128;
+
+/// What rounding may take from a place, as a part of D: a step of its f32, or two of its code in a wave.
+const ROUNDING: f64 = 1.3e-7;
+
+/// Reads `data` as a mission, what each relay is set to, and then as what happens to the frames between them.
+///
+/// # Panics
+/// Where a relay breaks a promise (`watch` has them), where two neighbours hold places of one pass that are too close, or
+/// where the chain, once nothing is lost any more, does not agree.
+pub fn chain(data: &[u8]) {
+    _ = flown(data);
+}
+
+/// As [`chain()`], and what its relays are in the end; `None` where the bytes ask for a mission or settings that are refused.
+///
+/// # Panics
+/// As [`chain()`].
+pub fn flown(data: &[u8]) -> Option<Vec<Watched>> {
+    let mut input = Input::new(data);
+    let mut chain = Chain::new(&mut input)?;
+    let to_the_end = input.below(4) == 3;
+    for _ in 0..MOST_OPERATIONS {
+        if input.is_empty() {
+            break;
+        }
+        chain.operate(&mut input);
+    }
+    if to_the_end {
+        chain.agree();
+    }
+    let relays = chain.members.into_iter().map(|member| member.watched);
+    Some(relays.collect())
+}
+
+/// One relay, and what is under way to it.
+struct Member {
+    watched: Watched,
+    settings: Settings,
+    arriving: VecDeque<Sent>,
+}
+
+struct Chain {
+    mission: Mission,
+    members: Vec<Member>,
+    now: Instant,
+    /// Of the next relay that is switched on: never the same twice.
+    seed: u32,
+}
+
+impl Chain {
+    fn new(input: &mut Input<'_>) -> Option<Self> {
+        let mission = setting::mission(input, MOST_RELAYS)?;
+        let common = setting::of_chain(input, &mission);
+        let mut chain = Self {
+            mission,
+            members: Vec::new(),
+            now: Instant::ZERO,
+            seed: u32::from(input.word()),
+        };
+        for index in 1..=mission.relays() {
+            let settings = setting::settings(input, &mission, common);
+            let watched = chain.switched_on(index, settings)?;
+            chain.members.push(Member {
+                watched,
+                settings,
+                arriving: VecDeque::new(),
+            });
+        }
+        chain.settle_all();
+        Some(chain)
+    }
+
+    fn switched_on(&mut self, index: u16, settings: Settings) -> Option<Watched> {
+        self.seed = self.seed.wrapping_add(1);
+        let auth = settings.auth.map(|auth| Auth {
+            epoch: self.seed,
+            ..auth
+        });
+        let settings = Settings { auth, ..settings };
+        Watched::new(self.mission, index, settings, self.seed, self.now)
+    }
+
+    fn operate(&mut self, input: &mut Input<'_>) {
+        let at = usize::from(input.byte()) % self.members.len().max(1);
+        match input.below(15) {
+            0 | 1 => self.deliver(at),
+            2 => {
+                self.take(at);
+            }
+            3 => self.double(at),
+            4 => self.put_back(at),
+            5 => self.damage(at, input),
+            6 => self.cut(at, input),
+            7 => self.noise(at, input),
+            8 => self.pass(Duration::from_millis(u64::from(input.word()))),
+            9 => self.wake(),
+            10 => self.restart(),
+            11 => self.reboot(at),
+            12 => self.sample(at, input),
+            14 => self.position(at, input),
+            _ => {
+                for _ in 0..=input.below(MOST_ROUNDS) {
+                    self.round();
+                }
+            }
+        }
+    }
+
+    fn take(&mut self, at: usize) -> Option<Sent> {
+        self.members.get_mut(at)?.arriving.pop_front()
+    }
+
+    /// The oldest frame that is under way to a relay arrives.
+    fn deliver(&mut self, at: usize) {
+        if let Some(frame) = self.take(at) {
+            self.arrive(at, frame.port, &frame.bytes);
+        }
+    }
+
+    fn arrive(&mut self, at: usize, port: Port, bytes: &[u8]) {
+        if let Some(member) = self.members.get_mut(at) {
+            member.watched.bytes(self.now, port, bytes);
+        }
+        self.settle(at);
+    }
+
+    fn double(&mut self, at: usize) {
+        if let Some(member) = self.members.get_mut(at)
+            && let Some(first) = member.arriving.front().cloned()
+        {
+            member.arriving.push_back(first);
+        }
+    }
+
+    /// The oldest frame is overtaken by all others.
+    fn put_back(&mut self, at: usize) {
+        if let Some(member) = self.members.get_mut(at)
+            && let Some(first) = member.arriving.pop_front()
+        {
+            member.arriving.push_back(first);
+        }
+    }
+
+    /// The oldest frame arrives with one byte changed.
+    fn damage(&mut self, at: usize, input: &mut Input<'_>) {
+        let (place, change) = (usize::from(input.byte()), input.byte());
+        if let Some(mut frame) = self.take(at) {
+            let len = frame.bytes.len();
+            if let Some(byte) = frame.bytes.get_mut(place % len.max(1)) {
+                *byte ^= change;
+            }
+            self.arrive(at, frame.port, &frame.bytes);
+        }
+    }
+
+    /// The oldest frame arrives in two pieces, the second only if it is not lost.
+    fn cut(&mut self, at: usize, input: &mut Input<'_>) {
+        let (place, lost) = (usize::from(input.byte()), input.flag());
+        if let Some(frame) = self.take(at) {
+            let cut = place % frame.bytes.len().max(1);
+            let (first, second) = frame.bytes.split_at_checked(cut).unwrap_or_default();
+            self.arrive(at, frame.port, first);
+            if !lost {
+                self.arrive(at, frame.port, second);
+            }
+        }
+    }
+
+    fn noise(&mut self, at: usize, input: &mut Input<'_>) {
+        let port = match (self.members.get(at), input.flag()) {
+            (Some(member), _) if member.settings.wiring == Wiring::Shared => Port::Shared,
+            (_, true) => Port::Upstream,
+            (_, false) => Port::Downstream,
+        };
+        self.arrive(at, port, input.piece());
+    }
+
+    fn pass(&mut self, span: Duration) {
+        self.now = self.now + span;
+        self.settle_all();
+    }
+
+    /// Time passes until a relay wants to be called.
+    fn wake(&mut self) {
+        let next = self
+            .members
+            .iter()
+            .filter_map(|member| member.watched.relay().poll_timeout())
+            .min();
+        self.now = self.now.max(next.unwrap_or(self.now));
+        self.settle_all();
+    }
+
+    /// All that is under way arrives as it was sent; with nothing under way, time passes.
+    fn round(&mut self) {
+        if self.members.iter().all(|member| member.arriving.is_empty()) {
+            self.wake();
+        }
+        for at in 0..self.members.len() {
+            self.deliver(at);
+        }
+    }
+
+    fn leader(&self) -> usize {
+        usize::from(self.mission.leader()).saturating_sub(1)
+    }
+
+    fn restart(&mut self) {
+        // Only who leads has something to begin.
+        for member in &mut self.members {
+            member.watched.restart(self.now);
+        }
+        self.settle_all();
+    }
+
+    /// A relay is switched off and on. What is under way to it stays there.
+    fn reboot(&mut self, at: usize) {
+        let Some(settings) = self.members.get(at).map(|member| member.settings) else {
+            return;
+        };
+        let index = u16::try_from(at).unwrap_or(0) + 1;
+        let Some(watched) = self.switched_on(index, settings) else {
+            return;
+        };
+        if let Some(member) = self.members.get_mut(at) {
+            member.watched = watched;
+        }
+        // If it leads it numbers its passes from somewhere else, perhaps from where it was before; and views are counted anew
+        // where most have forgotten them.
+        for member in &mut self.members {
+            member.watched.forget_pass();
+        }
+        self.settle(at);
+    }
+
+    /// A relay finds out where it is.
+    fn position(&mut self, at: usize, input: &mut Input<'_>) {
+        let distance_m = self.mission.config().distance_m;
+        let place = Placement {
+            x_m: input.even(0.0, distance_m),
+            altitude_m: input.scaled(0.1, 1e5),
+        };
+        if let Some(member) = self.members.get_mut(at) {
+            member.watched.position(self.now, self.now, place);
+        }
+        self.settle(at);
+    }
+
+    fn sample(&mut self, at: usize, input: &mut Input<'_>) {
+        let power_w = input.scaled(1e-30, 1e6);
+        let other_w = power_w * input.even(0.0, 1.0);
+        let Some(member) = self.members.get_mut(at) else {
+            return;
+        };
+        for power_w in [power_w, other_w] {
+            let sample = Sample::Interference { power_w };
+            member.watched.sample(sample, 64);
+        }
+        self.settle(at);
+    }
+
+    fn settle_all(&mut self) {
+        for at in 0..self.members.len() {
+            self.settle(at);
+        }
+    }
+
+    /// Drains a relay into the links, and looks at how far it is from its neighbours.
+    fn settle(&mut self, at: usize) {
+        let now = self.now;
+        let Some(member) = self.members.get_mut(at) else {
+            return;
+        };
+        let (sent, _) = member.watched.settle(now);
+        for frame in sent {
+            self.send(at, &frame);
+        }
+        self.look_at_place(at);
+        self.look_at_separation(at);
+        self.look_at_separation(at + 1);
+    }
+
+    /// Puts a frame on its way: to one neighbour, or on a shared channel to everybody.
+    fn send(&mut self, from: usize, frame: &Sent) {
+        for (at, member) in self.members.iter_mut().enumerate() {
+            let port = match frame.port {
+                Port::Upstream if at + 1 == from => Port::Downstream,
+                Port::Downstream if at == from + 1 => Port::Upstream,
+                Port::Shared if at != from => Port::Shared,
+                _ => continue,
+            };
+            if member.arriving.len() >= MOST_UNDER_WAY {
+                member.arriving.pop_front();
+            }
+            let bytes = frame.bytes.clone();
+            member.arriving.push_back(Sent { port, bytes });
+        }
+    }
+
+    /// Where nobody lies, each relay before one in its view is before it in the mission, and as for those after it.
+    fn look_at_place(&self, at: usize) {
+        if let Some(member) = self.members.get(at) {
+            let relay = member.watched.relay();
+            let (before, after) = (at + 1, self.members.len() - at);
+            let (index, left) = (usize::from(relay.index()), relay.mission().relays());
+            let behind = usize::from(left) + 1 - index;
+            assert!(
+                index <= before && behind <= after,
+                "relay {before} is {index} of {left}"
+            );
+        }
+    }
+
+    /// Relay `at` (from 0) and the one before it, where both hold places of the same pass.
+    fn look_at_separation(&self, at: usize) {
+        let (Some(before), Some(after)) = (
+            at.checked_sub(1)
+                .and_then(|before| self.members.get(before)),
+            self.members.get(at),
+        ) else {
+            return;
+        };
+        let held = before.watched.held();
+        if held.is_none() || held != after.watched.held() {
+            return;
+        }
+        let places = (
+            before.watched.relay().agreed(),
+            after.watched.relay().agreed(),
+        );
+        if let (Some(from), Some(to)) = places {
+            let config = self.mission.config();
+            let least = f64::from(config.min_separation_m);
+            let rounding = ROUNDING * f64::from(config.distance_m);
+            let apart = distance(from, to);
+            assert!(
+                apart >= least - rounding,
+                "{from:?} and {to:?} are {apart} m apart"
+            );
+            assert!(to.x_m >= from.x_m, "{from:?} and {to:?} in the wrong order");
+        }
+    }
+}
+
+fn distance(one: Placement, other: Placement) -> f64 {
+    let step = f64::from(other.x_m) - f64::from(one.x_m);
+    let climb = f64::from(other.altitude_m) - f64::from(one.altitude_m);
+    step.hypot(climb)
+}

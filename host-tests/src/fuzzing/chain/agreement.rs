@@ -1,0 +1,59 @@
+//! From any state to one agreement of all, once nothing is lost any more.
+
+use uav_relay::{Phase, Schedule};
+
+use super::{Chain, Member};
+
+/// Wake-ups and deliveries that a chain may take to agree once nothing is lost any more: 24 passes of 4 relays, each in 65
+/// portions, and before that a few minutes of probation, with a few dozen hails a second.
+const PATIENCE: usize = 20_000;
+
+impl Chain {
+    /// From now on nothing is lost: all of the chain must agree in one view, or its leader find that it cannot.
+    pub(super) fn agree(&mut self) {
+        let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
+        if self.members.iter().any(fixed) {
+            // Ten thousand sweeps are a schedule too, but take too long here.
+            return;
+        }
+        for member in &mut self.members {
+            member.arriving.clear();
+        }
+        self.restart();
+        for _ in 0..PATIENCE {
+            self.round();
+            if self.has_agreed() {
+                return;
+            }
+        }
+        let states: Vec<_> = self.members.iter().map(state).collect();
+        unreachable!("the chain never agrees: {states:?} at {:?}", self.now);
+    }
+
+    fn has_agreed(&self) -> bool {
+        let leader = self.members.get(self.leader());
+        if leader.is_some_and(|leader| phase(leader) == Phase::Infeasible) {
+            return true;
+        }
+        let quiet = self.members.iter().all(|member| member.arriving.is_empty());
+        let target = leader.and_then(|leader| leader.watched.relay().target());
+        quiet
+            && self.members.iter().all(|member| {
+                phase(member) == Phase::Holding
+                    && member.watched.relay().mission().relays() == self.mission.relays()
+                    && member.watched.relay().target().map(f32::to_bits) == target.map(f32::to_bits)
+            })
+    }
+}
+
+fn phase(member: &Member) -> Phase {
+    member.watched.relay().phase()
+}
+
+/// Phase, view, place in it, its size, and neighbours: what a failure shows.
+fn state(member: &Member) -> (Phase, u16, u16, u16, [Option<u16>; 2]) {
+    let relay = member.watched.relay();
+    let left = relay.mission().relays();
+    let (view, index) = (relay.view(), relay.index());
+    (relay.phase(), view, index, left, relay.neighbours())
+}

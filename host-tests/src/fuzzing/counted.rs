@@ -1,0 +1,71 @@
+//! The counters of a relay, taken together.
+
+use uav_relay::Stats;
+
+/// Frames with the right check sequence: each is counted in one of these.
+pub const fn intact(stats: &Stats) -> u32 {
+    stats.received
+        + stats.overheard
+        + stats.version
+        + stats.hellos
+        + stats.malformed
+        + stats.foreign
+        + stats.misaddressed
+        + stats.unsigned
+        + stats.forged
+        + stats.replayed
+}
+
+/// Every counter, in the order of [`Stats`].
+pub const fn all(stats: &Stats) -> [u32; 23] {
+    let Stats {
+        sent,
+        repeats,
+        sweeps,
+        received,
+        repeated,
+        overheard,
+        oversized,
+        truncated,
+        crc,
+        version,
+        hellos,
+        unsigned,
+        forged,
+        replayed,
+        malformed,
+        foreign,
+        misaddressed,
+        misdirected,
+        mission,
+        view,
+        views,
+        stale,
+        samples_refused,
+    } = *stats;
+    [
+        sent,
+        repeats,
+        sweeps,
+        received,
+        repeated,
+        overheard,
+        oversized,
+        truncated,
+        crc,
+        version,
+        hellos,
+        unsigned,
+        forged,
+        replayed,
+        malformed,
+        foreign,
+        misaddressed,
+        misdirected,
+        mission,
+        view,
+        views,
+        stale,
+        samples_refused,
+    ]
+}

@@ -1,0 +1,262 @@
+//! Any bytes behind a good check sequence: what can be read can be written, and is then the same.
+
+use uav_relay::mission::MAX_RELAYS;
+use uav_relay::wire::auth::TAG;
+use uav_relay::wire::deframe::{DeframeError, Deframer};
+use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};
+use uav_relay::wire::message::Message;
+use uav_relay::{Identity, Instant, Port, Relay, Stats};
+
+use super::cobs::stuffed;
+use super::input::Input;
+use super::member::Member;
+use super::message::{Header, sealed};
+use super::setting;
+use super::watch::NETWORK;
+
+/// Bytes of the check sequence.
+const CHECK: usize = 4;
+
+/// What a chain that signs its frames has as the byte of its method.
+const SIGNS: u8 = 8;
+
+/// Takes `data` for the header and the body of a frame, adds the CRC and COBS, and reads it.
+///
+/// # Panics
+/// Where the frame does not come out as it went in, a flipped bit goes unseen, a message does not have one encoding, or
+/// has a number that no message may have.
+pub fn frame(data: &[u8]) {
+    let mut plain = data.to_vec();
+    sealed(&mut plain);
+    let wire = stuffed(&plain);
+    comes_through(&plain, &wire);
+    flipped(&plain);
+    taken_apart(&plain);
+    signed(&plain);
+    let Ok((header, message)) = frame::decode(&plain) else {
+        return;
+    };
+    look_at(&message);
+    let mut again = [0; MAX_FRAME];
+    let len = frame::encode(header, &message, &mut again);
+    if header.sender > MAX_NODE || header.destination > MAX_NODE {
+        assert_eq!(len, 0, "nobody writes to 4095");
+        return;
+    }
+    // Written again, a frame that had a tag has none.
+    let mut bare = plain.clone();
+    if frame::open(&bare).is_ok_and(|opened| opened.tag.is_some()) {
+        bare.truncate(bare.len() - TAG - CHECK);
+        if let Some(flags) = bare.get_mut(3) {
+            *flags &= 0x0F;
+        }
+        sealed(&mut bare);
+    }
+    assert_eq!(again.get(..len), Some(&*stuffed(&bare)), "{message:?}");
+    let written = again.get(..len).unwrap_or_default();
+    assert_eq!(written.iter().position(|&byte| byte == 0), Some(len - 1));
+}
+
+/// An intact frame comes apart as the format has it.
+fn taken_apart(plain: &[u8]) {
+    let opened = frame::open(plain);
+    let (Some(checked), Some(&[_, first, _, second])) = (
+        plain.len().checked_sub(CHECK),
+        plain
+            .first_chunk()
+            .filter(|_| plain.len() >= HEADER + CHECK),
+    ) else {
+        return assert_eq!(opened, Err(FrameError::Short));
+    };
+    let (version, flags) = (first >> 4, second >> 4);
+    if version != VERSION || ![0, 1, 3].contains(&flags) {
+        return assert_eq!(opened, Err(FrameError::Version));
+    }
+    let tag = if flags == 0 { 0 } else { TAG };
+    let Some(ends) = checked.checked_sub(tag).filter(|&ends| ends >= HEADER) else {
+        return assert_eq!(opened, Err(FrameError::Short));
+    };
+    let Ok(opened) = opened else {
+        unreachable!("{opened:?}");
+    };
+    assert_eq!(Some(opened.body), plain.get(HEADER..ends));
+    assert_eq!(Some(opened.signed), plain.get(..ends));
+    let told = plain.get(ends..checked).filter(|_| tag > 0);
+    assert_eq!(opened.tag.as_ref().map(|tag| &tag[..]), told);
+    assert_eq!(opened.hello, flags == 3);
+}
+
+/// The body behind the right addresses and the right tag counts as what it is, at a relay that asks for tags, and once; a
+/// flipped bit of it is a forgery.
+fn signed(plain: &[u8]) {
+    let body = plain.get(HEADER..plain.len() - CHECK).unwrap_or_default();
+    let Some(Met {
+        mut relay,
+        mut member,
+    }) = met()
+    else {
+        return;
+    };
+    let header = Header {
+        network: NETWORK,
+        sender: 1,
+        destination: 2,
+    };
+    let right = member.signed(header, body);
+    if right.len() > MAX_DECODED {
+        return;
+    }
+    let mut altered = right.clone();
+    altered.truncate(right.len() - CHECK);
+    let bits = 8 * (altered.len() - HEADER);
+    let chosen = plain.last().map_or(0, |&byte| usize::from(byte)) % bits;
+    if let Some(byte) = altered.get_mut(HEADER + chosen / 8) {
+        *byte ^= 1 << (chosen % 8);
+    }
+    sealed(&mut altered);
+    let (before, now) = (*relay.stats(), Instant::ZERO);
+    for plain in [&altered, &right, &right] {
+        relay.handle_bytes(now, Port::Upstream, &stuffed(plain));
+    }
+    let mut expected = Stats {
+        forged: before.forged + 1,
+        replayed: before.replayed + 1,
+        ..before
+    };
+    if Message::decode(body).is_ok() {
+        expected.received += 1;
+    } else {
+        expected.malformed += 1;
+    }
+    // What a message does is for other targets to look at.
+    let after = Stats {
+        mission: before.mission,
+        view: before.view,
+        stale: before.stale,
+        misdirected: before.misdirected,
+        repeated: before.repeated,
+        sweeps: before.sweeps,
+        ..*relay.stats()
+    };
+    assert_eq!(after, expected);
+}
+
+/// Relay 2 of 3 that asks for tags, and its neighbour upstream, who have met.
+#[derive(Clone)]
+struct Met {
+    relay: Relay,
+    member: Member,
+}
+
+fn met() -> Option<Met> {
+    thread_local! {
+        static MET: Option<Met> = meet();
+    }
+    MET.with(Clone::clone)
+}
+
+fn meet() -> Option<Met> {
+    let mut input = Input::new(&[0, 2, SIGNS]);
+    let mission = setting::mission(&mut input, 3)?;
+    let settings = setting::of_chain(&mut input, &mission);
+    let identity = Identity {
+        network: NETWORK,
+        index: 2,
+    };
+    let now = Instant::ZERO;
+    let mut relay = Relay::new(mission, identity, settings, 1, now).ok()?;
+    let mut hello = [0; MAX_FRAME];
+    let transmit = relay.poll_transmit(now, &mut hello)?;
+    let mut member = Member::greeted(hello.get(..transmit.len)?)?;
+    let header = Header {
+        network: NETWORK,
+        sender: 1,
+        destination: 2,
+    };
+    relay.handle_bytes(now, Port::Upstream, &stuffed(&member.hello(header)));
+    assert_eq!(relay.stats().rejected(), 0);
+    Some(Met { relay, member })
+}
+
+fn comes_through(plain: &[u8], wire: &[u8]) {
+    let mut deframer = Deframer::new();
+    for &byte in wire {
+        let outcome = deframer.push(byte);
+        if byte != 0 {
+            assert_eq!(outcome, None);
+        } else if plain.len() > MAX_DECODED {
+            assert_eq!(outcome, Some(Err(DeframeError::Oversized)));
+        } else {
+            assert_eq!(outcome, Some(Ok(plain)));
+        }
+    }
+}
+
+/// One bit of the frame, which its own check sequence chooses, arrives flipped.
+fn flipped(plain: &[u8]) {
+    let mut plain = plain.to_vec();
+    let bits = plain.len() * 8;
+    let chosen = plain
+        .last_chunk()
+        .map_or(0, |chunk| u32::from_le_bytes(*chunk) as usize % bits);
+    if let Some(byte) = plain.get_mut(chosen / 8) {
+        *byte ^= 1 << (chosen % 8);
+    }
+    let refusal = if plain.len() < 14 {
+        FrameError::Short
+    } else {
+        FrameError::Crc
+    };
+    assert_eq!(frame::decode(&plain), Err(refusal));
+}
+
+/// What follows from the ranges of a message.
+fn look_at(message: &Message<'_>) {
+    match message {
+        Message::Sweep(sweep) => {
+            let targets = sweep.ladder.targets();
+            assert_eq!(targets.len(), sweep.ladder.len());
+            let rising = targets.is_sorted();
+            assert!(
+                rising && targets.iter().all(|&sir| is_target(sir)),
+                "{targets:?}"
+            );
+            assert!(sweep.reaches.len() <= targets.len());
+            assert!(sweep.profile.is_valid());
+        }
+        Message::Wave(wave) => {
+            let rungs = 0..wave.rungs.count();
+            assert!(rungs.map(|at| wave.rungs.target(at)).all(is_target));
+            let pairs = usize::from(wave.rungs.count()) * usize::from(wave.levels.count());
+            assert_eq!(wave.reaches.len(), 3 * pairs);
+        }
+        Message::Token(token) => {
+            assert!(token.place.x_m.is_finite() && token.place.altitude_m > 0.0);
+        }
+        Message::Moved(moved) => {
+            assert!(moved.place.x_m.is_finite() && moved.place.altitude_m > 0.0);
+        }
+        Message::Verdict(answer) => {
+            assert!(answer.verdict.slacks.iter().all(|slack| slack.is_finite()));
+        }
+        Message::Hail(hail) => assert!(hail.neighbour <= MAX_RELAYS, "{hail:?}"),
+        Message::Roster(roster) => {
+            let there = 1..=MAX_RELAYS;
+            assert!(there.contains(&roster.place), "{roster:?}");
+            assert!(there.contains(&roster.before.relays), "{roster:?}");
+        }
+        Message::Count(count) => {
+            let there = 1..=MAX_RELAYS;
+            assert!(there.contains(&count.place), "{count:?}");
+            assert!(count.relays.is_none_or(|relays| there.contains(&relays)));
+        }
+        Message::Fence { fence, .. } => {
+            assert!(fence.tie != 0 && fence.x_m.abs() <= 1e7 && fence.target_m.abs() <= 1e7);
+        }
+        Message::Busy { .. } | Message::Heartbeat { .. } | Message::Trace(_) => {}
+    }
+}
+
+fn is_target(sir: f32) -> bool {
+    (f32::MIN_POSITIVE..=f32::MAX).contains(&sir)
+}

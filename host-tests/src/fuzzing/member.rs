@@ -1,0 +1,124 @@
+//! A neighbour that has the network's key: it says hello, and signs whatever it is to say, however mad.
+//!
+//! Written from the format, not by the crate. A hello holds the relay's nonce and its neighbour's as far as it knows that, 8
+//! bytes each, the low byte first, and whether it asks for an answer.
+
+use blake2::Blake2sMac;
+use blake2::digest::consts::U8;
+use blake2::digest::{FixedOutput, Mac};
+use uav_relay::wire::deframe::Deframer;
+use uav_relay::wire::frame::{self, Opened};
+
+use super::message::{Header, sealed};
+use super::setting::KEY;
+
+/// Flag: a tag follows the body.
+const SIGNED: u16 = 0x1000;
+
+/// Flag: the body is a hello.
+const HELLO: u16 = 0x2000;
+
+/// Bytes of a nonce.
+const NONCE: usize = 8;
+
+/// Bytes of a hello's body.
+const TOLD: usize = 2 * NONCE + 1;
+
+/// One neighbour of one relay.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Member {
+    key: [u8; 32],
+    /// Its own nonce, larger after every start.
+    own: Vec<u8>,
+    /// The relay's.
+    relay: Vec<u8>,
+    counter: u32,
+}
+
+impl Member {
+    /// A neighbour that has heard the relay's hello, if `frame`, as it was sent, is one.
+    pub fn greeted(frame: &[u8]) -> Option<Self> {
+        let mut deframer = Deframer::new();
+        let mut ended = None;
+        for &byte in frame {
+            if let Some(Ok(plain)) = deframer.push(byte) {
+                ended = hello_in(plain);
+            }
+        }
+        let body = ended.filter(|body| body.len() == TOLD)?;
+        Some(Self {
+            key: KEY,
+            own: raised(&[0; NONCE]),
+            relay: body.get(..NONCE)?.to_vec(),
+            counter: 0,
+        })
+    }
+
+    /// As it is after its next start.
+    pub fn restarted(&self) -> Self {
+        Self {
+            own: raised(&self.own),
+            counter: 0,
+            ..self.clone()
+        }
+    }
+
+    /// The same, with another key.
+    pub fn stranger(&self) -> Self {
+        let mut other = self.clone();
+        for byte in &mut other.key {
+            *byte ^= 1;
+        }
+        other
+    }
+
+    /// Its next frame, signed: header, body, tag and CRC before COBS.
+    pub fn signed(&mut self, header: Header, body: &[u8]) -> Vec<u8> {
+        let relay = self.relay.clone();
+        self.frame(header, SIGNED, &relay, body)
+    }
+
+    /// Its hello, before COBS. It asks for nothing.
+    pub fn hello(&mut self, header: Header) -> Vec<u8> {
+        let body = [&*self.own, &*self.relay, &[0]].concat();
+        let to = self.relay.clone();
+        self.frame(header, SIGNED | HELLO, &to, &body)
+    }
+
+    fn frame(&mut self, header: Header, flags: u16, to: &[u8], body: &[u8]) -> Vec<u8> {
+        let mut plain = header.before(flags, self.counter, body);
+        self.counter += 1;
+        let tag = self.tag(to, &plain);
+        plain.extend_from_slice(&tag);
+        sealed(&mut plain);
+        plain
+    }
+
+    /// Keyed BLAKE2s over the nonces of both ends and what is signed, cut to eight bytes.
+    fn tag(&self, to: &[u8], signed: &[u8]) -> [u8; 8] {
+        let Ok(mut mac) = Blake2sMac::<U8>::new_from_slice(&self.key) else {
+            unreachable!("a key of 32 bytes");
+        };
+        mac.update(&self.own);
+        mac.update(to);
+        mac.update(signed);
+        mac.finalize_fixed().into()
+    }
+}
+
+/// The body of `plain`, if that is a hello.
+fn hello_in(plain: &[u8]) -> Option<Vec<u8>> {
+    let Opened { body, hello, .. } = frame::open(plain).ok()?;
+    hello.then(|| body.to_vec())
+}
+
+/// One more, the low byte first.
+fn raised(number: &[u8]) -> Vec<u8> {
+    let mut carry = true;
+    let up = number.iter().map(|&byte| {
+        let (sum, over) = byte.overflowing_add(u8::from(carry));
+        carry = over;
+        sum
+    });
+    up.collect()
+}

@@ -1,0 +1,346 @@
+//! Frames with a body of every kind and fuzzed numbers in it, right in everything else: what a mad neighbour may say.
+//!
+//! Bodies are written from the byte tables, not by the crate: what the crate would never write must come too.
+
+use uav_relay::wire::crc::Crc32c;
+
+use super::input::Input;
+
+/// What a neighbour may know of the relay it talks to.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Known {
+    /// Digest of its mission.
+    pub digest: u16,
+    /// Number of the view that it has agreed to.
+    pub view: u16,
+    /// Number of its current pass.
+    pub number: u16,
+    /// Number of the talk that its last fence was of, 0 for none.
+    pub tie: u16,
+    /// D, m.
+    pub distance_m: f32,
+}
+
+/// Who sends a frame to whom, as words: what stands in the top bits of an address goes on the wire too.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Header {
+    /// The network.
+    pub network: u16,
+    /// The sender, and above it the version less 1.
+    pub sender: u16,
+    /// The destination, and above it flags.
+    pub destination: u16,
+}
+
+impl Header {
+    /// The bytes of a frame before the tag and the check sequence, with some flags more.
+    pub fn before(self, flags: u16, counter: u32, body: &[u8]) -> Vec<u8> {
+        let mut plain = Vec::with_capacity(22 + body.len());
+        for word in [
+            1 << 12 | self.sender,
+            flags | self.destination,
+            self.network,
+        ] {
+            plain.extend_from_slice(&word.to_le_bytes());
+        }
+        plain.extend_from_slice(&counter.to_le_bytes());
+        plain.extend_from_slice(body);
+        plain
+    }
+
+    /// A frame without a tag, before COBS.
+    pub fn unsigned(self, body: &[u8]) -> Vec<u8> {
+        let mut plain = self.before(0, 0, body);
+        sealed(&mut plain);
+        plain
+    }
+}
+
+/// Adds the check sequence.
+pub fn sealed(plain: &mut Vec<u8>) {
+    let mut crc = Crc32c::new();
+    crc.update(plain);
+    plain.extend_from_slice(&crc.finish().to_le_bytes());
+}
+
+/// A body of any of the thirteen kinds, or of none.
+pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
+    let tag = input.below(15);
+    let mut body = Body {
+        bytes: vec![tag],
+        input,
+        known,
+    };
+    match tag {
+        0 => body.sweep(false),
+        1 => body.verdict(),
+        2 => body.number(),
+        3 => {
+            body.digest();
+            body.small(0, 1);
+        }
+        4 => body.sweep(true),
+        5 => body.wave(),
+        6 => body.trace(),
+        7 => body.token(),
+        8 => body.moved(),
+        9 => body.hail(),
+        10 => body.roster(),
+        11 => body.count(),
+        12 => body.fence(),
+        _ => body.bytes = body.input.piece().to_vec(),
+    }
+    body.bytes
+}
+
+/// A body being written.
+struct Body<'a, 'b> {
+    bytes: Vec<u8>,
+    input: &'a mut Input<'b>,
+    known: &'a Known,
+}
+
+impl Body<'_, '_> {
+    /// The current pass, the next, one before, or any.
+    fn number(&mut self) {
+        let number = match self.input.byte() {
+            0..96 => self.known.number.wrapping_add(1),
+            96..192 => self.known.number,
+            behind @ 192..248 => self.known.number.wrapping_sub(u16::from(behind - 190)),
+            _ => self.input.word(),
+        };
+        self.bytes.extend_from_slice(&number.to_le_bytes());
+    }
+
+    fn digest(&mut self) {
+        let wrong = u16::from(self.input.byte() == u8::MAX);
+        self.word(self.known.digest ^ wrong);
+    }
+
+    fn word(&mut self, word: u16) {
+        self.bytes.extend_from_slice(&word.to_le_bytes());
+    }
+
+    /// Of a pass of the relay's view, or, rarely, of another one.
+    fn pass(&mut self) {
+        self.number();
+        let view = match self.input.byte() {
+            u8::MAX => self.input.word(),
+            up @ 240.. => self.known.view.wrapping_add(u16::from(up - 240)),
+            _ => self.known.view,
+        };
+        self.word(self.known.digest.wrapping_add(view));
+    }
+
+    /// The number of a view: the relay's, one of the next, or any.
+    fn view(&mut self) {
+        let view = match self.input.byte() {
+            up @ 0..224 => self.known.view.wrapping_add(u16::from(up % 4)),
+            down @ 224..248 => self.known.view.wrapping_sub(u16::from(down - 223)),
+            _ => self.input.word(),
+        };
+        self.word(view);
+    }
+
+    /// A relay of a short chain, or any.
+    fn relay(&mut self) {
+        let relay = match self.input.byte() {
+            small @ 0..240 => u16::from(small % 6),
+            _ => self.input.word(),
+        };
+        self.word(relay);
+    }
+
+    fn float(&mut self, usual: impl FnOnce(&mut Input<'_>) -> f32) -> f32 {
+        let number = self.input.mostly(usual);
+        self.bytes.extend_from_slice(&number.to_le_bytes());
+        number
+    }
+
+    /// A byte from `least` to `most`, rarely any.
+    fn small(&mut self, least: u8, most: u8) -> u8 {
+        let byte = self.input.byte();
+        let small = if byte < 240 {
+            least + byte % (most - least + 1)
+        } else {
+            self.input.byte()
+        };
+        self.bytes.push(small);
+        small
+    }
+
+    fn profile(&mut self) {
+        self.altitude();
+        self.power();
+    }
+
+    fn altitude(&mut self) {
+        self.float(|input| input.scaled(0.1, 1e5));
+    }
+
+    fn power(&mut self) {
+        self.float(|input| input.scaled(1e-6, 1e6));
+    }
+
+    fn sir(&mut self) {
+        self.float(|input| input.scaled(1e-6, 1e6));
+    }
+
+    fn place(&mut self) {
+        let distance_m = self.known.distance_m;
+        self.float(|input| input.even(0.0, distance_m));
+    }
+
+    /// A list of floats with its count: one number over and over, or each its own.
+    fn list(&mut self, most: u8, low: f32, high: f32) {
+        let count = self.small(0, most);
+        let same = self.input.flag();
+        let first = self.input.mostly(|input| input.even(low, high));
+        for at in 0..count {
+            if same || at == 0 {
+                self.bytes.extend_from_slice(&first.to_le_bytes());
+            } else {
+                self.float(|input| input.even(low, high));
+            }
+        }
+    }
+
+    fn sweep(&mut self, measured: bool) {
+        self.pass();
+        self.sir();
+        let single = self.input.flag();
+        let (gap, growth) = if single {
+            (0, 0)
+        } else {
+            (self.input.byte(), self.input.byte())
+        };
+        self.bytes.extend_from_slice(&[gap, growth]);
+        self.profile();
+        if measured {
+            self.float(|input| input.scaled(1e-9, 1e32));
+        }
+        let distance_m = self.known.distance_m;
+        self.list(if single { 1 } else { 16 }, 0.0, distance_m);
+    }
+
+    fn verdict(&mut self) {
+        self.pass();
+        if self.small(0, 1) == 1 {
+            self.small(0, 15);
+        }
+        let distance_m = self.known.distance_m;
+        self.list(16, -distance_m, distance_m);
+    }
+
+    fn wave(&mut self) {
+        self.pass();
+        self.sir();
+        self.float(|input| input.scaled(1e-6, 1e6));
+        let targets = self.small(1, 16);
+        self.altitude();
+        self.float(|input| input.even(0.0, 1e3));
+        let levels = self.small(1, 64);
+        self.power();
+        let pairs = u16::from(targets) * u16::from(levels);
+        let len = 3 * pairs.min(64);
+        let [low, high] = len.to_le_bytes();
+        if len < 128 {
+            self.bytes.push(low);
+        } else {
+            // A varint of two bytes.
+            self.bytes.push(low | 0x80);
+            self.bytes.push(high << 1 | low >> 7);
+        }
+        let place = [self.input.byte(), self.input.byte(), self.input.byte()];
+        let same = self.input.flag();
+        for at in 0..pairs.min(64) {
+            let place = if same || at == 0 {
+                place
+            } else {
+                [0, self.input.byte(), self.input.byte()]
+            };
+            self.bytes.extend_from_slice(&place);
+        }
+    }
+
+    fn trace(&mut self) {
+        self.pass();
+        if self.small(0, 1) == 1 {
+            self.small(0, 15);
+            self.small(0, 63);
+        }
+    }
+
+    fn token(&mut self) {
+        self.pass();
+        self.place();
+        self.altitude();
+        self.power();
+        if self.small(0, 2) == 2 {
+            self.float(|input| input.even(0.0, 1e3));
+            let grid = if self.input.flag() {
+                [2 + self.input.below(16), 2 + self.input.below(16)]
+            } else {
+                [0, 0]
+            };
+            self.bytes.extend_from_slice(&grid);
+        } else {
+            self.bytes.extend_from_slice(&[0; 6]);
+        }
+        self.sir();
+    }
+
+    fn hail(&mut self) {
+        self.view();
+        self.digest();
+        self.relay();
+        self.bytes.extend_from_slice(&[0; 4]);
+        self.small(0, 15);
+    }
+
+    fn roster(&mut self) {
+        self.view();
+        self.digest();
+        self.relay();
+        self.relay();
+        self.view();
+        self.small(0, 1);
+    }
+
+    fn count(&mut self) {
+        self.view();
+        self.digest();
+        self.relay();
+        self.relay();
+        self.bytes.extend_from_slice(&[0; 3]);
+    }
+
+    fn fence(&mut self) {
+        self.tie();
+        self.digest();
+        self.tie();
+        self.relay();
+        let distance_m = self.known.distance_m;
+        for _ in 0..2 {
+            self.float(|input| input.even(-distance_m, 2.0 * distance_m));
+        }
+    }
+
+    /// The number of the relay's own talk on that side, a small one, or any.
+    fn tie(&mut self) {
+        let word = match self.input.byte() {
+            small @ 0..96 => u16::from(small),
+            96..192 => self.known.tie,
+            _ => self.input.word(),
+        };
+        self.word(word);
+    }
+
+    fn moved(&mut self) {
+        self.pass();
+        self.place();
+        self.altitude();
+        self.small(0, 1);
+        self.sir();
+    }
+}

@@ -1,0 +1,230 @@
+//! A mission and the settings of a relay, from a fuzzer's bytes: within the ranges the crate takes, up to their ends.
+
+use uav_relay::channel::AirGround;
+use uav_relay::guard::confines::Confines;
+use uav_relay::wire::auth::{Auth, Key};
+use uav_relay::{
+    Adjust, Band, Channel, Duration, Field, FieldPoint, Interference, Interferer, Local, Measure,
+    Method, Mission, MissionConfig, Profile, Schedule, Settings, Wiring,
+};
+
+use super::input::Input;
+
+/// Fields, made once: one lives as long as the program.
+const EVEN: Field = Field::new(&[at(0.0, 1e8)]);
+const UNEVEN: Field = Field::new(&[at(0.0, 4.2e5), at(600.0, 3.75e5), at(1000.0, 4.4e5)]);
+const STEEP: Field = Field::new(&[at(100.0, 1e7), at(300.0, 1e10), at(310.0, 1e6)]);
+const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
+
+/// The key of every network here.
+pub const KEY: [u8; 32] = *b"known to whoever reads this line";
+
+const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
+    FieldPoint { x_m, upsilon_per_w }
+}
+
+/// A mission of at most `most` relays. `None` where they do not fit on the distance, or the bytes ask for what a mission refuses.
+///
+/// Half of the missions are the paper's with little changed: a few bytes get a relay far there. The other half draws every
+/// number from the whole of its range.
+pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
+    let kind = input.below(12);
+    let relays = u16::from(input.below(most.max(1))) + 1;
+    let config = if kind < 6 {
+        tame(kind, relays)?
+    } else {
+        wild(input, kind, relays)?
+    };
+    Mission::try_new(config).ok()
+}
+
+/// The paper's scenario, changed in one respect.
+fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
+    let paper = MissionConfig {
+        relays,
+        distance_m: 1000.0,
+        min_separation_m: 4.0,
+        tx_power_w: 80.0,
+        common: Profile {
+            altitude_m: 20.0,
+            power_w: 1.0,
+        },
+        channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).ok()?,
+        band: Band::at(20.0),
+        interference: Interference::Source(Interferer {
+            power_w: 80.0,
+            x_m: 500.0,
+            y_m: 400.0,
+        }),
+        tolerance: 1e-4,
+    };
+    Some(match kind {
+        0 => paper,
+        1 => MissionConfig {
+            band: Band {
+                least_m: 20.0,
+                most_m: 300.0,
+            },
+            ..paper
+        },
+        // As far apart as they fit.
+        2 => MissionConfig {
+            min_separation_m: 990.0 / f32::from(relays),
+            ..paper
+        },
+        3 => MissionConfig {
+            interference: Interference::Field(EVEN),
+            ..paper
+        },
+        4 => MissionConfig {
+            interference: Interference::Field(UNEVEN),
+            ..paper
+        },
+        _ => MissionConfig {
+            interference: Interference::Field(STEEP),
+            ..paper
+        },
+    })
+}
+
+/// Any mission there may be.
+fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
+    let distance_m = input.scaled(1.0, 1e6);
+    let (least_m, most_m) = {
+        let (one, other) = (input.scaled(0.1, 1e5), input.scaled(0.1, 1e5));
+        (one.min(other), one.max(other))
+    };
+    let separation = if input.flag() {
+        input.even(0.0, distance_m.min(1e5))
+    } else {
+        0.0
+    };
+    let interference = match kind {
+        6..9 => Interference::Source(interferer(input, distance_m)),
+        9 => Interference::Field(WILD),
+        10 => Interference::Field(EVEN),
+        _ => Interference::Field(STEEP),
+    };
+    Some(MissionConfig {
+        relays,
+        distance_m,
+        min_separation_m: separation,
+        tx_power_w: input.scaled(1e-6, 1e6),
+        common: Profile {
+            altitude_m: input.even(least_m, most_m),
+            power_w: input.scaled(1e-6, 1e6),
+        },
+        channel: channel(input)?,
+        band: Band { least_m, most_m },
+        interference,
+        tolerance: input.scaled(1e-6, 0.1),
+    })
+}
+
+/// On the link or far away, on its line or aside.
+fn interferer(input: &mut Input<'_>, distance_m: f32) -> Interferer {
+    let power_w = input.scaled(1e-6, 1e9);
+    let x_m = match input.below(4) {
+        0 => input.even(0.0, distance_m),
+        1 => input.even(-distance_m, 2.0 * distance_m),
+        2 => input.even(-1e7, 1e7),
+        _ => distance_m,
+    };
+    let y_m = match input.below(3) {
+        0 => 0.0,
+        1 => input.scaled(1e-3, distance_m),
+        _ => input.even(-1e7, 1e7),
+    };
+    Interferer { power_w, x_m, y_m }
+}
+
+fn channel(input: &mut Input<'_>) -> Option<Channel> {
+    let carrier_hz = f64::from(input.scaled(1e6, 1e12)).clamp(1e6, 1e12);
+    let (one, other) = (input.even(0.0, 200.0), input.even(0.0, 200.0));
+    let air_ground = match input.below(3) {
+        0 => AirGround::Los,
+        1 => AirGround::Nlos,
+        _ => AirGround::Weighted(f64::from(input.even(0.0, 1.0))),
+    };
+    let (los, nlos) = (one.min(other), one.max(other));
+    Channel::from_db(carrier_hz, los.into(), nlos.into(), air_ground).ok()
+}
+
+/// The settings of one relay of `mission`; what every relay of a chain must have in common is in `chain`.
+pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Settings {
+    let own = input.byte();
+    let profile = (own % 4 == 1).then(|| Profile {
+        altitude_m: input.scaled(0.1, 1e5),
+        power_w: input.scaled(1e-6, 1e6),
+    });
+    let measures = own / 16 % 2 == 1 && mission.field().is_some();
+    let guard = (own / 32 == 1).then(|| Confines {
+        hover_m: f32::from(input.below(4)),
+        lag: Duration::from_millis(u64::from(input.byte())),
+        ..Confines::of(mission, profile.unwrap_or(mission.config().common))
+    });
+    Settings {
+        profile,
+        guard,
+        hold_altitude: own / 4 % 4 == 1,
+        measure: measures.then(|| Measure {
+            i_max_w: input.scaled(1e-30, 1e6),
+            samples: 100 + u32::from(input.below(8)),
+        }),
+        ..chain
+    }
+}
+
+/// What all relays of a chain have in common.
+pub fn of_chain(input: &mut Input<'_>, mission: &Mission) -> Settings {
+    let how = input.byte();
+    let method = match how % 4 {
+        1 if mission.interferer().is_some() => Method::Altitude,
+        2 if mission.interferer().is_some() => Method::Adjust(adjust(input)),
+        _ => Method::Align,
+    };
+    let schedule = if how / 4 % 8 == 1 {
+        Schedule::FixedStep {
+            step: f64::from(input.scaled(1e-6, 1e6)),
+        }
+    } else {
+        Schedule::Bracketed
+    };
+    let auth = matches!(how / 4 % 8, 2 | 3).then(|| Auth {
+        key: Key::new(KEY),
+        epoch: 1,
+    });
+    Settings {
+        method,
+        schedule,
+        auth,
+        predict: how / 32 % 2 != 1,
+        wiring: if how / 64 % 2 == 1 {
+            Wiring::Shared
+        } else {
+            Wiring::Pair
+        },
+        hop_time: if how / 128 == 0 {
+            Duration::from_millis(30)
+        } else {
+            Duration::from_millis(5)
+        },
+        ..Settings::default()
+    }
+}
+
+fn adjust(input: &mut Input<'_>) -> Adjust {
+    let grid = input.byte();
+    Adjust {
+        rounds: u16::from(input.below(4)),
+        explore_m: input.even(0.0, 1e5),
+        local: if grid % 2 == 1 {
+            Local::Grid {
+                columns: 2 + grid / 16,
+                rows: 2 + input.below(32),
+            }
+        } else {
+            Local::Fine
+        },
+    }
+}

@@ -1,0 +1,384 @@
+//! A relay that is watched: after every input it is drained as a firmware drains it, and what its documentation promises
+//! must hold.
+
+use uav_relay::guard::confines::Confines;
+use uav_relay::wire::deframe::Deframer;
+use uav_relay::wire::frame::{self, MAX_FRAME};
+use uav_relay::wire::message::Message;
+use uav_relay::{
+    Event, Identity, Instant, Method, Mission, Placement, Port, Profile, Relay, Sample, Settings,
+    Side, Stats, Wiring,
+};
+
+use super::counted::{all, intact};
+use super::heap;
+
+/// Frames that a relay can owe at once: a pass or what came of one, a sign that it is busy; to either side a heartbeat, four
+/// hails and a fence; a hello to each of the eight nodes that it remembers.
+const MOST_FRAMES: usize = 2 + 2 * (1 + 4 + 1) + 8;
+
+/// Events that can be pending at once.
+const MOST_EVENTS: usize = 11;
+
+/// Nodes this far off are heard on a shared channel.
+const NEAR: u16 = 4;
+
+/// The shortest frame whose check sequence is worked out, on the wire: a header, no body, the check sequence.
+const LEAST_CHECKED: usize = 16;
+
+/// The shortest frame of a message, on the wire: that a relay is busy.
+const LEAST_MESSAGE: usize = 19;
+
+/// The network of every relay here.
+pub const NETWORK: u16 = 9;
+
+/// A frame that a relay has sent.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Sent {
+    /// Through which port.
+    pub port: Port,
+    /// Its bytes, the delimiter included.
+    pub bytes: Vec<u8>,
+}
+
+/// A relay, and what was true of it when it was looked at last.
+#[derive(Clone, Debug)]
+pub struct Watched {
+    relay: Relay,
+    /// Its node, and how many there are.
+    node: u16,
+    all: u16,
+    settings: Settings,
+    given: Profile,
+    stats: Stats,
+    /// The view it has agreed to.
+    view: u16,
+    agreed: Option<Placement>,
+    setpoint: Option<Placement>,
+    /// Frames it has sent.
+    sent: u32,
+    /// Bytes that have come in since the last delimiter, by port.
+    begun: [usize; 3],
+    /// Number of the last pass it has said anything of.
+    number: u16,
+    /// Number of the talk that its last fence was of.
+    tie: u16,
+    /// View and number of the pass that its place is from, as far as that is known.
+    held: Option<(u16, u16)>,
+}
+
+impl Watched {
+    /// Relay `index` of `mission`, switched on at `now`; `None` where a setting is refused.
+    pub fn new(
+        mission: Mission,
+        index: u16,
+        settings: Settings,
+        seed: u32,
+        now: Instant,
+    ) -> Option<Self> {
+        let identity = Identity {
+            network: NETWORK,
+            index,
+        };
+        let relay = heap::without(|| Relay::new(mission, identity, settings, seed, now)).ok()?;
+        Some(Self {
+            relay,
+            node: index,
+            all: mission.relays(),
+            settings,
+            given: settings.profile.unwrap_or(mission.config().common),
+            stats: Stats::default(),
+            view: 0,
+            agreed: None,
+            setpoint: None,
+            sent: 0,
+            begun: [0; 3],
+            number: 0,
+            tie: 0,
+            held: None,
+        })
+    }
+
+    /// The relay.
+    pub const fn relay(&self) -> &Relay {
+        &self.relay
+    }
+
+    /// What it is set to.
+    pub const fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Number of the last pass it has said anything of.
+    pub const fn number(&self) -> u16 {
+        self.number
+    }
+
+    /// Number of the talk that its last fence was of, 0 for none.
+    pub const fn tie(&self) -> u16 {
+        self.tie
+    }
+
+    /// View and number of the pass that the place it has agreed to is from; `None` where a guard leads it there, too.
+    pub const fn held(&self) -> Option<(u16, u16)> {
+        self.held
+    }
+
+    /// What its place is from does not count any more: passes are numbered anew.
+    pub const fn forget_pass(&mut self) {
+        self.held = None;
+    }
+
+    /// Bytes come in at `port`.
+    ///
+    /// # Panics
+    /// Where more is made of them than there can be in them: a check sequence is worked out for at most one frame in 16 bytes,
+    /// and a message read in at most one in 19, so that the work is bounded by their number.
+    pub fn bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
+        let before = *self.relay.stats();
+        heap::without(|| self.relay.handle_bytes(now, port, bytes));
+        let after = self.relay.stats();
+        let Some(begun) = self.begun.get_mut(port as usize) else {
+            return;
+        };
+        let there = *begun + bytes.len();
+        let checked = intact(after) + after.crc - intact(&before) - before.crc;
+        let received = after.received - before.received;
+        assert!(
+            LEAST_CHECKED * checked as usize <= there && LEAST_MESSAGE * received as usize <= there,
+            "{checked} frames, {received} messages in {there} bytes"
+        );
+        let ended = bytes.iter().rposition(|&byte| byte == 0);
+        *begun = ended.map_or(there, |at| bytes.len() - 1 - at);
+    }
+
+    /// A measurement comes in, `count` times over.
+    pub fn sample(&mut self, sample: Sample, count: u8) {
+        heap::without(|| {
+            for _ in 0..count {
+                self.relay.handle_sample(sample);
+            }
+        });
+    }
+
+    /// It is told where it was at time `at`.
+    pub fn position(&mut self, now: Instant, at: Instant, place: Placement) {
+        heap::without(|| self.relay.handle_position(now, at, place));
+    }
+
+    /// It is told that who fell silent at `side` has landed.
+    pub fn forget(&mut self, now: Instant, side: Side) {
+        heap::without(|| self.relay.forget(now, side));
+    }
+
+    /// It is told to agree again.
+    pub fn restart(&mut self, now: Instant) {
+        heap::without(|| self.relay.restart(now));
+    }
+
+    /// Handles what is due, drains the relay, and looks at it: what it has sent, and what happened.
+    ///
+    /// # Panics
+    /// Where something that is promised does not hold.
+    pub fn settle(&mut self, now: Instant) -> (Vec<Sent>, Vec<Event>) {
+        heap::without(|| self.relay.handle_timeout(now));
+        let mut sent = Vec::with_capacity(MOST_FRAMES);
+        let mut buffer = [0; MAX_FRAME];
+        while let Some(transmit) = heap::without(|| self.relay.poll_transmit(now, &mut buffer)) {
+            let bytes = buffer.get(..transmit.len).unwrap_or_default().to_vec();
+            let port = transmit.port;
+            self.look_at_frame(port, &bytes);
+            sent.push(Sent { port, bytes });
+            assert!(
+                sent.len() <= MOST_FRAMES,
+                "a relay that never stops sending"
+            );
+        }
+        let more = self.relay.poll_transmit(now, &mut buffer);
+        assert_eq!(more, None, "a frame after the last one");
+        let mut events = Vec::with_capacity(MOST_EVENTS);
+        while let Some(event) = heap::without(|| self.relay.poll_event()) {
+            events.push(event);
+            assert!(events.len() <= MOST_EVENTS, "events without end");
+        }
+        let next = self.relay.poll_timeout();
+        assert!(
+            next.is_none_or(|at| at > now),
+            "{next:?} at {now:?}: it spins"
+        );
+        self.look_at_view(&events);
+        self.look_at_counters();
+        self.look_at_setpoint(&events);
+        self.look_at_agreed(&events);
+        self.look_at_numbers();
+        (sent, events)
+    }
+
+    /// A frame must be one, from this relay, to the neighbour behind its port.
+    fn look_at_frame(&mut self, port: Port, bytes: &[u8]) {
+        let mut deframer = Deframer::new();
+        let mut frames = 0;
+        for &byte in bytes {
+            let Some(plain) = deframer.push(byte) else {
+                continue;
+            };
+            frames += 1;
+            let Ok(Ok(opened)) = plain.map(frame::open) else {
+                unreachable!("what is sent is no frame: {bytes:?}");
+            };
+            let header = opened.header;
+            let signs = self.settings.auth.is_some();
+            assert_eq!(opened.tag.is_some(), signs, "{opened:?}");
+            assert_eq!((header.network, header.sender), (NETWORK, self.node));
+            assert_eq!(header.counter, self.sent, "the counter of frames");
+            let far = match self.settings.wiring {
+                Wiring::Pair => 1,
+                Wiring::Shared => NEAR,
+            };
+            let off = self.node.abs_diff(header.destination) <= far;
+            let upstream = off && header.destination < self.node;
+            let downstream = off && header.destination > self.node;
+            let right = match (self.settings.wiring, port) {
+                (Wiring::Pair, Port::Upstream) => upstream,
+                (Wiring::Pair, Port::Downstream) => downstream,
+                (Wiring::Shared, Port::Shared) => upstream || downstream,
+                _ => false,
+            };
+            assert!(right, "{header:?} through {port:?}");
+            let config = self.relay.mission().config();
+            let there = (1..=self.all).contains(&header.destination);
+            assert!(there, "{header:?} to nobody");
+            if opened.hello {
+                continue;
+            }
+            let Ok(message) = Message::decode(opened.body) else {
+                unreachable!("what is sent is no message: {opened:?}");
+            };
+            if let Message::Sweep(sweep) = &message {
+                let inside = |place: &f32| (0.0..=config.distance_m).contains(place);
+                assert!(sweep.reaches.iter().all(inside), "{sweep:?}");
+            }
+            self.number = number_of(&message).unwrap_or(self.number);
+            if let Message::Fence { fence, .. } = &message {
+                self.tie = fence.tie;
+            }
+        }
+        assert_eq!(frames, 1, "{bytes:?}");
+        self.sent += 1;
+    }
+
+    /// A view comes after all before it, is told of and counted; the relay has a place in it, its neighbours are about it.
+    fn look_at_view(&mut self, events: &[Event]) {
+        let (relay, node) = (&self.relay, self.node);
+        let (view, left) = (relay.view(), relay.mission().relays());
+        assert!(view >= self.view, "view {view} after {}", self.view);
+        let counted = relay.stats().views > self.stats.views;
+        assert_eq!(counted, view > self.view, "view {view} in silence");
+        let told = events.contains(&Event::Reformed);
+        assert_eq!(told, view > self.view, "view {view}, {events:?}");
+        let index = relay.index();
+        assert!((1..=left).contains(&index), "place {index} of {left}");
+        assert!(left <= self.all, "{left} of {}", self.all);
+        let [before, after] = relay.neighbours();
+        assert!(before.is_none_or(|before| (1..node).contains(&before)));
+        assert!(after.is_none_or(|after| after > node && after <= self.all));
+        self.view = view;
+    }
+
+    /// No counter ever falls.
+    fn look_at_counters(&mut self) {
+        let stats = *self.relay.stats();
+        let pairs = all(&stats).into_iter().zip(all(&self.stats));
+        for (now, before) in pairs {
+            assert!(now >= before, "{stats:?} after {:?}", self.stats);
+        }
+        assert_eq!(stats.sent, self.sent);
+        self.stats = stats;
+    }
+
+    /// A setpoint never changes in silence, and is the agreed place, or inside the fence of its guard.
+    fn look_at_setpoint(&mut self, events: &[Event]) {
+        let setpoint = self.relay.setpoint();
+        let told = events.contains(&Event::SetpointChanged);
+        assert!(told || setpoint == self.setpoint, "moved in silence");
+        self.setpoint = setpoint.or(self.setpoint);
+        assert_eq!(setpoint, self.setpoint, "a place that was taken away");
+        let Some(place) = setpoint else {
+            assert!(!told, "told to fly nowhere");
+            return;
+        };
+        if let Some(Confines { fence, .. }) = self.settings.guard {
+            let x = fence.least_x_m..=fence.most_x_m;
+            let altitude = fence.least_altitude_m..=fence.most_altitude_m;
+            assert!(
+                x.contains(&place.x_m) && altitude.contains(&place.altitude_m),
+                "{place:?} outside of {fence:?}"
+            );
+        } else {
+            assert_eq!(setpoint, self.relay.agreed());
+        }
+    }
+
+    /// A place that was agreed on is finite, on the link, at an altitude that this relay may hold.
+    fn look_at_agreed(&mut self, events: &[Event]) {
+        let agreed = self.relay.agreed();
+        if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {
+            self.held = Some((self.view, self.number));
+        }
+        self.agreed = agreed.or(self.agreed);
+        assert_eq!(agreed, self.agreed, "an agreement that was taken away");
+        let Some(place) = agreed else {
+            return;
+        };
+        let config = self.relay.mission().config();
+        assert!((0.0..=config.distance_m).contains(&place.x_m), "{place:?}");
+        let given = place.altitude_m.to_bits() == self.given.altitude_m.to_bits();
+        let band = config.band.least_m..=config.band.most_m;
+        let chosen = !self.settings.hold_altitude && band.contains(&place.altitude_m);
+        assert!(given || chosen, "{place:?}, given {:?}", self.given);
+    }
+
+    /// Whatever else it tells is in its range.
+    fn look_at_numbers(&self) {
+        let sir = |sir: f32| (0.0..=f32::MAX).contains(&sir);
+        assert!(
+            self.relay.target().is_none_or(sir),
+            "{:?}",
+            self.relay.target()
+        );
+        let rounds = self.relay.rounds();
+        assert!(rounds.is_none_or(|(_, worst)| sir(worst)), "{rounds:?}");
+        if let (Some((done, _)), Method::Adjust(adjust)) = (rounds, self.settings.method) {
+            assert!(done <= adjust.rounds.max(1), "{done} rounds");
+        }
+        assert!(
+            self.relay.profile().is_valid(),
+            "{:?}",
+            self.relay.profile()
+        );
+        if let Some(estimate) = self.relay.estimate() {
+            assert!(estimate.alpha > 1.0 && estimate.alpha.is_finite());
+            assert!(estimate.beta > 0.0 && estimate.beta.is_finite());
+        }
+        let measured = self.relay.measured_per_w();
+        assert!(measured.is_none_or(|upsilon| (1e-9..=1e32).contains(&upsilon)));
+    }
+}
+
+/// The number of the pass that a message is of.
+const fn number_of(message: &Message<'_>) -> Option<u16> {
+    Some(match message {
+        Message::Sweep(sweep) => sweep.number,
+        Message::Verdict(answer) => answer.number,
+        Message::Busy { sweep } => *sweep,
+        Message::Wave(wave) => wave.number,
+        Message::Trace(trace) => trace.number,
+        Message::Token(token) => token.number,
+        Message::Moved(moved) => moved.number,
+        Message::Heartbeat { .. }
+        | Message::Hail(_)
+        | Message::Roster(_)
+        | Message::Count(_)
+        | Message::Fence { .. } => return None,
+    })
+}

@@ -1,0 +1,75 @@
+//! Each target on random bytes and on inputs of its corpus with a few bytes changed: a plain test run explores a little too.
+
+use host_tests::fuzzing::TARGETS;
+use host_tests::random::seed;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::corpus;
+
+/// Inputs of each kind and target.
+const INPUTS: usize = 1000;
+
+/// The longest random input.
+const LONGEST: usize = 300;
+
+fn rng() -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(seed(1))
+}
+
+/// Runs `target` on what `draw` gives, and shows the input where it fails.
+fn explore(target: fn(&[u8]), mut draw: impl FnMut() -> Vec<u8>) {
+    for _ in 0..INPUTS {
+        let input = draw();
+        let passes = std::panic::catch_unwind(|| target(&input)).is_ok();
+        assert!(passes, "{input:?} fails, see above");
+    }
+}
+
+fn bytes(rng: &mut impl Rng) -> Vec<u8> {
+    let len = rng.random_range(0..=LONGEST);
+    let mut bytes = vec![0; len];
+    rng.fill_bytes(&mut bytes);
+    bytes
+}
+
+/// One input with up to four bytes changed, left out, doubled, or with the end of another.
+fn changed(rng: &mut impl Rng, inputs: &[(String, Vec<u8>)]) -> Vec<u8> {
+    let pick = |rng: &mut dyn Rng| inputs[rng.random_range(0..inputs.len())].1.clone();
+    let mut input = pick(rng);
+    for _ in 0..rng.random_range(1..=4) {
+        let at = rng.random_range(0..=input.len());
+        match rng.random_range(0..4) {
+            0 => input.insert(at, rng.random()),
+            1 => {
+                let other = pick(rng);
+                input.truncate(at);
+                input.extend(&other[at.min(other.len())..]);
+            }
+            2 if at < input.len() => drop(input.remove(at)),
+            _ if at < input.len() => input[at] = rng.random(),
+            _ => {}
+        }
+    }
+    input
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "takes too long there")]
+fn random_bytes_pass() {
+    for (name, target) in TARGETS {
+        let mut rng = rng();
+        println!("{name}");
+        explore(target, || bytes(&mut rng));
+    }
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "takes too long there")]
+fn changed_inputs_pass() {
+    for (name, target) in TARGETS {
+        let (mut rng, inputs) = (rng(), corpus(name));
+        println!("{name}");
+        explore(target, || changed(&mut rng, &inputs));
+    }
+}

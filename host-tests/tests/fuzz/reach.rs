@@ -1,0 +1,101 @@
+//! That the corpora get where things may go wrong: every counter counts, every method finds places, links are bad.
+
+use std::collections::BTreeMap;
+
+use host_tests::fuzzing::counted::all;
+use host_tests::fuzzing::watch::Watched;
+use host_tests::fuzzing::{chain, relay};
+use uav_relay::{Method, Phase, Wiring};
+
+use super::corpus;
+
+/// How a relay came to a place.
+fn method(watched: &Watched) -> &'static str {
+    match watched.settings().method {
+        _ if watched.relay().mission().field().is_some() => "field",
+        Method::Align => "align",
+        Method::Altitude => "altitude",
+        Method::Adjust(_) => "adjust",
+    }
+}
+
+/// The sums of every counter over some relays.
+fn counted<'a>(relays: impl IntoIterator<Item = &'a Watched>) -> [u64; 23] {
+    relays.into_iter().fold([0; 23], |sums, watched| {
+        let counters = all(watched.relay().stats());
+        std::array::from_fn(|at| sums[at] + u64::from(counters[at]))
+    })
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "takes too long there")]
+fn relays_of_the_corpus_count_everything_and_hold_places_of_every_method() {
+    let relays: Vec<Watched> = corpus("relay")
+        .iter()
+        .filter_map(|(_, bytes)| relay::flown(bytes))
+        .collect();
+    let counters = counted(&relays);
+    println!("{counters:?}");
+    assert!(counters.iter().all(|&count| count > 0), "{counters:?}");
+    let mut places = BTreeMap::new();
+    for watched in &relays {
+        let held = u32::from(watched.relay().agreed().is_some());
+        *places.entry(method(watched)).or_insert(0) += held;
+    }
+    println!("{places:?}");
+    assert_eq!(places.len(), 4, "{places:?}");
+    assert!(places.values().all(|&held| held > 0), "{places:?}");
+    let measured = relays
+        .iter()
+        .any(|watched| watched.relay().measured_per_w().is_some());
+    assert!(measured, "nobody measures");
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "takes too long there")]
+fn chains_of_the_corpus_agree_by_every_method_over_bad_links() {
+    let chains: Vec<Vec<Watched>> = corpus("chain")
+        .iter()
+        .filter_map(|(_, bytes)| chain::flown(bytes))
+        .collect();
+    let mut agreed = BTreeMap::new();
+    for relays in &chains {
+        let all = relays
+            .iter()
+            .all(|watched| watched.relay().phase() == Phase::Holding);
+        let shared = relays[0].settings().wiring == Wiring::Shared;
+        *agreed.entry((method(&relays[0]), shared)).or_insert(0) += u32::from(all);
+    }
+    println!("{agreed:?}");
+    let signed = chains.iter().filter(|relays| {
+        let signs = relays[0].settings().auth.is_some();
+        signs
+            && relays
+                .iter()
+                .all(|one| one.relay().phase() == Phase::Holding)
+    });
+    assert!(signed.count() > 0, "no signed chain agrees");
+    for method in ["align", "altitude", "adjust", "field"] {
+        for shared in [false, true] {
+            let count = agreed.get(&(method, shared)).copied().unwrap_or(0);
+            assert!(count > 0, "no chain agrees by {method}, shared: {shared}");
+        }
+    }
+    let [
+        _,
+        repeats,
+        _,
+        _,
+        repeated,
+        overheard,
+        _,
+        truncated,
+        crc,
+        ..,
+        stale,
+        _,
+    ] = counted(chains.iter().flatten());
+    let bad = [repeats, repeated, overheard, truncated, crc, stale];
+    println!("{bad:?}");
+    assert!(bad.iter().all(|&count| count > 0), "{bad:?}");
+}

@@ -1,0 +1,46 @@
+//! The corpora: every input again, and that they stay small.
+
+use host_tests::fuzzing::TARGETS;
+
+use super::corpus;
+
+/// What all corpora may take in a checkout: files, and bytes in them.
+const MOST: (usize, usize) = (150, 200 << 10);
+
+/// Under Miri, a thousand times slower: the targets that do not compute for long, and how many short inputs of each.
+const FOR_MIRI: [(&str, usize); 3] = [("deframe", 4), ("frame", 6), ("relay", 3)];
+
+/// The longest input for Miri, bytes.
+const SHORT: usize = 60;
+
+/// The inputs of a target that are run: all, but for Miri.
+fn chosen(target: &str) -> Vec<(String, Vec<u8>)> {
+    let mut inputs = corpus(target);
+    assert!(!inputs.is_empty(), "{target}");
+    if cfg!(miri) {
+        let few = FOR_MIRI.iter().find(|(name, _)| *name == target);
+        inputs.retain(|(_, bytes)| bytes.len() <= SHORT);
+        inputs.truncate(few.map_or(0, |(_, count)| *count));
+    }
+    inputs
+}
+
+#[test]
+fn every_input_of_the_corpora_passes() {
+    for (name, target) in TARGETS {
+        for (path, bytes) in chosen(name) {
+            let passes = std::panic::catch_unwind(|| target(&bytes)).is_ok();
+            assert!(passes, "{path}: `{name}` fails, see above");
+        }
+    }
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "nothing of the crate runs here")]
+fn the_corpora_are_small() {
+    let inputs: Vec<_> = TARGETS.iter().flat_map(|(name, _)| corpus(name)).collect();
+    let bytes: usize = inputs.iter().map(|(_, bytes)| bytes.len()).sum();
+    println!("{} inputs, {bytes} bytes", inputs.len());
+    assert!(inputs.len() <= MOST.0, "{} files", inputs.len());
+    assert!(bytes <= MOST.1, "{bytes} bytes");
+}

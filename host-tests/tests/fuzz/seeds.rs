@@ -1,0 +1,252 @@
+//! Where the corpora begin: golden frames, recorded flights, the example scenarios.
+//!
+//! ```sh
+//! cargo test -p host-tests --test fuzz -- --ignored write_the_seeds
+//! cd host-tests
+//! cargo +nightly fuzz run relay                # and so on, for as long as you like; then
+//! cargo +nightly fuzz cmin relay -- -use_counters=0 -set_cover_merge=1
+//! ```
+
+use std::fs;
+
+use host_tests::fuzzing::input::Input;
+use host_tests::fuzzing::watch::NETWORK;
+use host_tests::fuzzing::{TARGETS, setting};
+use serde::Deserialize;
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{Identity, Instant, Port, Relay, Settings};
+
+use super::folder;
+
+/// Frames of a flight that are kept: a few passes of every kind.
+const FRAMES: usize = 24;
+
+#[derive(Deserialize)]
+struct Vectors {
+    frames: Vec<Frame>,
+}
+
+#[derive(Deserialize)]
+struct Frame {
+    plain: String,
+    wire: String,
+}
+
+fn hex(text: &str) -> Vec<u8> {
+    (0..text.len())
+        .step_by(2)
+        .map(|at| u8::from_str_radix(&text[at..at + 2], 16).unwrap())
+        .collect()
+}
+
+fn golden() -> Vec<Frame> {
+    let vectors: Vectors = serde_json::from_str(include_str!("../data/vectors.json")).unwrap();
+    vectors.frames
+}
+
+/// Two lengths and a stream: each golden frame alone, then all of them with noise in between.
+fn deframe() -> Vec<Vec<u8>> {
+    let wires: Vec<_> = golden().iter().map(|frame| hex(&frame.wire)).collect();
+    let cut = |stream: &[u8]| [&[4, 9], stream].concat();
+    let all = [
+        &wires[0],
+        &[5, 1, 0, 0][..],
+        &wires[6],
+        &[0x55; 260],
+        &wires[16],
+    ]
+    .concat();
+    let mut seeds: Vec<_> = wires.iter().map(|wire| cut(wire)).collect();
+    seeds.push(cut(&all));
+    seeds
+}
+
+/// Each golden frame without its check sequence.
+fn frame() -> Vec<Vec<u8>> {
+    golden()
+        .iter()
+        .map(|frame| {
+            let plain = hex(&frame.plain);
+            plain[..plain.len() - 4].to_vec()
+        })
+        .collect()
+}
+
+fn scenario() -> Vec<Vec<u8>> {
+    let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples");
+    ["scenario", "several", "field", "altitudes"]
+        .iter()
+        .map(|name| fs::read(format!("{examples}/{name}.toml")).unwrap())
+        .collect()
+}
+
+/// What a chain and its mission begin with: mission, number of relays, method and the numbers of Algorithm 2.
+fn missions() -> Vec<Vec<u8>> {
+    // Unsigned, and signed.
+    let align = (0..6).flat_map(|mission| [0, 8].map(|how| vec![mission, 3, how]));
+    let altitude = [1, 33, 65, 73].map(|how| vec![1, 3, how]);
+    let adjust = [vec![1, 3, 2, 0, 2, 20, 0], vec![1, 3, 2, 65, 2, 20, 0, 5]];
+    align.chain(altitude).chain(adjust).collect()
+}
+
+/// A chain that is switched on, told to agree in the end, and run for so many rounds.
+fn chain() -> Vec<Vec<u8>> {
+    let with = |mission: &[u8], operations: &[u8]| {
+        // Seed, four relays without anything of their own, to the end.
+        [mission, &[1, 0], &[0; 4], &[3], operations].concat()
+    };
+    let mut seeds: Vec<_> = missions()
+        .iter()
+        .map(|mission| with(mission, &[0, 13, 127, 0, 13, 127]))
+        .collect();
+    // Each of the fifteen operations, between rounds.
+    for operation in 0..15 {
+        let operations = [0, 13, 9, 1, operation, 5, 1, 2, 0, 13, 60];
+        seeds.push(with(&[1, 3, 1], &operations));
+    }
+    // Damage, frames cut and lost, noise, frames doubled and put back, a restart, on links and on one channel.
+    let faults = [
+        &[
+            0, 13, 2, 1, 5, 3, 7, 0, 13, 2, 1, 6, 9, 1, 1, 0, 1, 7, 0, 3, 5, 1, 0,
+        ][..],
+        &[
+            0, 13, 9, 1, 3, 2, 4, 1, 5, 5, 1, 2, 3, 0, 13, 40, 0, 10, 0, 13, 1,
+        ],
+        &[1, 5, 6, 2, 2, 6, 4, 0, 0, 13, 60],
+    ]
+    .concat();
+    seeds.extend([0, 64].map(|how| with(&[0, 3, how], &faults)));
+    seeds
+}
+
+/// A relay that hears what it hears in a flight of its chain, and operations on one that nobody talks to.
+fn relay() -> Vec<Vec<u8>> {
+    let mut seeds = Vec::new();
+    for mission in missions() {
+        for index in [1, 2, 4] {
+            seeds.push(recorded(&mission, index));
+        }
+        // Wake-ups, a restart, samples, each kind of message from either side.
+        let mut operations = vec![3, 63, 7, 3, 9, 8, 100, 1, 0, 0, 200];
+        for tag in 0..13 {
+            operations.extend([9, tag % 2, tag, 0, 0, 0, 128, 0, 1, 0, 64, 0, 128, 0, 0]);
+        }
+        seeds.push([&*mission, &[0, 1, 0, 0, 1, 0, 1, 0], &operations].concat());
+    }
+    seeds.extend([0, 64].map(formed));
+    seeds.extend([refused(), again()]);
+    seeds
+}
+
+/// The last of four relays, with a guard, on links or on one channel: it is told where it is, counted in the next two views,
+/// and hears of a fence, a pass of another view, and nodes beyond its neighbour.
+fn formed(wiring: u8) -> Vec<u8> {
+    let head = [0, 3, 0, 3, wiring, 32, 0, 0, 0, 0, 0, 1, 0];
+    let position = [15, 0, 0, 0, 100, 0, 0, 20];
+    // The view after its own, a good digest, the third place of four in view 0, whose leader is there.
+    let roster = [9, 0, 10, 1, 0, 3, 4, 224, 0, 1];
+    let hail = [9, 0, 9, 1, 0, 3, 0, 5];
+    let fence = [9, 0, 12, 7, 0, 100, 0, 0, 0, 128, 0, 0, 128];
+    let late = [9, 0, 0, 0, 241, 0, 0, 64, 0, 128, 0, 0, 0, 0, 0];
+    let far = [9, 46, 9, 1, 0, 4, 0, 9, 3, 8, 9, 46, 9, 1, 0, 4, 0, 9];
+    let parts = [&head[..], &position, &roster, &hail, &roster, &fence];
+    [&parts.concat()[..], &position, &late, &far, &[3, 60]].concat()
+}
+
+/// A relay that asks for tags hears from a neighbour of another mission, and from one without a tag.
+fn refused() -> Vec<u8> {
+    let head = [0, 3, 0, 1, 8, 0, 0, 0, 0, 1, 0];
+    let other = [9, 0, 3, 255, 0, 0];
+    let bare = [9, 0, 3, 0, 0, 11];
+    [&head[..], &other, &bare].concat()
+}
+
+/// The second of four relays hears the first pass of its leader twice.
+fn again() -> Vec<u8> {
+    let head = [0, 3, 0, 1, 0, 0, 0, 0, 0, 1, 0];
+    let pass = [9, 192, 0, 250, 64, 0, 0, 0];
+    let targets = [0, 0, 128, 1, 0, 0, 128, 0, 0, 128, 1, 1, 0, 0, 64];
+    [&head[..], &pass, &targets].concat()
+}
+
+/// The flight of a chain as one of its relays sees it.
+fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
+    let mut input = Input::new(prefix);
+    let mission = setting::mission(&mut input, 5).unwrap();
+    let settings: Settings = setting::of_chain(&mut input, &mission);
+    let mut relays: Vec<Relay> = (1..=mission.relays())
+        .map(|index| {
+            let identity = Identity {
+                network: NETWORK,
+                index,
+            };
+            Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
+        })
+        .collect();
+    let own = u8::try_from(index).unwrap() - 1;
+    let head = [prefix.get(..2).unwrap(), &[0, own]].concat();
+    let mut seed = [&*head, &prefix[2..], &[0, 0, 0, 0, 1, 0]].concat();
+    let mut frames = 0;
+    while frames < FRAMES {
+        let Some(now) = relays.iter().filter_map(Relay::poll_timeout).min() else {
+            break;
+        };
+        if now > Instant::from_millis(4_000) {
+            break;
+        }
+        seed.extend([3, 0]);
+        for relay in &mut relays {
+            relay.handle_timeout(now);
+        }
+        frames += exchange(&mut relays, now, usize::from(own), &mut seed);
+    }
+    seed
+}
+
+/// Has all relays say what they have to say; how many frames relay `own` (from 0) has heard, which go into `seed`.
+fn exchange(relays: &mut [Relay], now: Instant, own: usize, seed: &mut Vec<u8>) -> usize {
+    let (mut heard, mut said) = (0, true);
+    let mut buffer = [0; MAX_FRAME];
+    while said {
+        said = false;
+        for from in 0..relays.len() {
+            while let Some(transmit) = relays[from].poll_transmit(now, &mut buffer) {
+                let bytes = &buffer[..transmit.len];
+                said = true;
+                let (to, port) = match transmit.port {
+                    Port::Upstream => (from - 1..from, Port::Downstream),
+                    Port::Downstream => (from + 1..from + 2, Port::Upstream),
+                    Port::Shared => (0..relays.len(), Port::Shared),
+                };
+                for to in to.filter(|&to| to != from) {
+                    relays[to].handle_bytes(now, port, bytes);
+                    if to == own {
+                        seed.extend([6, port as u8, u8::try_from(bytes.len()).unwrap()]);
+                        seed.extend(bytes);
+                        heard += 1;
+                    }
+                }
+            }
+        }
+    }
+    heard
+}
+
+#[test]
+#[ignore = "writes into the corpora"]
+fn write_the_seeds() {
+    for (name, _) in TARGETS {
+        let seeds = match name {
+            "deframe" => deframe(),
+            "frame" => frame(),
+            "relay" => relay(),
+            "chain" => chain(),
+            _ => scenario(),
+        };
+        fs::create_dir_all(folder(name)).unwrap();
+        for (number, seed) in (1..).zip(seeds) {
+            let path = folder(name).join(format!("seed-{number:02}"));
+            fs::write(path, seed).unwrap();
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! What the targets judge by: COBS against a published one, numbers that cover their ranges.
+
+use host_tests::fuzzing::cobs::{stuffed, unstuffed};
+use host_tests::fuzzing::input::Input;
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+proptest! {
+    #[test]
+    #[cfg_attr(miri, ignore = "nothing of the crate runs here")]
+    fn cobs_agrees_with_a_published_one(plain in vec(prop_oneof![Just(0), 1..=u8::MAX], 0..900)) {
+        let wire = stuffed(&plain);
+        let (end, inside) = wire.split_last().unwrap();
+        prop_assert_eq!(*end, 0);
+        prop_assert_eq!(&cobs::encode_vec(&plain), inside);
+        prop_assert_eq!(unstuffed(inside), (plain, true));
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "nothing of the crate runs here")]
+    fn cobs_of_full_runs_agrees_too(runs in vec(252..257_usize, 0..4), zero_behind: bool) {
+        let mut plain: Vec<u8> = runs.iter().flat_map(|&len| [vec![7; len], vec![0]].concat()).collect();
+        if !zero_behind {
+            plain.pop();
+        }
+        let mut published = cobs::encode_vec(&plain);
+        published.push(0);
+        prop_assert_eq!(published, stuffed(&plain));
+    }
+}
+
+#[test]
+fn numbers_reach_both_ends_of_their_range_and_beyond_the_bytes_there_are_zeros() {
+    let (low, high) = (0.1_f32, 1e5_f32);
+    assert_eq!(Input::new(&[0, 0]).scaled(low, high), low);
+    assert_eq!(Input::new(&[255, 255]).scaled(low, high), high);
+    assert_eq!(Input::new(&[0, 0]).even(-high, high), -high);
+    assert_eq!(Input::new(&[255, 255]).even(-high, high), high);
+    let mut input = Input::new(&[7]);
+    assert_eq!((input.word(), input.is_empty(), input.byte()), (7, true, 0));
+    assert_eq!(Input::new(&[9, 1, 2]).piece(), [1, 2]);
+}

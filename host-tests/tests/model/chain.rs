@@ -1,0 +1,258 @@
+//! The relays, connected, and the clock: after every turn of a main loop the rules are checked.
+
+use proptest::prop_assert;
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{Duration, Event, Heading, Instant, Port, Relay, Side};
+
+use super::Checked;
+use super::ledger::{Ledger, MOST_FRAMES, Turn};
+use super::passes::Met;
+use super::scenario::{Kind, Scenario};
+use super::seal::{Seal, taken};
+use super::tally::Tally;
+use super::wires::{FLIGHT, Flying, Wires, end, pass};
+
+/// By how much f32 arithmetic may miss a target, relative.
+pub(crate) const MISS: f64 = 2e-4;
+
+/// By how much it may miss the least separation, relative.
+const CLOSE: f64 = 1e-5;
+
+/// A chain, the model of it, and the clock.
+pub(crate) struct World<'a> {
+    pub(crate) scenario: &'a Scenario,
+    pub(crate) now: Instant,
+    pub(crate) relays: Vec<Relay>,
+    pub(crate) wires: Wires,
+    pub(crate) ledgers: Vec<Ledger>,
+    pub(crate) tally: Tally,
+    /// The largest epoch that a relay was started with.
+    pub(crate) epochs: u32,
+}
+
+impl<'a> World<'a> {
+    /// Every relay has just been switched on.
+    pub(crate) fn new(scenario: &'a Scenario, seed: u32) -> Checked<Self> {
+        let now = Instant::from_millis(1);
+        let relays = scenario.relays();
+        let mut world = Self {
+            scenario,
+            now,
+            relays: (0..relays)
+                .map(|at| scenario.relay(at, seed.wrapping_add(at as u32), at as u32 + 1, now))
+                .collect(),
+            wires: Wires::new(relays),
+            ledgers: (1..=relays).map(|at| Ledger::new(now, at as u32)).collect(),
+            tally: Tally::default(),
+            epochs: relays as u32,
+        };
+        world.turn_all()?;
+        Ok(world)
+    }
+
+    /// One turn of the main loop of relay `at`, from 0: time, frames, events, and when to come back.
+    pub(crate) fn turn(&mut self, at: usize) -> Checked {
+        let now = self.now;
+        let relay = &mut self.relays[at];
+        relay.handle_timeout(now);
+        let mut frame = [0; MAX_FRAME];
+        let mut sent = 0;
+        self.ledgers[at].look_up(relay)?;
+        let most = MOST_FRAMES + if self.scenario.signs() { 2 } else { 0 };
+        while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
+            sent += 1;
+            prop_assert!(sent <= most, "relay {} sends and sends", at + 1);
+            let bytes = frame[..transmit.len].to_vec();
+            if let Some(pass) = pass(&bytes) {
+                let leads = at == self.scenario.leader();
+                self.ledgers[at].says(self.scenario, leads, pass)?;
+            }
+            let to = match transmit.port {
+                Port::Upstream => at - 1,
+                _ => at + 1,
+            };
+            let frame = Flying {
+                due: now + FLIGHT,
+                seal: Seal {
+                    from: self.ledgers[at].epoch,
+                    to: self.ledgers[to].epoch,
+                },
+                bytes,
+            };
+            self.wires.send(at, transmit.port, frame);
+        }
+        let events: Vec<_> = std::iter::from_fn(|| relay.poll_event()).collect();
+        prop_assert!(
+            relay.poll_timeout().is_none_or(|at| at > now),
+            "relay {} would spin",
+            at + 1
+        );
+        self.tally.most("frames of a drain", u64::from(sent));
+        let measured = self
+            .ledgers
+            .iter()
+            .filter_map(|ledger| ledger.measured_per_w);
+        let turn = Turn {
+            now,
+            measured_per_w: measured.reduce(f64::max),
+            relay: &self.relays[at],
+            sent,
+            events: &events,
+        };
+        let missed = events
+            .iter()
+            .filter(|event| matches!(event, Event::NeighbourLost(_)));
+        missed.for_each(|_| self.tally.add("neighbours missed"));
+        if events.contains(&Event::Reformed) {
+            self.tally.add("views agreed on");
+        }
+        if self.ledgers[at].audit(self.scenario, at, &turn)? {
+            self.neighbours_agree()?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn turn_all(&mut self) -> Checked {
+        (0..self.relays.len()).try_for_each(|at| self.turn(at))
+    }
+
+    /// Relays next to each other that hold places for one target keep apart, and the hops between them meet it.
+    fn neighbours_agree(&mut self) -> Checked {
+        let places: Vec<_> = self.ledgers.iter().map(|ledger| ledger.place).collect();
+        let hops = self.scenario.judge.hops(&places);
+        let apart = f64::from(self.scenario.mission.config().min_separation_m) * (1.0 - CLOSE);
+        let last = self.ledgers.len();
+        for (hop, sir) in hops.into_iter().enumerate() {
+            // Neither Tx nor Rx has a say: their one neighbour's target is that of the hop.
+            let from = &self.ledgers[hop.saturating_sub(1)];
+            let to = &self.ledgers[hop.min(last - 1)];
+            let Some(target) = from.target.filter(|_| {
+                from.holding
+                    && to.holding
+                    && from.target.map(f32::to_bits) == to.target.map(f32::to_bits)
+            }) else {
+                continue;
+            };
+            let (Some(before), Some(after)) = (from.place, to.place) else {
+                continue;
+            };
+            let is_between = hop > 0 && hop < last;
+            let begins = match self.scenario.mission.heading() {
+                Heading::TowardRx => from,
+                Heading::TowardTx => to,
+            };
+            let measures = self.scenario.kind == Kind::Measured;
+            if is_between && measures && begins.begins_anew() {
+                self.tally.add("hops excused");
+                continue;
+            }
+            let louder = to
+                .measured_per_w
+                .filter(|_| hop < last)
+                .map_or(1.0, |measured| {
+                    self.scenario.judge.louder(after.x_m, measured).max(1.0)
+                });
+            prop_assert!(
+                sir * louder >= f64::from(target) * (1.0 - MISS),
+                "hop {}: {sir} short of {target}",
+                hop + 1
+            );
+            self.tally.add("hops held");
+            if is_between {
+                let (dx, dh) = (after.x_m - before.x_m, after.altitude_m - before.altitude_m);
+                prop_assert!(
+                    dx >= 0.0 && dx.hypot(dh) >= apart,
+                    "relays {hop} and {} at {before:?} and {after:?}",
+                    hop + 1
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes of a frame arrive at the end of a line, and are dealt with.
+    pub(crate) fn arrive(&mut self, line: usize, bytes: &[u8], frame: &Flying) -> Checked {
+        self.hear(line, bytes, frame)?;
+        self.turn(end(line).0)
+    }
+
+    /// They arrive. What a pass is to the relay the ledger knows.
+    pub(crate) fn hear(&mut self, line: usize, bytes: &[u8], frame: &Flying) -> Checked {
+        let (to, port) = end(line);
+        let from = match port {
+            Port::Upstream => Side::Upstream,
+            _ => Side::Downstream,
+        };
+        let ended = self.wires.arrive(line, bytes, &frame.bytes);
+        let before = *self.relays[to].stats();
+        self.relays[to].handle_bytes(self.now, port, bytes);
+        let after = self.relays[to].stats();
+        let is_taken = taken(after) > taken(&before);
+        let signs = self.scenario.signs();
+        self.ledgers[to].heard(from, ended, is_taken.then_some(frame), signs, self.now)?;
+        if let Some(pass) = pass(&frame.bytes).filter(|_| is_taken) {
+            let met = self.ledgers[to].meets(self.scenario, pass, &before, after)?;
+            self.tally.add(match met {
+                Met::TakenUp => "passes taken up",
+                Met::Again => "passes again",
+                Met::Late => "stragglers",
+                Met::Foreign => "foreign passes",
+            });
+        }
+        self.ledgers[to].look_up(&self.relays[to])
+    }
+
+    /// When the next timer of any relay runs out.
+    fn next_timer(&self) -> Option<Instant> {
+        self.relays.iter().filter_map(Relay::poll_timeout).min()
+    }
+
+    pub(crate) fn tick(&mut self) -> Checked {
+        let next = self.next_timer();
+        prop_assert!(next.is_some(), "nobody will ever do anything");
+        self.now = next.unwrap_or(self.now).max(self.now);
+        for at in 0..self.relays.len() {
+            if self.relays[at]
+                .poll_timeout()
+                .is_some_and(|due| due <= self.now)
+            {
+                self.turn(at)?;
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn wait(&mut self, time: Duration) -> Checked {
+        let until = self.now + time;
+        while self.next_timer().is_some_and(|next| next <= until) {
+            self.tick()?;
+        }
+        self.now = until;
+        Ok(())
+    }
+
+    /// What happens next where nothing is wrong; whether anything does by `until`.
+    pub(crate) fn flow(&mut self, until: Instant) -> Checked<bool> {
+        let timer = self.next_timer();
+        match self.wires.next() {
+            Some((due, line)) if due <= until && timer.is_none_or(|timer| due <= timer) => {
+                self.now = self.now.max(due);
+                self.wires.hurry(self.now);
+                if let Some(frame) = self.wires.take(line, 0) {
+                    self.arrive(line, &frame.bytes, &frame)?;
+                }
+                Ok(true)
+            }
+            _ if timer.is_some_and(|timer| timer <= until) => self.tick().map(|()| true),
+            _ => Ok(false),
+        }
+    }
+
+    /// Whether every relay holds a place, all for one target.
+    pub(crate) fn agrees(&self) -> bool {
+        let target = self.ledgers[0].target.map(f32::to_bits);
+        self.ledgers
+            .iter()
+            .all(|ledger| ledger.holding && ledger.target.map(f32::to_bits) == target)
+    }
+}

@@ -1,0 +1,134 @@
+//! From any state to one agreement: faults stop, links are whole, and the leader is told once to begin again.
+
+use proptest::{prop_assert, prop_assert_eq};
+use uav_relay::{Duration, Relay};
+
+use super::Checked;
+use super::chain::{MISS, World};
+use super::scenario::{Calm, Kind};
+
+/// The longest that an undisturbed chain may take, ms of virtual time.
+const LONGEST_MS: u64 = 20_000;
+
+/// Views that may come after the agreement.
+const MOST_VIEWS: u32 = 2;
+
+/// How long the chain is watched after it has agreed, ms: nobody may be missed, and nothing may move.
+const WATCH_MS: u64 = 16_000;
+
+impl World<'_> {
+    /// What the chain agrees on by itself.
+    pub(crate) fn calm(&mut self) -> Checked<Calm> {
+        let took = self.agree(Duration::from_millis(LONGEST_MS))?;
+        let target = self.ledgers[0].target.unwrap_or_default();
+        Ok(Calm {
+            places: self.places(),
+            target: target.to_bits(),
+            took_us: took.as_micros(),
+        })
+    }
+
+    fn places(&self) -> Vec<(u32, u32)> {
+        let setpoints = self.relays.iter().filter_map(Relay::setpoint);
+        setpoints
+            .map(|place| (place.x_m.to_bits(), place.altitude_m.to_bits()))
+            .collect()
+    }
+
+    /// Lets the chain go on until every relay holds a place for one target; how long it takes.
+    fn agree(&mut self, at_most: Duration) -> Checked<Duration> {
+        let begun = self.now;
+        while !self.agrees() {
+            let goes_on = self.flow(begun + at_most)?;
+            prop_assert!(
+                goes_on,
+                "no agreement within {} ms: {:?}",
+                at_most.as_micros() / 1_000,
+                self.ledgers
+            );
+        }
+        Ok(self.now.since(begun))
+    }
+
+    /// What a chain of this mission may take, told to begin again in whatever state.
+    ///
+    /// As long as an undisturbed one, and on each line the first frame may be lost to what was left there of a broken one:
+    /// the relay that waits for what comes back of it over `h` hops, 2 h + 2 times `hop_time` and an eighth, sends it again.
+    fn patience(&self) -> Duration {
+        let hop_us = self.scenario.settings[0].hop_time.as_micros();
+        let hops = 1..self.relays.len() as u64;
+        let waits: u64 = hops.map(|hops| (2 * hops + 2) * hop_us * 9 / 8).sum();
+        // Where hellos were lost too, they are said again when there has been silence for long enough.
+        let greets = if self.scenario.signs() { 2 } else { 0 };
+        let quiet_us = self.scenario.settings[0].quiet.as_micros();
+        let silence_us = greets * quiet_us + 2 * self.a_call().as_micros();
+        Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us)
+    }
+
+    /// How long a call for a new view may take to the leader where nothing is lost: each relay on its way may just have called in
+    /// vain, and calls again after no more than `quiet`.
+    fn a_call(&self) -> Duration {
+        let calls = self.relays.len() as u64 - 1;
+        let quiet_us = self.scenario.settings[0].quiet.as_micros();
+        Duration::from_micros(calls * quiet_us)
+    }
+
+    /// What Algorithm 2 ends with is what its worst hop has, no more and no less; other methods may leave hops that have more.
+    fn is_as_good_as_it_says(&self) -> Checked {
+        if self.scenario.kind == Kind::Adjust
+            && let Some(target) = self.ledgers[0].target
+        {
+            let places: Vec<_> = self.ledgers.iter().map(|ledger| ledger.place).collect();
+            let hops = self.scenario.judge.hops(&places);
+            let worst = hops.into_iter().fold(f64::INFINITY, f64::min);
+            prop_assert!(
+                (worst / f64::from(target) - 1.0).abs() <= MISS,
+                "{target} is said of a chain that has {worst}"
+            );
+        }
+        Ok(())
+    }
+
+    /// A view that was called for before the agreement may come after it: then the chain agrees again.
+    fn settle(&mut self, at_most: Duration) -> Checked {
+        for _ in 0..MOST_VIEWS {
+            let views: Vec<u16> = self.relays.iter().map(Relay::view).collect();
+            let until = self.now + self.a_call();
+            while self.flow(until)? {}
+            if self.relays.iter().map(Relay::view).eq(views) {
+                return Ok(());
+            }
+            self.tally.add("views after an agreement");
+            self.agree(at_most)?;
+        }
+        prop_assert!(false, "views without end");
+        Ok(())
+    }
+
+    /// The end of every sequence; how long the agreement took.
+    pub(crate) fn recover(&mut self) -> Checked<Duration> {
+        (0..self.wires.links()).for_each(|link| self.wires.join(link));
+        self.wires.hurry_all(self.now);
+        self.restart()?;
+        let at_most = match self.scenario.kind {
+            Kind::Measured => Duration::from_millis(LONGEST_MS),
+            _ => self.patience(),
+        };
+        let took = self.agree(at_most)?;
+        self.settle(at_most)?;
+        let places = self.places();
+        if self.scenario.kind != Kind::Measured {
+            let target = self.relays[0].target().map(f32::to_bits);
+            prop_assert_eq!(target, Some(self.scenario.calm.target), "another target");
+            prop_assert_eq!(&places, &self.scenario.calm.places, "other places");
+        }
+        self.is_as_good_as_it_says()?;
+        let until = self.now + Duration::from_millis(WATCH_MS);
+        while self.flow(until)? {}
+        prop_assert_eq!(&self.places(), &places, "moved after the agreement");
+        for ledger in &self.ledgers {
+            prop_assert!(ledger.misses_nobody(), "{ledger:?}");
+        }
+        Ok(took)
+    }
+}

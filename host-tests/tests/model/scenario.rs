@@ -1,0 +1,312 @@
+//! The missions that are flown: 2 to 6 relays, every method, drawn as the random tests of the placements draw theirs.
+
+use host_tests::brief::{as_relays_know_it, of_link, of_stochastic_link};
+use host_tests::random::joint::scenario as joint_scenario;
+use host_tests::random::{Chain, Style, link as random_link, log_uniform};
+use host_tests::reference::joint::{Band, Effort, optimum};
+use host_tests::reference::stochastic::StochasticLink;
+use host_tests::reference::{Link, Station};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::wire::auth::{Auth, Key};
+use uav_relay::{
+    Adjust, Identity, Instant, Local, Measure, Method, Mission, MissionConfig, Profile, Relay,
+    Settings,
+};
+
+use super::chain::World;
+use super::judge::Judge;
+
+/// Samples that a relay takes at a place before it believes them.
+pub(crate) const SAMPLES: u32 = 100;
+
+/// How far apart neighbours must stay in half of the chains that choose altitudes, as a part of D / (N + 1): it often binds.
+const TIGHT: (f64, f64) = (0.05, 0.95);
+
+/// What the leader has the chain do.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(crate) enum Kind {
+    /// Algorithm 1, solved by the leader first.
+    Predicted,
+    /// Algorithm 1 by trying; relays may bring an altitude and a power of their own.
+    Tried,
+    /// Altitudes as well.
+    Altitude,
+    /// Algorithm 2.
+    Adjust,
+    /// Algorithm 4 in the field that was agreed on.
+    Field,
+    /// Algorithm 4 in the field as it is measured.
+    Measured,
+}
+
+impl Kind {
+    pub(crate) const ALL: [Self; 6] = [
+        Self::Predicted,
+        Self::Tried,
+        Self::Altitude,
+        Self::Adjust,
+        Self::Field,
+        Self::Measured,
+    ];
+}
+
+/// What an undisturbed chain agrees on.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Calm {
+    /// x and altitude of every relay, as their bits.
+    pub(crate) places: Vec<(u32, u32)>,
+    /// The target, as its bits.
+    pub(crate) target: u32,
+    /// Virtual time that it takes, µs.
+    pub(crate) took_us: u64,
+}
+
+/// A mission, and what is known of it.
+#[derive(Debug)]
+pub(crate) struct Scenario {
+    pub(crate) kind: Kind,
+    pub(crate) mission: Mission,
+    /// By relay.
+    pub(crate) settings: Vec<Settings>,
+    pub(crate) judge: Judge,
+    pub(crate) calm: Calm,
+}
+
+impl Scenario {
+    /// Relay `at`, from 0, switched on.
+    pub(crate) fn relay(&self, at: usize, seed: u32, epoch: u32, now: Instant) -> Relay {
+        let mut settings = self.settings[at];
+        if let Some(auth) = &mut settings.auth {
+            auth.epoch = epoch;
+        }
+        let identity = Identity {
+            network: 3,
+            index: at as u16 + 1,
+        };
+        Relay::new(self.mission, identity, settings, seed, now).unwrap()
+    }
+
+    /// Whether frames are signed.
+    pub(crate) fn signs(&self) -> bool {
+        self.settings.iter().all(|one| one.auth.is_some())
+    }
+
+    /// The same mission with signed frames: undisturbed, its chain agrees on the same.
+    fn signed(mut self) -> Self {
+        for one in &mut self.settings {
+            one.auth = Some(Auth {
+                key: Key::new([7; 32]),
+                epoch: 1,
+            });
+        }
+        let calm = World::new(&self, 1).unwrap().calm().unwrap();
+        assert_eq!(calm.places, self.calm.places);
+        assert_eq!(calm.target, self.calm.target);
+        self.calm = calm;
+        self
+    }
+
+    pub(crate) fn relays(&self) -> usize {
+        self.settings.len()
+    }
+
+    pub(crate) fn leader(&self) -> usize {
+        usize::from(self.mission.leader()) - 1
+    }
+}
+
+/// `count` missions of all kinds.
+pub(crate) fn pool(seed: u64, count: u32) -> Vec<Scenario> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..count as usize)
+        .map(|at| {
+            let kind = Kind::ALL[at % Kind::ALL.len()];
+            loop {
+                if let Some(scenario) = drawn(&mut rng, kind) {
+                    // Of each kind one in four.
+                    let signs = at / Kind::ALL.len() % 4 == 3;
+                    break if signs { scenario.signed() } else { scenario };
+                }
+            }
+        })
+        .collect()
+}
+
+/// One mission, if what is drawn is one.
+fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
+    let (mission, settings, judge) = match kind {
+        Kind::Predicted | Kind::Tried => aligned(rng, kind)?,
+        Kind::Altitude | Kind::Adjust => joint(rng, kind)?,
+        Kind::Field | Kind::Measured => in_a_field(rng, kind)?,
+    };
+    let mut scenario = Scenario {
+        kind,
+        mission,
+        settings,
+        judge,
+        calm: Calm {
+            places: Vec::new(),
+            target: 0,
+            took_us: u64::MAX,
+        },
+    };
+    scenario.calm = World::new(&scenario, 1).unwrap().calm().unwrap();
+    Some(scenario)
+}
+
+type Parts = (Mission, Vec<Settings>, Judge);
+
+/// What every relay is set to, with what single ones hold of their own.
+fn settings(relays: usize, common: Settings, own: &[(u16, Profile)]) -> Vec<Settings> {
+    let mut all = vec![common; relays];
+    for (index, profile) in own {
+        all[usize::from(*index) - 1].profile = Some(*profile);
+    }
+    all
+}
+
+fn aligned(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
+    let style = Style {
+        relays: 2..=6,
+        chain: if kind == Kind::Tried {
+            Chain::Any
+        } else {
+            Chain::Alike
+        },
+    };
+    let mut link = random_link(rng, &style);
+    if rng.random() {
+        link.min_separation_m =
+            link.distance_m / (link.len() + 1) as f64 * log_uniform(rng, 0.03, 1.0);
+    }
+    let link = as_relays_know_it(&link);
+    let (mission, own) = of_link(&link, 1e-4)?;
+    let common = Settings {
+        predict: kind == Kind::Predicted,
+        ..Settings::default()
+    };
+    let optimum = link.optimum()?;
+    let settings = settings(link.len(), common, &own);
+    Some((mission, settings, Judge::Source { link, optimum }))
+}
+
+fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
+    let drawn = joint_scenario(rng, &(2..=6), TIGHT);
+    let narrow = uav_relay::Band {
+        least_m: drawn.band.least_m as f32,
+        most_m: drawn.band.most_m as f32,
+    };
+    let band = Band {
+        least_m: f64::from(narrow.least_m),
+        most_m: f64::from(narrow.most_m),
+    };
+    let mut link = drawn.link;
+    // All at one altitude to begin with, but for single ones.
+    let common_m = log_uniform(rng, band.least_m, band.most_m);
+    for relay in &mut link.relays {
+        let own = rng.random_bool(0.2);
+        relay.altitude_m = if own {
+            log_uniform(rng, band.least_m, band.most_m)
+        } else {
+            common_m
+        };
+        relay.power_w *= if rng.random_bool(0.1) {
+            log_uniform(rng, 0.3, 3.0)
+        } else {
+            1.0
+        };
+    }
+    let link = as_relays_know_it(&link);
+    let (mission, own) = of_link(&link, 1e-4)?;
+    let config = MissionConfig {
+        band: narrow,
+        ..*mission.config()
+    };
+    let mission = Mission::try_new(config).ok()?;
+    let common = Settings {
+        predict: rng.random_bool(0.8),
+        method: if kind == Kind::Altitude {
+            Method::Altitude
+        } else {
+            Method::Adjust(turns(rng, narrow.most_m))
+        },
+        ..Settings::default()
+    };
+    let mut settings = settings(link.len(), common, &own);
+    for one in &mut settings {
+        one.hold_altitude = rng.random_bool(0.1);
+    }
+    // A search that need not keep relays apart finds more than any that must, and finds it surely.
+    let unseparated = Link {
+        min_separation_m: 0.0,
+        ..link.clone()
+    };
+    let optimum = optimum(&unseparated, band, Effort::usual(1))?.sir;
+    Some((mission, settings, Judge::Source { link, optimum }))
+}
+
+/// How Algorithm 2 goes, up to some part of the highest altitude at a time.
+fn turns(rng: &mut ChaCha8Rng, most_m: f32) -> Adjust {
+    Adjust {
+        rounds: rng.random_range(1..=6),
+        explore_m: most_m * rng.random_range(0.02..0.5),
+        local: if rng.random() {
+            Local::Fine
+        } else {
+            Local::Grid {
+                columns: 9,
+                rows: 5,
+            }
+        },
+    }
+}
+
+fn in_a_field(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
+    let round = |value: f64| f64::from(value as f32);
+    let relays = rng.random_range(2..=6_u8);
+    let points = rng.random_range(1..=4_u8);
+    let distance_m = round(log_uniform(rng, 100.0, 1e4));
+    let relay = Station {
+        altitude_m: round(distance_m * log_uniform(rng, 0.005, 0.1)),
+        power_w: round(log_uniform(rng, 0.1, 10.0)),
+    };
+    let mu_los = log_uniform(rng, 1.0, 1e4);
+    // So that SIRs are about 1.
+    let unit = mu_los * (distance_m / f64::from(relays)).powi(2) / relay.power_w;
+    let upsilon: Vec<(f64, f64)> = (0..points)
+        .map(|at| {
+            let x = distance_m * f64::from(at) / f64::from(points);
+            (round(x), round(unit * log_uniform(rng, 0.3, 3.0)))
+        })
+        .collect();
+    let least = upsilon
+        .iter()
+        .map(|(_, upsilon)| *upsilon)
+        .fold(f64::INFINITY, f64::min);
+    let link = StochasticLink {
+        distance_m,
+        tx_w: round(relay.power_w * log_uniform(rng, 0.5, 100.0)),
+        mu_los,
+        eta: mu_los * log_uniform(rng, 1.0, 1.9),
+        upsilon,
+        relays: vec![relay; usize::from(relays)],
+    };
+    // In an uneven field a chain that must keep apart may do without a target that it would meet without.
+    let apart = if points == 1 && rng.random() {
+        0.1 * distance_m / f64::from(relays)
+    } else {
+        0.0
+    };
+    let mission = of_stochastic_link(&link, apart as f32)?;
+    let common = Settings {
+        predict: rng.random_bool(0.8),
+        measure: (kind == Kind::Measured).then_some(Measure {
+            i_max_w: (10.0 / least) as f32,
+            samples: SAMPLES,
+        }),
+        ..Settings::default()
+    };
+    let settings = vec![common; usize::from(relays)];
+    Some((mission, settings, Judge::Field(link)))
+}
