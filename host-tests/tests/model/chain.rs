@@ -141,8 +141,8 @@ impl<'a> World<'a> {
                 Heading::TowardRx => from,
                 Heading::TowardTx => to,
             };
-            let measures = self.scenario.kind == Kind::Measured;
-            if is_between && measures && begins.begins_anew() {
+            let differs = matches!(self.scenario.kind, Kind::Measured | Kind::Altitude);
+            if is_between && differs && begins.begins_anew() {
                 self.tally.add("hops excused");
                 continue;
             }

@@ -1,8 +1,9 @@
 //! Which passes a relay may take part in: each once, in order, from the first one of its view on.
 //!
-//! One weakness is excused. A relay that was rebooted in the midst of the first pass of a view takes part in it again. If it, or
-//! the relay before, has measured something else since, it takes its place by another pass than the next relay, which
-//! has answered before: the hop between those two may miss the target until the next pass.
+//! One weakness is excused. A relay that was rebooted in the midst of a pass may take part in it again: in the first pass of a view,
+//! or in a later one if a first pass that was held up reaches it before. If it has forgotten the altitude it had, or it or the
+//! relay before has measured something else since, it takes its place by another pass than the next relay, which has answered
+//! before: the hop between those two may miss the target until the next pass. Frames with tags are not taken that late.
 
 use proptest::{prop_assert, prop_assert_eq};
 use uav_relay::wire::digest::digest;
@@ -79,10 +80,10 @@ impl Ledger {
         Ok(met)
     }
 
-    /// Whether it has taken part in its pass, the first one of a view, in a life before.
+    /// Whether it has taken part in its pass in a life before.
     pub(crate) fn begins_anew(&self) -> bool {
         self.pass
-            .is_some_and(|pass| pass.is_multiple_of(FIRST) && self.passes_before.contains(&pass))
+            .is_some_and(|pass| self.passes_before.contains(&pass))
     }
 
     fn rule(&self, number: u16) -> Met {
