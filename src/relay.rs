@@ -183,7 +183,7 @@ impl Relay {
     /// Takes in where the drone was at time `at`, `x_m` and altitude: when that was measured, not when it was read. Where
     /// `Settings::guard` is set there is no setpoint before the first of these.
     ///
-    /// Constant work. A place that is no number, or farther than 1e7 m, is counted by the guard and has no effect.
+    /// Constant work. A place that is no number, or farther than 1e7 m, has no effect.
     pub fn handle_position(&mut self, now: Instant, at: Instant, place: Placement) {
         self.node.handle_position(now, at, place);
     }
