@@ -1,5 +1,6 @@
 //! Algorithms 1 and 4 on board: a relay's share of a sweep of targets, and of its verdict.
 
+use super::MEMBERSHIP;
 use crate::mission::{Mission, Profile};
 use crate::placement::PerTarget;
 use crate::placement::ladder::Ladder;
@@ -10,6 +11,8 @@ use crate::placement::verdict::Verdict;
 #[derive(Clone, Debug)]
 pub(crate) struct Sweeping {
     pub(crate) ladder: Ladder,
+    /// What it came with, as [`told`] sums it up.
+    pub(crate) told: u32,
     /// This relay's place for each target.
     pub(crate) reaches: PerTarget,
     pub(crate) verdict: Verdict,
@@ -19,6 +22,7 @@ impl Sweeping {
     pub(crate) const fn new(ladder: Ladder) -> Self {
         Self {
             ladder,
+            told: 0,
             reaches: PerTarget::new(),
             verdict: Verdict {
                 commit: None,
@@ -37,6 +41,7 @@ impl Sweeping {
         measured_per_w: Option<f32>,
         from: &PerTarget,
     ) -> bool {
+        self.told = told(behind, from);
         let targets = self.ladder.targets();
         pass::extend(
             mission,
@@ -75,4 +80,18 @@ impl Sweeping {
         let target = *self.ladder.targets().get(commit)?;
         Some((*self.reaches.get(commit)?, target))
     }
+}
+
+/// What the relay before says of itself, summed up: it says the same whenever it says the same pass, unless it was rebooted.
+/// 0 where nothing can be done about that.
+pub(crate) fn told(behind: Option<Behind>, from: &PerTarget) -> u32 {
+    if !MEMBERSHIP {
+        return 0;
+    }
+    let held = behind.map_or([0.0; 2], |behind| {
+        [behind.profile.altitude_m, behind.profile.power_w]
+    });
+    held.iter().chain(from).fold(0, |sum: u32, value| {
+        sum.rotate_left(5).wrapping_add(value.to_bits())
+    })
 }

@@ -84,7 +84,7 @@ pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
-    /// Of another life of its leader, or one whose beginning was missed.
+    /// Of another life of its leader, or one that comes after others which were missed.
     Foreign,
 }
 
@@ -100,8 +100,8 @@ impl Arrival {
     }
 }
 
-/// A pass that is this many numbers or fewer behind the current one is a straggler, and as many ahead a new one; farther off,
-/// its leader was rebooted.
+/// A pass that is this many numbers or fewer behind the current one is a straggler; one that is farther off, or ahead but not
+/// next, is of another life of its leader, or the relay has missed something. Without views as many ahead are new.
 const STRAGGLERS: u16 = 32;
 
 /// The first pass that a leader begins has a number divisible by this, and no later one has.
@@ -141,16 +141,23 @@ impl Exchange {
 
     /// The leader numbers its next pass.
     pub(crate) const fn begin(&mut self) {
-        let next = self.number.wrapping_add(1);
-        self.number = if !self.begun {
+        self.number = if self.begun {
+            self.next()
+        } else {
             // The next one that is a first one.
             self.number.wrapping_add(LIFE) & !(LIFE - 1)
-        } else if next.is_multiple_of(LIFE) {
+        };
+        self.begun = true;
+    }
+
+    /// The number of the pass that its leader begins after the current one.
+    const fn next(self) -> u16 {
+        let next = self.number.wrapping_add(1);
+        if next.is_multiple_of(LIFE) {
             next.wrapping_add(1)
         } else {
             next
-        };
-        self.begun = true;
+        }
     }
 
     /// A pass of `number` is under way.
@@ -174,7 +181,7 @@ impl Exchange {
         let ahead = number.wrapping_sub(self.number);
         match (ahead, self.number.wrapping_sub(number)) {
             (0, _) if same => Arrival::Again,
-            (1..=STRAGGLERS, _) if !first || !MEMBERSHIP => Arrival::New,
+            (1..=STRAGGLERS, _) if !MEMBERSHIP || number == self.next() => Arrival::New,
             (_, 1..=STRAGGLERS) => self.straggler(),
             _ if MEMBERSHIP => Arrival::Foreign,
             _ => Arrival::New,
@@ -236,28 +243,32 @@ mod tests {
     }
 
     #[test]
-    fn the_next_passes_are_new_and_another_first_one_is_foreign() {
-        for ahead in 1..=u16::MAX {
-            let number = 200_u16.wrapping_add(ahead);
-            let behind = 200_u16.wrapping_sub(number);
-            let expected = if ahead <= STRAGGLERS && number % LIFE != 0 {
-                Arrival::New
-            } else if behind <= STRAGGLERS {
-                Arrival::Straggler
-            } else {
-                Arrival::Foreign
+    fn the_next_pass_alone_is_new_and_those_beyond_are_foreign() {
+        for last in [192, 200, 254, 255, u16::MAX - 1, u16::MAX] {
+            // The leader leaves first numbers out: after 255 comes 257.
+            let next = match last {
+                255 => 257,
+                u16::MAX => 1,
+                _ => last + 1,
             };
-            // 256 is 56 ahead: a leader that is rebooted may begin nearer than that.
-            assert_eq!(begun().arrival(number, false), expected, "{number}");
+            for off in 1..=u16::MAX {
+                let number = last.wrapping_add(off);
+                let expected = if number == next {
+                    Arrival::New
+                } else if last.wrapping_sub(number) <= STRAGGLERS {
+                    Arrival::Straggler
+                } else {
+                    Arrival::Foreign
+                };
+                let mut exchange = begun();
+                exchange.take(last);
+                assert_eq!(
+                    exchange.arrival(number, false),
+                    expected,
+                    "{number} after {last}"
+                );
+            }
         }
-        let mut before = Exchange::new(Phase::Idle, 0);
-        before.take(230);
-        assert_eq!(
-            before.arrival(256, false),
-            Arrival::Foreign,
-            "26 ahead, but a first one"
-        );
-        assert_eq!(before.arrival(257, false), Arrival::New);
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //! | what a relay finds | what it does |
 //! | --- | --- |
 //! | another node beside it than agreed on, which has taken it, too; or nobody | calls for a view |
-//! | a pass of another view, of another life of its leader, or one whose beginning it missed | calls for a view |
+//! | a pass of another view, of another life of its leader, or one that comes after others which it missed | calls for a view |
 //! | no pass for a while after it was switched on | calls for a view |
 //! | a call from a neighbour that knows as new a view, or has just been switched on | calls for a view |
 //! | a roster, when it is the last | counts: more than half of the view before, or half with its leader, are a chain |

@@ -2,7 +2,7 @@
 
 use proptest::prop_assert;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Duration, Event, Heading, Instant, Port, Relay, Side};
+use uav_relay::{Duration, Event, Instant, Port, Relay, Side};
 
 use super::Checked;
 use super::ledger::{Ledger, MOST_FRAMES, Turn};
@@ -137,12 +137,9 @@ impl<'a> World<'a> {
                 continue;
             };
             let is_between = hop > 0 && hop < last;
-            let begins = match self.scenario.mission.heading() {
-                Heading::TowardRx => from,
-                Heading::TowardTx => to,
-            };
-            let differs = matches!(self.scenario.kind, Kind::Measured | Kind::Altitude);
-            if is_between && differs && begins.begins_anew() {
+            // Where relays measure, passes go toward Tx: `to` hands them on to `from`.
+            let measures = self.scenario.kind == Kind::Measured;
+            if is_between && measures && to.begins_anew() {
                 self.tally.add("hops excused");
                 continue;
             }
@@ -185,13 +182,14 @@ impl<'a> World<'a> {
         };
         let ended = self.wires.arrive(line, bytes, &frame.bytes);
         let before = *self.relays[to].stats();
+        let stands = self.relays[to].setpoint().is_some();
         self.relays[to].handle_bytes(self.now, port, bytes);
         let after = self.relays[to].stats();
         let is_taken = taken(after) > taken(&before);
         let signs = self.scenario.signs();
         self.ledgers[to].heard(from, ended, is_taken.then_some(frame), signs, self.now)?;
         if let Some(pass) = pass(&frame.bytes).filter(|_| is_taken) {
-            let met = self.ledgers[to].meets(self.scenario, pass, &before, after)?;
+            let met = self.ledgers[to].meets(self.scenario, pass, stands, &before, after)?;
             self.tally.add(match met {
                 Met::TakenUp => "passes taken up",
                 Met::Again => "passes again",

@@ -60,6 +60,8 @@ pub(crate) struct Pass {
     pub(crate) number: u16,
     /// The digest of the mission, and the number of the view more.
     pub(crate) digest: u16,
+    /// Whether it is one of Algorithm 2.
+    pub(crate) moves: bool,
 }
 
 /// The pass that a frame hands onward, if that is what it does.
@@ -74,8 +76,11 @@ pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
                 Message::Token(token) => token.number,
                 _ => return None,
             };
-            let digest = message.mission()?;
-            return Some(Pass { number, digest });
+            return Some(Pass {
+                number,
+                digest: message.mission()?,
+                moves: matches!(message, Message::Token(_)),
+            });
         }
     }
     None

@@ -1,6 +1,6 @@
 //! A relay's share of a sweep (Algorithms 1 and 4), and of its verdict.
 
-use super::super::align::Sweeping;
+use super::super::align::{Sweeping, told};
 use super::super::exchange::{Next, Phase};
 use super::super::lead::{Lead, Rounds};
 use super::super::settings::Method;
@@ -15,16 +15,18 @@ use crate::wire::message::{Answer, Sweep};
 impl Share {
     /// A sweep from the relay before.
     pub(crate) fn on_sweep(&mut self, own: Own<'_>, sweep: &Sweep) -> Next {
-        let same = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.ladder == sweep.ladder);
+        let behind = Behind {
+            profile: sweep.profile,
+            measured_per_w: sweep.measured_per_w,
+        };
+        let told = told(Some(behind), &sweep.reaches);
+        let same = matches!(&self.pass, Pass::Sweep(sweeping)
+            if sweeping.ladder == sweep.ladder && sweeping.told == told);
         let arrival = self.exchange.arrival(sweep.number, same);
         if let Some(next) = arrival.refused(self.exchange) {
             return next;
         }
         self.exchange.take(sweep.number);
-        let behind = Behind {
-            profile: sweep.profile,
-            measured_per_w: sweep.measured_per_w,
-        };
         self.sweep_on(own, sweep.ladder, Some(behind), &sweep.reaches)
     }
 

@@ -17,11 +17,12 @@ impl Share {
         if let Some(next) = arrival.refused(self.exchange) {
             return next;
         }
-        if self.setpoint.is_none()
-            || own.mission.interferer().is_none()
-            || !own.is_between(token.place)
-        {
-            // A relay without a place has none to tell, and nobody stands beyond Rx.
+        if self.setpoint.is_none() {
+            // It has none to tell: it was not there when the places were agreed on.
+            return Next::Foreign;
+        }
+        if own.mission.interferer().is_none() || !own.is_between(token.place) {
+            // Nobody stands beyond Rx.
             return Next::Stale;
         }
         self.exchange.take(token.number);
