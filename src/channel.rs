@@ -120,6 +120,30 @@ impl Channel {
         )
     }
 
+    /// The channel of these path-loss factors, if there can be one: `mu_los` from 1e-3 to 1e30, `mu_nlos` up to 1e20 times as
+    /// large, `eta` between them.
+    #[cfg(feature = "upload")]
+    pub(crate) fn from_factors(mu_los: f64, mu_nlos: f64, eta: f64) -> Option<Self> {
+        let sound = (1e-3..=1e30).contains(&mu_los)
+            && (mu_los..=1e20 * mu_los).contains(&mu_nlos)
+            && (mu_los..=mu_nlos).contains(&eta);
+        sound.then_some(Self {
+            mu_los,
+            mu_nlos,
+            eta,
+        })
+    }
+
+    /// The same channel with eta between the other two to the last bit: of equal losses the weighted sum may be rounded to something
+    /// else, which [`Channel::from_factors`] would refuse.
+    #[cfg(feature = "upload")]
+    pub(crate) fn ordered(self) -> Self {
+        Self {
+            eta: self.eta.max(self.mu_los).min(self.mu_nlos),
+            ..self
+        }
+    }
+
     /// Path-loss factor between two drones.
     pub const fn mu_los(&self) -> f64 {
         self.mu_los

@@ -5,6 +5,8 @@
 pub mod channel;
 pub mod field;
 pub mod gain;
+#[cfg(feature = "upload")]
+pub mod ground;
 pub mod guard;
 pub mod mission;
 pub mod node;
@@ -19,6 +21,8 @@ pub mod wire;
 
 pub use channel::Channel;
 pub use field::{Field, FieldPoint};
+#[cfg(feature = "upload")]
+pub use ground::{Ground, Progress};
 pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfig, Profile};
 pub use node::Side;
 pub use node::event::Event;
@@ -34,6 +38,8 @@ pub use time::{Duration, Instant};
 #[cfg(feature = "auth")]
 pub use wire::auth::{Auth, Key};
 pub use wire::frame::FrameBuf;
+#[cfg(feature = "upload")]
+pub use wire::upload::Upload;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -2,7 +2,9 @@
 
 mod incoming;
 #[cfg(feature = "auth")]
-mod signed;
+pub(crate) mod signed;
+#[cfg(feature = "upload")]
+mod uploads;
 
 use crate::field::estimate::Estimate;
 use crate::guard::Hindrance;
@@ -54,7 +56,8 @@ pub struct Transmit {
 /// - Once drained, `poll_timeout` is `None` or later than `now`: the loop cannot spin.
 /// - *Setpoints* are finite, inside [0, D], at the altitude the relay holds or one of the mission's band, and at least the
 ///   mission's separation from those of its neighbours for the same pass. There is none before the first agreement, and
-///   nothing moves it but a new agreement or the relay's own turn in Algorithm 2.
+///   nothing moves it but a new agreement or the relay's own turn in Algorithm 2: a new mission does not, though the place that is
+///   held may be outside its limits, until the chain has agreed in it.
 ///
 /// ```
 /// use uav_relay::{Band, Channel, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};

@@ -89,7 +89,7 @@ fn an_end_that_never_reads_neither_blocks_nor_starves_the_other_link() {
         let frames: Vec<&[u8]> = heard.split_inclusive(|&byte| byte == 0).collect();
         assert!(frames.len() >= 2, "{kind:?}: {heard:?}");
         assert!(
-            frames.iter().all(|frame| [20, 28].contains(&frame.len())),
+            frames.iter().all(|frame| [20, 30].contains(&frame.len())),
             "{kind:?}: heartbeats, and hails that call for a view"
         );
         let before = nodes[0].driver.stats()[0].dropped;

@@ -28,12 +28,20 @@ mod document;
 mod forming;
 #[path = "wire/golden.rs"]
 mod golden;
+#[path = "wire/ground.rs"]
+mod ground;
 #[path = "wire/ladder.rs"]
 mod ladder;
 #[path = "wire/lies.rs"]
 mod lies;
+#[path = "wire/offer.rs"]
+mod offer;
+#[path = "wire/offered.rs"]
+mod offered;
 #[path = "wire/random.rs"]
 mod random;
+#[path = "wire/ranges.rs"]
+mod ranges;
 #[path = "wire/receive.rs"]
 mod receive;
 #[path = "wire/reject.rs"]
@@ -42,10 +50,14 @@ mod reject;
 mod sequence;
 #[path = "wire/shared.rs"]
 mod shared;
+#[path = "wire/signed.rs"]
+mod signed;
 #[path = "wire/strategies.rs"]
 mod strategies;
 #[path = "wire/stream.rs"]
 mod stream;
+#[path = "wire/uploads.rs"]
+mod uploads;
 #[path = "wire/views.rs"]
 mod views;
 #[path = "wire/wave.rs"]

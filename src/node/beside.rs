@@ -18,6 +18,7 @@ use super::MEMBERSHIP;
 use super::liveness::{Neighbour, Silence, tick};
 use super::settings::Settings;
 use crate::time::Instant;
+use crate::wire::digest::Stamp;
 
 /// Nodes on one side that are hailed.
 pub(crate) const CANDIDATES: u16 = 4;
@@ -85,6 +86,14 @@ pub(crate) struct Beside {
     near: Option<Instant>,
     losses: u8,
     pub(crate) signs: Signs,
+    /// The newest mission that the node taken holds, as far as it has said.
+    pub(crate) holds: Option<Stamp>,
+    /// Whether a newer one is to be offered to it.
+    #[cfg(feature = "upload")]
+    pub(crate) offer: bool,
+    /// Whether the ground at this side is owed a hail.
+    #[cfg(feature = "upload")]
+    pub(crate) ground: bool,
     /// Candidates that are owed a hail, and those of them that are asked for one: bit 0 is the nearest node.
     hails: u8,
     asks: u8,
@@ -108,6 +117,11 @@ impl Beside {
                 ask: false,
                 answer: false,
             },
+            holds: None,
+            #[cfg(feature = "upload")]
+            offer: false,
+            #[cfg(feature = "upload")]
+            ground: false,
             hails: 0,
             asks: 0,
         }

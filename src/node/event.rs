@@ -23,9 +23,13 @@ pub enum Event {
     Reformed,
     /// Too few relays can be reached to go on without the others: this part of the chain holds its places.
     Cut,
+    /// A newer mission has come: `Relay::upload`. Store it, and hand it to `Relay::resume` when the relay is next switched on.
+    Uploaded,
+    /// The chain has agreed to fly it: `Relay::mission` and `Relay::version` have new values, and new places follow.
+    Adopted,
 }
 
-const ALL: [Event; 11] = [
+const ALL: [Event; 13] = [
     Event::SetpointChanged,
     Event::Converged,
     Event::Infeasible,
@@ -37,6 +41,8 @@ const ALL: [Event; 11] = [
     Event::MissionMismatch(Side::Downstream),
     Event::Reformed,
     Event::Cut,
+    Event::Uploaded,
+    Event::Adopted,
 ];
 
 /// Events that have been raised and not yet taken, one bit each.

@@ -6,11 +6,13 @@ use super::beside::CANDIDATES;
 use super::event::Event;
 use super::exchange::Phase;
 use super::liveness::tick;
+use super::members::Members;
 use super::stats::bump;
 use super::timers::Timer;
 use super::{MEMBERSHIP, Node, PAUSE, Side};
-use crate::mission::Heading;
+use crate::mission::{Heading, Mission};
 use crate::time::Instant;
+use crate::wire::digest::Stamp;
 use crate::wire::message::Hail;
 
 impl Node {
@@ -48,7 +50,7 @@ impl Node {
         None
     }
 
-    fn hail(&mut self, side: Side, ask: bool) -> Hail {
+    pub(super) fn hail(&mut self, side: Side, ask: bool) -> Hail {
         let back = Side::back(self.mission.heading());
         let other = match side {
             Side::Upstream => Side::Downstream,
@@ -62,6 +64,8 @@ impl Node {
             form: self.members.calls && side == back,
             fresh: self.share.is_fresh(),
             ready: self.beside(other).is_ready(),
+            holds: self.members.held,
+            flies: self.members.flown == self.members.held,
         }
     }
 
@@ -75,6 +79,9 @@ impl Node {
         }
         let node = self.beside(side).node();
         if node == from {
+            #[cfg(feature = "upload")]
+            self.compare(side, from, hail.holds);
+            self.beside(side).holds = Some(hail.holds);
             if self.seeks() {
                 self.told(now, side, hail.neighbour == own);
             }
@@ -103,6 +110,7 @@ impl Node {
                 .beside(side)
                 .consider(from, courts, nearer, hail.ready, now, &settings)
             {
+                self.beside(side).holds = Some(hail.holds);
                 self.pending.raise(Event::NeighbourBack(side));
                 self.timers.set(side.timer(), now + tick(&settings));
                 self.owe_hail(side, from, true);
@@ -172,8 +180,11 @@ impl Node {
             self.owe_hail(back, to, true);
             return;
         }
-        let newest = self.members.newest;
-        let under_way = self.share.called().is_some_and(|view| view >= newest);
+        let Members { newest, held, .. } = self.members;
+        let under_way = self
+            .share
+            .called()
+            .is_some_and(|(view, stamp)| view >= newest && stamp == held);
         let Some(view) = newest.checked_add(1).filter(|_| !under_way) else {
             return;
         };
@@ -183,6 +194,15 @@ impl Node {
         let (share, own) = self.parts();
         let next = share.call(own, view);
         self.proceed(now, next);
+    }
+
+    /// The mission of stamp `stamp`, if it is the one flown or the one held.
+    fn mission_of(&self, stamp: Stamp) -> Option<Mission> {
+        #[cfg(feature = "upload")]
+        if stamp != self.members.flown {
+            return self.uploaded(stamp);
+        }
+        (stamp == self.members.flown).then_some(self.mission)
     }
 
     /// What came of a call is known: how many relays there are, or that they are too few.
@@ -196,7 +216,9 @@ impl Node {
         self.timers.stop(Timer::Work);
         self.stats.sweeps = self.share.sweeps();
         let view = self.share.number();
-        let mission = granted.and_then(|relays| self.mission.with_relays(relays).ok());
+        let stamp = self.share.stamp().unwrap_or(self.members.flown);
+        let mission = self.mission_of(stamp).zip(granted);
+        let mission = mission.and_then(|(mission, relays)| mission.with_relays(relays).ok());
         let (Some(relays), Some(mission)) = (granted, mission) else {
             self.pending.raise(Event::Cut);
             // Until somebody else is found there is nothing to ask again.
@@ -213,7 +235,12 @@ impl Node {
             Heading::TowardRx => place,
             Heading::TowardTx => relays.saturating_sub(place).saturating_add(1),
         };
-        self.mission = mission;
+        if stamp == self.members.flown {
+            self.mission = mission;
+        } else {
+            self.fly(mission, stamp);
+            self.pending.raise(Event::Adopted);
+        }
         self.members.agree(view, index);
         let heading = mission.heading();
         self.beside(Side::back(heading)).agree_with_caller();
@@ -222,6 +249,10 @@ impl Node {
         self.timers.stop(Timer::Call);
         bump(&mut self.stats.views);
         self.pending.raise(Event::Reformed);
+        if stamp != self.members.held {
+            // A newer one has come in the meantime.
+            self.call(now);
+        }
         if leads {
             self.timers.set(Timer::Work, now + PAUSE);
         }

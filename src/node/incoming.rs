@@ -2,18 +2,26 @@
 
 use super::event::Event;
 use super::exchange::{Next, Phase};
+use super::members::Members;
 use super::share::{ADJUST, ALTITUDE};
 use super::stats::bump;
 use super::timers::Timer;
-use super::{GUARD, MEMBERSHIP, Node, Side, VIEWS};
+use super::{GUARD, MEMBERSHIP, Node, Side};
 use crate::time::Instant;
 use crate::wire::message::Message;
+
+/// A pass whose digest is so many views off is of the same mission.
+const VIEWS: u16 = 64;
 
 impl Node {
     /// Node `from` at `side` has made itself known, for the first time if `first`: then what waits for an answer from there is
     /// said again.
     #[cfg(feature = "auth")]
     pub(crate) fn meet(&mut self, now: Instant, side: Side, from: u16, first: bool) {
+        #[cfg(feature = "upload")]
+        if self.ground_side(from).is_some() {
+            return;
+        }
         if self.beside(side).node() != from {
             if first {
                 // What was to be said to it before could not be read there.
@@ -40,6 +48,10 @@ impl Node {
         from: u16,
         message: &Message<'_>,
     ) -> bool {
+        #[cfg(feature = "upload")]
+        if self.ground_side(from).is_some() {
+            return self.on_ground(now, side, message);
+        }
         let taken = self.beside(side).node() == from;
         if taken {
             self.hear(now, side);
@@ -59,28 +71,7 @@ impl Node {
             // Nobody says anything else to a node that it has not taken.
             self.told(now, side, true);
         }
-        if let Some(told) = message.mission()
-            && !message.is_of_any_view()
-            && told != self.digest()
-            && MEMBERSHIP
-        {
-            let off = told.wrapping_sub(self.digest());
-            if off.min(off.wrapping_neg()) <= VIEWS {
-                bump(&mut self.stats.view);
-                if message.is_onward() {
-                    self.call(now);
-                }
-                self.owe_hail(side, from, false);
-                return true;
-            }
-        }
-        let digest = if message.is_of_any_view() {
-            self.members.digest
-        } else {
-            self.digest()
-        };
-        if message.mission().is_some_and(|told| told != digest) {
-            self.refuse_mission(side);
+        if !self.is_of_this_view(now, side, from, message) {
             return true;
         }
         self.handle(now, side, message);
@@ -88,9 +79,48 @@ impl Node {
         true
     }
 
-    /// The digest that passes bear in the view agreed on.
-    const fn digest(&self) -> u16 {
-        self.members.digest.wrapping_add(self.members.view)
+    /// Whether `message` from the neighbour `from` is of the mission and, if it is of one, of the view that this relay is in.
+    /// What is not is counted, and answered by a hail if the two may have to come to one view.
+    fn is_of_this_view(
+        &mut self,
+        now: Instant,
+        side: Side,
+        from: u16,
+        message: &Message<'_>,
+    ) -> bool {
+        let Some(told) = message.mission() else {
+            return true;
+        };
+        let Members { flown, held, .. } = self.members;
+        let calls = message.is_of_a_call();
+        if !calls && !message.is_of_a_view() {
+            return self.is_of_mission(side, told);
+        }
+        let known = match message {
+            Message::Roster(roster) => roster.stamp == held,
+            Message::Count(count) => count.stamp == held || count.stamp == flown,
+            _ => told == self.members.pass_digest(),
+        };
+        if known {
+            return true;
+        }
+        let off = told.wrapping_sub(self.members.pass_digest());
+        let near = !calls && off.min(off.wrapping_neg()) <= VIEWS;
+        // It was loaded with the same mission, so it flies an older or a newer one.
+        let kin = self.takes_uploads() && self.beside(side).holds.is_some();
+        if !(MEMBERSHIP && (near || kin)) {
+            self.refuse_mission(side);
+            if self.takes_uploads() {
+                self.owe_hail(side, from, false);
+            }
+            return false;
+        }
+        bump(&mut self.stats.view);
+        if near && message.is_onward() {
+            self.call(now);
+        }
+        self.owe_hail(side, from, false);
+        false
     }
 
     fn is_of_mission(&mut self, side: Side, digest: u16) -> bool {
@@ -101,7 +131,7 @@ impl Node {
         same
     }
 
-    fn refuse_mission(&mut self, side: Side) {
+    pub(super) fn refuse_mission(&mut self, side: Side) {
         bump(&mut self.stats.mission);
         self.pending.raise(Event::MissionMismatch(side));
     }
@@ -132,7 +162,12 @@ impl Node {
             }
             return;
         }
-        if !message.is_of_any_view() && !self.beside(side).is_agreed() {
+        #[cfg(feature = "upload")]
+        if let Message::Offer(upload) = message {
+            let from = self.beside(side).node();
+            return self.on_offer(now, side, from, upload);
+        }
+        if message.is_of_a_view() && !self.beside(side).is_agreed() {
             // It has not been counted with this relay yet.
             bump(&mut self.stats.stale);
             return;
@@ -172,7 +207,7 @@ impl Node {
                 }
                 next
             }
-            Message::Count(count) if MEMBERSHIP => share.on_count(count),
+            Message::Count(count) if MEMBERSHIP => share.on_count(own, count),
             Message::Busy { sweep } => {
                 if self.share.phase() == Phase::Waiting && *sweep == self.share.number() {
                     // It has arrived: what is missing is the answer, and that may take its time.

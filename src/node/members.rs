@@ -11,11 +11,12 @@
 //! | a pass of another view, of another life of its leader, or one that comes after others which it missed | calls for a view |
 //! | no pass for a while after it was switched on | calls for a view |
 //! | a call from a neighbour that knows as new a view, or has just been switched on | calls for a view |
+//! | a newer mission than the one it flies | calls for a view, which flies it if all hold it |
 //! | a roster, when it is the last | counts: more than half of the view before, or half with its leader, are a chain |
 
 use crate::mission::Mission;
 use crate::time::Duration;
-use crate::wire::digest::digest;
+use crate::wire::digest::{Stamp, digest};
 
 use super::settings::Settings;
 
@@ -26,8 +27,12 @@ pub(crate) struct Members {
     pub(crate) node: u16,
     /// Relays of the mission.
     pub(crate) all: u16,
-    /// Digest of the mission.
+    /// Digest of the mission as it was loaded.
     pub(crate) digest: u16,
+    /// The mission that it flies.
+    pub(crate) flown: Stamp,
+    /// The newest mission that it holds.
+    pub(crate) held: Stamp,
     /// Number of the view agreed on.
     pub(crate) view: u16,
     /// The largest number of a view heard of.
@@ -42,16 +47,25 @@ pub(crate) struct Members {
 
 impl Members {
     pub(crate) fn new(mission: &Mission, node: u16) -> Self {
+        let digest = digest(mission);
+        let flown = Stamp { version: 0, digest };
         Self {
             node,
             all: mission.relays(),
-            digest: digest(mission),
+            digest,
+            flown,
+            held: flown,
             view: 0,
             newest: 0,
             index: node,
             calls: false,
             tries: 0,
         }
+    }
+
+    /// The digest that passes bear in the view agreed on.
+    pub(crate) const fn pass_digest(&self) -> u16 {
+        self.flown.digest.wrapping_add(self.view)
     }
 
     /// A new view is called for; whether it was not until now.

@@ -15,6 +15,7 @@
 //! | [`members`] | which view of the chain was agreed on, and when a new one is called for |
 //! | `incoming`, `outgoing` | what a message does; what there is to say |
 //! | `forming` | hails, calls and new views |
+//! | `uploads` | a newer mission, in flight |
 //! | [`timers`] | every timer, in one table |
 //! | `steering` | the setpoint on its way to the agreed place |
 //! | [`event`] | what the firmware is told |
@@ -42,11 +43,16 @@ mod side;
 pub mod stats;
 mod steering;
 pub mod timers;
+#[cfg(feature = "upload")]
+mod uploads;
 
 use crate::guard::Guard;
 use crate::mission::{Mission, Profile};
 use crate::sir::Placement;
 use crate::time::{Duration, Instant};
+use crate::wire::digest::Stamp;
+#[cfg(feature = "upload")]
+use crate::wire::upload::Upload;
 
 use beside::{Beside, CANDIDATES};
 use event::{Event, Pending};
@@ -67,11 +73,11 @@ const PAUSE: Duration = Duration::from_micros(250);
 /// Whether this crate was built to re-form the chain. Without it, none of its code is reached.
 pub(crate) const MEMBERSHIP: bool = cfg!(feature = "membership");
 
+/// Whether it was built to take a newer mission in flight.
+pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
+
 /// Whether it was built to guard setpoints.
 pub(crate) const GUARD: bool = cfg!(feature = "guard");
-
-/// A pass whose digest is so many views off is of the same mission.
-const VIEWS: u16 = 64;
 
 /// A relay's share of the protocol.
 #[derive(Clone, Debug)]
@@ -81,6 +87,9 @@ pub(crate) struct Node {
     members: Members,
     share: Share,
     meter: Meter,
+    /// The newest mission that was uploaded.
+    #[cfg(feature = "upload")]
+    upload: Option<Upload>,
     guard: Option<Guard>,
     timers: Timers,
     upstream: Beside,
@@ -123,6 +132,8 @@ impl Node {
             settings,
             share: Share::new(&mission, leader, low, profile),
             meter: Meter::new(settings.measure),
+            #[cfg(feature = "upload")]
+            upload: None,
             guard: guard(&settings, identity.index, after, seed, now),
             timers: Timers::new(),
             upstream: Beside::new(identity.index.saturating_sub(1), now),
@@ -157,8 +168,12 @@ impl Node {
     }
 
     /// On which side node `sender` is, if it may have something to say to this relay: a neighbour, or one that might become
-    /// one. Neither Tx nor Rx runs this protocol, so they are none.
+    /// one, or the ground where it may upload missions.
     pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
+        #[cfg(feature = "upload")]
+        if let Some(side) = self.ground_side(sender) {
+            return Some(side);
+        }
         let own = self.members.node;
         let near = sender.abs_diff(own) <= if self.seeks() { CANDIDATES } else { 1 };
         if !near || sender == own || sender < 1 || sender > self.members.all {
@@ -176,6 +191,11 @@ impl Node {
         MEMBERSHIP && self.settings.wiring == Wiring::Shared
     }
 
+    /// Whether newer missions are taken in flight: only where frames are signed.
+    const fn takes_uploads(&self) -> bool {
+        UPLOAD && self.settings.auth.is_some()
+    }
+
     /// The relay's share, and what it needs to know of the relay.
     fn parts(&mut self) -> (&mut Share, Own<'_>) {
         let onward = match Side::onward(self.mission.heading()) {
@@ -185,13 +205,22 @@ impl Node {
         let own = Own {
             mission: &self.mission,
             settings: &self.settings,
-            mission_digest: self.members.digest,
+            flown: self.members.flown,
+            held: self.members.held,
             view: self.members.view,
             index: self.members.index,
             end: onward.is_end(),
             measured_per_w: self.meter.published(),
         };
         (&mut self.share, own)
+    }
+
+    /// Flies `mission` from now on, whose stamp is `stamp`.
+    fn fly(&mut self, mission: Mission, stamp: Stamp) {
+        self.mission = mission;
+        self.members.flown = stamp;
+        let common = mission.config().common;
+        self.share.load(self.settings.profile.unwrap_or(common));
     }
 
     /// Does what the relay's share asks for.

@@ -18,6 +18,12 @@ impl Node {
             let patience = self.patience();
             self.timers.set(Timer::Repeat, now + patience);
             if let Some(to) = next {
+                #[cfg(feature = "upload")]
+                if self.share.is_rolling()
+                    && let Some(offer) = self.offer(onward)
+                {
+                    return Some((onward, to, offer));
+                }
                 let (share, own) = self.parts();
                 return share.onward(own).map(|message| (onward, to, message));
             }
@@ -49,6 +55,19 @@ impl Node {
         }
         if MEMBERSHIP && let Some((side, to, hail)) = self.next_hail() {
             return Some((side, to, Message::Hail(hail)));
+        }
+        #[cfg(feature = "upload")]
+        for side in [Side::Upstream, Side::Downstream] {
+            let to = self.beside(side).node();
+            if core::mem::take(&mut self.beside(side).offer)
+                && to != 0
+                && let Some(offer) = self.offer(side)
+            {
+                return Some((side, to, offer));
+            }
+            if let Some((to, hail)) = self.next_report(side) {
+                return Some((side, to, Message::Hail(hail)));
+            }
         }
         if GUARD && let Some(guard) = &mut self.guard {
             let (side, to, fence) = guard.poll()?;

@@ -5,6 +5,7 @@ use crate::node::stats::bump;
 use crate::node::{Node, Side};
 use crate::time::Instant;
 use crate::wire::frame::{self, FrameBuf, Header, Opened};
+use crate::wire::message::Message;
 use crate::wire::session::{Checked, Session};
 
 /// A frame from a neighbour, or from somebody who says so.
@@ -40,35 +41,46 @@ pub(super) fn next(
     frame: &mut FrameBuf,
 ) -> Option<(Side, usize)> {
     session.pin(node.neighbours());
-    if let Some(to) = session.take_hello() {
-        return Some(hello(session, to, header, frame));
-    }
-    let (side, to, message) = node.poll_message(now)?;
-    if !session.knows(to) {
-        // It could not be read there; it is said again once it can.
-        session.greet(to);
-        let to = session.take_hello()?;
-        return Some(hello(session, to, header, frame));
-    }
-    header.destination = to;
-    let signer = session.signer(to);
-    Some((side, frame::encode_signed(*header, &message, signer, frame)))
-}
-
-/// Writes a hello to node `to`.
-fn hello(
-    session: &mut Session,
-    to: u16,
-    header: &mut Header,
-    frame: &mut FrameBuf,
-) -> (Side, usize) {
-    header.destination = to;
-    let side = if to < header.sender {
+    let len = if let Some(len) = greeting(session, header, frame) {
+        len
+    } else {
+        let (_, to, message) = node.poll_message(now)?;
+        say(session, to, &message, header, frame)?
+    };
+    let side = if header.destination < header.sender {
         Side::Upstream
     } else {
         Side::Downstream
     };
+    Some((side, len))
+}
+
+/// Writes a hello that is owed to some node.
+pub(crate) fn greeting(
+    session: &mut Session,
+    header: &mut Header,
+    frame: &mut FrameBuf,
+) -> Option<usize> {
+    let to = session.take_hello()?;
+    header.destination = to;
     let body = session.hello(to);
     let signer = session.signer(to);
-    (side, frame::encode_hello(*header, &body, signer, frame))
+    Some(frame::encode_hello(*header, &body, signer, frame))
+}
+
+/// Writes `message` to node `to`, or a hello in its place if it could not be read there: it is said again once it can.
+pub(crate) fn say(
+    session: &mut Session,
+    to: u16,
+    message: &Message<'_>,
+    header: &mut Header,
+    frame: &mut FrameBuf,
+) -> Option<usize> {
+    if !session.knows(to) {
+        session.greet(to);
+        return greeting(session, header, frame);
+    }
+    header.destination = to;
+    let signer = session.signer(to);
+    Some(frame::encode_signed(*header, message, signer, frame))
 }

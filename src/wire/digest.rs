@@ -1,13 +1,17 @@
 //! The 16-bit digest of a mission, by which relays tell whether they fly the same one.
 
 use super::crc::Crc32c;
-use crate::mission::{Interference, Mission};
+use crate::mission::{Interference, Mission, MissionConfig};
 
 /// The low half of a CRC-32C over every parameter of `mission`; `FORMAT.md` has their order.
 ///
 /// It tells mistakes apart, not adversaries: two different missions share a digest once in 65 536.
 pub fn digest(mission: &Mission) -> u16 {
-    let c = mission.config();
+    of(mission.config())
+}
+
+/// The same of parameters alone.
+pub(super) fn of(c: &MissionConfig) -> u16 {
     let mut crc = Crc32c::new();
     crc.update(&c.relays.to_le_bytes());
     for number in [
@@ -43,6 +47,18 @@ pub fn digest(mission: &Mission) -> u16 {
     }
     let [a, b, ..] = crc.finish().to_le_bytes();
     u16::from_le_bytes([a, b])
+}
+
+/// Which mission somebody holds or flies: the newest of all that were uploaded, or the one that was loaded before flight.
+///
+/// In the order of versions; of two missions with one version, the one with the larger digest counts as the newer one.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Stamp {
+    /// The operator's number of an uploaded mission, from 1; 0 is the mission that was loaded before flight.
+    pub version: u16,
+    /// [`digest`] of the mission, with all its relays.
+    pub digest: u16,
 }
 
 #[cfg(test)]

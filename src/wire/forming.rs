@@ -1,8 +1,9 @@
-//! The wire form of the messages by which a chain is formed: a view's number, three numbers and a byte of flags.
+//! The wire form of the messages by which a chain is formed: a view's number, four numbers and a byte of flags.
 
 use serde::{Deserialize, Serialize};
 
 use super::body::Pass;
+use super::digest::Stamp;
 use super::message::{Before, Count, Hail, Roster};
 use crate::mission::MAX_RELAYS;
 
@@ -14,22 +15,24 @@ pub(super) struct Forming {
     one: [u8; 2],
     other: [u8; 2],
     more: [u8; 2],
+    version: [u8; 2],
     flags: u8,
 }
 
 impl Forming {
-    const fn new(pass: Pass, numbers: [u16; 3], flags: u8) -> Self {
-        let [one, other, more] = numbers;
+    const fn new(pass: Pass, numbers: [u16; 4], flags: u8) -> Self {
+        let [one, other, more, version] = numbers;
         Self {
             pass,
             one: one.to_le_bytes(),
             other: other.to_le_bytes(),
             more: more.to_le_bytes(),
+            version: version.to_le_bytes(),
             flags,
         }
     }
 
-    /// The numbers, of which the first two are of relays and the last of a view, and the flags.
+    /// The numbers, of which the first two are of relays, the third one of a view or a digest, and the flags.
     fn parts(self) -> Option<(u16, u16, u16, u8)> {
         let one = u16::from_le_bytes(self.one);
         let other = u16::from_le_bytes(self.other);
@@ -37,21 +40,29 @@ impl Forming {
         (one <= MAX_RELAYS && other <= MAX_RELAYS).then_some((one, other, more, self.flags))
     }
 
-    /// The neighbour; flags from bit 0: asks for a hail, asks for a new view, fresh, ready.
+    const fn stamp(self, digest: u16) -> Stamp {
+        Stamp {
+            version: u16::from_le_bytes(self.version),
+            digest,
+        }
+    }
+
+    /// The neighbour; digest and version of what it holds; flags from bit 0: asks for a hail, asks for a new view, fresh, ready,
+    /// flies what it holds.
     pub(super) fn of_hail(hail: &Hail) -> Self {
-        let flags = [hail.ask, hail.form, hail.fresh, hail.ready]
+        let flags = [hail.ask, hail.form, hail.fresh, hail.ready, hail.flies]
             .into_iter()
             .rev()
             .fold(0, |flags, flag| flags << 1 | u8::from(flag));
         Self::new(
             Pass::new(hail.newest, hail.mission),
-            [hail.neighbour, 0, 0],
+            [hail.neighbour, 0, hail.holds.digest, hail.holds.version],
             flags,
         )
     }
 
     pub(super) fn hail(self) -> Option<Hail> {
-        let (neighbour, 0, 0, flags @ 0..=0x0F) = self.parts()? else {
+        let (neighbour, 0, held, flags @ 0..=0x1F) = self.parts()? else {
             return None;
         };
         Some(Hail {
@@ -62,15 +73,23 @@ impl Forming {
             form: flags & 2 != 0,
             fresh: flags & 4 != 0,
             ready: flags & 8 != 0,
+            flies: flags & 16 != 0,
+            holds: self.stamp(held),
         })
     }
 
-    /// The sender's place; size and number of the view before; whether its leader is there.
+    /// The sender's place; size and number of the view before; version of the mission; whether its leader is there.
     pub(super) fn of_roster(roster: &Roster) -> Self {
+        let before = roster.before;
         Self::new(
-            Pass::new(roster.view, roster.mission),
-            [roster.place, roster.before.relays, roster.before.view],
-            u8::from(roster.before.leader),
+            Pass::new(roster.view, roster.stamp.digest),
+            [
+                roster.place,
+                before.relays,
+                before.view,
+                roster.stamp.version,
+            ],
+            u8::from(before.leader),
         )
     }
 
@@ -79,7 +98,7 @@ impl Forming {
             return None;
         };
         Some(Roster {
-            mission: self.pass.mission(),
+            stamp: self.stamp(self.pass.mission()),
             view: self.pass.number(),
             place,
             before: Before {
@@ -90,11 +109,16 @@ impl Forming {
         })
     }
 
-    /// The sender's place; how many relays, 0 for too few.
+    /// The sender's place; how many relays, 0 for too few; version of the mission.
     pub(super) fn of_count(count: &Count) -> Self {
         Self::new(
-            Pass::new(count.view, count.mission),
-            [count.place, count.relays.unwrap_or(0), 0],
+            Pass::new(count.view, count.stamp.digest),
+            [
+                count.place,
+                count.relays.unwrap_or(0),
+                0,
+                count.stamp.version,
+            ],
             0,
         )
     }
@@ -104,7 +128,7 @@ impl Forming {
             return None;
         };
         Some(Count {
-            mission: self.pass.mission(),
+            stamp: self.stamp(self.pass.mission()),
             view: self.pass.number(),
             place,
             relays: (relays > 0).then_some(relays),

@@ -1,5 +1,8 @@
 //! What neighbours say to each other. `body` has how they say it, `FORMAT.md` the byte tables.
 
+use super::digest::Stamp;
+#[cfg(feature = "upload")]
+use super::upload::Upload;
 use crate::guard::Fence;
 use crate::mission::Profile;
 use crate::placement::PerTarget;
@@ -58,6 +61,9 @@ pub enum Message<'a> {
         /// What the sender says of it.
         fence: Fence,
     },
+    /// Either way, also from the ground: a mission that is newer than the one that the receiver holds.
+    #[cfg(feature = "upload")]
+    Offer(Upload),
 }
 
 impl Message<'_> {
@@ -73,21 +79,29 @@ impl Message<'_> {
             Self::Token(token) => Some(token.mission),
             Self::Moved(moved) => Some(moved.mission),
             Self::Hail(hail) => Some(hail.mission),
-            Self::Roster(roster) => Some(roster.mission),
-            Self::Count(count) => Some(count.mission),
+            Self::Roster(roster) => Some(roster.stamp.digest),
+            Self::Count(count) => Some(count.stamp.digest),
+            #[cfg(feature = "upload")]
+            Self::Offer(upload) => Some(upload.base()),
         }
     }
 
-    /// Whether its digest is that of the mission as it was loaded, and not that of a view of the chain.
-    pub(crate) const fn is_of_any_view(&self) -> bool {
+    /// Whether it is said of a pass that places come of: then its digest is that of a view of the chain.
+    pub(crate) const fn is_of_a_view(&self) -> bool {
         matches!(
             self,
-            Self::Heartbeat { .. }
-                | Self::Hail(_)
-                | Self::Roster(_)
-                | Self::Count(_)
-                | Self::Fence { .. }
+            Self::Sweep(_)
+                | Self::Verdict(_)
+                | Self::Wave(_)
+                | Self::Trace(_)
+                | Self::Token(_)
+                | Self::Moved(_)
         )
+    }
+
+    /// Whether it is said of the call for a view: then its digest is that of the mission to be flown in it.
+    pub(crate) const fn is_of_a_call(&self) -> bool {
+        matches!(self, Self::Roster(_) | Self::Count(_))
     }
 
     /// Whether it is a pass, which goes onward.
@@ -207,7 +221,7 @@ pub struct Moved {
 /// What one node tells another about the chain as it sees it.
 #[expect(
     clippy::struct_excessive_bools,
-    reason = "four flags of the wire format"
+    reason = "five flags of the wire format"
 )]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -226,14 +240,18 @@ pub struct Hail {
     pub fresh: bool,
     /// Whether it can hear a node on its other side, or needs none there.
     pub ready: bool,
+    /// The newest mission that it holds.
+    pub holds: Stamp,
+    /// Whether that is the one it flies.
+    pub flies: bool,
 }
 
 /// The call for a new view, as one relay hands it to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Roster {
-    /// [`super::digest::digest`] of the sender's mission, as it was loaded.
-    pub mission: u16,
+    /// The mission that the view is to fly: the one that every relay up to the sender holds.
+    pub stamp: Stamp,
     /// The number of the new view, above that of every agreed one.
     pub view: u16,
     /// How many relays it has come through, the sender included: 1 to 1000.
@@ -258,8 +276,8 @@ pub struct Before {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Count {
-    /// [`super::digest::digest`] of the sender's mission, as it was loaded.
-    pub mission: u16,
+    /// The mission that the view flies.
+    pub stamp: Stamp,
     /// The number of the view.
     pub view: u16,
     /// The sender's place, from 1 at the one that has called: 1 to 1000.

@@ -1,11 +1,12 @@
 //! Bytes on the link: [`deframe`] cuts the byte stream at delimiters and undoes COBS, [`frame`] checks integrity and holds
 //! the addresses, [`message`] is what neighbours say, [`digest`] how they tell missions apart, [`auth`] how they tell
-//! members from others. `FORMAT.md` beside this file has byte tables and examples.
+//! members from others, `upload` how a newer mission is told. `FORMAT.md` beside this file has byte tables and examples.
 
 pub mod auth;
 #[cfg(feature = "auth")]
 mod blake2s;
 mod body;
+mod checks;
 pub mod crc;
 pub mod deframe;
 pub mod digest;
@@ -14,3 +15,5 @@ pub mod frame;
 pub mod message;
 #[cfg(feature = "auth")]
 pub(crate) mod session;
+#[cfg(feature = "upload")]
+pub mod upload;

@@ -5,7 +5,7 @@ use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};
 use uav_relay::wire::message::Message;
-use uav_relay::{Identity, Instant, Port, Relay, Stats};
+use uav_relay::{Identity, Instant, Mission, Port, Relay, Stats};
 
 use super::cobs::stuffed;
 use super::input::Input;
@@ -252,6 +252,10 @@ fn look_at(message: &Message<'_>) {
         }
         Message::Fence { fence, .. } => {
             assert!(fence.tie != 0 && fence.x_m.abs() <= 1e7 && fence.target_m.abs() <= 1e7);
+        }
+        Message::Offer(upload) => {
+            let same = Mission::try_new(*upload.config()).is_ok();
+            assert!(same && upload.version() > 0, "{upload:?}");
         }
         Message::Busy { .. } | Message::Heartbeat { .. } | Message::Trace(_) => {}
     }

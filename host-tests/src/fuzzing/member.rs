@@ -54,6 +54,16 @@ impl Member {
         })
     }
 
+    /// One that the relay has not heard of, and which has not heard of the relay.
+    pub fn unknown() -> Self {
+        Self {
+            key: KEY,
+            own: raised(&[0; NONCE]),
+            relay: vec![0; NONCE],
+            counter: 0,
+        }
+    }
+
     /// As it is after its next start.
     pub fn restarted(&self) -> Self {
         Self {
@@ -78,9 +88,10 @@ impl Member {
         self.frame(header, SIGNED, &relay, body)
     }
 
-    /// Its hello, before COBS. It asks for nothing.
+    /// Its hello, before COBS. It asks for nothing but the relay's, if it has not heard that yet.
     pub fn hello(&mut self, header: Header) -> Vec<u8> {
-        let body = [&*self.own, &*self.relay, &[0]].concat();
+        let asks = u8::from(self.relay.iter().all(|&byte| byte == 0));
+        let body = [&*self.own, &*self.relay, &[asks]].concat();
         let to = self.relay.clone();
         self.frame(header, SIGNED | HELLO, &to, &body)
     }

@@ -2,15 +2,24 @@
 //!
 //! Bodies are written from the byte tables, not by the crate: what the crate would never write must come too.
 
+mod offer;
+
 use uav_relay::wire::crc::Crc32c;
+use uav_relay::wire::digest::Stamp;
 
 use super::input::Input;
 
 /// What a neighbour may know of the relay it talks to.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Known {
-    /// Digest of its mission.
+    /// Digest of the mission that it was loaded with.
     pub digest: u16,
+    /// The relays of that.
+    pub relays: u16,
+    /// Digest of the mission that it flies.
+    pub flown: u16,
+    /// The newest mission that it holds.
+    pub held: Stamp,
     /// Number of the view that it has agreed to.
     pub view: u16,
     /// Number of its current pass.
@@ -63,7 +72,7 @@ pub fn sealed(plain: &mut Vec<u8>) {
     plain.extend_from_slice(&crc.finish().to_le_bytes());
 }
 
-/// A body of any of the thirteen kinds, or of none.
+/// A body of any of the fourteen kinds, or of none.
 pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
     let tag = input.below(15);
     let mut body = Body {
@@ -88,6 +97,7 @@ pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
         10 => body.roster(),
         11 => body.count(),
         12 => body.fence(),
+        13 => body.offer(),
         _ => body.bytes = body.input.piece().to_vec(),
     }
     body.bytes
@@ -129,7 +139,7 @@ impl Body<'_, '_> {
             up @ 240.. => self.known.view.wrapping_add(u16::from(up - 240)),
             _ => self.known.view,
         };
-        self.word(self.known.digest.wrapping_add(view));
+        self.word(self.known.flown.wrapping_add(view));
     }
 
     /// The number of a view: the relay's, one of the next, or any.
@@ -294,25 +304,57 @@ impl Body<'_, '_> {
         self.view();
         self.digest();
         self.relay();
-        self.bytes.extend_from_slice(&[0; 4]);
-        self.small(0, 15);
+        self.word(0);
+        let Stamp { digest, version } = self.stamp();
+        self.word(digest);
+        self.word(version);
+        self.small(0, 31);
     }
 
     fn roster(&mut self) {
         self.view();
-        self.digest();
+        let Stamp { digest, version } = self.stamp();
+        self.word(digest);
         self.relay();
         self.relay();
         self.view();
+        self.word(version);
         self.small(0, 1);
     }
 
     fn count(&mut self) {
         self.view();
-        self.digest();
+        let Stamp { digest, version } = self.stamp();
+        self.word(digest);
         self.relay();
         self.relay();
-        self.bytes.extend_from_slice(&[0; 3]);
+        self.word(0);
+        self.word(version);
+        self.bytes.push(0);
+    }
+
+    /// The mission that the relay holds, the one that it was loaded with, one that is newer or older than the one held, or any.
+    fn stamp(&mut self) -> Stamp {
+        let held = self.known.held;
+        match self.input.byte() {
+            0..128 => held,
+            128..192 => Stamp {
+                version: 0,
+                digest: self.known.digest,
+            },
+            192..216 => Stamp {
+                version: held.version.wrapping_add(1),
+                ..held
+            },
+            216..240 => Stamp {
+                version: held.version.saturating_sub(1),
+                ..held
+            },
+            _ => Stamp {
+                version: self.input.word(),
+                digest: self.input.word(),
+            },
+        }
     }
 
     fn fence(&mut self) {

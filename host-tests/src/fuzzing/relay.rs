@@ -1,8 +1,10 @@
 //! One relay under anything that may come: bytes, lying neighbours, time in leaps, samples, restarts.
 
-use uav_relay::wire::digest::digest;
+mod addresses;
+
+use uav_relay::wire::digest::{Stamp, digest};
 use uav_relay::wire::frame::MAX_DECODED;
-use uav_relay::{Duration, Instant, Mission, Placement, Port, Sample, Side, Stats, Wiring};
+use uav_relay::{Duration, Instant, Mission, Placement, Port, Sample, Side, Stats, Upload, Wiring};
 
 use super::cobs::stuffed;
 use super::counted::intact;
@@ -10,7 +12,8 @@ use super::input::Input;
 use super::member::Member;
 use super::message::{Header, Known, body, sealed};
 use super::setting;
-use super::watch::{NETWORK, Watched};
+use super::watch::Watched;
+use addresses::{far, from, port};
 
 /// Operations in one run: some milliseconds of computing.
 const MOST_OPERATIONS: usize = 256;
@@ -113,8 +116,24 @@ impl Bench {
             let place = usize::from(side == 1 && there == [true; 2]);
             let heard = sent.get(place).filter(|_| there.get(side) == Some(&true));
             let member = heard.and_then(|frame| Member::greeted(&frame.bytes));
+            let member = member.or_else(|| self.ground(side));
             self.introduce(side, member);
         }
+    }
+
+    /// Tx or Rx, if that is next at `side` and the relay answers it: nobody is greeted there before they say something.
+    fn ground(&mut self, side: usize) -> Option<Member> {
+        let (header, port) = from(self.index, side, self.wiring);
+        let signs = self.watched.settings().auth.is_some();
+        if !signs || (1..=self.mission.relays()).contains(&header.sender) {
+            return None;
+        }
+        let hello = stuffed(&Member::unknown().hello(header));
+        self.watched.bytes(self.now, port, &hello);
+        let (sent, _) = self.watched.settle(self.now);
+        let heard = sent.last().and_then(|frame| Member::greeted(&frame.bytes));
+        // What it has said was of another life.
+        heard.map(|member| member.restarted())
     }
 
     /// `member` is the neighbour at `side` from now on, and says hello.
@@ -233,11 +252,14 @@ impl Bench {
             27 => header.sender |= 0x2000,
             28 => header.network ^= 1,
             29 => header.destination = u16::from(input.byte()),
-            30 => port = self::port(input.byte()),
+            30 => port = addresses::port(input.byte()),
             _ => {}
         }
         let known = Known {
             digest: digest(&self.mission),
+            relays: self.mission.relays(),
+            flown: self.flown(),
+            held: self.held(),
             view: self.watched.relay().view(),
             number: self.watched.number(),
             tie: self.watched.tie(),
@@ -265,13 +287,30 @@ impl Bench {
         }
     }
 
+    /// Digest of the mission that the relay flies, with all its relays.
+    fn flown(&self) -> u16 {
+        let mission = self.watched.relay().mission();
+        let whole = mission.with_relays(self.mission.relays());
+        digest(&whole.unwrap_or(self.mission))
+    }
+
+    /// The newest mission that it holds.
+    fn held(&self) -> Stamp {
+        let loaded = Stamp {
+            version: 0,
+            digest: digest(&self.mission),
+        };
+        self.watched.relay().upload().map_or(loaded, Upload::stamp)
+    }
+
     /// A frame arrives; `None` where nobody listens.
     fn hear(&mut self, port: Port, wire: &[u8], fate: Option<Fate>) {
         let before = self.watched.relay().clone();
         self.watched.bytes(self.now, port, wire);
         let after = self.watched.relay();
         let (was, is) = (before.stats(), after.stats());
-        let counted = frames(is) - frames(was);
+        let key = self.watched.settings().auth.is_some();
+        let counted = frames(is, key) - frames(was, key);
         assert_eq!(counted, u64::from(fate.is_some()), "frames counted");
         let grown = match fate {
             None | Some(Fate::Counted) => return,
@@ -328,47 +367,11 @@ impl Bench {
     }
 }
 
-/// The header and the port of a frame from the neighbour at `side` of relay `index`.
-const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Port) {
-    let (sender, port) = if side == 1 {
-        (index + 1, Port::Downstream)
-    } else {
-        (index - 1, Port::Upstream)
-    };
-    let header = Header {
-        network: NETWORK,
-        sender,
-        destination: index,
-    };
-    match wiring {
-        Wiring::Pair => (header, port),
-        Wiring::Shared => (header, Port::Shared),
-    }
-}
-
-/// The node `more` beyond the neighbour at `side` of relay `index`, as far as there is one.
-const fn far(index: u16, side: usize, more: u8) -> u16 {
-    let distance = 1 + more as u16;
-    if side == 1 {
-        index + distance
-    } else {
-        index.saturating_sub(distance)
-    }
-}
-
-const fn port(byte: u8) -> Port {
-    match byte % 3 {
-        0 => Port::Upstream,
-        1 => Port::Downstream,
-        _ => Port::Shared,
-    }
-}
-
-/// Frames that have been taken or refused.
-fn frames(stats: &Stats) -> u64 {
+/// Frames that have been taken or refused, at a relay with a key or without one.
+fn frames(stats: &Stats, key: bool) -> u64 {
     let broken = [stats.oversized, stats.truncated, stats.crc];
     let broken: u64 = broken.into_iter().map(u64::from).sum();
-    broken + u64::from(intact(stats))
+    broken + u64::from(intact(stats, key))
 }
 
 /// Frames that were no member's, or not new.

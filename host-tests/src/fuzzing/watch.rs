@@ -6,19 +6,19 @@ use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::{
-    Event, Identity, Instant, Method, Mission, Placement, Port, Profile, Relay, Sample, Settings,
-    Side, Stats, Wiring,
+    Event, Identity, Instant, Method, Mission, Placement, Port, Relay, Sample, Settings, Side,
+    Stats, Wiring,
 };
 
 use super::counted::{all, intact};
 use super::heap;
 
 /// Frames that a relay can owe at once: a pass or what came of one, a sign that it is busy; to either side a heartbeat, four
-/// hails and a fence; a hello to each of the eight nodes that it remembers.
-const MOST_FRAMES: usize = 2 + 2 * (1 + 4 + 1) + 8;
+/// hails, a fence, an offer and a hail to the ground; a hello to each of the eight nodes that it remembers.
+const MOST_FRAMES: usize = 2 + 2 * (1 + 4 + 1 + 2) + 8;
 
 /// Events that can be pending at once.
-const MOST_EVENTS: usize = 11;
+const MOST_EVENTS: usize = 13;
 
 /// Nodes this far off are heard on a shared channel.
 const NEAR: u16 = 4;
@@ -49,7 +49,6 @@ pub struct Watched {
     node: u16,
     all: u16,
     settings: Settings,
-    given: Profile,
     stats: Stats,
     /// The view it has agreed to.
     view: u16,
@@ -86,7 +85,6 @@ impl Watched {
             node: index,
             all: mission.relays(),
             settings,
-            given: settings.profile.unwrap_or(mission.config().common),
             stats: Stats::default(),
             view: 0,
             agreed: None,
@@ -142,7 +140,8 @@ impl Watched {
             return;
         };
         let there = *begun + bytes.len();
-        let checked = intact(after) + after.crc - intact(&before) - before.crc;
+        let key = self.settings.auth.is_some();
+        let checked = intact(after, key) + after.crc - intact(&before, key) - before.crc;
         let received = after.received - before.received;
         assert!(
             LEAST_CHECKED * checked as usize <= there && LEAST_MESSAGE * received as usize <= there,
@@ -246,7 +245,13 @@ impl Watched {
             };
             assert!(right, "{header:?} through {port:?}");
             let config = self.relay.mission().config();
-            let there = (1..=self.all).contains(&header.destination);
+            // Tx and Rx are told which mission is held, where there is a key.
+            let all = if signs {
+                0..=self.all + 1
+            } else {
+                1..=self.all
+            };
+            let there = all.contains(&header.destination);
             assert!(there, "{header:?} to nobody");
             if opened.hello {
                 continue;
@@ -325,17 +330,19 @@ impl Watched {
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {
             self.held = Some((self.view, self.number));
         }
-        self.agreed = agreed.or(self.agreed);
-        assert_eq!(agreed, self.agreed, "an agreement that was taken away");
-        let Some(place) = agreed else {
+        assert!(agreed.is_some() || self.agreed.is_none(), "taken away");
+        // A place of the mission before is held until the next agreement.
+        let Some(place) = agreed.filter(|_| agreed != self.agreed) else {
             return;
         };
+        self.agreed = agreed;
         let config = self.relay.mission().config();
         assert!((0.0..=config.distance_m).contains(&place.x_m), "{place:?}");
-        let given = place.altitude_m.to_bits() == self.given.altitude_m.to_bits();
+        let given = self.settings.profile.unwrap_or(config.common);
+        let held = place.altitude_m.to_bits() == given.altitude_m.to_bits();
         let band = config.band.least_m..=config.band.most_m;
         let chosen = !self.settings.hold_altitude && band.contains(&place.altitude_m);
-        assert!(given || chosen, "{place:?}, given {:?}", self.given);
+        assert!(held || chosen, "{place:?}, given {given:?}");
     }
 
     /// Whatever else it tells is in its range.
@@ -379,6 +386,7 @@ const fn number_of(message: &Message<'_>) -> Option<u16> {
         | Message::Hail(_)
         | Message::Roster(_)
         | Message::Count(_)
-        | Message::Fence { .. } => return None,
+        | Message::Fence { .. }
+        | Message::Offer(_) => return None,
     })
 }

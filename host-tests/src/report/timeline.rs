@@ -12,9 +12,11 @@ use crate::sim::outcome::{Moment, Turning};
 pub struct MomentReport {
     /// When, s of virtual time.
     pub at_s: f64,
-    /// Whose, by its number in the mission, from 1. Of a partition it is the last relay before it.
+    /// Whose, by its number in the mission, from 1. Of a partition it is the last relay before it; of an upload that begins, 0 is the
+    /// transmitter, and the receiver comes after the last relay.
     pub relay: u16,
-    /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted` or `healed`.
+    /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted`, `healed`, `offered`, `held` or
+    /// `adopted`.
     pub what: &'static str,
     /// The neighbour that was lost or found.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -25,6 +27,9 @@ pub struct MomentReport {
     /// How many relays it has.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relays: Option<u16>,
+    /// Version of the mission that was offered, held or adopted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
     /// The target agreed on, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
@@ -32,17 +37,30 @@ pub struct MomentReport {
 
 impl MomentReport {
     fn of(moment: &Moment) -> Self {
-        let (what, view, relays) = match moment.what {
-            Turning::Silent => ("silent", None, None),
-            Turning::Booted => ("on", None, None),
-            Turning::Lost(_) => ("lost", None, None),
-            Turning::Found(_) => ("found", None, None),
-            Turning::Reformed { view, relays, .. } => ("formed", Some(view), Some(relays)),
-            Turning::Cut => ("cut", None, None),
-            Turning::Converged => ("converged", None, None),
-            Turning::Infeasible => ("infeasible", None, None),
-            Turning::Parted => ("parted", None, None),
-            Turning::Healed => ("healed", None, None),
+        let what = match moment.what {
+            Turning::Silent => "silent",
+            Turning::Booted => "on",
+            Turning::Lost(_) => "lost",
+            Turning::Found(_) => "found",
+            Turning::Reformed { .. } => "formed",
+            Turning::Cut => "cut",
+            Turning::Converged => "converged",
+            Turning::Infeasible => "infeasible",
+            Turning::Parted => "parted",
+            Turning::Healed => "healed",
+            Turning::Offered(_) => "offered",
+            Turning::Uploaded(_) => "held",
+            Turning::Adopted(_) => "adopted",
+        };
+        let (view, relays) = match moment.what {
+            Turning::Reformed { view, relays, .. } => (Some(view), Some(relays)),
+            _ => (None, None),
+        };
+        let version = match moment.what {
+            Turning::Offered(version) | Turning::Uploaded(version) | Turning::Adopted(version) => {
+                Some(version)
+            }
+            _ => None,
         };
         let sir = moment.target.filter(|_| what == "converged");
         Self {
@@ -52,6 +70,7 @@ impl MomentReport {
             other: moment.other,
             view,
             relays,
+            version,
             sir: sir.map(f64::from),
         }
     }
@@ -125,6 +144,7 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         // What is the same to the bit.
         "converged" => one.sir.map(f64::to_bits) == moment.sir.map(f64::to_bits),
         "silent" | "on" => one.at_s.to_bits() == moment.at_s.to_bits(),
+        "held" | "adopted" => one.version == moment.version,
         "cut" => true,
         _ => false,
     }
@@ -133,7 +153,7 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
 impl Group {
     fn at_s(&self) -> f64 {
         match self.sample.what {
-            "formed" | "converged" => self.last_s,
+            "formed" | "converged" | "held" | "adopted" => self.last_s,
             _ => self.first_s,
         }
     }
@@ -151,6 +171,9 @@ impl Group {
             "converged" => format!("SIR {:.3}", one.sir.unwrap_or_default()),
             "parted" => format!("parted after {}", one.relay),
             "healed" => format!("joined after {}", one.relay),
+            "offered" | "held" | "adopted" => {
+                format!("mission {} {}", one.version.unwrap_or_default(), one.what)
+            }
             other => other.to_owned(),
         }
     }
@@ -166,6 +189,7 @@ impl Group {
         let one = &self.sample;
         let other = one.other.unwrap_or_default();
         let relay = one.relay;
+        let version = one.version.unwrap_or_default();
         match one.what {
             "silent" => format!("{who} went silent"),
             "on" => format!("{who} switched on again"),
@@ -173,38 +197,51 @@ impl Group {
             "found" if many => format!("{who} found each other"),
             "found" => format!("{who} found relay {other}"),
             "formed" => format!(
-                "formed anew: {} relays, view {}",
-                one.relays.unwrap_or_default(),
+                "formed anew: {}, view {}",
+                count(one.relays.unwrap_or_default().into()),
                 one.view.unwrap_or_default()
             ),
             "cut" => format!("{who} cut off: too few to go on without the others"),
             "converged" => format!(
-                "converged: {} relays, SIR {:.3}",
-                self.relays.len(),
+                "converged: {}, SIR {:.3}",
+                count(self.relays.len()),
                 one.sir.unwrap_or_default()
             ),
             "parted" => format!("relays 1 to {relay} and the others do not hear each other"),
             "healed" => format!("relays 1 to {relay} and the others hear each other again"),
+            "offered" if relay == 0 => format!("the transmitter uploads mission {version}"),
+            "offered" => format!("the receiver uploads mission {version}"),
+            "held" => format!(
+                "{who} {} mission {version}",
+                if many { "hold" } else { "holds" }
+            ),
+            "adopted" => format!("mission {version} adopted: {}", count(self.relays.len())),
             _ => "no target can be met".to_owned(),
         }
     }
 }
 
-/// "3", "3 and 5", "1, 2 and 5", "3 to 9".
+/// "3", "3 and 5", "1, 2 and 5", "1 to 3 and 5 to 9".
 pub(super) fn list(relays: &[u16]) -> String {
     let mut sorted = relays.to_vec();
     sorted.sort_unstable();
-    match sorted.as_slice() {
-        [] => String::new(),
-        [one] => one.to_string(),
-        [first, .., last] if sorted.len() > 2 && usize::from(last - first) + 1 == sorted.len() => {
-            format!("{first} to {last}")
-        }
-        [rest @ .., last] => {
-            let rest: Vec<String> = rest.iter().map(u16::to_string).collect();
-            format!("{} and {last}", rest.join(", "))
+    let mut parts: Vec<String> = Vec::new();
+    for run in sorted.chunk_by(|one, next| one + 1 == *next) {
+        match run {
+            [first, _, .., last] => parts.push(format!("{first} to {last}")),
+            few => parts.extend(few.iter().map(u16::to_string)),
         }
     }
+    match parts.as_slice() {
+        [] => String::new(),
+        [one] => one.clone(),
+        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
+    }
+}
+
+/// "1 relay", "8 relays".
+fn count(relays: usize) -> String {
+    format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
 }
 
 /// Lines at either end of a long story.
@@ -230,7 +267,7 @@ pub(super) fn text(timeline: &[MomentReport]) -> String {
 pub fn words(timeline: &[MomentReport]) -> Vec<(f64, String)> {
     groups(timeline)
         .iter()
-        .filter(|group| group.sample.what != "found")
+        .filter(|group| !matches!(group.sample.what, "found" | "held"))
         .map(|group| (group.at_s(), group.words()))
         .collect()
 }

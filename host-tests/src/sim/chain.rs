@@ -3,10 +3,12 @@
 mod air;
 mod ending;
 mod flight;
+mod ground;
 mod story;
 mod strike;
 
 pub use flight::FlightSpec;
+pub use ground::UploadSpec;
 
 use std::collections::BTreeMap;
 
@@ -14,9 +16,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::node::settings::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::wire::upload::Upload;
 use uav_relay::{Identity, Instant, Method, Placement, Relay, Sample, Settings};
 
 use flight::Flight;
+use ground::{Station, stations};
 
 use super::attack::{Attacker, Struck};
 use super::faults::Injected;
@@ -42,6 +46,10 @@ struct Member {
     starts: u32,
     /// Passes that it has begun before it was switched on last.
     swept: u32,
+    /// What it has stored of uploads.
+    stored: Option<Upload>,
+    /// Where it was told to fly when that was last found to be within its limits.
+    safe: Option<Placement>,
     /// Its neighbours toward Tx and Rx when it was heard last.
     beside: [Option<u16>; 2],
     /// The wake-up in the queue that counts: the earliest one. Any other is void.
@@ -62,6 +70,7 @@ pub struct Chain {
     holding: usize,
     /// Kills, boots, partitions and strikes that are still to come.
     ahead: usize,
+    stations: Vec<Station>,
     attacker: Option<Attacker>,
     flight: Option<Flight>,
 }
@@ -75,13 +84,21 @@ impl Chain {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let mut members = Vec::new();
         for index in 1..=setup.mission.relays() {
-            let relay = switched_on(&setup, index, 1, rng.random(), Instant::ZERO)?;
+            let start = Start {
+                index,
+                number: 1,
+                seed: rng.random(),
+                now: Instant::ZERO,
+            };
+            let relay = switched_on(&setup, start, None)?;
             members.push(Member {
                 node: index,
                 lines: [Line::default(); 2],
                 killed: None,
                 starts: 1,
                 swept: 0,
+                stored: None,
+                safe: None,
                 beside: relay.neighbours(),
                 relay,
                 wake: None,
@@ -94,7 +111,10 @@ impl Chain {
         for &(index, at) in &setup.boots {
             queue.put(at, usize::from(index.saturating_sub(1)), Happening::Boot);
         }
-        let mut ahead = setup.kills.len() + setup.boots.len();
+        for (which, spec) in setup.uploads.iter().enumerate() {
+            queue.put(spec.at, which, Happening::Upload);
+        }
+        let mut ahead = setup.kills.len() + setup.boots.len() + setup.uploads.len();
         for partition in &setup.partitions {
             for at in [Some(partition.from), partition.until]
                 .into_iter()
@@ -105,6 +125,7 @@ impl Chain {
             }
         }
         let mut chain = Self {
+            stations: stations(&setup),
             setup,
             members,
             queue,
@@ -227,33 +248,53 @@ impl Chain {
                 index: member.relay.index(),
                 relays: member.relay.mission().relays(),
                 view: member.relay.view(),
+                version: member.relay.version(),
             })
             .collect();
         self.outcome
     }
 
     fn happen(&mut self, index: usize, happening: Happening) {
-        let now = self.now;
         if matches!(
             happening,
-            Happening::Kill | Happening::Boot | Happening::Part | Happening::Strike(_)
+            Happening::Kill
+                | Happening::Boot
+                | Happening::Part
+                | Happening::Upload
+                | Happening::Strike(_)
         ) {
             self.ahead -= 1;
         }
+        match happening {
+            Happening::Fly => self.fly(),
+            Happening::Part => self.tell_of_partitions(),
+            Happening::Strike(kind) => self.strike(kind),
+            Happening::Upload => self.begin_upload(index),
+            Happening::Heard { bytes } => self.hear(index, &bytes),
+            Happening::Ask => self.ask(index),
+            of_relay => self.happen_to(index, of_relay),
+        }
+    }
+
+    /// Something happens to relay `index` (from 0).
+    fn happen_to(&mut self, index: usize, happening: Happening) {
+        let now = self.now;
         let Some(member) = self.members.get_mut(index) else {
             return;
         };
         match happening {
-            Happening::Fly => return self.fly(),
-            Happening::Part => return self.tell_of_partitions(),
-            Happening::Strike(kind) => return self.strike(kind),
             Happening::Boot => {
-                let (start, seed) = (member.starts + 1, self.rng.random());
-                let Ok(relay) = switched_on(&self.setup, member.node, start, seed, now) else {
+                let start = Start {
+                    index: member.node,
+                    number: member.starts + 1,
+                    seed: self.rng.random(),
+                    now,
+                };
+                let Ok(relay) = switched_on(&self.setup, start, member.stored.as_ref()) else {
                     return;
                 };
                 member.swept += member.relay.stats().sweeps;
-                member.starts = start;
+                member.starts = start.number;
                 member.beside = relay.neighbours();
                 member.relay = relay;
                 member.killed = None;
@@ -281,6 +322,7 @@ impl Chain {
                 member.wake = None;
                 member.relay.handle_timeout(now);
             }
+            _ => return,
         }
         self.drain(index);
     }
@@ -300,8 +342,10 @@ impl Chain {
             return;
         };
         let by = member.node;
-        if let Some(place) = member.relay.setpoint() {
-            let config = self.setup.mission.config();
+        if let Some(place) = member.relay.setpoint()
+            && member.safe != Some(place)
+        {
+            let config = member.relay.mission().config();
             let end = config.distance_m;
             // What it was given, or one of the band.
             let given = self.setup.profiles.iter().find(|(of, _)| *of == by);
@@ -312,6 +356,8 @@ impl Chain {
             let inside = (0.0..=end).contains(&place.x_m)
                 && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
             self.outcome.unsafe_setpoints += u64::from(!inside);
+            // With a new mission it stays where it is until the next agreement.
+            member.safe = inside.then_some(place);
         }
         if let Some((done, sir)) = member.relay.rounds()
             && sir > 0.0
@@ -336,27 +382,43 @@ impl Chain {
     }
 }
 
-/// Relay `index` (from 1) of the run, switched on at `now` for the `start`th time.
-fn switched_on(
-    setup: &Setup,
+/// A relay that is switched on.
+#[derive(Clone, Copy, Debug)]
+struct Start {
+    /// Which one, from 1.
     index: u16,
-    start: u32,
+    /// For the how manieth time, from 1.
+    number: u32,
     seed: u32,
     now: Instant,
-) -> Result<Relay, SetupError> {
+}
+
+/// A relay of the run that has just been switched on, with what it has stored.
+fn switched_on(setup: &Setup, start: Start, stored: Option<&Upload>) -> Result<Relay, SetupError> {
+    let Start {
+        index,
+        number,
+        seed,
+        now,
+    } = start;
     let own = setup.profiles.iter().find(|(of, _)| *of == index);
     let settings = Settings {
         profile: own.map(|(_, profile)| *profile),
         hold_altitude: setup.held.contains(&index),
         hop_time: setup.link.hop_time(),
-        auth: setup.proof(start).or(setup.settings.auth),
+        auth: setup.proof(number).or(setup.settings.auth),
         ..setup.settings
     };
     let identity = Identity {
         network: NETWORK,
         index,
     };
-    Relay::new(setup.mission, identity, settings, seed, now)
+    let mut relay = Relay::new(setup.mission, identity, settings, seed, now)?;
+    if let Some(upload) = stored {
+        let resumed = relay.resume(upload);
+        debug_assert_eq!(resumed, Ok(()), "it was uploaded for this mission");
+    }
+    Ok(relay)
 }
 
 /// Runs `setup` to the end.

@@ -6,10 +6,13 @@ use uav_relay::node::settings::SetupError;
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::crc::Crc32c;
 use uav_relay::wire::deframe::Deframer;
-use uav_relay::wire::digest::digest;
+use uav_relay::wire::digest::{Stamp, digest};
 use uav_relay::wire::frame::{self, HEADER, Header, MAX_FRAME};
 use uav_relay::wire::message::{Before, Count, Hail, Message, Roster};
-use uav_relay::{Auth, Identity, Instant, Key, Mission, Relay, Settings, Wiring};
+use uav_relay::{
+    Auth, Identity, Instant, Interference, Interferer, Key, Mission, MissionConfig, Relay,
+    Settings, Upload, Wiring,
+};
 
 /// The network that every simulated relay belongs to.
 pub(super) const NETWORK: u16 = 1;
@@ -106,16 +109,17 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
 /// A message that needs nothing to have been heard.
 fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let digest = digest(mission);
+    let stamp = Stamp { version: 0, digest };
     let view = rng.random_range(1..=40);
-    let message = match rng.random_range(0..5) {
-        0 => Message::Heartbeat {
+    let message = match (rng.random_range(0..6), better(mission, rng)) {
+        (0, _) => Message::Heartbeat {
             mission: digest,
             answer: true,
         },
-        1 => Message::Busy {
+        (1, _) => Message::Busy {
             sweep: rng.random(),
         },
-        2 => Message::Hail(Hail {
+        (2, _) => Message::Hail(Hail {
             mission: digest,
             newest: view,
             neighbour: way.to,
@@ -123,9 +127,11 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
             form: true,
             fresh: rng.random(),
             ready: true,
+            holds: stamp,
+            flies: true,
         }),
-        3 => Message::Roster(Roster {
-            mission: digest,
+        (3, _) => Message::Roster(Roster {
+            stamp,
             view,
             place: rng.random_range(1..=mission.relays()),
             before: Before {
@@ -134,8 +140,9 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
                 leader: true,
             },
         }),
+        (4, Some(offer)) => Message::Offer(offer),
         _ => Message::Count(Count {
-            mission: digest,
+            stamp,
             view,
             place: rng.random_range(1..=mission.relays()),
             relays: rng
@@ -146,6 +153,22 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut frame = [0; MAX_FRAME];
     let len = frame::encode(header(way, rng), &message, &mut frame);
     frame.get(..len).unwrap_or_default().to_vec()
+}
+
+/// A mission that looks newer than `mission`, with the interferer somewhere else; `None` in a field, where nothing is uploaded.
+fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
+    let config = mission.config();
+    let at = mission.interferer()?;
+    let interferer = Interferer {
+        power_w: at.power_w,
+        x_m: rng.random_range(0.0..=config.distance_m),
+        y_m: at.y_m * rng.random_range(0.5..2.0),
+    };
+    let config = MissionConfig {
+        interference: Interference::Source(interferer),
+        ..*config
+    };
+    Upload::new(mission, rng.random_range(1..=3), config).ok()
 }
 
 /// A hello whose nonces and tag are random.

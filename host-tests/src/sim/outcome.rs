@@ -18,7 +18,7 @@ pub enum Turning {
     Lost(Side),
     /// It heard a neighbour at that side again, or another one.
     Found(Side),
-    /// It agreed to a new view: its number, its place there, and how many relays there are.
+    /// It agreed to a new view: its number, its place there, how many relays there are, and what they fly.
     Reformed {
         /// Number of the view.
         view: u16,
@@ -26,6 +26,8 @@ pub enum Turning {
         index: u16,
         /// How many relays.
         relays: u16,
+        /// Version of the mission that they fly.
+        version: u16,
     },
     /// Its part of the chain is too small to go on.
     Cut,
@@ -37,6 +39,12 @@ pub enum Turning {
     Parted,
     /// They hear each other again.
     Healed,
+    /// The ground begins to upload a mission of this version: the transmitter as relay 0, the receiver as the one after the last.
+    Offered(u16),
+    /// It holds a newer mission, of this version.
+    Uploaded(u16),
+    /// It flies it, with all others that were counted.
+    Adopted(u16),
 }
 
 /// A turning and whose it was.
@@ -90,6 +98,8 @@ pub struct RelayEnd {
     pub relays: u16,
     /// Number of the view.
     pub view: u16,
+    /// Version of the mission that it flies.
+    pub version: u16,
 }
 
 /// What came of a run.

@@ -19,6 +19,15 @@ pub enum Happening {
     },
     /// It may have something to do.
     Wake,
+    /// Bytes arrive on the ground.
+    Heard {
+        /// What.
+        bytes: Vec<u8>,
+    },
+    /// The ground may have something to do.
+    Ask,
+    /// An upload begins; its number stands in place of the relay's.
+    Upload,
     /// All drones fly on for a step.
     Fly,
     /// It goes silent.

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::{Auth, Instant, Key, Mission, Profile, Settings, Wiring};
 
 use super::attack::Attack;
-use super::chain::FlightSpec;
+use super::chain::{FlightSpec, UploadSpec};
 use super::faults::Faults;
 use super::link::LinkSpec;
 
@@ -48,12 +48,16 @@ pub struct Setup {
     pub faults: Faults,
     /// Relays that go silent: index from 1, and when.
     pub kills: Vec<(u16, Instant)>,
-    /// Relays that are switched on again, with nothing left of what they knew: index from 1, and when.
+    /// Relays that are switched on again, with nothing left of what they knew but an upload: index from 1, and when.
     pub boots: Vec<(u16, Instant)>,
     /// Times in which one part of the chain does not hear the other.
     pub partitions: Vec<Partition>,
     /// Whether frames carry tags: with a key drawn from the seed, and an epoch that counts the starts of a relay.
     pub auth: bool,
+    /// Missions that are uploaded in flight; without `auth` nothing is.
+    pub uploads: Vec<UploadSpec>,
+    /// Relays that do not keep what was uploaded when they are switched off: index from 1.
+    pub forgetful: Vec<u16>,
     /// What an attacker does, if there is one.
     pub attack: Option<Attack>,
     /// How the drones fly, where that is simulated, too.
@@ -85,6 +89,8 @@ impl Setup {
             boots: Vec::new(),
             partitions: Vec::new(),
             auth: false,
+            uploads: Vec::new(),
+            forgetful: Vec::new(),
             attack: None,
             flight: None,
             radio_reach: Self::RADIO_REACH,

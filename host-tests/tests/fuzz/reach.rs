@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use host_tests::fuzzing::counted::all;
 use host_tests::fuzzing::watch::Watched;
 use host_tests::fuzzing::{chain, relay};
-use uav_relay::{Method, Phase, Wiring};
+use uav_relay::{Method, Phase, Relay, Wiring};
 
 use super::corpus;
 
@@ -49,6 +49,18 @@ fn relays_of_the_corpus_count_everything_and_hold_places_of_every_method() {
         .iter()
         .any(|watched| watched.relay().measured_per_w().is_some());
     assert!(measured, "nobody measures");
+    let holds = |flies: bool| {
+        let with = |relay: &Relay| relay.upload().is_some() && (relay.version() > 0) == flies;
+        relays
+            .iter()
+            .filter(|watched| with(watched.relay()))
+            .count()
+    };
+    println!("{} hold an upload, {} fly one", holds(false), holds(true));
+    assert!(
+        holds(false) > 0 && holds(true) > 0,
+        "nobody is offered anything"
+    );
 }
 
 #[test]

@@ -128,14 +128,45 @@ fn relay() -> Vec<Vec<u8>> {
         }
         // Wake-ups, a restart, samples, each kind of message from either side.
         let mut operations = vec![3, 63, 7, 3, 9, 8, 100, 1, 0, 0, 200];
-        for tag in 0..13 {
+        for tag in 0..14 {
             operations.extend([9, tag % 2, tag, 0, 0, 0, 128, 0, 1, 0, 64, 0, 128, 0, 0]);
         }
         seeds.push([&*mission, &[0, 1, 0, 0, 1, 0, 1, 0], &operations].concat());
     }
     seeds.extend([0, 64].map(formed));
     seeds.extend([refused(), again()]);
+    seeds.extend([8, 72].map(uploaded));
+    seeds.extend([0, 3].map(by_the_ground));
     seeds
+}
+
+/// The next version for as many relays, of the paper's mission with the interferer elsewhere, from one side or the other.
+fn offer(side: u8) -> Vec<u8> {
+    let head = [9, side, 13, 1, 0, 0, 1];
+    let interferer = [0, 0, 128, 0, 0, 192, 0, 0, 64];
+    [&head[..], &interferer, &[255, 1, 0]].concat()
+}
+
+/// The second of four relays with a key, on links or on one channel: it is offered a mission, its other neighbour comes to hold
+/// it, too, and they are counted in a view that flies it.
+fn uploaded(how: u8) -> Vec<u8> {
+    let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
+    let hail = [9, 1, 9, 0, 0, 2, 0, 0, 0];
+    // The next view, of the mission held: from the first place, after view 0 of four with its leader; back from the third.
+    let roster = [9, 0, 10, 1, 0, 1, 4, 0, 1, 0];
+    let count = [9, 1, 11, 1, 0, 3, 4, 0];
+    let wake = [3, 3];
+    let parts = [&head[..], &offer(0), &wake, &hail, &roster, &count, &wake];
+    parts.concat()
+}
+
+/// The first or the last of four relays with a key hears from Tx or from Rx: a question, a mission, the same again.
+fn by_the_ground(index: u8) -> Vec<u8> {
+    let head = [0, 3, 0, index, 8, 0, 0, 0, 0, 1, 0];
+    let side = u8::from(index > 0);
+    let asks = [9, side, 9, 0, 0, 0, 0, 1, 0];
+    let offer = offer(side);
+    [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
 
 /// The last of four relays, with a guard, on links or on one channel: it is told where it is, counted in the next two views,

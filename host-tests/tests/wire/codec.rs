@@ -9,12 +9,15 @@ use uav_relay::placement::ladder::Ladder;
 use uav_relay::placement::levels::Levels;
 use uav_relay::placement::verdict::Verdict;
 use uav_relay::placement::wave::{Choice, Rungs};
+use uav_relay::wire::digest::Stamp;
 use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{
     Answer, Before, Count, Hail, Message, MessageError, Moved, Roster, Sweep, Token, Trace, Turn,
     Wave,
 };
 use uav_relay::{Local, Placement, Profile};
+
+use super::offer::Offer;
 
 /// What a body says, field by field.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
@@ -102,6 +105,7 @@ pub(crate) enum Said {
         x_m: f32,
         target_m: f32,
     },
+    Offer(Offer),
 }
 
 /// What the three messages by which a chain forms anew have in common.
@@ -110,8 +114,8 @@ pub(crate) struct Forming {
     /// Of a view.
     pub(crate) number: u16,
     pub(crate) mission: u16,
-    /// Three numbers, in the order in which they are sent.
-    pub(crate) numbers: [u16; 3],
+    /// Four numbers, in the order in which they are sent.
+    pub(crate) numbers: [u16; 4],
     pub(crate) flags: u8,
 }
 
@@ -127,6 +131,13 @@ impl Forming {
 
     fn flag(self, bit: u8) -> bool {
         self.flags >> bit & 1 == 1
+    }
+
+    fn stamp(self, digest: u16) -> Stamp {
+        Stamp {
+            version: self.numbers[3],
+            digest,
+        }
     }
 }
 
@@ -290,6 +301,7 @@ impl Said {
                 }
                 reals(&mut out, &[*x_m, *target_m]);
             }
+            Self::Offer(offer) => out = offer.body(),
         }
         out
     }
@@ -435,9 +447,11 @@ impl Said {
                 form: forming.flag(1),
                 fresh: forming.flag(2),
                 ready: forming.flag(3),
+                holds: forming.stamp(forming.numbers[2]),
+                flies: forming.flag(4),
             }),
             Self::Roster(forming) => Message::Roster(Roster {
-                mission: forming.mission,
+                stamp: forming.stamp(forming.mission),
                 view: forming.number,
                 place: forming.numbers[0],
                 before: Before {
@@ -447,7 +461,7 @@ impl Said {
                 },
             }),
             Self::Count(forming) => Message::Count(Count {
-                mission: forming.mission,
+                stamp: forming.stamp(forming.mission),
                 view: forming.number,
                 place: forming.numbers[0],
                 relays: Some(forming.numbers[1]).filter(|&relays| relays > 0),
@@ -469,6 +483,7 @@ impl Said {
                     target_m,
                 },
             },
+            Self::Offer(offer) => offer.message(),
         }
     }
 
@@ -576,14 +591,14 @@ impl Said {
                 ..
             } => is_place(*x_m) && is_altitude(*altitude_m) && is_sir(*worst),
             Self::Hail(Forming { numbers, flags, .. }) => {
-                numbers[0] <= 1000 && numbers[1..] == [0, 0] && *flags <= 15
+                numbers[0] <= 1000 && numbers[1] == 0 && *flags <= 31
             }
             Self::Roster(Forming { numbers, flags, .. }) => {
                 let counts = &numbers[..2];
                 counts.iter().all(|count| (1..=1000).contains(count)) && *flags <= 1
             }
             Self::Count(Forming { numbers, flags, .. }) => {
-                let [place, relays, unused] = *numbers;
+                let [place, relays, unused, _] = *numbers;
                 (1..=1000).contains(&place) && relays <= 1000 && unused == 0 && *flags == 0
             }
             Self::Fence {
@@ -592,6 +607,7 @@ impl Said {
                 target_m,
                 ..
             } => *number != 0 && x_m.abs() <= 1e7 && target_m.abs() <= 1e7,
+            Self::Offer(offer) => offer.in_range(),
         }
     }
 }
@@ -774,6 +790,7 @@ impl Reader<'_> {
                 x_m: self.real()?,
                 target_m: self.real()?,
             },
+            13 => Said::Offer(self.offer()?),
             _ => return None,
         })
     }
@@ -782,9 +799,15 @@ impl Reader<'_> {
         Some(Forming {
             number: self.word()?,
             mission: self.word()?,
-            numbers: [self.word()?, self.word()?, self.word()?],
+            numbers: [self.word()?, self.word()?, self.word()?, self.word()?],
             flags: self.byte()?,
         })
+    }
+
+    fn offer(&mut self) -> Option<Offer> {
+        let (offer, rest) = Offer::read(self.0)?;
+        self.0 = rest;
+        Some(offer)
     }
 }
 
@@ -812,12 +835,12 @@ pub(crate) fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     targets
 }
 
-fn wide(value: f32) -> f64 {
+pub(crate) fn wide(value: f32) -> f64 {
     value.into()
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "this is the rounding")]
-fn narrow(value: f64) -> f32 {
+pub(crate) fn narrow(value: f64) -> f32 {
     value as f32
 }
 

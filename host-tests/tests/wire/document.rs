@@ -53,7 +53,7 @@ fn the_annotated_examples_are_golden_vectors() {
     }
     seen.sort_unstable();
     seen.dedup();
-    let tags: Vec<u8> = (0..=12).collect();
+    let tags: Vec<u8> = (0..=13).collect();
     assert_eq!(seen, tags, "each tag has an example");
 }
 
@@ -138,7 +138,7 @@ fn every_row_of_the_rejection_table_is_counted_as_it_says() {
         assert_eq!(counted(relay.stats()), wanted, "{}", row[1]);
         found += 1;
     }
-    assert!(found > 75);
+    assert!(found > 120, "{found}");
 }
 
 /// The digest of a mission whose interference is these f32, by the document.

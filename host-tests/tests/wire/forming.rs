@@ -14,6 +14,7 @@ pub(crate) const ASKS: u8 = 1;
 pub(crate) const FORMS: u8 = 2;
 pub(crate) const FRESH: u8 = 4;
 pub(crate) const READY: u8 = 8;
+pub(crate) const FLIES: u8 = 16;
 
 /// What node `sender` says to node `destination`, on network 7.
 pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
@@ -26,13 +27,25 @@ pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
     wire(&plain(header, &said.body()))
 }
 
+/// What a roster or a count says of a view that is to fly the mission that was loaded before flight.
 pub(crate) fn forming(number: u16, mission: u16, numbers: [u16; 3], flags: u8) -> Forming {
+    let [place, relays, before] = numbers;
     Forming {
         number,
         mission,
-        numbers,
+        numbers: [place, relays, before, 0],
         flags,
     }
+}
+
+/// The hail of a node that flies the mission that was loaded before flight, and has no other.
+pub(crate) fn hailing(newest: u16, mission: u16, neighbour: u16, flags: u8) -> Said {
+    Said::Hail(Forming {
+        number: newest,
+        mission,
+        numbers: [neighbour, 0, mission, 0],
+        flags: flags | FLIES,
+    })
 }
 
 /// What `relay` sends at `now` or a millisecond later.
@@ -65,7 +78,7 @@ fn a_roster_goes_through_three_relays_and_the_count_back() {
     let mission = digest(head.mission());
     let now = Instant::ZERO;
     // Somebody wants a view: the head, whom nobody is before, calls for the first one.
-    let hail = Said::Hail(forming(0, mission, [1, 0, 0], FORMS | READY));
+    let hail = hailing(0, mission, 1, FORMS | READY);
     head.handle_bytes(now, Port::Downstream, &framed(1, Port::Downstream, &hail));
     let roster = |place| Said::Roster(forming(1, mission, [place, 3, 0], 1));
     let count = |place| Said::Count(forming(1, mission, [place, 3, 0], 0));
@@ -186,7 +199,7 @@ fn a_part_that_is_cut_off_stops_calling() {
     // It calls: it has missed a beginning.
     let sweep = &one_of_each(FIRST + 1, mission)[0];
     relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, sweep));
-    let calls = Said::Hail(forming(0, mission, [3, 0, 0], ASKS | FORMS | FRESH));
+    let calls = hailing(0, mission, 3, ASKS | FORMS | FRESH);
     assert_eq!(soon(&mut relay, now), [(Port::Upstream, calls)]);
     now = now + Duration::from_millis(1);
     let roster = Said::Roster(forming(1, mission, [1, 8, 0], 0));
@@ -216,7 +229,7 @@ fn a_leader_whose_part_is_cut_off_holds_until_it_is_asked_again() {
     let mut head = relay(1, 8, Wiring::Pair);
     let mission = digest(head.mission());
     let now = Instant::ZERO;
-    let hail = |newest| Said::Hail(forming(newest, mission, [1, 0, 0], FORMS | READY));
+    let hail = |newest| hailing(newest, mission, 1, FORMS | READY);
     head.handle_bytes(
         now,
         Port::Downstream,
@@ -250,10 +263,10 @@ fn a_hail_is_answered_by_a_hail_if_it_asks_for_one() {
         let mut relay = relay(4, 8, Wiring::Pair);
         let mission = digest(relay.mission());
         let flags = if asks { ASKS } else { 0 };
-        let hail = Said::Hail(forming(newest, mission, [4, 0, 0], flags));
+        let hail = hailing(newest, mission, 4, flags);
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &hail));
         let out = soon(&mut relay, now);
-        let answer = Said::Hail(forming(newest, mission, [3, 0, 0], FRESH));
+        let answer = hailing(newest, mission, 3, FRESH);
         let expected = asks.then_some((Port::Upstream, answer));
         assert_eq!(out, expected.into_iter().collect::<Vec<_>>());
         assert_eq!(counted(relay.stats()), ["received"]);

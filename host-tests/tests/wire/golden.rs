@@ -13,6 +13,7 @@ use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message};
 
 use super::codec::{self, Said};
+use super::offer::Offer;
 
 #[derive(Deserialize)]
 pub(crate) struct Vectors {
@@ -106,7 +107,7 @@ impl Frame {
 /// The vectors of the file.
 pub(crate) fn vectors() -> Vectors {
     let vectors: Vectors = serde_json::from_str(include_str!("../data/vectors.json")).unwrap();
-    assert!(vectors.frames.len() >= 53 && vectors.ladders.len() >= 10);
+    assert!(vectors.frames.len() >= 67 && vectors.ladders.len() >= 10);
     assert!(vectors.rungs.len() >= 8 && vectors.levels.len() >= 10 && vectors.places.len() >= 15);
     vectors
 }
@@ -279,21 +280,46 @@ fn the_vectors_hold_every_hail_roster_and_count() {
     let some = |what: fn(&Said) -> bool| {
         assert!(frames.iter().any(|vector| what(&vector.message)));
     };
-    for flags in [0, 5, 9, 11, 15] {
+    for flags in [0, 9, 21, 25, 27, 31] {
         assert!(
             frames
                 .iter()
                 .any(|vector| matches!(vector.message, Said::Hail(hail) if hail.flags == flags))
         );
     }
-    some(|said| matches!(said, Said::Hail(hail) if hail.numbers[0] == 1000));
+    some(|said| matches!(said, Said::Hail(hail) if hail.numbers == [1000, 0, u16::MAX, u16::MAX]));
+    some(|said| matches!(said, Said::Hail(hail) if hail.numbers[3] == 0 && hail.flags & 16 != 0));
+    some(|said| matches!(said, Said::Hail(hail) if hail.numbers[3] > 0 && hail.flags & 16 == 0));
     some(|said| matches!(said, Said::Roster(roster) if roster.flags == 0));
     some(|said| {
-        let most = [1000, 1000, u16::MAX];
+        let most = [1000, 1000, u16::MAX, u16::MAX];
         matches!(said, Said::Roster(roster) if roster.numbers == most && roster.flags == 1)
     });
     some(|said| matches!(said, Said::Count(count) if count.numbers[1] == 0));
-    some(|said| matches!(said, Said::Count(count) if count.numbers[..2] == [1000, 1000]));
+    some(|said| {
+        let most = [1000, 1000, 0, u16::MAX];
+        matches!(said, Said::Count(count) if count.numbers == most)
+    });
+}
+
+#[test]
+fn the_vectors_hold_offers_of_every_extreme() {
+    let frames = vectors().frames;
+    let some = |what: fn(&Offer) -> bool| {
+        assert!(
+            frames
+                .iter()
+                .any(|vector| matches!(&vector.message, Said::Offer(offer) if what(offer)))
+        );
+    };
+    some(|offer| offer.version == 1 && offer.relays == 1 && offer.distance_m == 1.0);
+    some(|offer| offer.version == u16::MAX && offer.relays == 1000 && offer.distance_m == 1e6);
+    some(|offer| offer.mu_los == 1e30 && offer.mu_nlos == 1e50);
+    some(|offer| offer.mu_los == 1e-3 && offer.mu_nlos == offer.eta);
+    some(|offer| offer.least_m < offer.most_m && offer.eta < offer.mu_nlos);
+    some(|offer| offer.least_m == offer.most_m && offer.eta > offer.mu_los);
+    some(|offer| offer.x_m < 0.0 && offer.interferer_w == 1e-6);
+    some(|offer| offer.y_m < 0.0 && offer.interferer_w == 1e9);
 }
 
 #[test]

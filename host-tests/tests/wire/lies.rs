@@ -10,7 +10,7 @@ use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::{Instant, Port, Wiring};
 
-use super::codec::{Forming, Said, plain, wire};
+use super::codec::{Said, plain, wire};
 use super::config;
 use super::receive::{NETWORK, drain, relay};
 use super::strategies::{messages, sweeps};
@@ -43,13 +43,13 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         Said::Busy { number } => *number = as_number,
         // The number of a fence is that of a talk, never 0.
         Said::Heartbeat { mission, .. } | Said::Fence { mission, .. } => *mission = as_mission,
-        Said::Hail(forming) | Said::Roster(forming) | Said::Count(forming) => {
-            *forming = Forming {
-                number: as_number,
-                mission: as_mission,
-                ..*forming
-            };
+        Said::Hail(hail) => (hail.number, hail.mission) = (as_number, as_mission),
+        // Of a view that flies the mission that was loaded.
+        Said::Roster(forming) | Said::Count(forming) => {
+            (forming.number, forming.mission) = (as_number, as_mission);
+            forming.numbers[3] = 0;
         }
+        Said::Offer(offer) => offer.base = as_mission,
     }
     said
 }

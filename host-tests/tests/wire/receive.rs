@@ -102,6 +102,8 @@ pub(crate) fn counted(stats: &Stats) -> Vec<&'static str> {
         ("mission", stats.mission),
         ("repeated", stats.repeated),
         ("stale", stats.stale),
+        // Of messages at a relay without a key, which asks for no tag.
+        ("unsigned", stats.unsigned),
         ("view", stats.view),
     ];
     let mut names: Vec<&str> = of_frames(stats)

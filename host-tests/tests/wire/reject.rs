@@ -10,6 +10,7 @@ use uav_relay::wire::message::{Answer, MAX_BODY, Message, MessageError, Wave};
 
 use super::codec::{Forming, Said, plain, sealed};
 use super::golden::vectors;
+use super::offer::offer;
 use super::strategies::pad;
 
 const HEADER: Header = Header {
@@ -116,7 +117,7 @@ fn moved() -> Said {
 const FORMING: Forming = Forming {
     number: 1,
     mission: 2,
-    numbers: [1, 0, 0],
+    numbers: [1, 0, 0, 0],
     flags: 0,
 };
 
@@ -154,7 +155,7 @@ fn bodies_that_are_no_message_are_refused() {
             let longer = [&body[..], &[extra]].concat();
             assert_eq!(verdict_on(&longer), Err(ENCODING), "{}", vector.name);
         }
-        for tag in 13..=u8::MAX {
+        for tag in 14..=u8::MAX {
             let mut other = body.clone();
             other[0] = tag;
             assert_eq!(verdict_on(&other), Err(ENCODING), "{}", vector.name);
@@ -227,6 +228,7 @@ fn padded_varints_are_refused() {
         Said::Hail(FORMING).body(),
         Said::Roster(FORMING).body(),
         Said::Count(FORMING).body(),
+        Said::Offer(offer()).body(),
     ] {
         let mut padded = body.clone();
         pad(&mut padded, true, 0);
@@ -456,7 +458,7 @@ fn a_turn_is_written_in_one_way() {
     }
 }
 
-/// Which of 0 to 65535 a message takes at `at` of a body of 12 bytes; the others are out of range and nothing else.
+/// Which of 0 to 65535 a message takes at `at` of its body; the others are out of range and nothing else.
 fn taken(mut body: Vec<u8>, at: usize) -> Vec<u16> {
     let fits = |number: &u16| {
         body[at..at + 2].copy_from_slice(&number.to_le_bytes());
@@ -471,7 +473,7 @@ fn taken(mut body: Vec<u8>, at: usize) -> Vec<u16> {
 fn a_chain_has_up_to_a_thousand_relays_and_what_a_message_does_not_use_is_zero() {
     let hail = Said::Hail(FORMING).body();
     let roster = Said::Roster(Forming {
-        numbers: [1, 1, 0],
+        numbers: [1, 1, 0, 0],
         ..FORMING
     });
     let roster = roster.body();
@@ -479,11 +481,11 @@ fn a_chain_has_up_to_a_thousand_relays_and_what_a_message_does_not_use_is_zero()
     let any: Vec<u16> = (0..=u16::MAX).collect();
     let (from_0, from_1) = (any[..=1000].to_vec(), any[1..=1000].to_vec());
     for (body, numbers, flags) in [
-        (&hail, [&from_0, &vec![0], &vec![0]], 16),
-        (&roster, [&from_1, &from_1, &any], 2),
-        (&count, [&from_1, &from_0, &vec![0]], 1),
+        (&hail, [&from_0, &vec![0], &any, &any], 32),
+        (&roster, [&from_1, &from_1, &any, &any], 2),
+        (&count, [&from_1, &from_0, &vec![0], &any], 1),
     ] {
-        for (at, numbers) in [5, 7, 9].into_iter().zip(numbers) {
+        for (at, numbers) in [5, 7, 9, 11].into_iter().zip(numbers) {
             assert_eq!(&taken(body.clone(), at), numbers, "tag {}, {at}", body[0]);
         }
         for at in [1, 3] {
@@ -491,7 +493,7 @@ fn a_chain_has_up_to_a_thousand_relays_and_what_a_message_does_not_use_is_zero()
         }
         for byte in 0..=u8::MAX {
             let mut body = body.clone();
-            body[11] = byte;
+            body[13] = byte;
             let expected = if byte < flags { Ok(()) } else { Err(VALUE) };
             assert_eq!(verdict_on(&body), expected, "tag {}: {byte}", body[0]);
         }

@@ -16,6 +16,7 @@ use uav_relay::{
 use super::codec::{Forming, Said, plain, wire};
 use super::config;
 use super::lies::renamed;
+use super::offer::{Offer, offer};
 use super::receive::{FIELD, NETWORK, counted, drain, paper, relay_of};
 use super::strategies::messages;
 use super::stream::unstuffed;
@@ -98,6 +99,7 @@ pub(crate) fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> 
 }
 
 /// One message of each tag, of this pass.
+#[expect(clippy::too_many_lines, reason = "a message of each tag")]
 pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     let x_m = 400.0;
     let altitude_m = 20.0;
@@ -175,20 +177,32 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         Said::Hail(Forming {
             number,
             mission,
-            numbers: [4, 0, 0],
-            flags: 0,
+            numbers: [4, 0, mission, 0],
+            flags: 16,
         }),
         Said::Roster(Forming {
             number,
             mission,
-            numbers: [3, 8, 0],
+            numbers: [3, 8, 0, 0],
             flags: 1,
         }),
         Said::Count(Forming {
             number,
             mission,
-            numbers: [5, 8, 0],
+            numbers: [5, 8, 0, 0],
             flags: 0,
+        }),
+        Said::Fence {
+            number: 1,
+            mission,
+            echo: 0,
+            fence: 1,
+            x_m,
+            target_m: x_m,
+        },
+        Said::Offer(Offer {
+            base: mission,
+            ..offer()
         }),
     ]
 }
@@ -518,9 +532,9 @@ fn tamed(said: Said) -> Said {
             choice: choice.map(|[_, level]| [0, level % 2]),
         },
         Said::Roster(forming) => {
-            let [_, relays, view] = forming.numbers;
+            let [_, relays, view, version] = forming.numbers;
             Said::Roster(Forming {
-                numbers: [3, relays.min(8), view],
+                numbers: [3, relays.min(8), view, version],
                 ..forming
             })
         }
@@ -659,7 +673,7 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                 }
                 let (number, mission) = match kind {
                     9..=11 => (view.wrapping_add(1), digest),
-                    3 => (0, digest),
+                    3 | 12 | 13 => (0, digest),
                     _ => (pass, digest.wrapping_add(view)),
                 };
                 let number = number.wrapping_add_signed(step.off);

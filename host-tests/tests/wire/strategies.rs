@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use uav_relay::wire::frame::Header;
 
 use super::codec::{Forming, Said, plain, sealed, targets, wire};
+use super::offered::{NUMBERS, offers};
 
 /// The largest node number.
 const MAX_NODE: u16 = 4094;
@@ -307,33 +308,34 @@ fn counts(least: u16) -> BoxedStrategy<u16> {
 /// A hail, a roster, a count or a fence.
 fn formings() -> BoxedStrategy<Said> {
     let views = || prop_oneof![4 => 0..8_u16, 1 => any::<u16>()];
-    let hail = (views(), any::<u16>(), counts(0), 0..16_u8).prop_map(
-        |(number, mission, neighbour, flags)| {
+    let stamps = || (any::<u16>(), views());
+    let hail = (views(), any::<u16>(), counts(0), stamps(), 0..32_u8).prop_map(
+        |(number, mission, neighbour, (digest, version), flags)| {
             Said::Hail(Forming {
                 number,
                 mission,
-                numbers: [neighbour, 0, 0],
+                numbers: [neighbour, 0, digest, version],
                 flags,
             })
         },
     );
     let places = (counts(1), counts(1), views());
-    let roster = (views(), any::<u16>(), places, 0..2_u8).prop_map(
-        |(number, mission, (place, relays, before), flags)| {
+    let roster = (views(), stamps(), places, 0..2_u8).prop_map(
+        |(number, (mission, version), (place, relays, before), flags)| {
             Said::Roster(Forming {
                 number,
                 mission,
-                numbers: [place, relays, before],
+                numbers: [place, relays, before, version],
                 flags,
             })
         },
     );
-    let count = (views(), any::<u16>(), counts(1), counts(0)).prop_map(
-        |(number, mission, place, relays)| {
+    let count = (views(), stamps(), counts(1), counts(0)).prop_map(
+        |(number, (mission, version), place, relays)| {
             Said::Count(Forming {
                 number,
                 mission,
-                numbers: [place, relays, 0],
+                numbers: [place, relays, 0, version],
                 flags: 0,
             })
         },
@@ -383,6 +385,7 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         2 => tokens(),
         2 => moves(),
         3 => formings(),
+        2 => offers(),
     ]
     .boxed()
 }
@@ -418,6 +421,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
                 7 => &[5, 9, 13, 18, 24],
                 8 => &[5, 9, 14],
                 9..=11 => &[5, 7],
+                13 => &NUMBERS,
                 _ => &[1],
             };
             let at = starts[at.index(starts.len())];
@@ -443,7 +447,8 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
                 6 => &[5, 6, 7],
                 7 => &[17, 22, 23],
                 8 => &[13],
-                9..=11 => &[5, 6, 7, 8, 9, 10, 11],
+                9..=11 => &[5, 6, 7, 8, 9, 10, 11, 12, 13],
+                13 => &[1, 2, 5, 6],
                 _ => &[0],
             };
             let at = bytes[at.index(bytes.len())];
@@ -457,7 +462,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         pad(&mut body, tag, more);
         body
     });
-    let tagged = (0..15_u8, vec(any::<u8>(), 0..=220)).prop_map(|(tag, mut body)| {
+    let tagged = (0..16_u8, vec(any::<u8>(), 0..=220)).prop_map(|(tag, mut body)| {
         body.insert(0, tag);
         body
     });

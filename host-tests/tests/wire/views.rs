@@ -4,7 +4,7 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Instant, Port, Relay, Wiring};
 
 use super::codec::Said;
-use super::forming::{ASKS, FORMS, FRESH, READY, events, forming, soon};
+use super::forming::{ASKS, FORMS, FRESH, READY, events, forming, hailing, soon};
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, framed, one_of_each, sent};
 
@@ -54,7 +54,7 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
             after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, verdict));
             let said = soon(&mut after, now);
             if calls {
-                let hail = Said::Hail(forming(view, mission, [5, 0, 0], READY));
+                let hail = hailing(view, mission, 5, READY);
                 assert_eq!(said, [(Port::Downstream, hail)]);
             } else {
                 assert_eq!(said, []);
@@ -95,8 +95,8 @@ fn a_late_roster_of_an_old_view_changes_nothing_and_a_leader_that_insists_hears_
     }
     let roster = Said::Roster(forming(4, mission, [3, 8, 0], 1));
     relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &roster));
-    let hail = forming(6, mission, [3, 0, 0], ASKS | FORMS | READY);
-    assert_eq!(soon(&mut relay, now), [(Port::Upstream, Said::Hail(hail))]);
+    let hail = hailing(6, mission, 3, ASKS | FORMS | READY);
+    assert_eq!(soon(&mut relay, now), [(Port::Upstream, hail)]);
     assert_eq!((relay.stats().stale, relay.view()), (4, 5));
 }
 
@@ -113,10 +113,10 @@ fn a_hail_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() {
     ] {
         let mut after = relay.clone();
         let flags = FORMS | if fresh { FRESH } else { 0 };
-        let hail = Said::Hail(forming(newest, mission, [4, 0, 0], flags));
+        let hail = hailing(newest, mission, 4, flags);
         after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &hail));
         let known = newest.max(3);
-        let on = Said::Hail(forming(known, mission, [3, 0, 0], ASKS | FORMS | READY));
+        let on = hailing(known, mission, 3, ASKS | FORMS | READY);
         let expected = calls.then_some((Port::Upstream, on));
         assert_eq!(
             soon(&mut after, now),

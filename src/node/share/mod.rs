@@ -1,40 +1,31 @@
 //! A relay's share of every algorithm: what it does with a pass, and with what comes back of it.
 //!
 //! [`exchange`](super::exchange) has the state table. What a pass carries is one of three: targets (`sweeps`), targets and
-//! altitude levels (`waves`), or a token (`turns`). The call for a new view (`roll`) is a pass like them.
+//! altitude levels (`waves`), or a token (`turns`). The call for a new view (`roll`) is a pass like them. `leader` has what comes
+//! before a pass begins.
 
+mod leader;
 mod roll;
 mod sweeps;
 mod turns;
 mod waves;
-
-use core::task::Poll;
 
 use super::MEMBERSHIP;
 use super::adjust::Turning;
 use super::align::Sweeping;
 use super::exchange::{Exchange, Next, Phase};
 use super::lead::Lead;
-use super::settings::{Method, Settings};
+use super::settings::Settings;
 use crate::mission::{Band, Mission, Profile};
-use crate::placement::climb::{Attempt, Climb};
-use crate::placement::coarse::Coarse;
 use crate::placement::ladder::Ladder;
 use crate::placement::levels::{Levels, TUBE};
-use crate::placement::local::Beside;
-use crate::placement::pass::origins;
-use crate::placement::search::{Infeasible, Schedule, Search};
+use crate::placement::search::Infeasible;
 use crate::placement::wave::{Choice, Wave};
 use crate::sir::Placement;
+use crate::wire::digest::Stamp;
 use crate::wire::message::{self, Answer, Count, Message, Moved, Roster, Sweep, Token, Trace};
 
 use roll::Rolling;
-
-/// Hops of the prediction in one call of `work`: 16 reaches each.
-const HOPS_AT_ONCE: u16 = 16;
-
-/// The same in a field, where a reach takes twice the work.
-const FIELD_HOPS_AT_ONCE: u16 = 8;
 
 /// Hops evaluated in one call of `work` on a pass of altitude levels, and 64 more at most.
 const LEVELS_AT_ONCE: u16 = 32;
@@ -51,8 +42,9 @@ pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 pub(crate) struct Own<'a> {
     pub(crate) mission: &'a Mission,
     pub(crate) settings: &'a Settings,
-    /// The digest of the mission as it was loaded.
-    pub(crate) mission_digest: u16,
+    /// The mission that it flies, and the newest that it holds.
+    pub(crate) flown: Stamp,
+    pub(crate) held: Stamp,
     /// Number of the view that it has agreed to.
     pub(crate) view: u16,
     /// Its place among the relays of that view, 1 next to Tx.
@@ -66,7 +58,12 @@ pub(crate) struct Own<'a> {
 impl Own<'_> {
     /// The digest that the passes of this view bear.
     const fn digest(self) -> u16 {
-        self.mission_digest.wrapping_add(self.view)
+        self.flown.digest.wrapping_add(self.view)
+    }
+
+    /// Whether it can fly the mission of that stamp.
+    fn has(self, stamp: Stamp) -> bool {
+        stamp == self.held || stamp == self.flown
     }
 
     fn is_last(&self) -> bool {
@@ -143,6 +140,22 @@ impl Share {
         }
     }
 
+    /// Whether it has just been made.
+    #[cfg(feature = "upload")]
+    pub(crate) const fn is_untouched(&self) -> bool {
+        let at_first = matches!(self.exchange.phase, Phase::Idle | Phase::Planning);
+        at_first && matches!(self.lead, Lead::No) && self.setpoint.is_none()
+    }
+
+    /// Another mission is flown from now on, in which this relay is given `profile`. It stays where it is.
+    pub(crate) fn load(&mut self, profile: Profile) {
+        self.profile = profile;
+        self.tube = Levels::held(profile.altitude_m, TUBE);
+        if self.setpoint.is_none() {
+            self.altitude_m = profile.altitude_m;
+        }
+    }
+
     /// The leader begins from the start: with Algorithm 1 or 4, at the altitudes the relays were given.
     pub(crate) fn restart(&mut self) {
         self.lead = Lead::No;
@@ -170,136 +183,6 @@ impl Share {
             Ok(false) => Next::Work { moved: false },
             Err(Infeasible) => self.give_up(),
         }
-    }
-
-    /// Goes on with the leader's computation; whether the next pass can begin.
-    fn plan(&mut self, own: Own<'_>) -> Result<bool, Infeasible> {
-        let (mission, profile) = (own.mission, self.profile);
-        match &mut self.lead {
-            Lead::No => {
-                self.begin_lead(own)?;
-                Ok(false)
-            }
-            Lead::Predicting(planner) => {
-                // The leader knows its own profile; of the others it can only assume what the mission has in common.
-                let profile_of = |index| {
-                    if index == own.index {
-                        profile
-                    } else {
-                        mission.config().common
-                    }
-                };
-                let hops = match mission.field() {
-                    None => HOPS_AT_ONCE,
-                    Some(_) => FIELD_HOPS_AT_ONCE,
-                };
-                let ladder = match planner.step(mission, profile_of, hops) {
-                    Ok(None) => return Ok(false),
-                    Ok(Some(agreed)) => Some(agreed.ladder),
-                    // The others may hold something else: let their answers decide.
-                    Err(Infeasible) => None,
-                };
-                let last = own.settings.method == Method::Align;
-                self.search_with(own, ladder, last)?;
-                Ok(true)
-            }
-            Lead::Surveying(coarse) if ALTITUDE => {
-                let Some(interferer) = mission.interferer() else {
-                    return Err(Infeasible);
-                };
-                let found =
-                    coarse.step(mission, interferer, profile, &mut self.wave, LEVELS_AT_ONCE);
-                if let Poll::Ready(predicted) = found {
-                    self.climb(own, predicted);
-                }
-                Ok(false)
-            }
-            Lead::Climbing(climb) if ALTITUDE && climb.is_vain() => {
-                // Nothing better than what Algorithm 1 gave: agree on that once more.
-                let target = climb.target();
-                self.search_with(own, Some(Ladder::single(target)), true)?;
-                Ok(true)
-            }
-            _ => Ok(true),
-        }
-    }
-
-    #[inline(never)] // a planner is built here once; its stack is not for every call of `work`
-    fn begin_lead(&mut self, own: Own<'_>) -> Result<(), Infeasible> {
-        self.lead = Lead::begin(own.mission, self.profile, own.settings)?;
-        if let Lead::Searching { search, .. } = &mut self.lead
-            && own.measured_per_w.is_some()
-        {
-            search.take_as_even();
-        }
-        Ok(())
-    }
-
-    /// Goes over to trying targets, with `ladder` first if there is one.
-    #[inline(never)]
-    fn search_with(
-        &mut self,
-        own: Own<'_>,
-        ladder: Option<Ladder>,
-        last: bool,
-    ) -> Result<(), Infeasible> {
-        let mut search = Search::new(own.mission, self.profile, Schedule::Bracketed)?;
-        if own.measured_per_w.is_some() {
-            search.take_as_even();
-        }
-        if let Some(ladder) = ladder {
-            search.begin_with(ladder);
-        }
-        self.lead = Lead::Searching { search, last };
-        Ok(())
-    }
-
-    #[inline(never)]
-    fn climb(&mut self, own: Own<'_>, predicted: Option<(f32, u8)>) {
-        let target = self.target.unwrap_or(1.0);
-        let tolerance = own.mission.config().tolerance;
-        self.lead = Lead::Climbing(Climb::new(target, tolerance, predicted));
-    }
-
-    #[inline(never)]
-    fn survey(&mut self, own: Own<'_>, target: f32) {
-        let coarse = Coarse::new(own.mission, target, &mut self.wave);
-        self.lead = Lead::Surveying(coarse);
-    }
-
-    /// The leader begins the pass it has planned.
-    fn begin_pass(&mut self, own: Own<'_>) -> Next {
-        let mission = own.mission;
-        match &self.lead {
-            Lead::Searching { search, .. } => {
-                let ladder = *search.ladder();
-                self.begin();
-                self.sweep_on(own, ladder, None, &origins(mission))
-            }
-            Lead::Climbing(climb) if ALTITUDE => {
-                let Attempt { rungs, levels } = climb.attempt();
-                self.begin();
-                let levels = self.levels(own, levels);
-                self.wave.begin(mission, rungs, levels);
-                self.pass = Pass::Wave;
-                self.go_on_with_wave(own)
-            }
-            Lead::Adjusting(rounds) if ADJUST => {
-                let (turn, sir) = (rounds.turn(), rounds.sir);
-                self.begin();
-                let tx = Beside {
-                    place: Placement::default(),
-                    apart_m: 0.0,
-                };
-                self.take_turn(own, Turning::new(turn, sir, tx, mission.tx_gain()))
-            }
-            _ => Next::Work { moved: false },
-        }
-    }
-
-    fn begin(&mut self) {
-        self.exchange.begin();
-        self.sweeps = self.sweeps.saturating_add(1);
     }
 
     /// What to hand onward, while an answer is awaited.
@@ -336,7 +219,7 @@ impl Share {
                 })
             }),
             Pass::Roll(rolling) if MEMBERSHIP => Some(Message::Roster(Roster {
-                mission: own.mission_digest,
+                stamp: rolling.stamp,
                 view: rolling.view,
                 place: rolling.place,
                 before: rolling.before,
@@ -382,7 +265,7 @@ impl Share {
                 })
             }),
             Pass::Roll(rolling) if MEMBERSHIP => Some(Message::Count(Count {
-                mission: own.mission_digest,
+                stamp: rolling.stamp,
                 view: rolling.view,
                 place: rolling.place,
                 relays: rolling.relays,

@@ -3,6 +3,7 @@
 use super::super::exchange::{Arrival, Next, Phase};
 use super::super::lead::Lead;
 use super::{Own, Pass, Share};
+use crate::wire::digest::Stamp;
 use crate::wire::message::{Before, Count, Roster};
 
 /// A call, as one relay sees it.
@@ -10,6 +11,8 @@ use crate::wire::message::{Before, Count, Roster};
 pub(crate) struct Rolling {
     /// Number of the new view.
     pub(crate) view: u16,
+    /// The mission that it is to fly.
+    pub(crate) stamp: Stamp,
     /// This relay's place in it, from 1 at the leader.
     pub(crate) place: u16,
     /// The newest view that a relay up to this one has agreed to.
@@ -22,17 +25,19 @@ impl Share {
     /// The leader calls for view `view`, above every one it has heard of.
     pub(crate) fn call(&mut self, own: Own<'_>, view: u16) -> Next {
         self.sweeps = self.sweeps.saturating_add(1);
-        self.roll(own, view, 0, None)
+        self.roll(own, view, own.held, 0, None)
     }
 
-    /// A call from the relay before.
+    /// A call from the relay before, for a view that flies the mission that this relay holds.
     pub(crate) fn on_roster(&mut self, own: Own<'_>, roster: &Roster) -> Next {
         let current = match &self.pass {
             Pass::Roll(rolling) => Some(*rolling),
             _ => None,
         };
         let again = current.is_some_and(|rolling| {
-            rolling.view == roster.view && rolling.place == roster.place.saturating_add(1)
+            rolling.view == roster.view
+                && rolling.stamp == roster.stamp
+                && rolling.place == roster.place.saturating_add(1)
         });
         if again {
             return self.exchange.again();
@@ -48,10 +53,18 @@ impl Share {
                 _ => Next::Stale,
             };
         }
-        self.roll(own, roster.view, roster.place, Some(roster.before))
+        let before = Some(roster.before);
+        self.roll(own, roster.view, roster.stamp, roster.place, before)
     }
 
-    fn roll(&mut self, own: Own<'_>, view: u16, place: u16, before: Option<Before>) -> Next {
+    fn roll(
+        &mut self,
+        own: Own<'_>,
+        view: u16,
+        stamp: Stamp,
+        place: u16,
+        before: Option<Before>,
+    ) -> Next {
         let known = Before {
             view: own.view,
             relays: own.mission.relays(),
@@ -69,6 +82,7 @@ impl Share {
         self.exchange.phase = Phase::Waiting;
         self.pass = Pass::Roll(Rolling {
             view,
+            stamp,
             place: place.saturating_add(1),
             before,
             relays: None,
@@ -91,26 +105,31 @@ impl Share {
         // Of two halves the one with the leader is the larger.
         let there = 2 * u32::from(rolling.place) + u32::from(rolling.before.leader);
         let enough = !own.settings.quorum || there > u32::from(rolling.before.relays);
-        self.conclude_roll(enough.then_some(rolling.place))
+        self.conclude_roll(own, enough.then_some(rolling.place))
     }
 
     /// What came of a call, from the relay after.
-    pub(crate) fn on_count(&mut self, count: &Count) -> Next {
+    pub(crate) fn on_count(&mut self, own: Own<'_>, count: &Count) -> Next {
         if let Pass::Roll(rolling) = &self.pass
             && self.exchange.phase == Phase::Waiting
             && rolling.view == count.view
+            && rolling.stamp == count.stamp
             && rolling.place.saturating_add(1) == count.place
             && count.relays.is_none_or(|relays| relays > rolling.place)
         {
-            return self.conclude_roll(count.relays);
+            return self.conclude_roll(own, count.relays);
         }
         Next::Stale
     }
 
-    fn conclude_roll(&mut self, relays: Option<u16>) -> Next {
+    fn conclude_roll(&mut self, own: Own<'_>, relays: Option<u16>) -> Next {
         let Pass::Roll(rolling) = &mut self.pass else {
             return Next::Nothing;
         };
+        if !own.has(rolling.stamp) {
+            // A newer mission has taken its place since: the others come to hold that one, too.
+            return Next::Foreign;
+        }
         rolling.relays = relays;
         self.exchange.phase = Phase::Answered;
         Next::Formed { granted: relays }
@@ -145,11 +164,143 @@ impl Share {
         matches!(self.pass, Pass::Roll(_))
     }
 
-    /// The number of the view that is being called for, while the answer is awaited.
-    pub(crate) fn called(&self) -> Option<u16> {
+    /// The view that is being called for, its number and its mission, while the answer is awaited.
+    pub(crate) fn called(&self) -> Option<(u16, Stamp)> {
         match &self.pass {
-            Pass::Roll(rolling) if self.exchange.phase == Phase::Waiting => Some(rolling.view),
+            Pass::Roll(rolling) if self.exchange.phase == Phase::Waiting => {
+                Some((rolling.view, rolling.stamp))
+            }
             _ => None,
         }
+    }
+
+    /// The mission of the last call; `None` if the current pass is another.
+    pub(crate) const fn stamp(&self) -> Option<Stamp> {
+        match &self.pass {
+            Pass::Roll(rolling) => Some(rolling.stamp),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(feature = "upload")]
+#[cfg(test)]
+mod tests {
+    use super::{Next, Own, Pass, Phase, Rolling, Share};
+    use crate::mission::Mission;
+    use crate::mission::tests::paper;
+    use crate::node::settings::Settings;
+    use crate::wire::digest::{Stamp, digest};
+    use crate::wire::message::{Before, Count, Roster};
+
+    /// What relay 2 of 3 holds: mission 4; it flies the one it was loaded with.
+    struct Held {
+        mission: Mission,
+        settings: Settings,
+        stamp: Stamp,
+    }
+
+    impl Held {
+        fn new() -> Self {
+            Self {
+                mission: Mission::try_new(paper(3)).unwrap(),
+                settings: Settings::default(),
+                stamp: Stamp {
+                    version: 4,
+                    digest: 0x1234,
+                },
+            }
+        }
+
+        fn own(&self) -> Own<'_> {
+            Own {
+                mission: &self.mission,
+                settings: &self.settings,
+                flown: Stamp {
+                    version: 0,
+                    digest: digest(&self.mission),
+                },
+                held: self.stamp,
+                view: 0,
+                index: 2,
+                end: false,
+                measured_per_w: None,
+            }
+        }
+
+        fn roster(&self, view: u16) -> Roster {
+            Roster {
+                stamp: self.stamp,
+                view,
+                place: 1,
+                before: Before {
+                    view: 0,
+                    relays: 3,
+                    leader: true,
+                },
+            }
+        }
+
+        fn count(&self, view: u16) -> Count {
+            Count {
+                stamp: self.stamp,
+                view,
+                place: 3,
+                relays: Some(3),
+            }
+        }
+    }
+
+    fn share(held: &Held) -> Share {
+        Share::new(&held.mission, false, 0, held.mission.config().common)
+    }
+
+    /// The leader was switched on again in the midst of a call, and has been offered another mission.
+    #[test]
+    fn a_call_for_the_same_view_with_another_mission_is_another_call() {
+        let mut held = Held::new();
+        let mut share = share(&held);
+        let first = held.roster(1);
+        assert_eq!(
+            share.on_roster(held.own(), &first),
+            Next::Forward { moved: false }
+        );
+        assert_eq!(share.on_roster(held.own(), &first), Next::Busy);
+        held.stamp.version = 5;
+        assert_eq!(
+            share.on_roster(held.own(), &held.roster(1)),
+            Next::Stale,
+            "and not that it has arrived"
+        );
+    }
+
+    #[test]
+    fn a_count_is_of_the_mission_that_was_called_for() {
+        let held = Held::new();
+        let mut share = share(&held);
+        share.on_roster(held.own(), &held.roster(1));
+        let mut count = held.count(1);
+        count.stamp.version = 5;
+        assert_eq!(share.on_count(held.own(), &count), Next::Stale);
+        assert_eq!(
+            share.on_count(held.own(), &held.count(1)),
+            Next::Formed { granted: Some(3) }
+        );
+    }
+
+    /// A newer mission has taken the place of the one called for: it cannot be flown any more.
+    #[test]
+    fn who_has_lost_the_mission_has_no_part_in_its_view() {
+        let mut held = Held::new();
+        let mut share = share(&held);
+        share.on_roster(held.own(), &held.roster(1));
+        let count = held.count(1);
+        held.stamp.version = 5;
+        assert_eq!(share.on_count(held.own(), &count), Next::Foreign);
+        assert_eq!(share.phase(), Phase::Waiting);
+        assert!(matches!(
+            share.pass,
+            Pass::Roll(Rolling { relays: None, .. })
+        ));
     }
 }

@@ -1,11 +1,18 @@
 //! How frames travel from one relay to others.
 
-use uav_relay::Port;
+use uav_relay::{Instant, Port};
 
 use super::super::attack::Recorded;
 use super::super::faults::Faults;
 use super::super::queue::Happening;
 use super::Chain;
+
+/// Who hears a frame, counted from 0.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Receiver {
+    Relay(usize),
+    Ground(usize),
+}
 
 impl Chain {
     /// Whether relays `one` and `other` (from 0) cannot hear each other now.
@@ -36,6 +43,25 @@ impl Chain {
             Port::Downstream => (index + 1..index + 2, Port::Upstream),
             Port::Shared => (index.saturating_sub(reach)..index + reach + 1, Port::Shared),
         };
+        let relays = receivers
+            .filter(|receiver| *receiver != index)
+            .filter(|receiver| *receiver < self.members.len() && !self.are_parted(index, *receiver))
+            .map(Receiver::Relay);
+        let grounds = (0..self.stations.len())
+            .filter(|at| self.reaches_ground(index, port, *at))
+            .map(Receiver::Ground);
+        let receivers: Vec<Receiver> = relays.chain(grounds).collect();
+        self.send(frame, into, arrives, receivers);
+    }
+
+    /// Puts `frame` into the queues of all that hear it, each with what happens to it on its way.
+    pub(super) fn send(
+        &mut self,
+        frame: &[u8],
+        into: Port,
+        arrives: Instant,
+        receivers: impl IntoIterator<Item = Receiver>,
+    ) {
         if let Some(attacker) = &mut self.attacker {
             attacker.record(Recorded {
                 arrived: arrives,
@@ -48,18 +74,16 @@ impl Chain {
             Some(end) if self.now >= end => Faults::default(),
             _ => self.setup.faults,
         };
-        for receiver in receivers.filter(|receiver| *receiver != index) {
-            if receiver >= self.members.len() || self.are_parted(index, receiver) {
-                continue;
-            }
+        for receiver in receivers {
             let arrivals = faults.inject(frame, &mut self.rng, &mut self.outcome.injected);
             for arrival in arrivals {
                 let late = late_by.times(u32::try_from(arrival.late).unwrap_or(u32::MAX));
-                let happening = Happening::Bytes {
-                    port: into,
-                    bytes: arrival.bytes,
+                let bytes = arrival.bytes;
+                let (at, happening) = match receiver {
+                    Receiver::Relay(at) => (at, Happening::Bytes { port: into, bytes }),
+                    Receiver::Ground(at) => (at, Happening::Heard { bytes }),
                 };
-                self.queue.put(arrives + late, receiver, happening);
+                self.queue.put(arrives + late, at, happening);
             }
         }
     }

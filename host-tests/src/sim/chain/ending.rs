@@ -3,6 +3,7 @@
 use uav_relay::{Phase, Side, Wiring};
 
 use super::super::outcome::Ending;
+use super::ground::Station;
 use super::{Chain, Member};
 
 impl Chain {
@@ -12,7 +13,11 @@ impl Chain {
         }
         let killed = self.members.iter().any(|member| member.killed.is_some());
         if killed && self.setup.settings.wiring == Wiring::Pair {
+            // Nothing that is uploaded gets past it.
             return self.all_noticed().then_some(Ending::Broken);
+        }
+        if self.stations.iter().any(Station::is_busy) {
+            return None;
         }
         let phases = || {
             let living = self.members.iter().filter(|member| member.killed.is_none());

@@ -36,9 +36,19 @@ impl Chain {
                         view: member.relay.view(),
                         index: member.relay.index(),
                         relays: member.relay.mission().relays(),
+                        version: member.relay.version(),
                     };
                     (what, None)
                 }
+                Event::Uploaded => {
+                    let upload = member.relay.upload().copied();
+                    if !self.setup.forgetful.contains(&by) {
+                        member.stored = upload;
+                    }
+                    let version = upload.map_or(0, |upload| upload.version());
+                    (Turning::Uploaded(version), None)
+                }
+                Event::Adopted => (Turning::Adopted(member.relay.version()), None),
                 Event::Cut => (Turning::Cut, None),
                 Event::Infeasible => (Turning::Infeasible, None),
                 _ => continue,

@@ -60,7 +60,7 @@ impl Chain {
         self.attacker = Some(attacker);
     }
 
-    /// From one relay to another that might listen to it.
+    /// From one relay, or from the ground, to a relay that might listen to it.
     fn way(&self, attacker: &mut Attacker) -> Way {
         let relays = self.setup.mission.relays();
         let reach = match self.setup.settings.wiring {
@@ -69,10 +69,10 @@ impl Chain {
         };
         let to = attacker.rng.random_range(1..=relays);
         let off = attacker.rng.random_range(1..=reach);
-        let before = attacker.rng.random::<bool>() && off < to || to + off > relays;
+        let before = attacker.rng.random::<bool>() && off <= to || to + off > relays + 1;
         Way {
             from: if before {
-                to.saturating_sub(off).max(1)
+                to.saturating_sub(off)
             } else {
                 to + off
             },

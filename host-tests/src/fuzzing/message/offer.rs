@@ -1,0 +1,97 @@
+//! Offers of mad neighbours: the numbers of a whole mission, most of them in range, some of them the relay's own.
+
+use super::Body;
+
+/// What the paper's scenario has after the number of relays and before the interferer: D and the least separation in m, power
+/// of Tx in W, common altitude in m, common power in W.
+const PAPER: [f32; 5] = [1000.0, 4.0, 80.0, 20.0, 1.0];
+
+/// The paper's path-loss factors, with and without line of sight.
+const LOSSES: [f64; 2] = [7_191.8, 884_786.1];
+
+impl Body<'_, '_> {
+    pub(super) fn offer(&mut self) {
+        self.version();
+        self.digest();
+        self.all();
+        if self.input.flag() {
+            self.paper();
+        } else {
+            self.wild();
+        }
+    }
+
+    /// The version that the relay holds, one of the next, or any.
+    fn version(&mut self) {
+        let held = self.known.held.version;
+        let version = match self.input.byte() {
+            up @ 0..240 => held.wrapping_add(u16::from(up % 4)),
+            _ => self.input.word(),
+        };
+        self.word(version);
+    }
+
+    /// As many relays as the mission has, or any number.
+    fn all(&mut self) {
+        let relays = match self.input.byte() {
+            0..240 => self.known.relays,
+            _ => self.input.word(),
+        };
+        self.word(relays);
+    }
+
+    /// The paper's mission with the interferer somewhere else, and any altitudes or one.
+    fn paper(&mut self) {
+        self.reals(&PAPER);
+        self.float(|input| input.scaled(1.0, 1e4));
+        self.float(|input| input.even(-500.0, 1500.0));
+        self.float(|input| input.even(-1000.0, 1000.0));
+        self.reals(&[1e-4]);
+        let [los, nlos] = LOSSES;
+        self.losses([los, nlos, los]);
+        let most_m = if self.input.flag() { 300.0 } else { 20.0 };
+        self.reals(&[20.0, most_m]);
+    }
+
+    /// Every number from the whole of its range.
+    fn wild(&mut self) {
+        let distance_m = self.input.scaled(1.0, 1e6);
+        self.float(|_| distance_m);
+        let apart = distance_m / f32::from(self.known.relays.max(1));
+        self.float(|input| input.even(0.0, apart));
+        self.power();
+        let (one, other) = (self.input.scaled(0.1, 1e5), self.input.scaled(0.1, 1e5));
+        let (least_m, most_m) = (one.min(other), one.max(other));
+        self.float(|input| input.even(least_m, most_m));
+        self.power();
+        self.float(|input| input.scaled(1e-6, 1e9));
+        for _ in 0..2 {
+            self.float(|input| input.even(-1e7, 1e7));
+        }
+        self.float(|input| input.scaled(1e-6, 0.1));
+        let los = f64::from(self.input.scaled(1e-3, 1e30)).clamp(1e-3, 1e30);
+        let nlos = los * f64::from(self.input.scaled(1.0, 1e20)).min(1e20);
+        let eta = if self.input.flag() { los } else { nlos };
+        self.losses([los, nlos, eta]);
+        self.float(|_| least_m);
+        self.float(|_| most_m);
+    }
+
+    /// Path-loss factors, rarely one of them any number at all.
+    fn losses(&mut self, mut losses: [f64; 3]) {
+        let which = usize::from(self.input.byte());
+        if let Some(loss) = losses.get_mut(which) {
+            let (low, high) = (self.input.long(), self.input.long());
+            *loss = f64::from_bits(u64::from(high) << 32 | u64::from(low));
+        }
+        for loss in losses {
+            self.bytes.extend_from_slice(&loss.to_le_bytes());
+        }
+    }
+
+    fn reals(&mut self, numbers: &[f32]) {
+        for number in numbers {
+            self.bytes.extend_from_slice(&number.to_le_bytes());
+        }
+    }
+}

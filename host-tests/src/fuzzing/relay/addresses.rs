@@ -1,0 +1,42 @@
+//! Who says something to a relay, and through which port it comes.
+
+use uav_relay::{Port, Wiring};
+
+use super::super::message::Header;
+use super::super::watch::NETWORK;
+
+/// The header and the port of a frame from the neighbour at `side` of relay `index`.
+pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Port) {
+    let (sender, port) = if side == 1 {
+        (index + 1, Port::Downstream)
+    } else {
+        (index - 1, Port::Upstream)
+    };
+    let header = Header {
+        network: NETWORK,
+        sender,
+        destination: index,
+    };
+    match wiring {
+        Wiring::Pair => (header, port),
+        Wiring::Shared => (header, Port::Shared),
+    }
+}
+
+/// The node `more` beyond the neighbour at `side` of relay `index`, as far as there is one.
+pub(super) const fn far(index: u16, side: usize, more: u8) -> u16 {
+    let distance = 1 + more as u16;
+    if side == 1 {
+        index + distance
+    } else {
+        index.saturating_sub(distance)
+    }
+}
+
+pub(super) const fn port(byte: u8) -> Port {
+    match byte % 3 {
+        0 => Port::Upstream,
+        1 => Port::Downstream,
+        _ => Port::Shared,
+    }
+}

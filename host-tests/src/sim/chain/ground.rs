@@ -1,0 +1,170 @@
+//! The ground's end of an upload: the transmitter and the receiver, as nodes of the run.
+
+use uav_relay::ground::{Ground, Progress};
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::wire::upload::Upload;
+use uav_relay::{Instant, Port, Side, Wiring};
+
+use super::super::forge::NETWORK;
+use super::super::link::Line;
+use super::super::outcome::{Moment, Turning};
+use super::super::queue::Happening;
+use super::super::setup::Setup;
+use super::Chain;
+use super::air::Receiver;
+
+/// A mission that is uploaded in the run.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct UploadSpec {
+    /// Where: the transmitter is upstream of the chain, the receiver downstream.
+    pub end: Side,
+    /// When.
+    pub at: Instant,
+    /// What.
+    pub upload: Upload,
+}
+
+/// The transmitter or the receiver.
+#[derive(Debug)]
+pub(super) struct Station {
+    end: Side,
+    ground: Ground,
+    line: Line,
+    wake: Option<Instant>,
+}
+
+impl Station {
+    /// Whether an upload of its is under way.
+    pub(super) fn is_busy(&self) -> bool {
+        matches!(
+            self.ground.progress(),
+            Progress::Offering | Progress::Held { .. }
+        )
+    }
+}
+
+/// One station for every end that something is uploaded from.
+pub(super) fn stations(setup: &Setup) -> Vec<Station> {
+    let Some(proof) = setup.proof(1) else {
+        return Vec::new();
+    };
+    let uploads = setup.uploads.iter().map(|spec| spec.end);
+    let mut ends: Vec<Side> = uploads.collect();
+    ends.sort();
+    ends.dedup();
+    ends.into_iter()
+        .map(|end| Station {
+            end,
+            ground: Ground::new(&setup.mission, end, NETWORK, setup.settings.wiring, proof),
+            line: Line::default(),
+            wake: None,
+        })
+        .collect()
+}
+
+impl Chain {
+    /// Upload number `which` of the setup begins.
+    pub(super) fn begin_upload(&mut self, which: usize) {
+        let Some(spec) = self.setup.uploads.get(which).copied() else {
+            return;
+        };
+        let Some(at) = self
+            .stations
+            .iter()
+            .position(|station| station.end == spec.end)
+        else {
+            return;
+        };
+        if let Some(station) = self.stations.get_mut(at)
+            && station.ground.upload(self.now, spec.upload).is_ok()
+        {
+            self.tell_of_ground(spec.end, Turning::Offered(spec.upload.version()));
+        }
+        self.drain_station(at);
+    }
+
+    /// Bytes arrive at station `at`.
+    pub(super) fn hear(&mut self, at: usize, bytes: &[u8]) {
+        if let Some(station) = self.stations.get_mut(at) {
+            station.ground.handle_bytes(bytes);
+        }
+        self.drain_station(at);
+    }
+
+    /// Station `at` may have something to do.
+    pub(super) fn ask(&mut self, at: usize) {
+        let now = self.now;
+        if let Some(station) = self.stations.get_mut(at)
+            && station.wake == Some(now)
+        {
+            station.wake = None;
+            station.ground.handle_timeout(now);
+        }
+        self.drain_station(at);
+    }
+
+    fn drain_station(&mut self, at: usize) {
+        let now = self.now;
+        let mut frame = [0; MAX_FRAME];
+        while let Some(station) = self.stations.get_mut(at)
+            && let Some(len) = station.ground.poll_transmit(&mut frame)
+        {
+            let end = station.end;
+            let arrives = station.line.send(now, len, &self.setup.link);
+            self.outcome.messages += 1;
+            self.outcome.bytes += len as u64;
+            let relays = self.members.len();
+            let reach = match self.setup.settings.wiring {
+                Wiring::Pair => 1,
+                Wiring::Shared => self.setup.radio_reach,
+            };
+            let (receivers, port) = match end {
+                Side::Upstream => (0..reach.min(relays), Port::Upstream),
+                Side::Downstream => (relays.saturating_sub(reach)..relays, Port::Downstream),
+            };
+            let into = match self.setup.settings.wiring {
+                Wiring::Pair => port,
+                Wiring::Shared => Port::Shared,
+            };
+            let bytes = frame.get(..len).unwrap_or_default().to_vec();
+            self.send(&bytes, into, arrives, receivers.map(Receiver::Relay));
+        }
+        if let Some(station) = self.stations.get_mut(at)
+            && let Some(again) = station.ground.poll_timeout()
+            && station.wake.is_none_or(|wake| again < wake)
+        {
+            assert!(again > now, "the ground would spin");
+            station.wake = Some(again);
+            self.queue.put(again, at, Happening::Ask);
+        }
+    }
+
+    /// Whether station `at` hears what relay `index` (from 0) sends through `port`.
+    pub(super) fn reaches_ground(&self, index: usize, port: Port, at: usize) -> bool {
+        let Some(station) = self.stations.get(at) else {
+            return false;
+        };
+        let (off, side) = match station.end {
+            Side::Upstream => (index + 1, Port::Upstream),
+            Side::Downstream => (self.members.len() - index, Port::Downstream),
+        };
+        match port {
+            Port::Shared => off <= self.setup.radio_reach,
+            _ => off == 1 && port == side,
+        }
+    }
+
+    fn tell_of_ground(&mut self, end: Side, what: Turning) {
+        self.outcome.moments.push(Moment {
+            at: self.now,
+            relay: match end {
+                Side::Upstream => 0,
+                Side::Downstream => self.setup.mission.relays() + 1,
+            },
+            what,
+            other: None,
+            target: None,
+            sweeps: 0,
+        });
+    }
+}

@@ -1,0 +1,209 @@
+//! Uploads to a chain on good links.
+
+use uav_relay::{Adjust, Band, Local, Method, Profile, Schedule};
+
+use super::*;
+
+/// When the upload begins.
+const AT: Instant = seconds(20);
+
+/// Runs `setup` with an upload of `config`; how long after its beginning the last relay took its place, ms, and bytes.
+fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
+    let mut calm = setup.clone();
+    calm.partitions.clear();
+    let before = run(calm).unwrap();
+    setup.uploads = vec![upload(&setup.mission, end, AT, 1, config)];
+    setup.deadline = seconds(200);
+    let outcome = run(setup.clone()).unwrap();
+    judge(&setup, &outcome, 1, config).unwrap();
+    assert_ne!(outcome.bits(), before.bits(), "nothing to fly to");
+    let refused = |outcome: &Outcome| -> u32 {
+        let relays = outcome.relays.iter();
+        relays.map(|relay| relay.stats.rejected()).sum()
+    };
+    assert_eq!(refused(&outcome), refused(&before));
+    let settled = |moment: &&Moment| moment.what == Turning::Converged;
+    let last = outcome.moments.iter().rfind(settled).unwrap();
+    let took = last.at.since(AT).as_micros() / 1_000;
+    (took, outcome.bytes - before.bytes)
+}
+
+#[test]
+fn a_new_place_of_the_interferer_is_flown_by_all_wherever_it_is_uploaded() {
+    for relays in [1, 2, 3, 8, 20] {
+        for shared in [true, false] {
+            for end in [Side::Upstream, Side::Downstream] {
+                let base = mission(relays);
+                let config = moved(&base, 700.0, -300.0);
+                let (took, bytes) = fly(signed(base, shared), end, config);
+                println!("{relays} relays, shared {shared}, {end:?}: {took} ms, {bytes} bytes");
+                // An offer, a hail, a roster, a count, a sweep and a verdict a hop, each within two of the links' hop times.
+                assert!(took < 200 * relays as u64 + 300, "{took} ms");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_new_band_of_altitudes_is_climbed_into_from_where_the_relays_are() {
+    let base = MissionConfig {
+        band: Band {
+            least_m: 15.0,
+            most_m: 60.0,
+        },
+        ..*mission(5).config()
+    };
+    let base = Mission::try_new(base).unwrap();
+    let config = MissionConfig {
+        band: Band {
+            least_m: 90.0,
+            most_m: 180.0,
+        },
+        common: Profile {
+            altitude_m: 120.0,
+            ..base.config().common
+        },
+        ..*base.config()
+    };
+    for method in [
+        Method::Altitude,
+        Method::Adjust(Adjust {
+            rounds: 20,
+            explore_m: 10.0,
+            local: Local::Fine,
+        }),
+    ] {
+        let mut setup = signed(base, true);
+        setup.settings.method = method;
+        // One of them keeps its own altitude and power, whatever the mission.
+        setup.profiles = vec![(
+            2,
+            Profile {
+                altitude_m: 100.0,
+                power_w: 1.5,
+            },
+        )];
+        setup.held = vec![2];
+        fly(setup, Side::Upstream, config);
+    }
+}
+
+#[test]
+fn every_parameter_but_the_number_of_relays_may_change() {
+    let base = mission(4);
+    let changed: [fn(&mut MissionConfig); 6] = [
+        |c| c.distance_m *= 1.3,
+        |c| c.min_separation_m = 200.0,
+        |c| c.tx_power_w *= 2.0,
+        |c| c.common.power_w *= 3.0,
+        |c| {
+            c.common.altitude_m = 55.0;
+            c.band = Band::at(55.0);
+        },
+        |c| {
+            c.channel = uav_relay::Channel::from_db(
+                2e9,
+                0.1,
+                21.0,
+                uav_relay::channel::AirGround::Weighted(0.5),
+            )
+            .unwrap();
+        },
+    ];
+    for change in changed {
+        let mut config = *base.config();
+        change(&mut config);
+        fly(signed(base, true), Side::Upstream, config);
+    }
+}
+
+#[test]
+fn a_newer_version_overtakes_an_older_one() {
+    let base = mission(8);
+    let (one, two) = (moved(&base, 700.0, -300.0), moved(&base, 100.0, 500.0));
+    // From the same end and from the other, at every stage of the first upload.
+    for ms in (0..600).step_by(20) {
+        for other in [Side::Upstream, Side::Downstream] {
+            let mut setup = signed(base, true);
+            let later = Instant::from_millis(20_000 + ms);
+            setup.uploads = vec![
+                upload(&base, Side::Upstream, AT, 1, one),
+                upload(&base, other, later, 2, two),
+            ];
+            setup.deadline = seconds(200);
+            let outcome = run(setup.clone()).unwrap();
+            judge(&setup, &outcome, 2, two).unwrap_or_else(|what| panic!("{ms} {other:?}: {what}"));
+            let cut = |moment: &Moment| moment.what == Turning::Cut;
+            assert!(!outcome.moments.iter().any(cut), "{ms} {other:?}");
+        }
+    }
+}
+
+#[test]
+fn an_older_version_changes_nothing_and_of_one_version_all_fly_the_same() {
+    let base = mission(8);
+    let (one, two) = (moved(&base, 700.0, -300.0), moved(&base, 100.0, 500.0));
+    let mut setup = signed(base, true);
+    setup.uploads = vec![
+        upload(&base, Side::Upstream, AT, 7, one),
+        upload(&base, Side::Downstream, seconds(30), 6, two),
+    ];
+    setup.deadline = seconds(200);
+    let outcome = run(setup.clone()).unwrap();
+    judge(&setup, &outcome, 7, one).unwrap();
+    // Two operators who do not know of each other.
+    for ms in (0..400).step_by(40) {
+        let at = Instant::from_millis(20_000 + ms);
+        setup.uploads = vec![
+            upload(&base, Side::Upstream, AT, 1, one),
+            upload(&base, Side::Downstream, at, 1, two),
+        ];
+        let outcome = run(setup.clone()).unwrap();
+        let stamp = |spec: &UploadSpec| spec.upload.stamp();
+        let newer = setup.uploads.iter().max_by_key(|spec| stamp(spec)).unwrap();
+        judge(&setup, &outcome, 1, *newer.upload.config()).unwrap();
+    }
+}
+
+#[test]
+fn an_infeasible_mission_is_followed_by_a_feasible_one() {
+    let base = mission(3);
+    // With fixed steps there is no place for a target below the first one.
+    let mut setup = signed(base, true);
+    setup.settings.schedule = Schedule::FixedStep { step: 0.2 };
+    let mut hopeless = moved(&base, 500.0, 0.0);
+    if let Interference::Source(interferer) = &mut hopeless.interference {
+        interferer.power_w = 1e6;
+    }
+    let good = moved(&base, 700.0, -300.0);
+    setup.uploads = vec![
+        upload(&base, Side::Upstream, AT, 1, hopeless),
+        upload(&base, Side::Upstream, seconds(40), 2, good),
+    ];
+    setup.deadline = seconds(200);
+    let outcome = run(setup.clone()).unwrap();
+    let given_up = |moment: &Moment| moment.what == Turning::Infeasible;
+    assert!(outcome.moments.iter().any(given_up));
+    judge(&setup, &outcome, 2, good).unwrap();
+}
+
+#[test]
+fn an_upload_in_the_midst_of_forming_anew_is_not_forgotten() {
+    let base = mission(6);
+    let config = moved(&base, 700.0, -300.0);
+    let mut setup = signed(base, true);
+    setup.kills = vec![(3, AT)];
+    setup.deadline = seconds(200);
+    let calm = run(setup.clone()).unwrap();
+    let formed = |moment: &&Moment| matches!(moment.what, Turning::Reformed { .. });
+    let at = calm.moments.iter().find(formed).unwrap().at;
+    for ms in (0..600).step_by(10) {
+        for end in [Side::Upstream, Side::Downstream] {
+            let begin = Instant::from_micros(at.as_micros() - 500_000 + 1_000 * ms);
+            setup.uploads = vec![upload(&base, end, begin, 1, config)];
+            let outcome = run(setup.clone()).unwrap();
+            judge(&setup, &outcome, 1, config)
+                .unwrap_or_else(|what| panic!("{ms} {end:?}: {what}"));
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! Drones that fly through an upload, guarded.
+
+use host_tests::sim::chain::FlightSpec;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::Duration;
+use uav_relay::guard::confines::Confines;
+
+use super::*;
+
+const SEPARATION_M: f32 = 5.0;
+
+/// What a place may be off by rounding, m: places are f32 of up to 1 km.
+const ROUNDING_M: f64 = 2e-3;
+
+/// Eight drones that take off close to each other, and a new mission while they are under way or hover.
+fn flight(seed: u64) -> (Setup, MissionConfig) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let config = MissionConfig {
+        min_separation_m: SEPARATION_M,
+        ..*mission(8).config()
+    };
+    let base = Mission::try_new(config).unwrap();
+    let mut setup = signed(base, true);
+    setup.settings.guard = Some(Confines::of(&base, config.common));
+    let mut x_m = 0.0;
+    setup.flight = Some(FlightSpec {
+        start: (0..8)
+            .map(|_| {
+                x_m += f64::from(SEPARATION_M) + 0.01 + rng.random_range(0.0..60.0_f64);
+                (x_m, 20.0)
+            })
+            .collect(),
+        speed_mps: (0..8).map(|_| rng.random_range(0.5..15.0)).collect(),
+        step: Duration::from_millis(200),
+    });
+    setup.seed = rng.random();
+    setup.faults.loss = rng.random_range(0.0..0.4);
+    let config = moved(
+        &base,
+        rng.random_range(-100.0..1_100.0),
+        rng.random_range(50.0..500.0),
+    );
+    let at = Instant::from_millis(rng.random_range(1_000..120_000));
+    let end = if rng.random() {
+        Side::Upstream
+    } else {
+        Side::Downstream
+    };
+    setup.uploads = vec![upload(&base, end, at, 1, config)];
+    setup.deadline = seconds(2_000);
+    (setup, config)
+}
+
+#[test]
+fn no_two_come_close_on_their_way_from_one_mission_to_the_next() {
+    let far = f64::from(SEPARATION_M) - ROUNDING_M;
+    for seed in 1..=40 {
+        let (setup, config) = flight(seed);
+        let outcome = run(setup.clone()).unwrap();
+        assert!(
+            outcome.nearest_m >= far,
+            "SEED={seed}: {}",
+            outcome.nearest_m
+        );
+        let mut ends = setup.clone();
+        // Where they are told to be in the end is what one without a guard is told.
+        ends.settings.guard = None;
+        judge(&ends, &outcome, 1, config).unwrap_or_else(|what| panic!("SEED={seed}: {what}"));
+    }
+    // Without a guard some do: the test can fail.
+    let close = (1..=40).any(|seed| {
+        let (mut setup, _) = flight(seed);
+        setup.settings.guard = None;
+        run(setup).unwrap().nearest_m < far
+    });
+    assert!(close);
+}

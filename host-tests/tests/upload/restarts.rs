@@ -1,0 +1,114 @@
+//! Relays that are switched off and on again: what they fly then.
+
+use uav_relay::Wiring;
+
+use super::*;
+
+/// Eight relays that were uploaded a mission, all switched off and on again at once; `forgetful` ones lose it then.
+fn power_cut(wiring: Wiring, forgetful: &[u16]) -> (Setup, Outcome) {
+    let base = mission(8);
+    let mut setup = signed(base, wiring == Wiring::Shared);
+    let config = moved(&base, 700.0, -300.0);
+    setup.uploads = vec![upload(&base, Side::Upstream, seconds(20), 3, config)];
+    for relay in 1..=8 {
+        setup.kills.push((relay, seconds(40)));
+        setup.boots.push((relay, seconds(41)));
+    }
+    setup.forgetful = forgetful.to_vec();
+    setup.deadline = seconds(300);
+    let outcome = run(setup.clone()).unwrap();
+    (setup, outcome)
+}
+
+/// Views that were agreed to after the power cut.
+fn views(outcome: &Outcome) -> usize {
+    let moments = outcome
+        .moments
+        .iter()
+        .filter(|moment| moment.at > seconds(41));
+    moments
+        .filter(|moment| matches!(moment.what, Turning::Reformed { .. }))
+        .count()
+}
+
+#[test]
+fn a_chain_that_stores_what_was_uploaded_flies_it_at_once_when_it_is_switched_on_again() {
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        let (setup, outcome) = power_cut(wiring, &[]);
+        let config = *setup.uploads[0].upload.config();
+        judge(&setup, &outcome, 3, config).unwrap();
+        // As a chain that was given it before flight does: without a new view.
+        assert_eq!(views(&outcome), 0);
+        assert!(outcome.ended < seconds(43), "{:?}", outcome.ended);
+    }
+}
+
+#[test]
+fn one_relay_that_has_stored_it_is_enough() {
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        for keeper in 1..=8 {
+            let others: Vec<u16> = (1..=8).filter(|relay| *relay != keeper).collect();
+            let (setup, outcome) = power_cut(wiring, &others);
+            let config = *setup.uploads[0].upload.config();
+            judge(&setup, &outcome, 3, config)
+                .unwrap_or_else(|what| panic!("{wiring:?}, kept by {keeper}: {what}"));
+            // It says so as soon as a neighbour says something that it cannot take part in.
+            assert!(outcome.ended < seconds(42), "{:?}", outcome.ended);
+        }
+    }
+}
+
+#[test]
+fn a_chain_that_has_stored_nothing_flies_what_it_was_loaded_with() {
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        let all: Vec<u16> = (1..=8).collect();
+        let (setup, outcome) = power_cut(wiring, &all);
+        judge(&setup, &outcome, 0, *setup.mission.config()).unwrap();
+        assert_eq!(views(&outcome), 0);
+    }
+}
+
+#[test]
+fn whoever_is_rebooted_at_any_moment_of_an_upload_flies_it_with_the_others() {
+    let base = mission(5);
+    let config = moved(&base, 700.0, -300.0);
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        for end in [Side::Upstream, Side::Downstream] {
+            for relay in 1..=5 {
+                for ms in (0..300).step_by(15) {
+                    for forgetful in [vec![], vec![relay]] {
+                        let mut setup = signed(base, wiring == Wiring::Shared);
+                        setup.uploads = vec![upload(&base, end, seconds(20), 1, config)];
+                        let off = Instant::from_millis(20_000 + ms);
+                        let on = Instant::from_millis(20_100 + ms);
+                        setup.kills = vec![(relay, off)];
+                        setup.boots = vec![(relay, on)];
+                        setup.forgetful = forgetful.clone();
+                        setup.deadline = seconds(200);
+                        let outcome = run(setup.clone()).unwrap();
+                        judge(&setup, &outcome, 1, config).unwrap_or_else(|what| {
+                            panic!("{wiring:?} {end:?} {relay} at {ms} {forgetful:?}: {what}")
+                        });
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_others_fly_it_without_a_relay_that_is_lost_in_the_midst_of_it() {
+    let base = mission(8);
+    let config = moved(&base, 700.0, -300.0);
+    for relay in 1..=8 {
+        for ms in [0, 50, 100, 150, 200, 250, 300] {
+            let mut setup = signed(base, true);
+            setup.uploads = vec![upload(&base, Side::Upstream, seconds(20), 1, config)];
+            setup.kills = vec![(relay, Instant::from_millis(20_000 + ms))];
+            setup.deadline = seconds(200);
+            let outcome = run(setup.clone()).unwrap();
+            judge(&setup, &outcome, 1, config)
+                .unwrap_or_else(|what| panic!("{relay} at {ms}: {what}"));
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! The part of the second codec that is about uploads: what an offer says, its bytes, and its ranges.
+
+use serde::Deserialize;
+use uav_relay::wire::message::Message;
+use uav_relay::{Band, Interference, Interferer, Profile, Upload};
+
+use super::codec::{narrow, wide};
+
+/// A mission with its version, in the order in which it is sent.
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+pub(crate) struct Offer {
+    pub(crate) version: u16,
+    /// Digest of the mission that was loaded before flight.
+    pub(crate) base: u16,
+    pub(crate) relays: u16,
+    pub(crate) distance_m: f32,
+    pub(crate) min_separation_m: f32,
+    pub(crate) tx_power_w: f32,
+    pub(crate) altitude_m: f32,
+    pub(crate) power_w: f32,
+    /// The interferer's.
+    pub(crate) interferer_w: f32,
+    pub(crate) x_m: f32,
+    pub(crate) y_m: f32,
+    pub(crate) tolerance: f32,
+    pub(crate) mu_los: f64,
+    pub(crate) mu_nlos: f64,
+    pub(crate) eta: f64,
+    pub(crate) least_m: f32,
+    pub(crate) most_m: f32,
+}
+
+/// Where each number begins in the body.
+pub(crate) const RELAYS: usize = 5;
+pub(crate) const DISTANCE: usize = 7;
+pub(crate) const SEPARATION: usize = 11;
+pub(crate) const TX_POWER: usize = 15;
+pub(crate) const ALTITUDE: usize = 19;
+pub(crate) const POWER: usize = 23;
+pub(crate) const INTERFERER: usize = 27;
+pub(crate) const X: usize = 31;
+pub(crate) const Y: usize = 35;
+pub(crate) const TOLERANCE: usize = 39;
+pub(crate) const MU_LOS: usize = 43;
+pub(crate) const MU_NLOS: usize = 51;
+pub(crate) const ETA: usize = 59;
+pub(crate) const LEAST: usize = 67;
+pub(crate) const MOST: usize = 71;
+
+/// Bytes of the body.
+pub(crate) const BYTES: usize = 75;
+
+impl Offer {
+    /// The bytes of the body.
+    pub(crate) fn body(&self) -> Vec<u8> {
+        let mut out = vec![13];
+        for word in [self.version, self.base, self.relays] {
+            out.extend(word.to_le_bytes());
+        }
+        for number in [
+            self.distance_m,
+            self.min_separation_m,
+            self.tx_power_w,
+            self.altitude_m,
+            self.power_w,
+            self.interferer_w,
+            self.x_m,
+            self.y_m,
+            self.tolerance,
+        ] {
+            out.extend(number.to_le_bytes());
+        }
+        for number in [self.mu_los, self.mu_nlos, self.eta] {
+            out.extend(number.to_le_bytes());
+        }
+        for number in [self.least_m, self.most_m] {
+            out.extend(number.to_le_bytes());
+        }
+        out
+    }
+
+    /// What the bytes after the tag say, if there are enough of them, and those that are left.
+    pub(crate) fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
+        let (bytes, rest) = bytes.split_at_checked(BYTES - 1)?;
+        let word = |at: usize| u16::from_le_bytes([bytes[at - 1], bytes[at]]);
+        let real = |at: usize| f32::from_le_bytes(bytes[at - 1..at + 3].try_into().unwrap());
+        let long = |at: usize| f64::from_le_bytes(bytes[at - 1..at + 7].try_into().unwrap());
+        let offer = Self {
+            version: word(1),
+            base: word(3),
+            relays: word(RELAYS),
+            distance_m: real(DISTANCE),
+            min_separation_m: real(SEPARATION),
+            tx_power_w: real(TX_POWER),
+            altitude_m: real(ALTITUDE),
+            power_w: real(POWER),
+            interferer_w: real(INTERFERER),
+            x_m: real(X),
+            y_m: real(Y),
+            tolerance: real(TOLERANCE),
+            mu_los: long(MU_LOS),
+            mu_nlos: long(MU_NLOS),
+            eta: long(ETA),
+            least_m: real(LEAST),
+            most_m: real(MOST),
+        };
+        Some((offer, rest))
+    }
+
+    pub(crate) fn in_range(&self) -> bool {
+        let powers = [self.tx_power_w, self.power_w];
+        (1..=u16::MAX).contains(&self.version)
+            && (1..=1000).contains(&self.relays)
+            && (1.0..=1e6).contains(&self.distance_m)
+            && (0.0..=1e5).contains(&self.min_separation_m)
+            && self.fits()
+            && powers.iter().all(|power| (1e-6..=1e6).contains(power))
+            && (1e-6..=1e9).contains(&self.interferer_w)
+            && [self.x_m, self.y_m].iter().all(|at| at.abs() <= 1e7)
+            && (1e-6..=0.1).contains(&self.tolerance)
+            && (1e-3..=1e30).contains(&self.mu_los)
+            && (self.mu_los..=1e20 * self.mu_los).contains(&self.mu_nlos)
+            && (self.mu_los..=self.mu_nlos).contains(&self.eta)
+            && (0.1..=1e5).contains(&self.least_m)
+            && (self.least_m..=1e5).contains(&self.most_m)
+            && (self.least_m..=self.most_m).contains(&self.altitude_m)
+    }
+
+    /// Whether the relays have room between Tx and Rx.
+    fn fits(&self) -> bool {
+        let rounding = narrow(wide(self.distance_m) / 2_097_152.0);
+        let step = narrow(wide(self.min_separation_m) + wide(rounding));
+        narrow(f64::from(self.relays - 1) * wide(step)) <= self.distance_m
+    }
+
+    /// The digest of the mission that it is of: CRC-32C of all but version and base, the band only if there is one.
+    pub(crate) fn digest(&self) -> u16 {
+        let body = self.body();
+        let band = self.least_m < self.most_m;
+        let bytes = &body[RELAYS..if band { BYTES } else { LEAST }];
+        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes);
+        u16::try_from(crc & 0xFFFF).unwrap()
+    }
+
+    /// The message that says this. Only the crate can make it of any numbers: each of them must be found again in it.
+    pub(crate) fn message(&self) -> Message<'static> {
+        let upload = Upload::decode(&self.body()).unwrap();
+        let config = upload.config();
+        assert_eq!((upload.version(), upload.base()), (self.version, self.base));
+        let common = Profile {
+            altitude_m: self.altitude_m,
+            power_w: self.power_w,
+        };
+        let interferer = Interferer {
+            power_w: self.interferer_w,
+            x_m: self.x_m,
+            y_m: self.y_m,
+        };
+        let band = Band {
+            least_m: self.least_m,
+            most_m: self.most_m,
+        };
+        assert_eq!((config.relays, config.common), (self.relays, common));
+        assert_eq!(config.distance_m, self.distance_m);
+        assert_eq!(config.min_separation_m, self.min_separation_m);
+        assert_eq!(config.tx_power_w, self.tx_power_w);
+        assert_eq!(config.interference, Interference::Source(interferer));
+        assert_eq!(config.tolerance, self.tolerance);
+        let channel = config.channel;
+        let factors = [channel.mu_los(), channel.mu_nlos(), channel.eta()];
+        assert_eq!(factors, [self.mu_los, self.mu_nlos, self.eta]);
+        assert_eq!(config.band, band);
+        let stamp = upload.stamp();
+        assert_eq!((stamp.version, stamp.digest), (self.version, self.digest()));
+        Message::Offer(upload)
+    }
+}
+
+/// One that eight relays could fly.
+pub(crate) fn offer() -> Offer {
+    Offer {
+        version: 2,
+        base: 0x5A3C,
+        relays: 8,
+        distance_m: 1000.0,
+        min_separation_m: 4.0,
+        tx_power_w: 80.0,
+        altitude_m: 20.0,
+        power_w: 1.0,
+        interferer_w: 62.5,
+        x_m: 600.0,
+        y_m: -250.5,
+        tolerance: 1e-4,
+        mu_los: 7000.0,
+        mu_nlos: 900_000.5,
+        eta: 7000.25,
+        least_m: 20.0,
+        most_m: 300.0,
+    }
+}

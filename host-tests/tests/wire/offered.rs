@@ -1,0 +1,138 @@
+//! What proptest draws of offers: missions in range with all their extremes, and where a number in one may be spoiled.
+
+use proptest::prelude::*;
+
+use super::codec::Said;
+use super::offer::{
+    ALTITUDE, DISTANCE, ETA, INTERFERER, LEAST, MOST, MU_LOS, MU_NLOS, Offer, POWER, SEPARATION,
+    TOLERANCE, TX_POWER, X, Y,
+};
+
+/// Where four bytes of an offer are an f32, or the upper half of an f64.
+pub(crate) const NUMBERS: [usize; 14] = [
+    DISTANCE,
+    SEPARATION,
+    TX_POWER,
+    ALTITUDE,
+    POWER,
+    INTERFERER,
+    X,
+    Y,
+    TOLERANCE,
+    MU_LOS + 4,
+    MU_NLOS + 4,
+    ETA + 4,
+    LEAST,
+    MOST,
+];
+
+/// From `least` to `most`, small and large alike, and both often.
+fn scaled(least: f32, most: f32) -> BoxedStrategy<f32> {
+    let any_size =
+        (least.log2()..=most.log2()).prop_map(move |log| log.exp2().max(least).min(most));
+    prop_oneof![4 => any_size, 1 => Just(least), 1 => Just(most)].boxed()
+}
+
+/// Number of relays, distance, and a separation that they have room for.
+fn rooms() -> BoxedStrategy<(u16, f32, f32)> {
+    let relays = prop_oneof![4 => 1..=9_u16, 1 => 1..=1000_u16, 1 => Just(1), 1 => Just(1000)];
+    let parts = prop_oneof![4 => 0.0..0.99_f32, 1 => Just(0.0), 1 => Just(-0.0)];
+    (relays, scaled(1.0, 1e6), parts)
+        .prop_map(|(relays, distance_m, part)| {
+            let apart = (part * distance_m / f32::from(relays)).min(1e5);
+            (relays, distance_m, apart)
+        })
+        .boxed()
+}
+
+/// Path-loss factors in order.
+fn factors() -> BoxedStrategy<[f64; 3]> {
+    let parts = prop_oneof![4 => 0.0..=1.0_f64, 1 => Just(0.0), 1 => Just(1.0)];
+    let logs = prop_oneof![4 => -3.0..=30.0_f64, 1 => Just(-3.0), 1 => Just(30.0)];
+    let ratios = prop_oneof![4 => 0.0..=20.0_f64, 1 => Just(0.0), 1 => Just(20.0)];
+    (logs, ratios, parts)
+        .prop_map(|(log, ratio, part)| {
+            let los = 10_f64.powf(log).clamp(1e-3, 1e30);
+            let nlos = (los * 10_f64.powf(ratio)).clamp(los, 1e20 * los);
+            let eta = (part * los + (1.0 - part) * nlos).clamp(los, nlos);
+            [los, nlos, eta]
+        })
+        .boxed()
+}
+
+/// The ends of a band and an altitude in it.
+fn bands() -> BoxedStrategy<[f32; 3]> {
+    let ends = prop_oneof![
+        3 => (scaled(0.1, 1e5), scaled(0.1, 1e5)),
+        1 => scaled(0.1, 1e5).prop_map(|altitude_m| (altitude_m, altitude_m)),
+    ];
+    let parts = prop_oneof![4 => 0.0..=1.0_f32, 1 => Just(0.0), 1 => Just(1.0)];
+    (ends, parts)
+        .prop_map(|((one, other), part)| {
+            let (least, most) = (one.min(other), one.max(other));
+            [
+                least,
+                most,
+                (least + part * (most - least)).clamp(least, most),
+            ]
+        })
+        .boxed()
+}
+
+/// Along x or aside of it.
+fn beside() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        4 => -2e3..=2e3_f32,
+        1 => -1e7..=1e7_f32,
+        1 => Just(-1e7),
+        1 => Just(1e7),
+        1 => Just(-0.0),
+    ]
+}
+
+/// An offer in range.
+pub(crate) fn offers() -> BoxedStrategy<Said> {
+    let versions = prop_oneof![4 => 1..9_u16, 1 => 1..=u16::MAX];
+    let powers = (scaled(1e-6, 1e6), scaled(1e-6, 1e6), scaled(1e-6, 1e9));
+    (
+        (versions, any::<u16>()),
+        rooms(),
+        powers,
+        (beside(), beside()),
+        scaled(1e-6, 0.1),
+        factors(),
+        bands(),
+    )
+        .prop_map(
+            |(
+                (version, base),
+                (relays, distance_m, min_separation_m),
+                (tx_power_w, power_w, interferer_w),
+                (x_m, y_m),
+                tolerance,
+                [mu_los, mu_nlos, eta],
+                [least_m, most_m, altitude_m],
+            )| {
+                Said::Offer(Offer {
+                    version,
+                    base,
+                    relays,
+                    distance_m,
+                    min_separation_m,
+                    tx_power_w,
+                    altitude_m,
+                    power_w,
+                    interferer_w,
+                    x_m,
+                    y_m,
+                    tolerance,
+                    mu_los,
+                    mu_nlos,
+                    eta,
+                    least_m,
+                    most_m,
+                })
+            },
+        )
+        .boxed()
+}

@@ -1,0 +1,138 @@
+//! A node that has the key, by the rules of `FORMAT.md`: a neighbour of the relay under test, or Tx or Rx.
+
+use blake2::Blake2sMac;
+use blake2::digest::consts::U8;
+use blake2::digest::{FixedOutput, Mac};
+use uav_relay::wire::auth::{Auth, Key, TAG};
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{Identity, Instant, Mission, Port, Relay, Settings, Wiring};
+
+use super::codec::{Said, header, sealed, wire};
+use super::receive::{NETWORK, paper};
+use super::stream::unstuffed;
+use uav_relay::wire::frame::Header;
+
+const KEY: [u8; 32] = *b"whoever reads this is not secret";
+
+/// Flags in byte 3: a tag follows, and the body is a hello.
+const SIGNED: u8 = 0x10;
+const HELLO: u8 = 0x20;
+
+/// Relay `index` of eight in the paper's scenario, which has the key.
+pub(crate) fn with_key(index: u16, wiring: Wiring) -> Relay {
+    let mission = Mission::try_new(paper(8)).unwrap();
+    let (identity, settings) = set(index, wiring);
+    Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
+}
+
+/// Who such a relay is, and what it is set to.
+pub(crate) fn set(index: u16, wiring: Wiring) -> (Identity, Settings) {
+    let identity = Identity {
+        network: NETWORK,
+        index,
+    };
+    let settings = Settings {
+        wiring,
+        auth: Some(Auth {
+            key: Key::new(KEY),
+            epoch: 9,
+        }),
+        ..Settings::default()
+    };
+    (identity, settings)
+}
+
+/// Another node, and what it shares with the relay.
+#[derive(Clone, Debug)]
+pub(crate) struct Peer {
+    node: u16,
+    relay: u16,
+    port: Port,
+    /// Its nonce toward the relay, and the relay's toward it.
+    nonces: [u64; 2],
+    counter: u32,
+}
+
+impl Peer {
+    /// Node `node` meets `relay`, which then knows it.
+    pub(crate) fn meets(relay: &mut Relay, own: u16, node: u16, port: Port) -> Self {
+        let mut peer = Self {
+            node,
+            relay: own,
+            port,
+            nonces: [5 << 32 | 1, 0],
+            counter: 0,
+        };
+        // It asks, it is answered, it shows that it has heard that.
+        peer.hello(relay, true);
+        let answer = frames(relay, Instant::ZERO)
+            .into_iter()
+            .find(|(to, flags, _)| (*to, *flags) == (node, SIGNED | HELLO));
+        let (_, _, body) = answer.unwrap();
+        assert_eq!(body.len(), 17);
+        peer.nonces[1] = u64::from_le_bytes(body[..8].try_into().unwrap());
+        peer.hello(relay, false);
+        assert_eq!(relay.stats().rejected(), 0);
+        peer
+    }
+
+    fn hello(&mut self, relay: &mut Relay, asks: bool) {
+        let mut body: Vec<u8> = self
+            .nonces
+            .iter()
+            .copied()
+            .flat_map(u64::to_le_bytes)
+            .collect();
+        body.push(u8::from(asks));
+        let frame = self.frame(SIGNED | HELLO, &body);
+        relay.handle_bytes(Instant::ZERO, self.port, &frame);
+    }
+
+    /// The next frame with such a body.
+    fn frame(&mut self, flags: u8, body: &[u8]) -> Vec<u8> {
+        let mut bytes = header(Header {
+            network: NETWORK,
+            sender: self.node,
+            destination: self.relay,
+            counter: self.counter,
+        });
+        self.counter += 1;
+        bytes[3] |= flags;
+        bytes.extend(body);
+        let mut mac = Blake2sMac::<U8>::new_from_slice(&KEY).unwrap();
+        for nonce in self.nonces {
+            mac.update(&nonce.to_le_bytes());
+        }
+        mac.update(&bytes);
+        bytes.extend(mac.finalize_fixed());
+        wire(&sealed(bytes))
+    }
+
+    /// Says something to the relay.
+    pub(crate) fn says(&mut self, relay: &mut Relay, now: Instant, said: &Said) {
+        let frame = self.frame(SIGNED, &said.body());
+        relay.handle_bytes(now, self.port, &frame);
+    }
+}
+
+/// All frames that `relay` sends at `now`: to whom, with which flags, which body.
+fn frames(relay: &mut Relay, now: Instant) -> Vec<(u16, u8, Vec<u8>)> {
+    let mut out = Vec::new();
+    let mut buffer = [0; MAX_FRAME];
+    while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
+        let plain = unstuffed(&buffer[..transmit.len - 1]).unwrap();
+        let to = u16::from_le_bytes([plain[2], plain[3]]) & 0x0FFF;
+        let body = plain[10..plain.len() - 4 - TAG].to_vec();
+        out.push((to, plain[3] & 0xF0, body));
+    }
+    out
+}
+
+/// What `relay` says at `now`, and to whom; hellos left out.
+pub(crate) fn said(relay: &mut Relay, now: Instant) -> Vec<(u16, Said)> {
+    frames(relay, now)
+        .into_iter()
+        .filter(|(_, flags, _)| *flags == SIGNED)
+        .map(|(to, _, body)| (to, Said::read(&body).unwrap()))
+        .collect()
+}

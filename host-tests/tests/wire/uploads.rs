@@ -1,0 +1,378 @@
+//! Uploads, message by message, as the document has them: who is offered what, what a roster of another mission leads to, and
+//! what is left after a reboot. `ground` has what Tx and Rx say.
+
+use uav_relay::wire::digest::digest;
+use uav_relay::{Duration, Event, Instant, Interference, Mission, Port, Relay, Upload, Wiring};
+
+use super::codec::{Forming, Said};
+use super::forming::{ASKS, FLIES, FORMS, FRESH, READY, events};
+use super::offer::{Offer, offer};
+use super::receive::{FIELD, counted, paper, relay};
+use super::sequence::{FIRST, framed, one_of_each, sent};
+use super::signed::{Peer, said, set, with_key};
+
+pub(crate) const NOW: Instant = Instant::ZERO;
+
+/// Relay 4 of eight, which has nothing to say, the nodes beside it, and the digest of its mission.
+fn relay_4() -> (Relay, [Peer; 2], u16) {
+    let mut relay = with_key(4, Wiring::Pair);
+    let peers = [(3, Port::Upstream), (5, Port::Downstream)]
+        .map(|(node, port)| Peer::meets(&mut relay, 4, node, port));
+    said(&mut relay, NOW);
+    events(&mut relay);
+    let base = digest(relay.mission());
+    (relay, peers, base)
+}
+
+/// The mission of this version for the relays that were loaded with `base`.
+pub(crate) fn upload(version: u16, base: u16) -> Offer {
+    Offer {
+        version,
+        base,
+        ..offer()
+    }
+}
+
+/// A hail of a node that has heard of view 0 alone, and holds the mission of these: digest and version.
+pub(crate) fn hail(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
+    Said::Hail(Forming {
+        number: 0,
+        mission,
+        numbers: [neighbour, 0, holds.0, holds.1],
+        flags,
+    })
+}
+
+pub(crate) fn stamp(offer: &Offer) -> (u16, u16) {
+    (offer.digest(), offer.version)
+}
+
+/// What it says now, and what a millisecond later.
+fn both(relay: &mut Relay) -> [Vec<(u16, Said)>; 2] {
+    let now = said(relay, NOW);
+    let later = NOW + Duration::from_millis(1);
+    relay.handle_timeout(later);
+    [now, said(relay, later)]
+}
+
+pub(crate) fn held(relay: &Relay) -> Option<(u16, u16)> {
+    let stamp = relay.upload().map(Upload::stamp)?;
+    Some((stamp.digest, stamp.version))
+}
+
+#[test]
+fn an_offer_at_a_node_without_a_key_is_counted_and_nothing_else() {
+    for port in [Port::Upstream, Port::Downstream] {
+        let mut relay = relay(4, 8, Wiring::Pair);
+        let base = digest(relay.mission());
+        let offer = Said::Offer(upload(2, base));
+        relay.handle_bytes(NOW, port, &framed(4, port, &offer));
+        assert_eq!(counted(relay.stats()), ["received", "unsigned"]);
+        assert_eq!((sent(&mut relay, NOW), held(&relay)), (vec![], None));
+        // Nor is it told by a hail.
+        let newer = hail(base, 4, (1, 1), 0);
+        relay.handle_bytes(NOW, port, &framed(4, port, &newer));
+        assert_eq!(sent(&mut relay, NOW), []);
+        assert_eq!(events(&mut relay), []);
+    }
+}
+
+#[test]
+fn a_newer_mission_is_held_told_and_offered_on_and_a_view_called_for() {
+    for side in [0, 1] {
+        let (mut relay, mut peers, base) = relay_4();
+        let newer = upload(2, base);
+        let from = [3, 5][side];
+        peers[side].says(&mut relay, NOW, &Said::Offer(newer));
+        assert_eq!(held(&relay), Some(stamp(&newer)));
+        assert_eq!(events(&mut relay), [Event::Uploaded]);
+        assert_eq!(relay.version(), 0, "not flown before it is counted");
+        let form = if side == 0 { FORMS } else { 0 };
+        let answer = hail(base, from, stamp(&newer), FRESH | READY | form);
+        let mut now = vec![(from, answer)];
+        if side == 1 {
+            // The one before has not said that it holds it.
+            now.push((3, Said::Offer(newer)));
+        }
+        let call = hail(base, 3, stamp(&newer), ASKS | FORMS | FRESH | READY);
+        assert_eq!(both(&mut relay), [now, vec![(3, call)]]);
+        assert_eq!(relay.stats().rejected(), 0);
+    }
+}
+
+#[test]
+fn any_other_offer_is_answered_by_a_hail() {
+    let (mut relay, mut peers, base) = relay_4();
+    let newer = upload(2, base);
+    peers[1].says(&mut relay, NOW, &Said::Offer(newer));
+    both(&mut relay);
+    events(&mut relay);
+    // As large a version, and the smaller digest.
+    let rival = (1..u8::MAX)
+        .map(|y| Offer {
+            y_m: f32::from(y),
+            ..newer
+        })
+        .find(|rival| rival.digest() < newer.digest())
+        .unwrap();
+    let fewer = Offer {
+        relays: 7,
+        ..upload(3, base)
+    };
+    for other in [newer, rival, upload(1, base), fewer] {
+        let mut after = relay.clone();
+        peers[1].clone().says(&mut after, NOW, &Said::Offer(other));
+        let answer = hail(base, 5, stamp(&newer), FRESH | READY);
+        assert_eq!(said(&mut after, NOW), [(5, answer)], "{other:?}");
+        assert_eq!(held(&after), Some(stamp(&newer)));
+        assert_eq!(events(&mut after), []);
+        assert_eq!(after.stats().rejected(), 0);
+    }
+    let stranger = Said::Offer(upload(9, base ^ 1));
+    peers[1].says(&mut relay, NOW, &stranger);
+    assert_eq!(counted(relay.stats()), ["mission", "received"]);
+    assert_eq!(said(&mut relay, NOW), []);
+    assert_eq!(held(&relay), Some(stamp(&newer)));
+}
+
+#[test]
+fn of_two_missions_with_one_version_the_larger_digest_is_the_newer() {
+    let (mut relay, mut peers, base) = relay_4();
+    let mut offers: Vec<Offer> = (0..6_u8)
+        .map(|y| Offer {
+            y_m: f32::from(y),
+            ..upload(2, base)
+        })
+        .collect();
+    for offer in &offers {
+        peers[0].says(&mut relay, NOW, &Said::Offer(*offer));
+    }
+    offers.sort_by_key(Offer::digest);
+    assert_eq!(held(&relay), Some(stamp(&offers[5])));
+    let next = upload(3, base);
+    peers[0].says(&mut relay, NOW, &Said::Offer(next));
+    assert_eq!(held(&relay), Some(stamp(&next)), "whatever its digest");
+}
+
+#[test]
+fn a_hail_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_hail() {
+    let (mut relay, mut peers, base) = relay_4();
+    let own = upload(2, base);
+    peers[0].says(&mut relay, NOW, &Said::Offer(own));
+    both(&mut relay);
+    let (digest, version) = stamp(&own);
+    let answer = hail(base, 5, stamp(&own), FRESH | READY);
+    for (holds, expected) in [
+        ((base, 0), Some(Said::Offer(own))),
+        ((digest - 1, version), Some(Said::Offer(own))),
+        ((u16::MAX, version - 1), Some(Said::Offer(own))),
+        ((digest, version), None),
+        ((digest + 1, version), Some(answer.clone())),
+        ((0, version + 1), Some(answer)),
+    ] {
+        let mut after = relay.clone();
+        let hail = hail(base, 4, holds, 0);
+        peers[1].clone().says(&mut after, NOW, &hail);
+        let expected: Vec<_> = expected.map(|said| (5, said)).into_iter().collect();
+        assert_eq!(said(&mut after, NOW), expected, "{holds:?}");
+    }
+    // What was loaded cannot be offered: whoever holds less than that was loaded with another mission.
+    let (mut relay, mut peers, base) = relay_4();
+    peers[1].says(
+        &mut relay,
+        NOW,
+        &hail(base, 4, (base.wrapping_sub(1), 0), 0),
+    );
+    assert_eq!(said(&mut relay, NOW), []);
+}
+
+/// A roster to relay 4, or a count.
+fn forming(tag: u8, view: u16, of: (u16, u16), place: u16) -> Said {
+    let relays = [place, 8, 0, of.1];
+    let forming = Forming {
+        number: view,
+        mission: of.0,
+        numbers: relays,
+        flags: 11 - tag,
+    };
+    match tag {
+        10 => Said::Roster(forming),
+        _ => Said::Count(forming),
+    }
+}
+
+#[test]
+fn a_roster_of_another_mission_than_the_one_held_leads_to_a_hail() {
+    for known in [false, true] {
+        let (mut relay, mut peers, base) = relay_4();
+        if known {
+            // Then it is of the same relays, however foreign its mission may be.
+            peers[0].says(&mut relay, NOW, &hail(base, 4, (base, 0), 0));
+        }
+        let newer = stamp(&upload(2, base));
+        let before = *relay.stats();
+        for roster in [newer, (base, 2), (base.wrapping_add(1), 0)] {
+            let mut after = relay.clone();
+            let mut peer = peers[0].clone();
+            peer.says(&mut after, NOW, &forming(10, 1, roster, 3));
+            let (was, is) = (before, after.stats());
+            let raised = (is.view - was.view, is.mission - was.mission);
+            assert_eq!(raised, if known { (1, 0) } else { (0, 1) }, "{roster:?}");
+            let answer = hail(base, 3, (base, 0), FRESH | READY | FLIES);
+            assert_eq!(said(&mut after, NOW), [(3, answer)]);
+            assert_eq!(after.stats().received, before.received + 1);
+        }
+        peers[0].says(&mut relay, NOW, &forming(10, 1, (base, 0), 3));
+        let on = (5, forming(10, 1, (base, 0), 4));
+        assert_eq!(said(&mut relay, NOW), [on], "its own");
+    }
+}
+
+#[test]
+fn the_node_after_is_offered_the_mission_before_the_roster() {
+    let (mut relay, mut peers, base) = relay_4();
+    let newer = upload(2, base);
+    peers[0].says(&mut relay, NOW, &Said::Offer(newer));
+    both(&mut relay);
+    let roster = |place| forming(10, 1, stamp(&newer), place);
+    peers[0].says(&mut relay, NOW, &roster(3));
+    assert_eq!(said(&mut relay, NOW), [(5, Said::Offer(newer))]);
+    // It is not repeated at once: a hail shows whether it has arrived.
+    peers[1].says(&mut relay, NOW, &hail(base, 4, stamp(&newer), 0));
+    assert_eq!(said(&mut relay, NOW), [(5, roster(4))]);
+}
+
+/// A relay that flies version 2 in view 1 of all eight, which its neighbours have handed it.
+fn adopted() -> (Relay, [Peer; 2], u16, Offer) {
+    let (mut relay, mut peers, base) = relay_4();
+    let newer = upload(2, base);
+    peers[0].says(&mut relay, NOW, &Said::Offer(newer));
+    peers[1].says(&mut relay, NOW, &hail(base, 4, stamp(&newer), 0));
+    both(&mut relay);
+    peers[0].says(&mut relay, NOW, &forming(10, 1, stamp(&newer), 3));
+    assert_eq!(
+        said(&mut relay, NOW),
+        [(5, forming(10, 1, stamp(&newer), 4))]
+    );
+    assert_eq!((relay.version(), relay.view()), (0, 0));
+    peers[1].says(&mut relay, NOW, &forming(11, 1, stamp(&newer), 5));
+    assert_eq!(
+        said(&mut relay, NOW),
+        [(3, forming(11, 1, stamp(&newer), 4))]
+    );
+    (relay, peers, base, newer)
+}
+
+#[test]
+fn a_view_that_is_granted_flies_the_mission_of_its_roster() {
+    let (mut relay, peers, base, newer) = adopted();
+    assert_eq!((relay.version(), relay.view()), (2, 1));
+    assert_eq!(digest(relay.mission()), newer.digest());
+    let told = events(&mut relay);
+    assert_eq!(told, [Event::Reformed, Event::Uploaded, Event::Adopted]);
+    assert_eq!(relay.stats().rejected(), 0);
+    let own = newer.digest().wrapping_add(1);
+    // From a pass of the same view, of another view of that mission, of the mission before, of no view of either.
+    for (digest, expected) in [
+        (own, [0, 0]),
+        (own.wrapping_add(5), [1, 0]),
+        (base.wrapping_add(1), [1, 0]),
+        (base ^ 0x4000, [1, 0]),
+    ] {
+        let mut after = relay.clone();
+        let sweep = &one_of_each(FIRST, digest)[0];
+        peers[0].clone().says(&mut after, NOW, sweep);
+        let stats = after.stats();
+        assert_eq!([stats.view, stats.mission], expected, "{digest:04x}");
+        let hailed = said(&mut after, NOW).iter().any(|(to, said)| {
+            *to == 3 && matches!(said, Said::Hail(hail) if hail.flags & FLIES != 0)
+        });
+        assert_eq!(hailed, expected != [0, 0], "{digest:04x}");
+    }
+    // Signs of life are of the base for good.
+    for (mission, expected) in [(base, 0), (newer.digest(), 1), (own, 1)] {
+        let mut after = relay.clone();
+        let beat = Said::Heartbeat {
+            mission,
+            answer: false,
+        };
+        peers[0].clone().says(&mut after, NOW, &beat);
+        assert_eq!(after.stats().mission, expected);
+    }
+}
+
+#[test]
+fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_older_one_is_not() {
+    let (mut relay, mut peers, base, flown) = adopted();
+    events(&mut relay);
+    peers[0].says(&mut relay, NOW, &forming(10, 2, stamp(&flown), 3));
+    said(&mut relay, NOW);
+    let next = upload(3, base);
+    peers[0].says(&mut relay, NOW, &Said::Offer(next));
+    both(&mut relay);
+    for (of, view) in [((base, 0), 1), (stamp(&next), 1), (stamp(&flown), 2)] {
+        let mut after = relay.clone();
+        peers[1]
+            .clone()
+            .says(&mut after, NOW, &forming(11, 2, of, 5));
+        assert_eq!((after.version(), after.view()), (2, view), "{of:?}");
+        if view == 2 {
+            // It still holds a newer one than it flies.
+            let [_, later] = both(&mut after);
+            let call = Forming {
+                number: 2,
+                mission: base,
+                numbers: [3, 0, next.digest(), 3],
+                flags: ASKS | FORMS | READY,
+            };
+            assert_eq!(later, [(3, Said::Hail(call))]);
+        }
+    }
+}
+
+#[test]
+fn in_a_field_nothing_is_held() {
+    let mission = uav_relay::MissionConfig {
+        interference: Interference::Field(FIELD),
+        ..paper(8)
+    };
+    let mission = Mission::try_new(mission).unwrap();
+    let (identity, settings) = set(4, Wiring::Pair);
+    let mut relay = Relay::new(mission, identity, settings, 1, NOW).unwrap();
+    let mut peer = Peer::meets(&mut relay, 4, 3, Port::Upstream);
+    said(&mut relay, NOW);
+    // By chance the base has the same digest.
+    let offer = upload(1, digest(&mission));
+    peer.says(&mut relay, NOW, &Said::Offer(offer));
+    assert_eq!(
+        (held(&relay), counted(relay.stats())),
+        (None, vec!["received"])
+    );
+}
+
+#[test]
+fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
+    let (relay, _, base, newer) = adopted();
+    let mut kept = [0; 75];
+    relay.upload().unwrap().encode(&mut kept).unwrap();
+    assert_eq!(kept[..], newer.body());
+    let upload = Upload::decode(&kept).unwrap();
+    let loaded = Mission::try_new(paper(8)).unwrap();
+    for remembers in [false, true] {
+        let (identity, settings) = set(4, Wiring::Pair);
+        let mut relay = Relay::new(loaded, identity, settings, 1, NOW).unwrap();
+        if remembers {
+            relay.resume(&upload).unwrap();
+        }
+        let mut peer = Peer::meets(&mut relay, 4, 3, Port::Upstream);
+        said(&mut relay, NOW);
+        peer.says(&mut relay, NOW, &hail(base, 4, stamp(&newer), ASKS));
+        let holds = if remembers { stamp(&newer) } else { (base, 0) };
+        let answer = hail(base, 3, holds, FRESH | FLIES);
+        assert_eq!(said(&mut relay, NOW), [(3, answer)]);
+        assert_eq!((relay.version(), relay.view()), (holds.1, 0));
+        let sweep = &one_of_each(FIRST, newer.digest())[0];
+        peer.says(&mut relay, NOW, sweep);
+        assert_eq!(relay.stats().view, u32::from(!remembers));
+    }
+}

@@ -1,0 +1,290 @@
+//! The ground's end of an upload: hands a new mission to the nearest relay that answers, until it is flown.
+//!
+//! | progress | what comes of the relay asked | what follows |
+//! | --- | --- | --- |
+//! | `Offering` | it holds an older mission, or has not answered | it is offered the new one, every second; after three without an answer the next one of the four nearest is |
+//! | `Held` | it holds the new one, and flies another yet | it is asked every second |
+//! | `Flown` | it flies it: so does every relay that was counted, or it flies nothing | done |
+//! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
+
+use crate::mission::Mission;
+use crate::node::Side;
+use crate::node::beside::CANDIDATES;
+use crate::node::settings::Wiring;
+use crate::relay::signed::{greeting, say};
+use crate::time::{Duration, Instant};
+use crate::wire::auth::Auth;
+use crate::wire::deframe::Deframer;
+use crate::wire::digest::{Stamp, digest};
+use crate::wire::frame::{self, FrameBuf, Header};
+use crate::wire::message::{Hail, Message};
+use crate::wire::session::{Checked, Session};
+use crate::wire::upload::{Upload, UploadError};
+
+/// How long an answer is awaited.
+const PATIENCE: Duration = Duration::from_millis(1_000);
+
+/// So many questions without an answer are put to one relay before the next one is asked.
+const QUESTIONS: u8 = 3;
+
+/// How far an upload has come.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Progress {
+    /// There is nothing to upload.
+    #[default]
+    Idle,
+    /// No relay is known to hold it.
+    Offering,
+    /// A relay holds it: the others are being asked.
+    Held {
+        /// Node number of the relay.
+        by: u16,
+    },
+    /// The chain flies it.
+    Flown {
+        /// Node number of the relay that says so.
+        by: u16,
+        /// Number of the newest view of the chain.
+        view: u16,
+    },
+    /// The chain has a newer mission.
+    Outdated {
+        /// Its version.
+        version: u16,
+    },
+}
+
+/// The transmitter or the receiver, where it uploads missions; sans-IO, as [`Relay`](crate::Relay) is.
+///
+/// After every input call [`poll_transmit`](Self::poll_transmit) until it gives `None`, then wait for a byte or for
+/// [`poll_timeout`](Self::poll_timeout). It takes in anything, and what is not for it has no effect.
+#[derive(Clone, Debug)]
+pub struct Ground {
+    network: u16,
+    base: u16,
+    end: Side,
+    node: u16,
+    /// Relays that may hear it.
+    within: u16,
+    upload: Option<Upload>,
+    progress: Progress,
+    /// How far away the relay that is asked is, 1 for the next.
+    distance: u16,
+    unanswered: u8,
+    /// What that relay holds, once it has said so.
+    holds: Option<Stamp>,
+    due: bool,
+    again: Option<Instant>,
+    deframer: Deframer,
+    session: Session,
+    counter: u32,
+    refused: u32,
+}
+
+impl Ground {
+    /// The transmitter (`end` is upstream of the chain) or the receiver (downstream) of relays that were loaded with `base`. The
+    /// epoch in `auth` must be larger at every start, as a relay's.
+    pub fn new(base: &Mission, end: Side, network: u16, wiring: Wiring, auth: Auth) -> Self {
+        let all = base.relays();
+        let reach = match wiring {
+            Wiring::Pair => 1,
+            Wiring::Shared => CANDIDATES,
+        };
+        Self {
+            network,
+            base: digest(base),
+            end,
+            node: match end {
+                Side::Upstream => 0,
+                Side::Downstream => all + 1,
+            },
+            within: reach.min(all),
+            upload: None,
+            progress: Progress::Idle,
+            distance: 1,
+            unanswered: 0,
+            holds: None,
+            due: false,
+            again: None,
+            deframer: Deframer::new(),
+            session: Session::new(auth),
+            counter: 0,
+            refused: 0,
+        }
+    }
+
+    /// Uploads `upload` from now on, in place of one that is under way.
+    ///
+    /// # Errors
+    /// [`UploadError::Base`] if it is for relays that were loaded with another mission.
+    pub fn upload(&mut self, now: Instant, upload: Upload) -> Result<(), UploadError> {
+        if upload.base() != self.base {
+            return Err(UploadError::Base);
+        }
+        self.upload = Some(upload);
+        self.progress = Progress::Offering;
+        self.holds = None;
+        self.unanswered = 0;
+        self.due = true;
+        self.again = Some(now + PATIENCE);
+        Ok(())
+    }
+
+    /// How far the upload has come.
+    pub const fn progress(&self) -> Progress {
+        self.progress
+    }
+
+    /// Intact frames to this node that were none of a relay that it may hear, or came before.
+    pub const fn refused(&self) -> u32 {
+        self.refused
+    }
+
+    /// Takes in bytes, however they are cut; at most one tag for each 19 of them.
+    pub fn handle_bytes(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            if let Some(Ok(plain)) = self.deframer.push(byte) {
+                let Ok(frame) = frame::open(plain) else {
+                    continue;
+                };
+                let Header {
+                    network,
+                    sender,
+                    destination,
+                    ..
+                } = frame.header;
+                if network != self.network || destination != self.node {
+                    continue;
+                }
+                let distance = sender.abs_diff(self.node);
+                let near = (1..=self.within).contains(&distance);
+                let checked = if near {
+                    self.session.check(sender, &frame)
+                } else {
+                    Checked::Unsigned
+                };
+                match checked {
+                    Checked::Fresh { .. } => match Message::decode(frame.body) {
+                        Ok(Message::Hail(hail)) if hail.mission == self.base => {
+                            self.answered(sender, distance, hail);
+                        }
+                        _ => self.refused = self.refused.saturating_add(1),
+                    },
+                    Checked::Hello { first } => self.due |= first && self.is_under_way(),
+                    Checked::Unproven => {}
+                    _ => self.refused = self.refused.saturating_add(1),
+                }
+            }
+        }
+    }
+
+    /// Relay `by` has said what it holds.
+    fn answered(&mut self, by: u16, distance: u16, hail: Hail) {
+        let Some(upload) = &self.upload else { return };
+        let stamp = upload.stamp();
+        self.unanswered = 0;
+        self.distance = distance;
+        self.holds = Some(hail.holds);
+        self.progress = if hail.holds > stamp {
+            Progress::Outdated {
+                version: hail.holds.version,
+            }
+        } else if hail.holds < stamp {
+            Progress::Offering
+        } else if hail.flies {
+            Progress::Flown {
+                by,
+                view: hail.newest,
+            }
+        } else {
+            Progress::Held { by }
+        };
+        if !self.is_under_way() {
+            self.due = false;
+            self.again = None;
+        }
+    }
+
+    const fn is_under_way(&self) -> bool {
+        matches!(self.progress, Progress::Offering | Progress::Held { .. })
+    }
+
+    /// Asks again, if it is time to.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        if self.again.is_none_or(|again| again > now) {
+            return;
+        }
+        self.unanswered = self.unanswered.saturating_add(1);
+        if self.unanswered >= QUESTIONS {
+            self.unanswered = 0;
+            self.holds = None;
+            self.distance = if self.distance < self.within {
+                self.distance + 1
+            } else {
+                1
+            };
+            // It may have been switched on again, and know nothing of this node.
+            let to = self.to();
+            self.session.greet(to);
+        }
+        self.due = true;
+        self.again = Some(now + PATIENCE);
+    }
+
+    /// The relay that is asked.
+    fn to(&self) -> u16 {
+        match self.end {
+            Side::Upstream => self.distance,
+            Side::Downstream => self.node.saturating_sub(self.distance),
+        }
+    }
+
+    /// When [`Ground::handle_timeout`] wants to be called; `None` once there is nothing left to do.
+    pub const fn poll_timeout(&self) -> Option<Instant> {
+        self.again
+    }
+
+    /// Writes the next frame into `frame`, if there is one, and returns its length.
+    pub fn poll_transmit(&mut self, frame: &mut FrameBuf) -> Option<usize> {
+        if self.counter == u32::MAX {
+            return None;
+        }
+        let mut header = Header {
+            network: self.network,
+            sender: self.node,
+            destination: 0,
+            counter: self.counter,
+        };
+        let len = self.next(&mut header, frame)?;
+        self.counter += 1;
+        Some(len)
+    }
+
+    fn next(&mut self, header: &mut Header, frame: &mut FrameBuf) -> Option<usize> {
+        if let Some(len) = greeting(&mut self.session, header, frame) {
+            return Some(len);
+        }
+        if !core::mem::take(&mut self.due) {
+            return None;
+        }
+        let upload = self.upload?;
+        let to = self.to();
+        let message = if self.holds == Some(upload.stamp()) {
+            Message::Hail(Hail {
+                mission: self.base,
+                newest: 0,
+                neighbour: 0,
+                ask: true,
+                form: false,
+                fresh: false,
+                ready: true,
+                holds: upload.stamp(),
+                flies: false,
+            })
+        } else {
+            Message::Offer(upload)
+        };
+        say(&mut self.session, to, &message, header, frame)
+    }
+}

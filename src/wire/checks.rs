@@ -1,0 +1,214 @@
+//! What bytes say: one message in its one encoding, every number of it in its range, or nothing.
+//!
+//! The types of `body` hold any bytes; what [`Message::decode`] makes of them holds none that a relay would have to doubt.
+
+use super::body::{At, Body, Targets};
+use super::message::{Answer, Message, MessageError, Moved, Sweep, Token, Trace, Turn, Wave};
+use crate::field::is_upsilon;
+use crate::guard::Fence;
+use crate::mission::Profile;
+use crate::placement::PerTarget;
+use crate::placement::coded::{PLACES, WIDTH};
+use crate::placement::ladder::{Ladder, TARGETS};
+use crate::placement::levels::{Levels, MOST_LEVELS};
+use crate::placement::local::Local;
+use crate::placement::verdict::Verdict;
+use crate::placement::wave::{Choice, Rungs};
+use crate::sir::Placement;
+
+/// No slack or reach in metres is larger: a place is at most 1e6, a reach of the last hop is cut at 1e9.
+const FARTHEST_M: f32 = 2e9;
+
+impl<'a> Message<'a> {
+    /// The message in `bytes`, with every number in its range. Work linear in their number, at most
+    /// [`MAX_BODY`](super::message::MAX_BODY) of use.
+    ///
+    /// # Errors
+    /// [`MessageError::Encoding`] if it is not one message in its shortest form and nothing else, [`MessageError::Value`] for
+    /// a number that is not finite or outside its range.
+    #[inline(never)]
+    pub fn decode(bytes: &'a [u8]) -> Result<Self, MessageError> {
+        let (body, rest): (Body<'a>, _) =
+            postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)?;
+        if !rest.is_empty() || bytes.len() != body.shortest() {
+            return Err(MessageError::Encoding);
+        }
+        checked(body).ok_or(MessageError::Value)
+    }
+}
+
+/// The message that `body` is, if every number is in its range.
+fn checked(body: Body<'_>) -> Option<Message<'_>> {
+    Some(match body {
+        Body::Sweep(targets, reaches) => Message::Sweep(sweep(targets, None, reaches)?),
+        Body::Measured(targets, upsilon_per_w, reaches) if cfg!(feature = "field") => {
+            Message::Sweep(sweep(targets, Some(upsilon_per_w), reaches)?)
+        }
+        Body::Verdict(pass, commit, slacks) => {
+            let known = commit.is_none_or(|target| usize::from(target) < TARGETS);
+            if !(in_range(&slacks, -FARTHEST_M) && known) {
+                return None;
+            }
+            Message::Verdict(Answer {
+                number: pass.number(),
+                mission: pass.mission(),
+                verdict: Verdict { commit, slacks },
+            })
+        }
+        Body::Busy(number) => Message::Busy {
+            sweep: u16::from_le_bytes(number),
+        },
+        Body::Heartbeat(mission, answer) => Message::Heartbeat {
+            mission: u16::from_le_bytes(mission),
+            answer,
+        },
+        Body::Wave {
+            pass,
+            base,
+            rise,
+            targets,
+            centre_m,
+            width_m,
+            levels,
+            power_w,
+            reaches,
+        } if cfg!(feature = "altitude") => {
+            let pairs = usize::from(targets) * usize::from(levels);
+            if pairs > PLACES || reaches.len() != WIDTH * pairs {
+                return None;
+            }
+            Message::Wave(Wave {
+                number: pass.number(),
+                mission: pass.mission(),
+                rungs: Rungs::from_parts(base, rise, targets)?,
+                levels: Levels::from_parts(centre_m, width_m, levels)?,
+                power_w: profile(centre_m, power_w)?.power_w,
+                reaches,
+            })
+        }
+        Body::Trace(pass, choice) if cfg!(feature = "altitude") => {
+            let choice = choice.map(|[target, level]| Choice { target, level });
+            let most = MOST_LEVELS;
+            let fits = |choice: Choice| choice.target < most && choice.level < most;
+            if !choice.is_none_or(fits) {
+                return None;
+            }
+            Message::Trace(Trace {
+                number: pass.number(),
+                mission: pass.mission(),
+                choice,
+            })
+        }
+        Body::Token {
+            pass,
+            at,
+            power_w,
+            turn,
+            explore_m,
+            columns,
+            rows,
+            sir,
+        } if cfg!(feature = "adjust") => Message::Token(Token {
+            number: pass.number(),
+            mission: pass.mission(),
+            place: place(at)?,
+            power_w: profile(at.altitude_m, power_w)?.power_w,
+            turn: turn_from_parts(turn, explore_m, columns, rows)?,
+            sir: sir_in_range(sir)?,
+        }),
+        Body::Moved(pass, at, any, worst) if cfg!(feature = "adjust") => Message::Moved(Moved {
+            number: pass.number(),
+            mission: pass.mission(),
+            place: place(at)?,
+            any,
+            worst: sir_in_range(worst)?,
+        }),
+        Body::Hail(forming) if cfg!(feature = "membership") => Message::Hail(forming.hail()?),
+        Body::Roster(forming) if cfg!(feature = "membership") => Message::Roster(forming.roster()?),
+        Body::Count(forming) if cfg!(feature = "membership") => Message::Count(forming.count()?),
+        Body::Fence(pass, echo, number, x_m, target_m) if cfg!(feature = "guard") => {
+            Message::Fence {
+                mission: pass.mission(),
+                fence: fence(pass.number(), echo, number, x_m, target_m)?,
+            }
+        }
+        #[cfg(feature = "upload")]
+        Body::Offer(terms) => Message::Offer(terms.upload()?),
+        // Of a method that this relay was built without.
+        _ => return None,
+    })
+}
+
+fn sweep(targets: Targets, measured_per_w: Option<f32>, reaches: PerTarget) -> Option<Sweep> {
+    let ladder = Ladder::from_parts(targets.anchor, targets.gap, targets.growth)?;
+    let fits = reaches.len() <= ladder.len() && in_range(&reaches, 0.0);
+    let measured = measured_per_w.is_none_or(is_upsilon);
+    (fits && measured).then_some(Sweep {
+        number: targets.pass.number(),
+        mission: targets.pass.mission(),
+        ladder,
+        profile: profile(targets.altitude_m, targets.power_w)?,
+        measured_per_w,
+        reaches,
+    })
+}
+
+/// The fence of these parts, if they are in range.
+fn fence(tie: u16, echo: [u8; 2], number: [u8; 2], x_m: f32, target_m: f32) -> Option<Fence> {
+    let fence = Fence {
+        tie,
+        echo: u16::from_le_bytes(echo),
+        number: u16::from_le_bytes(number),
+        x_m,
+        target_m,
+    };
+    fence.is_valid().then_some(fence)
+}
+
+/// The turn of these parts, if they could not be written otherwise and are in range.
+fn turn_from_parts(turn: u8, explore_m: f32, columns: u8, rows: u8) -> Option<Turn> {
+    let rest = explore_m.to_bits() == 0 && columns == 0 && rows == 0;
+    match turn {
+        0 if rest => Some(Turn::Look),
+        1 if rest => Some(Turn::Stop),
+        2 if (0.0..=1e5).contains(&explore_m) => {
+            let local = match (columns, rows) {
+                (0, 0) => Local::Fine,
+                (2.., 2..) => Local::Grid { columns, rows },
+                _ => return None,
+            };
+            Some(Turn::Move { explore_m, local })
+        }
+        _ => None,
+    }
+}
+
+/// The place, if it may be one.
+fn place(at: At) -> Option<Placement> {
+    let sound = (0.0..=1e6).contains(&at.x_m) && (0.1..=1e5).contains(&at.altitude_m);
+    sound.then_some(Placement {
+        x_m: at.x_m,
+        altitude_m: at.altitude_m,
+    })
+}
+
+/// The profile of these numbers, if they are in range.
+fn profile(altitude_m: f32, power_w: f32) -> Option<Profile> {
+    let profile = Profile {
+        altitude_m,
+        power_w,
+    };
+    profile.is_valid().then_some(profile)
+}
+
+/// A linear SIR, if it is one.
+fn sir_in_range(sir: f32) -> Option<f32> {
+    (0.0..=f32::MAX).contains(&sir).then_some(sir)
+}
+
+/// Whether all numbers are within [`least`, `FARTHEST_M`].
+fn in_range(numbers: &[f32], least: f32) -> bool {
+    numbers
+        .iter()
+        .all(|number| (least..=FARTHEST_M).contains(number))
+}
