@@ -2,6 +2,7 @@
 
 pub mod attack;
 pub mod chain;
+pub mod flown;
 pub mod left;
 pub mod plan;
 pub mod recovery;
@@ -15,6 +16,7 @@ use uav_relay::{Mission, Placement, Profile};
 
 pub use attack::AttackReport;
 pub use chain::ChainReport;
+pub use flown::flown;
 use left::LostReport;
 pub use plan::PlanReport;
 
@@ -31,6 +33,9 @@ pub struct RelayReport {
     pub sir: f64,
     /// The same in dB.
     pub sir_db: f64,
+    /// Version of the mission that it flies, 0 for the one it took off with; absent where nothing was uploaded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
 }
 
 /// A linear power ratio in dB.
@@ -68,6 +73,7 @@ fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport> {
             h_m: f64::from(place.altitude_m),
             sir,
             sir_db: db(sir),
+            version: None,
         })
         .collect()
 }

@@ -27,3 +27,5 @@ mod hellos;
 mod kinds;
 #[path = "auth/net.rs"]
 mod net;
+#[path = "auth/offers.rs"]
+mod offers;

@@ -10,6 +10,8 @@
 
 #[path = "cli/hostile.rs"]
 mod hostile;
+#[path = "cli/upload.rs"]
+mod upload;
 
 use std::process::{Command, Output};
 

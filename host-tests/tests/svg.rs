@@ -10,6 +10,8 @@
 
 #[path = "svg/lost.rs"]
 mod lost;
+#[path = "svg/replaced.rs"]
+mod replaced;
 
 use host_tests::svg::{Picture, draw};
 use roxmltree::{Document, Node};
@@ -74,6 +76,10 @@ fn gallery() -> Vec<Picture> {
     });
     pictures.push(Picture {
         interferers: vec![],
+        ..level(8)
+    });
+    pictures.push(Picture {
+        replaced: vec![(30.0, 200.0, -100.0), (5.0, -150.0, 1.0)],
         ..level(8)
     });
     pictures

@@ -8,6 +8,7 @@ use uav_relay::placement::promise::is_most;
 use uav_relay::{Interference, Mission};
 
 use super::attack::AttackReport;
+use super::flown::{offered, version};
 use super::left::{LostReport, left, lost};
 use super::recovery::{self, RecoveryReport, recoveries};
 use super::timeline::{self, MomentReport};
@@ -48,6 +49,9 @@ pub struct ChainReport {
     pub method: String,
     /// Number of relays asked for.
     pub uavs: u16,
+    /// Version of the mission that the chain flies, 0 for the one it took off with, if one was uploaded: what SIRs are of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
     /// What went wrong, if anything.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
@@ -113,7 +117,7 @@ pub struct ChainReport {
 }
 
 impl ChainReport {
-    /// The report of a run.
+    /// The report of a run in which the chain flies `mission` in the end.
     pub fn new(method: &str, mission: &Mission, outcome: &Outcome, seed: u64) -> Self {
         let chain = left(outcome);
         let timeline = timeline::timeline(&outcome.moments);
@@ -125,8 +129,10 @@ impl ChainReport {
         let sirs = hop_sirs(mission, &places);
         let worst = sirs.iter().copied().reduce(f64::min);
         let mut relays = super::relays(&places, &sirs);
-        for (report, (node, _)) in relays.iter_mut().zip(&chain) {
+        let offered = offered(&outcome.moments);
+        for (report, (node, relay)) in relays.iter_mut().zip(&chain) {
             report.index = *node;
+            report.version = offered.map(|_| relay.version);
         }
         let flown = u16::try_from(chain.len()).unwrap_or(u16::MAX);
         let rx_sir = sirs.last().copied();
@@ -144,6 +150,7 @@ impl ChainReport {
         Self {
             method: method.to_owned(),
             uavs: mission.relays(),
+            version: offered.map(|_| version(outcome)),
             error: error(method, outcome),
             // A fixed step may have stepped over what there is.
             best_sir: (outcome.ending == Ending::Infeasible && !method.ends_with("-step"))
@@ -187,6 +194,7 @@ impl ChainReport {
         Self {
             method: method.to_owned(),
             uavs,
+            version: None,
             error: Some(why.to_owned()),
             best_sir: None,
             sir: None,
@@ -229,6 +237,18 @@ impl ChainReport {
                 self.relays_left(),
                 self.method
             );
+        }
+        match self.version {
+            None => {}
+            Some(0) => {
+                _ = writeln!(
+                    text,
+                    "the chain flies the mission that it took off with: no upload was adopted"
+                );
+            }
+            Some(version) => {
+                _ = writeln!(text, "the chain flies mission {version}, as uploaded");
+            }
         }
         if self.channel.is_some() {
             _ = writeln!(
@@ -331,6 +351,16 @@ fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
 }
 
 fn error(method: &str, outcome: &Outcome) -> Option<String> {
+    let error = ended(method, outcome)?;
+    let missing = offered(&outcome.moments).filter(|newest| *newest > version(outcome));
+    Some(match missing {
+        Some(version) => format!("{error}; mission {version} was not adopted"),
+        None => error,
+    })
+}
+
+/// Why a run has not ended well.
+fn ended(method: &str, outcome: &Outcome) -> Option<String> {
     match outcome.ending {
         Ending::Settled => None,
         Ending::Infeasible if method.ends_with("-step") => Some(

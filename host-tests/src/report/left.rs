@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::flown::offered;
 use crate::sim::outcome::{Ending, Outcome, RelayEnd};
 
 /// A relay that is not in the chain any more.
@@ -15,6 +16,9 @@ pub struct LostReport {
     /// Altitude there, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub h_m: Option<f64>,
+    /// Version of the mission that it flies, or flew when it went silent; absent where nothing was uploaded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
     /// `silent` if it went silent; `apart` if it lives but cannot reach the others; `cut` if it lives and no chain is left.
     pub why: &'static str,
 }
@@ -61,6 +65,7 @@ pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostRepo
             index,
             x_m: relay.setpoint.map(|place| f64::from(place.x_m)),
             h_m: relay.setpoint.map(|place| f64::from(place.altitude_m)),
+            version: offered(&outcome.moments).map(|_| relay.version),
             why: match outcome.ending {
                 _ if relay.killed.is_some() => "silent",
                 Ending::Cut => "cut",

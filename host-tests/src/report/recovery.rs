@@ -1,4 +1,4 @@
-//! How long it took the chain to form anew after it lost relays, or got some back.
+//! How long it took the chain to form anew after it lost relays, got some back, or was given another mission.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -21,6 +21,12 @@ pub struct RecoveryReport {
     pub lost: Vec<u16>,
     /// The relays that are in it again.
     pub back: Vec<u16>,
+    /// Version of the mission that is first flown in it, if that was uploaded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
+    /// When the ground began to upload that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offered_s: Option<f64>,
     /// When the first of them went silent, was switched on, or was parted from the others or joined with them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub happened_s: Option<f64>,
@@ -32,7 +38,7 @@ pub struct RecoveryReport {
     /// When all of them held their new places, unless another view came before that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged_s: Option<f64>,
-    /// Passes along the chain from when it was noticed until then, the calls for the view among them.
+    /// Passes along the chain from when it was noticed, or the upload began, until then; the calls for the view are among them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweeps: Option<u32>,
 }
@@ -49,7 +55,7 @@ struct View {
 pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport> {
     let views = views(moments);
     let mut before: BTreeSet<u16> = (1..=relays).collect();
-    let mut from = 0;
+    let (mut from, mut flown) = (0, 0);
     let mut reports = Vec::new();
     for (place, view) in views.iter().enumerate() {
         let until = views
@@ -61,16 +67,21 @@ pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport>
         let earlier = moments.get(from..first).unwrap_or_default();
         let later = moments.get(last..until).unwrap_or_default();
         let detected = detected(earlier, &lost, &back);
+        let version = adopted(moments, view).filter(|version| *version > flown);
+        let offered = version.and_then(|version| offered(moments, version));
+        let begun = detected.or(offered);
         let converged = converged(later, &view.members);
         reports.push(RecoveryReport {
             view: view.number,
             relays: u16::try_from(view.members.len()).unwrap_or(u16::MAX),
+            version,
+            offered_s: offered.map(|moment| seconds(moment.at)),
             happened_s: happened(moments.get(..first).unwrap_or_default(), &lost, &back)
                 .map(seconds),
             detected_s: detected.map(|moment| seconds(moment.at)),
             formed_s: moments.get(last).map_or(0.0, |moment| seconds(moment.at)),
             converged_s: converged.map(|moment| seconds(moment.at)),
-            sweeps: detected
+            sweeps: begun
                 .zip(converged)
                 .map(|(one, other)| sweeps(moments, &view.members, (one.at, other.at))),
             lost,
@@ -78,6 +89,7 @@ pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport>
         });
         before.clone_from(&view.members);
         from = first;
+        flown = version.unwrap_or(flown);
     }
     reports
 }
@@ -102,6 +114,24 @@ fn views(moments: &[Moment]) -> Vec<View> {
         .into_values()
         .filter(|(relays, view)| view.members.len() == usize::from(*relays));
     whole.map(|(_, view)| view).collect()
+}
+
+/// The newest mission that one of the relays of `view` flies once it is formed, if that was uploaded.
+fn adopted(moments: &[Moment], view: &View) -> Option<u16> {
+    // A relay tells that it flies it right after it has told of the view.
+    let story = moments.get(..=view.span.1 + 1).unwrap_or(moments);
+    let versions = story.iter().filter_map(|moment| match moment.what {
+        Turning::Adopted(version) if view.members.contains(&moment.relay) => Some(version),
+        _ => None,
+    });
+    versions.max()
+}
+
+/// The moment at which the ground began to upload a mission.
+fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
+    moments
+        .iter()
+        .find(|moment| moment.what == Turning::Offered(version))
 }
 
 /// When the last thing happened to relays that are lost now, or back.
@@ -160,12 +190,12 @@ fn sweeps(moments: &[Moment], members: &BTreeSet<u16>, span: (Instant, Instant))
         .sum()
 }
 
-/// A line for each, in which somebody was lost or came back; the others are only counted.
+/// A line for each, in which somebody was lost or came back, or a new mission is flown; the others are only counted.
 pub(super) fn text(recoveries: &[RecoveryReport]) -> String {
     let mut text = String::new();
     let mut same = 0;
     for one in recoveries {
-        let what: Vec<String> = [(&one.lost, "lost"), (&one.back, "back")]
+        let mut what: Vec<String> = [(&one.lost, "lost"), (&one.back, "back")]
             .into_iter()
             .filter(|(relays, _)| !relays.is_empty())
             .map(|(relays, how)| {
@@ -173,6 +203,10 @@ pub(super) fn text(recoveries: &[RecoveryReport]) -> String {
                 format!("{many} {} {how}", list(relays))
             })
             .collect();
+        what.extend(
+            one.version
+                .map(|version| format!("mission {version} uploaded")),
+        );
         if what.is_empty() {
             same += 1;
             continue;
@@ -208,6 +242,14 @@ impl RecoveryReport {
                 "formed anew {:.3} s later, ",
                 self.formed_s - detected
             );
+        }
+        if let Some(offered) = self.offered_s {
+            let after = self.formed_s - offered;
+            _ = if self.detected_s.is_some() {
+                write!(text, "adopted {after:.3} s after the upload began, ")
+            } else {
+                write!(text, "adopted after {after:.3} s, ")
+            };
         }
         let Some(converged) = self.converged_s else {
             return text + "another view came before it converged";

@@ -11,7 +11,8 @@ text{font-family:Helvetica,Arial,'DejaVu Sans',sans-serif;font-size:10px;fill:#2
 line,path{fill:none;stroke:#222;stroke-width:1px}\
 .grid{stroke:#e4e4e4}.leader{stroke:#999;stroke-width:.6px}.hop{stroke-linecap:round}\
 .relay{fill:#fff;stroke:#222}.lost{fill:#ddd}.cross{stroke:#222;stroke-width:1.6px}\
-.ground{fill:#222}.source{fill:#cc79a7;stroke:#222;stroke-width:.8px}";
+.ground{fill:#222}.source{fill:#cc79a7;stroke:#222;stroke-width:.8px}\
+.before{fill:#fff;stroke:#cc79a7;stroke-width:.8px;stroke-dasharray:2 1.5}.faint{fill:#888}";
 
 /// A point of the picture, in its units, y downward.
 pub(super) type Point = (f64, f64);

@@ -35,6 +35,8 @@ pub struct Picture {
     pub distance_m: f64,
     /// Every interferer: transmit power in watts, place along x and offset y on the ground, both in metres.
     pub interferers: Vec<(f64, f64, f64)>,
+    /// Those of the mission that was flown before, if there was another one: drawn faint, where the plot holds them.
+    pub replaced: Vec<(f64, f64, f64)>,
     /// The relays from Tx to Rx: place along x and altitude, both in metres. One that is not finite is left out.
     pub nodes: Vec<(f64, f64)>,
     /// Linear SIR of every hop, one more than there are relays in the chain, above 0; any other value is drawn grey and without a number.
@@ -62,9 +64,11 @@ pub fn draw(picture: &Picture) -> String {
     axis::draw(&mut canvas, &frame);
     hops::draw(&mut canvas, &mut labels, &hops);
     nodes::relays(&mut canvas, &mut labels, &frame, picture);
+    sources::replaced(&mut canvas, &mut labels, &frame, picture);
     sources::draw(&mut canvas, &mut labels, &frame, picture);
     nodes::ends(&mut canvas, &mut labels, &frame, length(picture));
     sources::label(&mut canvas, &mut labels, &frame, picture);
+    sources::label_replaced(&mut canvas, &mut labels, &frame, picture);
     hops::label(&mut canvas, &mut labels, &hops);
     nodes::label(&mut canvas, &mut labels, &frame, picture);
     legend::draw(&mut canvas, picture);
@@ -114,7 +118,7 @@ fn frame(picture: &Picture) -> Frame {
         let x = x.clamp(-distance, 2.0 * distance);
         (low, high, top) = (low.min(x), high.max(x), top.max(h));
     }
-    for (_, x, _) in &picture.interferers {
+    for (_, x, _) in picture.interferers.iter().chain(&picture.replaced) {
         if sources::near(*x, distance) {
             (low, high) = (low.min(*x), high.max(*x));
         }

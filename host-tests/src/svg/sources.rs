@@ -23,13 +23,10 @@ pub(super) fn near(x: f64, distance: f64) -> bool {
     x >= -0.2 * distance && x <= 1.2 * distance
 }
 
-/// The interferers that the plot holds, and those beyond it.
-fn sorted(picture: &Picture) -> (Vec<Source>, Vec<Source>) {
-    let distance = length(picture);
+/// The interferers that the plot of a chain of this length holds, and those beyond it.
+fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {
     let known = |(power, x, y): &Source| [power, x, y].iter().all(|part| part.is_finite());
-    picture
-        .interferers
-        .iter()
+    all.iter()
         .copied()
         .filter(known)
         .partition(|(_, x, _)| near(*x, distance))
@@ -37,37 +34,76 @@ fn sorted(picture: &Picture) -> (Vec<Source>, Vec<Source>) {
 
 /// Height kept free above the chain for the words about far interferers.
 pub(super) fn headroom(picture: &Picture) -> f64 {
-    let (_, far) = sorted(picture);
+    let (_, far) = sorted(&picture.interferers, length(picture));
     far.len().min(FAR_LINES) as f64 * LINE
 }
 
 /// Draws the markers, and the arrows with their words.
 pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
-    let (inside, far) = sorted(picture);
+    let (inside, far) = sorted(&picture.interferers, length(picture));
     beyond(canvas, labels, &far);
     let ground = frame.h.at(0.0);
     for (power, x, y) in inside {
         let at = frame.x.at(x);
-        let tip = format!(
-            "interferer: {} W, x = {} m, y = {} m",
-            plain(power),
-            plain(x),
-            plain(y)
-        );
-        let diamond = [
-            (at, ground - 6.0),
-            (at + 6.0, ground),
-            (at, ground + 6.0),
-            (at - 6.0, ground),
-        ];
-        canvas.marked(&diamond, "source", &tip);
+        let tip = format!("interferer: {}", whole((power, x, y)));
+        canvas.marked(&diamond((at, ground)), "source", &tip);
         labels.take(Area::around((at, ground - 3.0), (12.0, 6.0)));
+    }
+}
+
+/// The corners of a marker.
+fn diamond((x, y): Point) -> [Point; 4] {
+    [(x, y - 6.0), (x + 6.0, y), (x, y + 6.0), (x - 6.0, y)]
+}
+
+/// Power and place in words.
+fn whole((power, x, y): Source) -> String {
+    format!("{} W, x = {} m, y = {} m", plain(power), plain(x), plain(y))
+}
+
+/// Where the plot holds interferers of the mission before, and no marker of the present one covers them.
+fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
+    let (inside, _) = sorted(&picture.interferers, length(picture));
+    let (before, _) = sorted(&picture.replaced, length(picture));
+    let all = before
+        .into_iter()
+        .map(|source| (frame.x.at(source.1), source));
+    all.filter(|(at, _)| {
+        let covers = |(_, x, _): &Source| (frame.x.at(*x) - at).abs() < 12.0;
+        !inside.iter().any(covers)
+    })
+    .collect()
+}
+
+/// Draws the markers of interferers of the mission before.
+pub(super) fn replaced(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
+    let ground = frame.h.at(0.0);
+    for (at, source) in gone(picture, frame) {
+        let tip = format!("interferer of the mission before: {}", whole(source));
+        canvas.marked(&diamond((at, ground)), "before", &tip);
+        labels.take(Area::around((at, ground - 3.0), (12.0, 6.0)));
+    }
+}
+
+/// Says what they are, where there is room.
+pub(super) fn label_replaced(
+    canvas: &mut Canvas,
+    labels: &mut Labels,
+    frame: &Frame,
+    picture: &Picture,
+) {
+    let ground = frame.h.at(0.0);
+    for (at, _) in gone(picture, frame) {
+        let place = (at, ground - 13.0);
+        if labels.try_take(Area::around(place, (width("before", SIZE) + 2.0, LINE))) {
+            canvas.text((place.0, place.1 + 0.36 * SIZE), "faint halo", "before");
+        }
     }
 }
 
 /// Writes what is known of the interferers on the ground, once everything else there has its place.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
-    let (mut inside, _) = sorted(picture);
+    let (mut inside, _) = sorted(&picture.interferers, length(picture));
     let ground = frame.h.at(0.0);
     if inside.len() > CROWD {
         let span = |part: fn(&Source) -> f64| {

@@ -1,31 +1,38 @@
-//! A million attacks on a chain that settles, holds, settles again and is rebooted: none is taken, nothing is changed.
+//! A million attacks on a chain that settles, holds, settles again, is rebooted and given newer missions: none is taken, nothing
+//! is changed.
 
 use std::collections::BTreeMap;
 
-use uav_relay::{Instant, Phase, Wiring};
+use uav_relay::{Instant, Phase, Side, Wiring};
 
 use super::kinds::{Attack, Attacker, KINDS, Kind, raised};
 use super::net::{Deed, Net};
 
-/// A relay in the middle is rebooted, the chain agrees again; then its neighbours are, then the leader.
-const DEEDS: [(u64, Deed); 6] = [
+/// A relay in the middle is rebooted, the chain agrees again; a mission is uploaded, relays are rebooted that have stored it and
+/// others that have not, then the leader; a newer mission comes from the other end, and a relay next to either is rebooted.
+const DEEDS: [(u64, Deed); 11] = [
     (6_000, Deed::Reboot(4)),
     (6_500, Deed::Restart),
+    (12_000, Deed::Upload(Side::Upstream, 1)),
     (18_000, Deed::Reboot(5)),
-    (18_000, Deed::Reboot(8)),
+    (18_000, Deed::Resume(8)),
     (18_500, Deed::Restart),
     (30_000, Deed::Reboot(1)),
+    (36_000, Deed::Upload(Side::Downstream, 2)),
+    (42_000, Deed::Resume(2)),
+    (42_000, Deed::Reboot(7)),
+    (42_500, Deed::Restart),
 ];
 
-const END: Instant = Instant::from_millis(44_000);
+const END: Instant = Instant::from_millis(60_000);
 
 fn attacked(
     net: &mut Net,
     attacker: &mut Attacker,
+    kinds: &mut impl Iterator<Item = &'static Kind>,
     count: u64,
 ) -> BTreeMap<(Kind, &'static str), u64> {
     let mut table = BTreeMap::new();
-    let mut kinds = KINDS.iter().cycle();
     let mut done = 0;
     while done < count {
         let kind = *kinds.next().unwrap();
@@ -66,16 +73,18 @@ fn under_attack(wiring: Wiring, count: u64) {
             .iter()
             .all(|relay| relay.phase() == Phase::Holding)
     );
+    assert!(calm.relays.iter().all(|relay| relay.version() == 2));
     let share = count / calm.happenings;
 
     let mut net = Net::new(8, wiring, &DEEDS);
     let mut attacker = Attacker::new(1);
+    let mut kinds = KINDS.iter().cycle();
     let mut table: BTreeMap<(Kind, &'static str), u64> = BTreeMap::new();
     let mut left = count;
     loop {
         let more = net.step(END);
         let now = if more { share } else { left };
-        for (of, number) in attacked(&mut net, &mut attacker, now) {
+        for (of, number) in attacked(&mut net, &mut attacker, &mut kinds, now) {
             *table.entry(of).or_default() += number;
         }
         left -= now;
@@ -98,6 +107,12 @@ fn under_attack(wiring: Wiring, count: u64) {
     // Not a byte that was sent is another one, and nothing was taken but what members sent.
     assert_eq!(net.heard, calm.heard);
     assert_eq!(net.bits(), calm.bits());
+    for (relay, calm) in net.relays.iter().zip(&calm.relays) {
+        assert_eq!(
+            (relay.version(), relay.upload()),
+            (calm.version(), calm.upload())
+        );
+    }
     assert!(net.bits().iter().all(Option::is_some));
     for index in 1..=8 {
         let (stats, calm) = (net.stats(index), calm.stats(index));

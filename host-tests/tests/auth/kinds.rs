@@ -36,9 +36,19 @@ pub(crate) enum Kind {
     Bare,
     /// A valid message of any kind, with a tag of random bytes.
     Dressed,
+    /// An offer of a newer mission that was recorded since both ends were switched on, played to any relay.
+    OfferReplayed,
+    /// One from before either end was.
+    OfferFromBefore,
+    /// One with another counter, body or tag.
+    OfferAltered,
+    /// One of a mission that nobody has uploaded, from any node.
+    OfferForged,
+    /// A valid message, or one that was recorded, as if the ground had sent it.
+    FromGround,
 }
 
-pub(crate) const KINDS: [Kind; 13] = [
+pub(crate) const KINDS: [Kind; 18] = [
     Kind::Replayed,
     Kind::FromBefore,
     Kind::Flipped,
@@ -52,7 +62,22 @@ pub(crate) const KINDS: [Kind; 13] = [
     Kind::Noise,
     Kind::Bare,
     Kind::Dressed,
+    Kind::OfferReplayed,
+    Kind::OfferFromBefore,
+    Kind::OfferAltered,
+    Kind::OfferForged,
+    Kind::FromGround,
 ];
+
+impl Kind {
+    /// Whether it needs an offer that was recorded.
+    fn is_of_an_offer(self) -> bool {
+        matches!(
+            self,
+            Self::OfferReplayed | Self::OfferFromBefore | Self::OfferAltered
+        )
+    }
+}
 
 /// One attack: where, with what, and the counter that it raises.
 pub(crate) struct Attack {
@@ -110,7 +135,8 @@ fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
     let sender = frame.sender();
     // On a shared channel the four nearest on either side may have something to say.
     let far = if port == Port::Shared { 4 } else { 1 };
-    let there = (1..=relays).contains(&sender) && sender.abs_diff(to) <= far;
+    // The ground is beyond either end, and nowhere else.
+    let there = sender <= relays + 1 && sender.abs_diff(to) <= far;
     let before = port != Port::Downstream && there && sender < to;
     let after = port != Port::Upstream && there && sender > to;
     if frame.destination() != to || !(before || after) {
@@ -122,8 +148,8 @@ fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
 /// Whoever sends the attacks.
 pub(crate) struct Attacker {
     pub(crate) rng: ChaCha8Rng,
-    /// Valid frames of every message, unsigned.
-    messages: Vec<Plain>,
+    /// Bodies of every message.
+    pub(crate) messages: Vec<Plain>,
 }
 
 impl Attacker {
@@ -143,7 +169,8 @@ impl Attacker {
         let mut kinds: Vec<u8> = messages.iter().map(|message| message.0[0]).collect();
         kinds.sort_unstable();
         kinds.dedup();
-        assert_eq!(kinds, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
+        let all: Vec<u8> = (0..=12).collect();
+        assert!(kinds.starts_with(&all), "{kinds:?}");
         let mut rng = ChaCha8Rng::seed_from_u64(seed(1));
         rng.set_stream(stream);
         Self { rng, messages }
@@ -151,8 +178,19 @@ impl Attacker {
 
     /// An attack of `kind` on the net as it is now, if what that takes has been heard.
     pub(crate) fn attack(&mut self, net: &Net, kind: Kind) -> Option<Attack> {
-        let heard = net.heard.choose(&mut self.rng)?.clone();
-        let Heard { from, to, .. } = heard;
+        let heard = if kind.is_of_an_offer() {
+            &net.heard[*net.offers.choose(&mut self.rng)?]
+        } else {
+            net.heard.choose(&mut self.rng)?
+        };
+        let heard = heard.clone();
+        let (from, to, made) = match kind {
+            Kind::OfferForged | Kind::FromGround => {
+                let (from, to, frame) = self.pretended(net, kind, &heard)?;
+                (from, to, Some(frame))
+            }
+            _ => (heard.from, self.target(net, kind, heard.to)?, None),
+        };
         // Mostly where such a frame belongs.
         let port = if self.rng.random_bool(0.9) {
             net.port(from, to)
@@ -165,7 +203,10 @@ impl Attacker {
         if kind == Kind::Noise {
             return Some(self.noise(to, port));
         }
-        let (frame, right) = self.frame(net, kind, &heard)?;
+        let (frame, right) = match made {
+            Some(frame) => (frame, "forged"),
+            None => self.frame(net, kind, &heard)?,
+        };
         let raises = match refused(&frame, to, port, net.len()) {
             "forged" => right,
             other => other,
@@ -192,8 +233,9 @@ impl Attacker {
         let recorded = plain(wire);
         let is_hello = recorded.is_hello();
         let frame = match kind {
-            Kind::Replayed | Kind::FromBefore => {
-                let fits = (kind == Kind::Replayed) == (*lives == now);
+            Kind::Replayed | Kind::FromBefore | Kind::OfferReplayed | Kind::OfferFromBefore => {
+                let since = matches!(kind, Kind::Replayed | Kind::OfferReplayed);
+                let fits = since == (*lives == now);
                 // What is still under way has not been taken there.
                 let usable = fits && !is_hello && net.has_arrived(heard);
                 let raises = if net.is_of_now(heard) {
@@ -250,13 +292,14 @@ impl Attacker {
                 }
                 frame
             }
-            Kind::Noise => return None,
+            Kind::OfferAltered => self.altered(recorded),
+            Kind::OfferForged | Kind::FromGround | Kind::Noise => return None,
         };
         Some((frame, "forged"))
     }
 
     /// A counter that is old, new, or anything.
-    fn counter(&mut self, recorded: &Plain) -> u32 {
+    pub(crate) fn counter(&mut self, recorded: &Plain) -> u32 {
         match self.rng.random_range(0..3) {
             0 => recorded.counter(),
             1 => recorded

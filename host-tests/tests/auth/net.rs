@@ -1,4 +1,5 @@
-//! A chain on a clock of its own, every frame of which can be listened to and added to: what an attacker has.
+//! A chain on a clock of its own, and the ground at both ends, every frame of which can be listened to and added to: what an
+//! attacker has.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -6,7 +7,8 @@ use host_tests::brief::of_link;
 use host_tests::reference::Link;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
-    Auth, Duration, Event, Identity, Instant, Key, Mission, Port, Relay, Settings, Stats, Wiring,
+    Auth, Duration, Event, Ground, Identity, Instant, Interference, Interferer, Key, Mission,
+    MissionConfig, Port, Relay, Settings, Side, Stats, Upload, Wiring,
 };
 
 pub(crate) const NETWORK: u16 = 7;
@@ -17,6 +19,19 @@ const ON_THE_WAY: Duration = Duration::from_millis(10);
 
 pub(crate) fn mission(relays: u16) -> Mission {
     of_link(&Link::paper(usize::from(relays)), 1e-4).unwrap().0
+}
+
+/// Version `version` of it: the interferer is somewhere else in each.
+pub(crate) fn newer(base: &Mission, version: u16) -> Upload {
+    let config = MissionConfig {
+        interference: Interference::Source(Interferer {
+            power_w: 80.0,
+            x_m: 900.0 - 150.0 * f32::from(version),
+            y_m: -300.0,
+        }),
+        ..*base.config()
+    };
+    Upload::new(base, version, config).unwrap()
 }
 
 /// A frame that was sent, as somebody heard it who listens everywhere.
@@ -36,6 +51,10 @@ pub(crate) struct Heard {
 pub(crate) enum Deed {
     /// Relay of this index is switched off and on.
     Reboot(u16),
+    /// The same, and it has stored what was uploaded.
+    Resume(u16),
+    /// The ground at that end uploads a mission of this version.
+    Upload(Side, u16),
     /// The leader has the chain agree again.
     Restart,
 }
@@ -43,10 +62,16 @@ pub(crate) enum Deed {
 #[derive(Clone)]
 pub(crate) struct Net {
     pub(crate) relays: Vec<Relay>,
+    /// The transmitter and the receiver.
+    pub(crate) grounds: [Ground; 2],
+    /// What each relay has stored of uploads.
+    stored: Vec<Option<Upload>>,
     /// How often each relay has been switched on; its epoch.
     pub(crate) lives: Vec<u32>,
     pub(crate) now: Instant,
     pub(crate) heard: Vec<Heard>,
+    /// Which of them are offers of a newer mission.
+    pub(crate) offers: Vec<usize>,
     /// Messages that genuine frames have brought, for each relay since it was switched on.
     pub(crate) genuine: Vec<u32>,
     /// Links (from, to) on which a message has been taken since both ends were switched on.
@@ -67,9 +92,15 @@ impl Net {
             relays: (1..=relays)
                 .map(|index| relay(relays, index, wiring, (1, Instant::ZERO)))
                 .collect(),
+            grounds: [Side::Upstream, Side::Downstream].map(|end| {
+                let base = mission(relays);
+                Ground::new(&base, end, NETWORK, wiring, proof(1))
+            }),
+            stored: vec![None; relays.into()],
             lives: vec![1; relays.into()],
             now: Instant::ZERO,
             heard: Vec::new(),
+            offers: Vec::new(),
             genuine: vec![0; relays.into()],
             proven: BTreeMap::new(),
             learned: BTreeMap::new(),
@@ -95,8 +126,17 @@ impl Net {
         *self.relays[usize::from(index) - 1].stats()
     }
 
-    pub(crate) fn life(&self, index: u16) -> u32 {
-        self.lives[usize::from(index) - 1]
+    /// How often a node has been switched on; the ground has been once.
+    pub(crate) fn life(&self, node: u16) -> u32 {
+        if self.is_relay(node) {
+            self.lives[usize::from(node) - 1]
+        } else {
+            1
+        }
+    }
+
+    pub(crate) fn is_relay(&self, node: u16) -> bool {
+        (1..=self.len()).contains(&node)
     }
 
     pub(crate) fn len(&self) -> u16 {
@@ -139,10 +179,16 @@ impl Net {
             .min();
         let arrives = self.under_way.front().map(|(at, _)| *at);
         let does = self.deeds.front().map(|(at, _)| *at);
-        let next = [arrives, does, wake.map(|(at, _)| at)]
-            .into_iter()
-            .flatten()
+        let asks = (0..2)
+            .filter_map(|end| Some((self.grounds[end].poll_timeout()?, end)))
             .min();
+        let times = [
+            arrives,
+            does,
+            wake.map(|(at, _)| at),
+            asks.map(|(at, _)| at),
+        ];
+        let next = times.into_iter().flatten().min();
         let Some(next) = next.filter(|at| *at <= until) else {
             return false;
         };
@@ -152,6 +198,9 @@ impl Net {
             self.act();
         } else if arrives == Some(next) {
             self.deliver();
+        } else if let Some((at, end)) = asks.filter(|(at, _)| *at == next) {
+            self.grounds[end].handle_timeout(at);
+            self.drain_ground(end);
         } else if let Some((at, index)) = wake {
             self.relay(index).handle_timeout(at);
             self.drain(index);
@@ -170,6 +219,16 @@ impl Net {
         };
         match deed {
             Deed::Reboot(index) => self.reboot(index, self.life(index) + 1),
+            Deed::Resume(index) => {
+                let stored = self.stored[usize::from(index) - 1];
+                self.start(index, self.life(index) + 1, stored);
+            }
+            Deed::Upload(side, version) => {
+                let (now, end) = (self.now, usize::from(side == Side::Downstream));
+                let upload = newer(&mission(self.len()), version);
+                self.grounds[end].upload(now, upload).unwrap();
+                self.drain_ground(end);
+            }
             Deed::Restart => {
                 let now = self.now;
                 self.relay(1).restart(now);
@@ -179,11 +238,17 @@ impl Net {
     }
 
     pub(crate) fn reboot(&mut self, index: u16, epoch: u32) {
+        self.start(index, epoch, None);
+    }
+
+    fn start(&mut self, index: u16, epoch: u32, stored: Option<Upload>) {
         let place = usize::from(index) - 1;
         self.lives[place] = epoch;
         self.genuine[place] = 0;
         let now = self.now;
-        *self.relay(index) = relay(self.len(), index, self.wiring, (epoch, now));
+        let start = (epoch, now);
+        *self.relay(index) = started(self.len(), index, self.wiring, start, stored);
+        self.stored[place] = stored;
         self.drain(index);
     }
 
@@ -198,6 +263,11 @@ impl Net {
             wire,
             ..
         } = self.heard[heard].clone();
+        if !self.is_relay(to) {
+            let end = usize::from(to != 0);
+            self.grounds[end].handle_bytes(&wire);
+            return self.drain_ground(end);
+        }
         self.learned.insert((from, to), (lives.0, self.life(to)));
         let before = self.stats(to).received;
         self.give(to, self.port(from, to), &wire);
@@ -227,24 +297,45 @@ impl Net {
                 Port::Downstream => index + 1,
                 Port::Shared => super::frames::plain(&wire).destination(),
             };
-            let lives = (self.life(index), self.life(to));
-            let number = self.heard.len();
-            self.under_way.push_back((now + ON_THE_WAY, number));
-            self.heard.push(Heard {
-                from: index,
-                to,
-                lives,
-                number,
-                wire,
-            });
+            self.say(index, to, wire);
         }
         while let Some(event) = self.relay(index).poll_event() {
+            if event == Event::Uploaded {
+                self.stored[usize::from(index) - 1] = self.relay(index).upload().copied();
+            }
             assert!(
                 !matches!(event, Event::NeighbourLost(_)),
                 "{index}: {event:?} at {now:?}"
             );
         }
         sent
+    }
+
+    fn drain_ground(&mut self, end: usize) {
+        let mut frame = [0; MAX_FRAME];
+        while let Some(len) = self.grounds[end].poll_transmit(&mut frame) {
+            let wire = frame[..len].to_vec();
+            let from = [0, self.len() + 1][end];
+            let to = super::frames::plain(&wire).destination();
+            self.say(from, to, wire);
+        }
+    }
+
+    /// A frame goes on its way.
+    fn say(&mut self, from: u16, to: u16, wire: Vec<u8>) {
+        let lives = (self.life(from), self.life(to));
+        let number = self.heard.len();
+        self.under_way.push_back((self.now + ON_THE_WAY, number));
+        if super::offers::is_offer(&super::frames::plain(&wire)) {
+            self.offers.push(number);
+        }
+        self.heard.push(Heard {
+            from,
+            to,
+            lives,
+            number,
+            wire,
+        });
     }
 
     /// Where the relays were told to fly, and for which target, to the bit.
@@ -263,14 +354,29 @@ impl Net {
     }
 }
 
+fn proof(epoch: u32) -> Auth {
+    Auth {
+        key: Key::new(KEY),
+        epoch,
+    }
+}
+
 /// Relay `index` of `of`, switched on with an epoch at a time.
-pub(crate) fn relay(of: u16, index: u16, wiring: Wiring, (epoch, now): (u32, Instant)) -> Relay {
+pub(crate) fn relay(of: u16, index: u16, wiring: Wiring, start: (u32, Instant)) -> Relay {
+    started(of, index, wiring, start, None)
+}
+
+/// The same of a relay that has stored an upload, if it has.
+fn started(
+    of: u16,
+    index: u16,
+    wiring: Wiring,
+    (epoch, now): (u32, Instant),
+    stored: Option<Upload>,
+) -> Relay {
     let settings = Settings {
         wiring,
-        auth: Some(Auth {
-            key: Key::new(KEY),
-            epoch,
-        }),
+        auth: Some(proof(epoch)),
         ..Settings::default()
     };
     let identity = Identity {
@@ -278,5 +384,9 @@ pub(crate) fn relay(of: u16, index: u16, wiring: Wiring, (epoch, now): (u32, Ins
         index,
     };
     let seed = u32::from(index) << 8 | epoch;
-    Relay::new(mission(of), identity, settings, seed, now).unwrap()
+    let mut relay = Relay::new(mission(of), identity, settings, seed, now).unwrap();
+    if let Some(upload) = stored {
+        relay.resume(&upload).unwrap();
+    }
+    relay
 }

@@ -162,6 +162,11 @@ fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
     for kind in ["forged", "replayed"] {
         assert!(attack[kind]["taken"].as_u64().unwrap() > 10, "{attack}");
     }
+    // But no offer of another mission is: for that it takes a tag.
+    assert!(
+        attack["forged"]["counted"]["unsigned"].as_u64().unwrap() > 0,
+        "{attack}"
+    );
     assert!(
         attack["formed"].as_u64() > attack["formed_without"].as_u64(),
         "{attack}"

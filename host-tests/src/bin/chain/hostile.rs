@@ -1,4 +1,4 @@
-//! What may happen to the chain in the air: relays that go silent, parts that do not hear each other, an attacker.
+//! What may happen to the chain in the air: relays that go silent, parts that do not hear each other, an attacker, a new mission.
 
 use clap::Args;
 use host_tests::command::{Failure, number};
@@ -7,6 +7,7 @@ use host_tests::sim::setup::{Partition, Setup};
 use uav_relay::{Instant, Wiring};
 
 use crate::options::Options;
+use crate::upload::Uploads;
 
 /// The options for that.
 #[derive(Args, Debug)]
@@ -19,7 +20,8 @@ pub(crate) struct Hostile {
     /// Relay I goes silent S virtual seconds after the start; the others form anew without it. Repeatable
     #[arg(long, value_name = "I@S", value_parser = one)]
     pub(crate) kill: Vec<One>,
-    /// Relay I is switched on again after S seconds, with nothing left of what it knew. Repeatable
+    /// Relay I is switched on again after S seconds, with nothing left of what it knew but a mission that was uploaded.
+    /// Repeatable
     #[arg(long, value_name = "I@S", value_parser = one)]
     boot: Vec<One>,
     /// Relays 1 to K and the others do not hear each other from S seconds on, until T or for good. Repeatable
@@ -31,14 +33,16 @@ pub(crate) struct Hostile {
     /// An attacker sends N of the frames that it has heard again, 1 to 100000
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     replay: Option<u32>,
-    /// Frames carry tags, with a key drawn from the seed; so they do when there is an attacker
+    #[command(flatten)]
+    pub(crate) uploads: Uploads,
+    /// Frames carry tags, with a key drawn from the seed; so they do when there is an attacker or an upload
     #[arg(long, conflicts_with = "no_auth")]
     auth: bool,
-    /// Frames carry no tags, even when there is an attacker
+    /// Frames carry no tags, even when there is an attacker; without them nothing can be uploaded
     #[arg(long)]
     no_auth: bool,
     /// All relays talk by one radio, which those up to four away hear; so they do with any of --kill, --boot, --partition,
-    /// --forge and --replay
+    /// --forge, --replay and --upload
     #[arg(long, conflicts_with = "wires")]
     shared: bool,
     /// Each relay has a wire to either neighbour, even then; there a break is reported, not closed
@@ -64,6 +68,7 @@ impl Hostile {
     fn is_eventful(&self) -> bool {
         !(self.kill.is_empty() && self.boot.is_empty() && self.partition.is_empty())
             || self.is_attack()
+            || self.uploads.are_planned()
     }
 
     fn is_attack(&self) -> bool {
@@ -77,7 +82,8 @@ impl Hostile {
             .partition
             .iter()
             .map(|part| part.until.unwrap_or(part.from));
-        ones.chain(parts).max().unwrap_or(Instant::ZERO)
+        let all = ones.chain(parts).chain(self.uploads.times());
+        all.max().unwrap_or(Instant::ZERO)
     }
 
     /// Whether this goes together with a chain of `uavs`, and with the other options.
@@ -105,15 +111,18 @@ impl Hostile {
             return Err(Failure::input(line));
         }
         if self.is_eventful() && options.closed_loop.is_some() {
-            let line =
-                "--closed-loop goes with none of --kill, --boot, --partition, --forge and --replay";
+            let line = "--closed-loop goes with none of --kill, --boot, --partition, --forge, --replay and --upload";
+            return Err(Failure::input(line));
+        }
+        if self.uploads.are_planned() && self.no_auth {
+            let line = "--upload needs frames with tags, and --no-auth leaves them out";
             return Err(Failure::input(line));
         }
         Ok(())
     }
 
     /// Puts all of it into a run.
-    pub(crate) fn prepare(&self, setup: &mut Setup) {
+    pub(crate) fn prepare(&self, setup: &mut Setup) -> Result<(), Failure> {
         let pairs = |ones: &[One]| ones.iter().map(|one| (one.index, one.at)).collect();
         setup.kills = pairs(&self.kill);
         setup.boots = pairs(&self.boot);
@@ -130,10 +139,16 @@ impl Hostile {
                 until: after(ATTACK_S),
             });
         }
-        setup.auth = self.auth || self.is_attack() && !self.no_auth;
+        let asks = self.is_attack() || self.uploads.are_planned();
+        setup.auth = self.auth || asks && !self.no_auth;
+        setup.uploads = self.uploads.of(&setup.mission)?;
+        if !self.uploads.are_stored() {
+            setup.forgetful = (1..=setup.mission.relays()).collect();
+        }
         if self.is_eventful() {
             setup.deadline = after(PATIENCE_S);
         }
+        Ok(())
     }
 }
 
@@ -174,7 +189,7 @@ fn partition(text: &str) -> Result<Partition, String> {
 }
 
 /// Seconds after the start, 0 to 1e6.
-fn instant(text: &str) -> Option<Instant> {
+pub(crate) fn instant(text: &str) -> Option<Instant> {
     let seconds = number(text, 0.0, 1e6).ok()?;
     #[expect(
         clippy::cast_possible_truncation,

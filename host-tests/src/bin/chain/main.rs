@@ -2,6 +2,7 @@
 
 mod hostile;
 mod options;
+mod upload;
 
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
@@ -11,7 +12,7 @@ use clap::{Parser as _, ValueEnum as _};
 use host_tests::brief::{self, Refusal};
 use host_tests::command::{self, Failure, narrow};
 use host_tests::random::beta::beta_w;
-use host_tests::report::{AttackReport, ChainReport, timeline};
+use host_tests::report::{self, AttackReport, ChainReport, timeline};
 use host_tests::scenario::{Interference, Scenario};
 use host_tests::sim::chain::Chain;
 use host_tests::sim::faults::Faults;
@@ -55,11 +56,12 @@ fn run(options: &Options) -> Result<(), Failure> {
             return Err(Failure::input(format!("{file}: {refusal}")));
         }
     };
-    let mut setup = setup(options, mission);
+    let mut setup = setup(options, mission)?;
     setup.profiles = profiles;
     setup.held = brief::held(&scenario, options.uavs);
     let outcome = fly(options, &scenario, setup.clone())?;
-    let mut report = ChainReport::new(&method, &mission, &outcome, options.seed);
+    let flown = report::flown(&setup, &outcome);
+    let mut report = ChainReport::new(&method, &flown, &outcome, options.seed);
     report.channel = (setup.settings.wiring == Wiring::Shared).then_some("shared");
     if setup.attack.take().is_some() {
         let auth = setup.auth;
@@ -68,7 +70,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         report.attack = Some(attack);
     }
     if let Some(file) = &options.svg {
-        let picture = picture(&method, &mission, &scenario, &outcome, &report);
+        let picture = picture(&flown, &scenario, &outcome, &report);
         command::write(file, &svg::draw(&picture))?;
     }
     show(options, &report)
@@ -92,12 +94,20 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         };
         return Err(Failure::input(line));
     }
+    let uploads = options.hostile.uploads.are_planned();
+    if uploads && is_field {
+        let line = "--upload needs an [[interferer]], and the scenario has a [field]";
+        return Err(Failure::input(line));
+    }
     if let Some(one) = brief::hypothetical(scenario) {
         eprintln!(
             "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m stands for all, and SIRs are against it; `cargo plan` has what \
              its places are worth against all",
             one.power_w, one.x_m, one.y_m
         );
+        if uploads {
+            eprintln!("note: an upload changes that one, and what it leaves out stays as it is");
+        }
     }
     for index in scenario
         .relays
@@ -113,7 +123,7 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
 }
 
 /// What the options say of the run.
-fn setup(options: &Options, mission: Mission) -> Setup {
+fn setup(options: &Options, mission: Mission) -> Result<Setup, Failure> {
     let mut setup = Setup::new(mission);
     setup.settings.schedule = match options.method {
         Method::AlignStep | Method::StochasticStep => Schedule::FixedStep {
@@ -132,14 +142,14 @@ fn setup(options: &Options, mission: Mission) -> Setup {
     };
     setup.settings.predict = !options.no_predict;
     setup.seed = options.seed;
-    options.hostile.prepare(&mut setup);
+    options.hostile.prepare(&mut setup)?;
     setup.faults = Faults {
         loss: options.loss,
         corrupt: options.corrupt,
         duplicate: options.duplicate,
         reorder: options.reorder,
     };
-    setup
+    Ok(setup)
 }
 
 /// Runs the chain to its end; in a closed loop as often as that measures.
@@ -202,8 +212,8 @@ fn watch(chain: &mut Chain) {
     }
 }
 
+/// The chain at its places in the mission that it flies.
 fn picture(
-    method: &str,
     mission: &Mission,
     scenario: &Scenario,
     outcome: &Outcome,
@@ -228,10 +238,19 @@ fn picture(
     } else {
         outcome.relays.iter().map(place).collect()
     };
+    let before = scenario.sources();
+    let (interferers, replaced) = match (report.version, mission.interference()) {
+        (Some(1..), uav_relay::Interference::Source(at)) => {
+            let now = [at.power_w, at.x_m, at.y_m].map(f64::from);
+            (vec![now.into()], before)
+        }
+        _ => (before, Vec::new()),
+    };
     Picture {
-        title_method: method.to_owned(),
+        title_method: report.method.clone(),
         distance_m: f64::from(mission.config().distance_m),
-        interferers: scenario.sources(),
+        interferers,
+        replaced,
         nodes,
         hop_sir,
         lost,

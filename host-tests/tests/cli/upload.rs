@@ -1,0 +1,332 @@
+//! Missions that are uploaded in flight: what `cargo chain` makes of the options, and what it says of the runs.
+
+use roxmltree::Document;
+use serde_json::Value;
+
+use super::{chain, example, json, refusal};
+
+/// The default scenario with the interferer at x = 800 m, y = -300 m, as a chain takes off with it.
+fn from_the_start(folder: &tempfile::TempDir, more: &[&str]) -> Value {
+    let file = folder.path().join("moved.toml");
+    let text = "[geometry]\ndistance_m = 1000\naltitude_m = 20\nmin_separation_m = 4\n[power]\ntx_w = 80\nuav_w = 1\n[[interferer]]\npower_w = 80\nx_m = 800\ny_m = -300\n";
+    std::fs::write(&file, text).unwrap();
+    json(&[&["--scenario", file.to_str().unwrap()], more].concat())
+}
+
+const MOVED: &str = "20:x_m=800,y_m=-300";
+
+fn places(report: &Value) -> Vec<(Value, Value, Value)> {
+    let relays = report["relays"].as_array().unwrap().iter();
+    relays
+        .map(|relay| {
+            (
+                relay["x_m"].clone(),
+                relay["h_m"].clone(),
+                relay["sir"].clone(),
+            )
+        })
+        .collect()
+}
+
+fn whats(report: &Value, what: &str) -> usize {
+    let moments = report["timeline"].as_array().unwrap().iter();
+    moments.filter(|moment| moment["what"] == what).count()
+}
+
+/// By wires and by radio, from either end, over good links and bad ones.
+#[test]
+fn the_chain_ends_where_one_that_took_off_with_it_does_and_the_report_is_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let expected = from_the_start(&folder, &[]);
+    let loss = ["--loss", "0.3", "--corrupt", "0.1", "--seed", "3"];
+    for more in [
+        &[][..],
+        &["--upload-from", "rx"],
+        &["--wires"],
+        &["--wires", "--upload-from", "rx"],
+        &loss,
+        &[&loss[..], &["--upload-from", "rx", "--wires"]].concat(),
+    ] {
+        let report = json(&[&["--upload", MOVED], more].concat());
+        assert_eq!(places(&report), places(&expected), "{more:?}");
+        for key in ["sir", "rx_sir", "target"] {
+            assert_eq!(report[key], expected[key], "{key}, {more:?}");
+        }
+        assert_eq!(report["version"].as_u64(), Some(1));
+        let relays = report["relays"].as_array().unwrap();
+        assert!(relays.iter().all(|relay| relay["version"] == 1));
+        assert_eq!(
+            (whats(&report, "offered"), whats(&report, "adopted")),
+            (1, 8)
+        );
+        let recovery = report["recovery"].as_array().unwrap();
+        let of_it: Vec<&Value> = recovery.iter().filter(|one| one["version"] == 1).collect();
+        let [one] = of_it.as_slice() else {
+            panic!("{recovery:?}");
+        };
+        assert_eq!(one["offered_s"].as_f64(), Some(20.0));
+        let times = ["offered_s", "formed_s", "converged_s"].map(|key| one[key].as_f64().unwrap());
+        assert!(times.is_sorted() && times[2] < 60.0, "{times:?}");
+        assert!(one["sweeps"].as_u64().unwrap() >= 2, "{one}");
+        let ground = if more.contains(&"rx") { 9 } else { 0 };
+        let moments = report["timeline"].as_array().unwrap();
+        let offered = moments.iter().find(|moment| moment["what"] == "offered");
+        assert_eq!(offered.unwrap()["relay"].as_u64(), Some(ground));
+    }
+}
+
+#[test]
+fn without_an_upload_nothing_is_said_of_one() {
+    for report in [json(&[]), json(&["--kill", "4@20"])] {
+        assert!(report.get("version").is_none());
+        assert!(report["relays"][0].get("version").is_none());
+    }
+}
+
+#[test]
+fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("upload.svg");
+    let output = chain(&["--upload", MOVED, "--svg", file.to_str().unwrap()]);
+    assert!(output.status.success() && output.stderr.is_empty());
+    let text = String::from_utf8(output.stdout).unwrap();
+    for line in [
+        "worst hop: SIR 1.5817",
+        "the chain flies mission 1, as uploaded",
+        "one radio channel",
+        "converged: 8 relays, SIR 2.466",
+        "20.000 s  the transmitter uploads mission 1",
+        " s  relays 1 to 8 hold mission 1",
+        " s  mission 1 adopted: 8 relays",
+        "converged: 8 relays, SIR 1.582",
+        "view 1, mission 1 uploaded: adopted after 0.",
+    ] {
+        assert!(text.contains(line), "{line} in {text}");
+    }
+    let drawing = std::fs::read_to_string(file).unwrap();
+    Document::parse(&drawing).unwrap();
+    for words in [
+        "interferer: 80 W, x = 800 m, y = -300 m",
+        "interferer of the mission before: 80 W, x = 500 m, y = 400 m",
+        "|y| = 300 m",
+        "mission 1 offered",
+        "mission 1 adopted",
+        "1.5817 (1.99 dB)",
+    ] {
+        assert!(drawing.contains(words), "{words} in {drawing}");
+    }
+}
+
+/// Versions are numbered by time, not by the order of the options, and the last one is flown.
+#[test]
+fn of_two_uploads_the_later_one_is_flown() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = json(&[
+        "--upload",
+        "60:x_m=800,y_m=-300",
+        "--upload",
+        "20:power_w=30",
+    ]);
+    assert_eq!(report["version"].as_u64(), Some(2));
+    assert_eq!(places(&report), places(&from_the_start(&folder, &[])));
+    let recovery = report["recovery"].as_array().unwrap();
+    let versions: Vec<u64> = recovery
+        .iter()
+        .filter_map(|one| one["version"].as_u64())
+        .collect();
+    assert_eq!(versions, [1, 2]);
+}
+
+/// Every parameter that can be changed: to what a scenario file with it says.
+#[test]
+fn every_key_is_that_of_a_scenario_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("other.toml");
+    let text = "[geometry]\ndistance_m = 900\naltitude_m = 60\naltitude_min_m = 40\naltitude_max_m = 120\nmin_separation_m = 5\n[power]\ntx_w = 70\nuav_w = 2\n[[interferer]]\npower_w = 60\nx_m = 300\ny_m = 200\n";
+    std::fs::write(&file, text).unwrap();
+    let shared = ["--method", "altitude", "--uavs", "5"];
+    let expected = json(
+        &[
+            &["--scenario", file.to_str().unwrap(), "--tolerance", "0.01"],
+            &shared[..],
+        ]
+        .concat(),
+    );
+    let upload = "5:distance_m=900,altitude_m=60,altitude_min_m=40,altitude_max_m=120,min_separation_m=5,tx_w=70,uav_w=2,power_w=60,x_m=300,y_m=200,tolerance=0.01";
+    let report = json(&[&["--upload", upload], &shared[..]].concat());
+    assert_eq!(places(&report), places(&expected));
+    // A band of one altitude goes with it.
+    let report = json(&["--upload", "5:altitude_m=60"]);
+    assert_eq!(report["relays"][0]["h_m"].as_f64(), Some(60.0));
+}
+
+/// A relay that is switched on again flies what was uploaded, whether it has stored that or learns it from its neighbours.
+#[test]
+fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
+    let folder = tempfile::tempdir().unwrap();
+    let expected = places(&from_the_start(&folder, &[]));
+    for index in ["1", "4"] {
+        let (kill, boot) = (format!("{index}@60"), format!("{index}@90"));
+        let run = ["--upload", MOVED, "--kill", &kill, "--boot", &boot];
+        let stored = json(&run);
+        assert_eq!(places(&stored), expected);
+        assert_eq!(whats(&stored, "adopted"), 8);
+        let learned = json(&[&run[..], &["--no-store"]].concat());
+        assert_eq!(places(&learned), expected);
+        assert_eq!(whats(&learned, "adopted"), 9, "it adopts it anew");
+        for report in [stored, learned] {
+            let recovery = report["recovery"].as_array().unwrap();
+            let news = recovery.iter().filter(|one| one.get("version").is_some());
+            assert_eq!(news.count(), 1, "what is known is no news: {recovery:?}");
+        }
+    }
+}
+
+/// A relay is lost before, while and after a mission is uploaded.
+#[test]
+fn the_relays_that_are_left_fly_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let seven = from_the_start(&folder, &["--uavs", "7"]);
+    for at in ["5", "20.05", "25", "60"] {
+        for index in ["1", "4", "8"] {
+            let report = json(&["--upload", MOVED, "--kill", &format!("{index}@{at}")]);
+            assert_eq!(report["left"].as_u64(), Some(7), "{index}@{at}");
+            assert_eq!(places(&report), places(&seven), "{index}@{at}");
+        }
+    }
+}
+
+#[test]
+fn on_wires_nothing_gets_past_a_silent_relay_and_the_status_is_1() {
+    let output = chain(&[
+        "--json",
+        "--upload",
+        "20:x_m=800",
+        "--kill",
+        "4@20",
+        "--wires",
+    ]);
+    assert_eq!(output.status.code(), Some(1));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let error = report["error"].as_str().unwrap();
+    assert!(
+        error.contains("relay 4 went silent") && error.contains("mission 1 was not adopted"),
+        "{error}"
+    );
+    assert_eq!(report["version"].as_u64(), Some(0));
+    assert!(report["virtual_s"].as_f64().unwrap() < 60.0);
+}
+
+#[test]
+fn an_attacker_changes_nothing_of_it() {
+    let run = ["--upload", MOVED, "--forge", "2000", "--replay", "2000"];
+    let report = json(&run);
+    let attack = &report["attack"];
+    for kind in ["forged", "replayed"] {
+        assert_eq!(attack[kind]["sent"].as_u64(), Some(2000), "{attack}");
+        assert_eq!(attack[kind]["taken"].as_u64(), Some(0), "{attack}");
+    }
+    for key in ["moved", "misled", "unsafe_setpoints"] {
+        assert_eq!(attack[key].as_u64(), Some(0), "{key} in {attack}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(places(&report), places(&from_the_start(&folder, &[])));
+}
+
+#[test]
+fn of_several_interferers_the_one_that_stands_for_all_is_changed() {
+    let file = example("several.toml");
+    let output = chain(&["--scenario", &file, "--upload", "20:x_m=500", "--json"]);
+    assert!(output.status.success());
+    let notes = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        notes.contains("stands for all") && notes.contains("an upload changes that one"),
+        "{notes}"
+    );
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["version"].as_u64(), Some(1));
+}
+
+#[test]
+fn wrong_uploads_are_named_with_what_is_allowed() {
+    let field = example("field.toml");
+    for (arguments, parts) in [
+        (
+            &["--upload", "x"][..],
+            &["--upload", "'x'", "S:KEY=VALUE"][..],
+        ),
+        (&["--upload", "20:"], &["'20:'", "S:KEY=VALUE"]),
+        (&["--upload", "1e7"], &["'1e7'", "0 to 1e6"]),
+        (&["--upload", "20:x_m"], &["'20:x_m'", "S:KEY=VALUE"]),
+        (
+            &["--upload", "20:z=3"],
+            &["z is not a known key", "x_m, y_m, power_w"],
+        ),
+        (&["--upload", "20:x_m=1,x_m=2"], &["x_m must be given once"]),
+        (
+            &["--upload", "20:x_m=1e8"],
+            &["20:x_m=1e8", "x_m must be a number within -10000000.0 to"],
+        ),
+        (&["--upload", "20:y_m=NaN"], &["y_m must be"]),
+        (
+            &["--upload", "20:power_w=0"],
+            &["power_w must be a number within 1e-6 to"],
+        ),
+        (
+            &["--upload", "20:altitude_m=0"],
+            &["altitude_m must be a number within 0.1 to"],
+        ),
+        (
+            &["--upload", "20:tolerance=1"],
+            &["tolerance must be a number within 1e-6 to 0.1"],
+        ),
+        (
+            &["--upload", "20:min_separation_m=500"],
+            &[
+                "--upload 20:min_separation_m=500:",
+                "min_separation_m must not be above distance_m",
+            ],
+        ),
+        (
+            &["--upload", "20:altitude_min_m=50"],
+            &["--upload 20:altitude_min_m=50:", "band must be"],
+        ),
+        (&["--upload", "20", "--no-auth"], &["--upload", "--no-auth"]),
+        (&["--upload-from", "rx"], &["--upload"]),
+        (&["--no-store"], &["--upload"]),
+        (
+            &["--upload", "20", "--upload-from", "moon"],
+            &["--upload-from", "moon"],
+        ),
+        (
+            &[
+                "--upload",
+                "20",
+                "--scenario",
+                &field,
+                "--method",
+                "stochastic",
+            ],
+            &["--upload", "[[interferer]]", "[field]"],
+        ),
+        (
+            &[
+                "--upload",
+                "20",
+                "--scenario",
+                &field,
+                "--method",
+                "stochastic",
+                "--closed-loop",
+                "2",
+            ],
+            &["--closed-loop", "--upload"],
+        ),
+    ] {
+        let (status, line) = refusal(arguments);
+        assert_eq!(status, 2, "{arguments:?}: {line}");
+        for part in parts {
+            assert!(line.contains(part), "{arguments:?}: {part} not in {line}");
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! The interferer of a mission that was replaced in flight.
+
+use host_tests::svg::{Picture, draw};
+use roxmltree::{Document, Node};
+
+use super::{all, level, number, tip};
+
+#[test]
+fn the_interferer_of_the_mission_before_is_faint_and_said_to_be_that() {
+    let mut picture = level(8);
+    let without = draw(&picture);
+    picture.replaced = vec![(30.0, 200.0, -100.0)];
+    let svg = draw(&picture);
+    let document = Document::parse(&svg).unwrap();
+    let [before] = all(&document, "path", "before").try_into().unwrap();
+    assert_eq!(
+        tip(&before),
+        "interferer of the mission before: 30 W, x = 200 m, y = -100 m"
+    );
+    let [words] = all(&document, "text", "faint").try_into().unwrap();
+    assert_eq!(words.text(), Some("before"));
+    // Between the relays that stand at the same share of the line.
+    let relays = all(&document, "circle", "relay");
+    let (left, right) = (number(&relays[0], "cx"), number(&relays[1], "cx"));
+    assert!((left..right).contains(&number(&words, "x")));
+    // Nothing else in the picture is another one.
+    let plain = Document::parse(&without).unwrap();
+    for (name, class) in [("line", "hop"), ("circle", "relay"), ("path", "source")] {
+        let shapes = |document: &Document| -> Vec<Vec<String>> {
+            let values = |shape: &Node| {
+                let attributes = shape.attributes();
+                attributes.map(|one| one.value().to_owned()).collect()
+            };
+            all(document, name, class).iter().map(values).collect()
+        };
+        assert_eq!(shapes(&document), shapes(&plain), "{name}.{class}");
+    }
+}
+
+/// Where the present one's marker is, far off the chain, or nowhere.
+#[test]
+fn where_its_marker_would_only_be_in_the_way_it_is_left_out() {
+    let same = level(8).interferers;
+    for replaced in [
+        same,
+        vec![(80.0, 5000.0, 0.0)],
+        vec![(80.0, f64::NAN, 0.0)],
+        Vec::new(),
+    ] {
+        let picture = Picture {
+            replaced: replaced.clone(),
+            ..level(8)
+        };
+        assert_eq!(draw(&picture), draw(&level(8)), "{replaced:?}");
+    }
+}
