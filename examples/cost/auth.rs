@@ -15,7 +15,7 @@ use uav_relay::wire::frame::MAX_FRAME;
 use super::counter::{instructions, relay, sends};
 use super::missions::mission;
 
-const KEY: Key = Key::new([0xA5; 32]);
+pub(crate) const KEY: Key = Key::new([0xA5; 32]);
 
 /// One tag of a frame with a body of this many bytes, as the sender makes it and the receiver again.
 fn tag(body: usize) -> u32 {

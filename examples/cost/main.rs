@@ -21,6 +21,8 @@ mod shares;
 mod stack;
 #[cfg(target_os = "none")]
 mod sweeps;
+#[cfg(all(target_os = "none", feature = "upload"))]
+mod upload;
 
 #[cfg(not(target_os = "none"))]
 fn main() {
@@ -57,6 +59,8 @@ mod image {
         stack::stack();
         #[cfg(feature = "auth")]
         super::auth::auth();
+        #[cfg(feature = "upload")]
+        super::upload::upload();
         hprintln!("done 1");
         debug::exit(debug::EXIT_SUCCESS);
         counter::stop()

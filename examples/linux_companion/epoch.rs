@@ -1,12 +1,13 @@
 //! The number that rises at every start, in a file.
 //!
-//! It is on the disk before it is used: written beside the file, synced, and put in its place. So a loss of power at any moment
-//! leaves the number of the start before, or the next one, and no number is used twice.
+//! It is on the disk before it is used. So a loss of power at any moment leaves the number of the start before, or the next one, and
+//! no number is used twice.
 
-use std::fs::{File, rename};
-use std::io::{ErrorKind, Write as _};
+use std::io::ErrorKind;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
+
+use crate::keep::keep;
 
 /// The epoch of this start: one more than `file` says, and written there. Without a file it is the seconds of the clock, so that
 /// a file that is lost does not begin again from 1.
@@ -24,22 +25,9 @@ pub(crate) fn next(file: &Path) -> Result<u32, String> {
     let epoch = last
         .checked_add(1)
         .ok_or_else(|| named("there is no epoch after that"))?;
-    keep(file, epoch).map_err(|error| named(&format!("cannot be written: {error}")))?;
+    keep(file, format!("{epoch}\n").as_bytes())
+        .map_err(|error| named(&format!("cannot be written: {error}")))?;
     Ok(epoch)
-}
-
-fn keep(file: &Path, epoch: u32) -> std::io::Result<()> {
-    let mut beside = file.as_os_str().to_owned();
-    beside.push(".new");
-    let mut new = File::create(&beside)?;
-    writeln!(new, "{epoch}")?;
-    new.sync_all()?;
-    rename(&beside, file)?;
-    // The name too has to be on the disk.
-    let folder = file
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
-    File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
 }
 
 fn seconds() -> u32 {

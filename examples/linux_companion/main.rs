@@ -1,14 +1,16 @@
 //! A relay on a Linux companion computer, over real ttys: USB adapters, the UART of a header, telemetry radios.
 //!
 //! ```text
-//! cargo run --release --example linux_companion -- --index 2 --of 3 --upstream /dev/ttyUSB0 --downstream /dev/ttyUSB1
-//! cargo run --release --example linux_companion -- --index 2 --of 3 --shared /dev/ttyUSB0      # one radio for all
-//! cargo run --release --example linux_companion -- --help
+//! cargo run --release --features upload --example linux_companion -- --index 2 --of 3 --upstream /dev/ttyUSB0 --downstream /dev/ttyUSB1
+//! cargo run --release --features upload --example linux_companion -- --index 2 --of 3 --shared /dev/ttyUSB0      # one radio for all
+//! cargo run --release --features upload --example linux_companion -- --help
 //! ```
 //! The first relay needs no `--upstream`, the last one no `--downstream`. All relays of a chain are given the same `--of`,
 //! `--baud`, `--network` and mission; a neighbour that was given another mission is reported.
 //!
-//! With `--key-file` and `--epoch-file` its frames are signed; without, anybody in range can move the drones, and it says so.
+//! With `--key-file` and `--epoch-file` its frames are signed; without, anybody in range can move the drones, and it says so. One
+//! that signs takes new missions in flight (`examples/linux_ground` uploads them), and with `--upload-file` it still has them when it
+//! is switched on again.
 //!
 //! Every event is one line on standard output; an f32 also as its bits. To make this program yours, hand the setpoint to
 //! your autopilot in `report.rs`. It ends with status 0 at Ctrl-C or SIGTERM, 1 when a tty fails (let systemd start it again),
@@ -17,21 +19,33 @@
 //! | file | one idea |
 //! | --- | --- |
 //! | `options.rs` | the command line, checked |
+//! | `mission.rs`, `command.rs` | the part of it that is the mission; what is said of a mistake |
 //! | `tty.rs` | a tty that never blocks, as a `SerialPort` |
 //! | `ports.rs` | the ttys of either wiring, and sleep until one of them or a timer needs the relay |
 //! | `relay.rs` | the loop |
-//! | `report.rs` | the lines it prints |
+//! | `report.rs`, `line.rs` | the lines it prints |
 //! | `key.rs`, `epoch.rs` | what frames are signed with, from files |
+//! | `uploads.rs` | the newest mission that was uploaded, in a file |
+//! | `keep.rs` | a file that is written whole or not at all |
+//! | `system.rs` | time and signals |
 //!
 //! It runs on other kinds of Unix too; on a Mac the ttys are called `/dev/cu.*`.
 #![cfg_attr(unix, forbid(unsafe_code))]
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(unix)]
+mod command;
+#[cfg(unix)]
 mod epoch;
+#[cfg(unix)]
+mod keep;
 #[cfg(unix)]
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
 mod key;
+#[cfg(unix)]
+mod line;
+#[cfg(unix)]
+mod mission;
 #[cfg(unix)]
 mod options;
 #[cfg(unix)]
@@ -41,7 +55,11 @@ mod relay;
 #[cfg(unix)]
 mod report;
 #[cfg(unix)]
+mod system;
+#[cfg(unix)]
 mod tty;
+#[cfg(unix)]
+mod uploads;
 
 #[cfg(unix)]
 fn main() -> std::process::ExitCode {

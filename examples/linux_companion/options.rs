@@ -4,16 +4,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
-use uav_relay::channel::AirGround;
-use uav_relay::mission::MissionError;
 use uav_relay::serial::byte_time;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
-    Adjust, Band, Channel, Duration, Field, FieldPoint, Identity, Interference, Interferer,
-    Mission, MissionConfig, Profile, Settings, Wiring,
+    Adjust, Duration, Field, FieldPoint, Identity, Interference, Mission, Settings, Wiring,
 };
 
+use crate::command::{self, named};
 use crate::key;
+use crate::mission::{self, MissionOptions};
 
 /// A frame's way through two kernels and two USB adapters, and the computing: an adapter alone may wait 16 ms.
 const LATENCY: Duration = Duration::from_millis(40);
@@ -29,10 +28,10 @@ struct Options {
     /// Number of relays, 1 to 1000
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
     of: u16,
-    /// Tty toward the transmitter; relay 1 needs none
+    /// Tty toward the transmitter; relay 1 needs one only where that uploads missions
     #[arg(long, value_name = "TTY")]
     upstream: Option<PathBuf>,
-    /// Tty toward the receiver; relay N needs none
+    /// Tty toward the receiver; relay N needs one only where that uploads missions
     #[arg(long, value_name = "TTY")]
     downstream: Option<PathBuf>,
     /// Tty to one channel that all relays hear, in place of the other two
@@ -50,41 +49,26 @@ struct Options {
     /// File that keeps the number of this start, made if it is missing; it must never go back
     #[arg(long, value_name = "FILE", requires = "key_file")]
     epoch_file: Option<PathBuf>,
+    /// File that keeps the newest mission that was uploaded in flight; without it a relay takes uploads, and has forgotten them when
+    /// it is switched on again
+    #[arg(long, value_name = "FILE", requires = "key_file")]
+    upload_file: Option<PathBuf>,
     /// Milliseconds of silence after which a neighbour is asked for a sign of life
     #[arg(long, value_name = "MS", default_value_t = 5_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
     quiet_ms: u64,
     /// Milliseconds of silence after which it counts as lost, above those of --quiet-ms
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
     lost_ms: u64,
-    /// Distance from transmitter to receiver, m, 1 to 1e6
-    #[arg(long, value_name = "M", default_value_t = 1000.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 1.0, 1e6))]
-    distance: f32,
-    /// Altitude of every relay, m, 0.1 to 1e5
-    #[arg(long, value_name = "M", default_value_t = 20.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.1, 1e5))]
-    altitude: f32,
-    /// Altitudes to choose from, m, 0.1 to 1e5, --altitude among them; without it that alone
-    #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
-    band: Option<Band>,
+    #[command(flatten)]
+    mission: MissionOptions,
     /// How the places are found; with --field, only by `align`. What counts is what the first relay is given, with --field the
     /// last one
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
-    /// Power of the transmitter, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", default_value_t = 80.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 1e6))]
-    tx_power: f32,
-    /// Power of every relay, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 1e6))]
-    uav_power: f32,
-    /// Interferer: power (W, 1e-6 to 1e9), place along and beside the line to the receiver (m, -1e7 to 1e7)
-    #[arg(long, value_name = "P,X,Y", default_value = "80,500,400", allow_hyphen_values = true, value_parser = interferer)]
-    interferer: Interferer,
     /// In place of --interferer, a field: Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32) along the line to the receiver
     /// (m, -1e7 to 1e7), X rising
     #[arg(long, value_name = "X:UPSILON,X:UPSILON,..", conflicts_with = "interferer", allow_hyphen_values = true, value_parser = field)]
     field: Option<Field>,
-    /// Least distance between two relays, m, 0 to 1e5
-    #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 1e5))]
-    min_separation: f32,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -122,6 +106,7 @@ pub(crate) struct Plan {
 pub(crate) struct Secret {
     pub(crate) key: [u8; 32],
     pub(crate) epoch_file: PathBuf,
+    pub(crate) upload_file: Option<PathBuf>,
 }
 
 impl std::fmt::Debug for Secret {
@@ -132,27 +117,7 @@ impl std::fmt::Debug for Secret {
 
 /// Reads the command line; where there is nothing to run, help or the mistake has been printed.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
-    let options = Options::try_parse().map_err(|error| {
-        if !error.use_stderr() {
-            // Help. Nobody is left to be told that it cannot be printed.
-            let _ = error.print();
-            return ExitCode::SUCCESS;
-        }
-        // The mistake is the first paragraph; usage and tips follow.
-        let text = error.to_string();
-        let wrong: Vec<&str> = text
-            .lines()
-            .take_while(|line| !line.trim().is_empty())
-            .map(str::trim)
-            .collect();
-        refuse(wrong.join(" ").trim_start_matches("error: "))
-    })?;
-    plan(&options).map_err(|line| refuse(&line))
-}
-
-fn refuse(line: &str) -> ExitCode {
-    eprintln!("{line}");
-    ExitCode::from(2)
+    plan(&command::read()?).map_err(|line| command::refuse(&line))
 }
 
 fn plan(options: &Options) -> Result<Plan, String> {
@@ -215,6 +180,7 @@ fn secret(options: &Options) -> Result<Option<Secret>, String> {
     Ok(Some(Secret {
         key: key::load(key_file)?,
         epoch_file: epoch_file.clone(),
+        upload_file: options.upload_file.clone(),
     }))
 }
 
@@ -251,73 +217,11 @@ fn ttys(options: &Options) -> Result<Ttys, String> {
 }
 
 fn mission(options: &Options) -> Result<Mission, String> {
-    // 2 GHz, excess losses of 0.1 dB with line of sight and 21 dB without: as the simulator has them, to the bit.
-    let channel =
-        Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).map_err(|error| error.to_string())?;
-    let config = MissionConfig {
-        relays: options.of,
-        distance_m: options.distance,
-        min_separation_m: options.min_separation,
-        tx_power_w: options.tx_power,
-        common: Profile {
-            altitude_m: options.altitude,
-            power_w: options.uav_power,
-        },
-        channel,
-        band: options.band.unwrap_or(Band::at(options.altitude)),
-        interference: options.field.map_or(
-            Interference::Source(options.interferer),
-            Interference::Field,
-        ),
-        tolerance: 1e-4,
-    };
-    Mission::try_new(config).map_err(|error| match error {
-        MissionError::TooManyForDistance => format!(
-            "--min-separation {}: must be at most --distance {} / (--of {} - 1)",
-            options.min_separation, options.distance, options.of
-        ),
-        MissionError::Band => {
-            let Band { least_m, most_m } = config.band;
-            format!(
-                "--band {least_m},{most_m}: must be from LEAST to MOST, with --altitude {} among them",
-                options.altitude
-            )
-        }
-        other => other.to_string(),
-    })
-}
-
-fn number(text: &str, least: f32, most: f32) -> Result<f32, String> {
-    let value = text.trim().parse().ok();
-    value
-        .filter(|value| (least..=most).contains(value))
-        .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
-}
-
-/// One of several numbers.
-fn named(name: &str, text: &str, least: f32, most: f32) -> Result<f32, String> {
-    number(text, least, most).map_err(|error| format!("{name} {error}"))
-}
-
-fn interferer(text: &str) -> Result<Interferer, String> {
-    let [power, x, y] = text.split(',').collect::<Vec<_>>()[..] else {
-        return Err("must be three numbers: P,X,Y".to_owned());
-    };
-    Ok(Interferer {
-        power_w: named("P", power, 1e-6, 1e9)?,
-        x_m: named("X", x, -1e7, 1e7)?,
-        y_m: named("Y", y, -1e7, 1e7)?,
-    })
-}
-
-fn band(text: &str) -> Result<Band, String> {
-    let (least, most) = text
-        .split_once(',')
-        .ok_or("must be two numbers: LEAST,MOST")?;
-    Ok(Band {
-        least_m: named("LEAST", least, 0.1, 1e5)?,
-        most_m: named("MOST", most, 0.1, 1e5)?,
-    })
+    let given = &options.mission;
+    let interference = options
+        .field
+        .map_or(Interference::Source(given.interferer), Interference::Field);
+    mission::mission(given.config(options.of, interference)?, "--")
 }
 
 /// The mission wants its field for as long as the program runs.

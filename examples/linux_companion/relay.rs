@@ -1,25 +1,23 @@
 //! The loop: move bytes, report events, sleep.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::io;
 use std::os::fd::AsFd;
-use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant as Clock};
 
-use signal_hook::consts::{SIGINT, SIGTERM};
-use uav_relay::{Auth, Instant, Key, Relay, Settings};
+use uav_relay::{Auth, Event, Key, Relay, Settings, Upload};
 
-use crate::epoch;
 use crate::options::Plan;
 use crate::ports::{Ports, Woken};
 use crate::report::Report;
+use crate::system::{now, on_signals};
+use crate::{epoch, uploads};
 
 /// Runs the relay until it is told to stop.
 ///
 /// # Errors
 /// One line that says why it could not go on.
 pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
-    let stop = on_signals().map_err(|error| format!("cannot wait for signals: {error}"))?;
+    let stop = on_signals()?;
     let mut ports = Ports::open(&plan.ttys, plan.baud)?;
     let clock = Clock::now();
     let auth = auth(plan)?;
@@ -27,15 +25,25 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
         auth,
         ..plan.settings
     };
+    let held = held(plan);
     let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), now(clock))
         .map_err(|error| error.to_string())?;
+    if let Some(held) = &held {
+        relay.resume(held).map_err(|error| error.to_string())?;
+    }
     let report = Report::new(plan.identity, &plan.mission);
     let names: Vec<String> = ports.ttys().map(|tty| tty.name().to_owned()).collect();
     report.started(&names, plan.baud)?;
     report.signs(auth.map(|auth| auth.epoch))?;
+    if held.is_some() {
+        report.resumed(&relay)?;
+    }
     loop {
         let wake = ports.poll(now(clock), &mut relay);
         while let Some(event) = relay.poll_event() {
+            if event == Event::Uploaded {
+                store(plan, &relay);
+            }
             report.event(now(clock), event, &relay)?;
         }
         if let Some(line) = ports.ttys().find_map(|tty| tty.failure()) {
@@ -59,21 +67,27 @@ fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
     }))
 }
 
-/// Time since the start, by a clock that nobody sets.
-fn now(clock: Clock) -> Instant {
-    Instant::from_micros(u64::try_from(clock.elapsed().as_micros()).unwrap_or(u64::MAX))
-}
-
 /// Another number at every start, of the source that std keys its hash maps with.
 fn seed() -> u32 {
     let [a, b, c, d, ..] = RandomState::new().build_hasher().finish().to_le_bytes();
     u32::from_le_bytes([a, b, c, d])
 }
 
-/// A stream that gets a byte at SIGINT or SIGTERM, so that poll(2) notices.
-fn on_signals() -> io::Result<UnixStream> {
-    let (ours, theirs) = UnixStream::pair()?;
-    signal_hook::low_level::pipe::register(SIGINT, theirs.try_clone()?)?;
-    signal_hook::low_level::pipe::register(SIGTERM, theirs)?;
-    Ok(ours)
+/// What was uploaded before this start. A file that is of no use is no reason not to fly: the chain hands the relay the newer mission.
+fn held(plan: &Plan) -> Option<Upload> {
+    let file = plan.secret.as_ref()?.upload_file.as_ref()?;
+    uploads::load(file, &plan.mission).unwrap_or_else(|line| {
+        eprintln!("{line}");
+        None
+    })
+}
+
+/// Keeps what was uploaded for the next start; where it cannot be kept, it is flown all the same.
+fn store(plan: &Plan, relay: &Relay) {
+    let file = plan.secret.as_ref().map(|secret| &secret.upload_file);
+    if let (Some(Some(file)), Some(upload)) = (file, relay.upload())
+        && let Err(line) = uploads::store(file, upload)
+    {
+        eprintln!("{line}");
+    }
 }

@@ -2,10 +2,11 @@
 //! as its bits, so that two relays (or a relay and a simulation) can be compared exactly.
 
 use std::fmt;
-use std::io::Write as _;
 
 use uav_relay::wire::digest::digest;
-use uav_relay::{Event, Identity, Instant, Mission, Placement, Relay, Side, Stats};
+use uav_relay::{Event, Identity, Instant, Mission, Placement, Relay, Side, Stats, Upload};
+
+use crate::line::line;
 
 /// An f32 for people and, exactly, for programs.
 struct Exact(f32);
@@ -69,6 +70,18 @@ impl Report {
         }
     }
 
+    /// That the relay flies what was uploaded before this start.
+    #[expect(clippy::unused_self, reason = "as the other lines")]
+    pub(crate) fn resumed(&self, relay: &Relay) -> Result<(), String> {
+        line(
+            Instant::ZERO,
+            format_args!(
+                "resumed: flies version {} of the mission, uploaded before this start",
+                relay.version()
+            ),
+        )
+    }
+
     pub(crate) fn event(&self, now: Instant, event: Event, relay: &Relay) -> Result<(), String> {
         match event {
             Event::SetpointChanged => match relay.setpoint() {
@@ -99,6 +112,17 @@ impl Report {
                     self.neighbour(side),
                     self.digest
                 ),
+            ),
+            Event::Uploaded => {
+                let version = relay.upload().map_or(0, Upload::version);
+                line(
+                    now,
+                    format_args!("uploaded: holds version {version} of the mission"),
+                )
+            }
+            Event::Adopted => line(
+                now,
+                format_args!("adopted: flies version {} of the mission", relay.version()),
             ),
             other => line(now, format_args!("event: {other:?}")),
         }
@@ -137,12 +161,4 @@ fn fly_to(now: Instant, place: Placement) -> Result<(), String> {
             Exact(place.altitude_m)
         ),
     )
-}
-
-/// Not `println!`: that panics when nobody reads any more.
-fn line(now: Instant, text: fmt::Arguments<'_>) -> Result<(), String> {
-    let micros = now.as_micros();
-    let (seconds, millis) = (micros / 1_000_000, micros / 1_000 % 1_000);
-    writeln!(std::io::stdout(), "{seconds:>6}.{millis:03} s  {text}")
-        .map_err(|error| format!("standard output: {error}"))
 }

@@ -1,4 +1,4 @@
-//! All the unsafe of the board: what the compiler cannot see about flash, RAM, interrupts and the linker.
+//! All the unsafe of the board but the writing of flash: what the compiler cannot see about RAM, interrupts and the linker.
 
 use core::ptr::{read_volatile, write_volatile};
 
@@ -7,8 +7,6 @@ use cortex_m::peripheral::NVIC;
 use stm32f4xx_hal::pac::Interrupt;
 
 use super::config::{self, Block};
-#[cfg(feature = "auth")]
-use super::epoch::{self, Entry};
 
 /// The configuration block, where it stands in the flash.
 pub(crate) fn block() -> &'static Block {
@@ -38,69 +36,6 @@ pub(crate) fn seed() -> u32 {
     // SAFETY: as above.
     unsafe { write_volatile(first, seed) };
     seed
-}
-
-/// What stands in one of the two sectors that keep the epoch.
-#[cfg(feature = "auth")]
-pub(crate) fn epochs(sector: usize) -> &'static [Entry] {
-    let address = epoch::SECTORS.get(sector).copied().unwrap_or_default();
-    if address == 0 {
-        return &[];
-    }
-    // SAFETY: a part of the flash, always readable and aligned, that no image reaches (`memory.x`). Only `write_epoch` writes
-    // there, and what this function gave before is not looked at after that.
-    unsafe { core::slice::from_raw_parts(address as *const Entry, epoch::ENTRIES) }
-}
-
-/// Writes an epoch down, and reads it back; whether it stands there. An erase takes a second or two.
-///
-/// No other access to the flash's registers is under way: nothing else in this program has them.
-#[cfg(feature = "auth")]
-pub(crate) fn write_epoch(step: epoch::Step) -> bool {
-    use stm32f4xx_hal::pac::FLASH;
-
-    const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-    /// Words at a time, as the 3.3 V of this board allow.
-    const BY_WORD: u8 = 2;
-    let Some(address) = epoch::SECTORS.get(step.sector) else {
-        return false;
-    };
-    // SAFETY: see above.
-    let flash = unsafe { FLASH::steal() };
-    // Reading waits by itself until the flash is free; this is for what is asked of it next.
-    let wait = || while flash.sr().read().bsy().bit_is_set() {};
-    for key in KEYS {
-        // SAFETY: any word may be written there; these two unlock.
-        flash.keyr().write(|w| unsafe { w.bits(key) });
-    }
-    if step.erase {
-        let number = epoch::FIRST_SECTOR + u8::from(step.sector == 1);
-        // SAFETY: a sector that no image reaches.
-        flash
-            .cr()
-            .write(|w| unsafe { w.psize().bits(BY_WORD).ser().set_bit().snb().bits(number) });
-        flash.cr().modify(|_, w| w.strt().set_bit());
-        wait();
-    }
-    // SAFETY: a size that the register knows.
-    flash
-        .cr()
-        .write(|w| unsafe { w.psize().bits(BY_WORD).pg().set_bit() });
-    let first = (*address as *mut Entry)
-        .wrapping_add(step.entry)
-        .cast::<u32>();
-    let words = epoch::entry(step.epoch);
-    for (place, word) in [first, first.wrapping_add(1)].into_iter().zip(words) {
-        // SAFETY: inside the sector as `epoch::next` has it, aligned, and blank.
-        unsafe { write_volatile(place, word) };
-        wait();
-    }
-    flash.cr().write(|w| w.lock().set_bit());
-    [first, first.wrapping_add(1)]
-        .into_iter()
-        .zip(words)
-        // SAFETY: as above.
-        .all(|(place, word)| unsafe { read_volatile(place) } == word)
 }
 
 /// For a drone that cannot take part: sleeps for good.

@@ -9,9 +9,11 @@ use uav_relay::wire::auth::Key;
 use uav_relay::{Event, Instant, Placement, Relay, Sample, Settings, Wiring};
 
 use super::clock::Clock;
-#[cfg(feature = "auth")]
-use super::epoch;
+#[cfg(feature = "upload")]
+use super::kept;
 use super::{board, config, log};
+#[cfg(feature = "auth")]
+use super::{epoch, flash};
 
 /// What the links of both variants have in common.
 pub(crate) trait Links {
@@ -57,6 +59,10 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, relay: &mut Relay) 
             {
                 fly_to(place);
             }
+            #[cfg(feature = "upload")]
+            if event == Event::Uploaded {
+                kept::keep(relay);
+            }
         }
         if log::asked() {
             log::counters(relay);
@@ -76,7 +82,12 @@ pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> 
         Ok(config) => {
             log::begins(&config);
             let auth = sign().ok()?;
-            switch_on(&config, auth, wiring, now)
+            let relay = switch_on(&config, auth, wiring, now)?;
+            #[cfg(feature = "upload")]
+            if auth.is_some() {
+                kept::resume(relay);
+            }
+            Some(relay)
         }
         Err(error) => {
             log::refused(error);
@@ -94,9 +105,12 @@ fn switch_on(
     wiring: Wiring,
     now: Instant,
 ) -> Option<&'static mut Relay> {
+    let common = config.mission.config().common;
     let settings = Settings {
         auth,
-        profile: Some(config.profile),
+        // What it has in common with the others may change with an upload.
+        profile: Some(config.profile)
+            .filter(|own| !cfg!(feature = "upload") || config.hold_altitude || *own != common),
         hold_altitude: config.hold_altitude,
         method: config.method,
         measure: config.measure,
@@ -136,11 +150,17 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
             return Err(CannotSign);
         }
     };
-    let Some(step) = epoch::next([board::epochs(0), board::epochs(1)], floor) else {
+    let sectors = flash::EPOCHS.map(flash::Sector::records);
+    let Some(step) = epoch::next(sectors, floor) else {
         log::no_epoch();
         return Err(CannotSign);
     };
-    let kept = board::write_epoch(step);
+    let kept = flash::EPOCHS.get(step.sector).is_some_and(|sector| {
+        if step.erase {
+            sector.erase();
+        }
+        sector.write(step.entry, &epoch::entry(step.epoch))
+    });
     let epoch = if kept { step.epoch } else { floor };
     log::signs(epoch, kept);
     Ok(Some(Auth {

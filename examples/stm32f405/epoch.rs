@@ -3,16 +3,10 @@
 //! Two sectors of flash hold it. Each start appends an entry of two words, the epoch and its complement, to the sector that has
 //! the largest; when that is full the other one is erased and gone on with, so that a loss of power at any moment leaves the
 //! largest epoch that was ever used where it is. An entry that a loss of power has cut short is no epoch, and its epoch has not
-//! been used: it counts only once it has been read back. [`ENTRIES`] starts fill a sector.
+//! been used: it counts only once it has been read back. 16 384 starts fill a sector of 128 KiB.
 
 /// Where the two sectors begin: sectors 9 and 10 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x080A_0000, 0x080C_0000];
-
-/// The number that the flash's registers know the first of them by; the other is the next.
-pub const FIRST_SECTOR: u8 = 9;
-
-/// Entries of a sector of 128 KiB.
-pub const ENTRIES: usize = 16_384;
 
 /// An epoch and its complement; all ones where nothing is written.
 pub type Entry = [u32; 2];

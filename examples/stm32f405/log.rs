@@ -81,6 +81,25 @@ pub(crate) fn no_epoch() {
     defmt::error!("no epoch is left to sign with");
 }
 
+/// The mission of this version was uploaded before this start.
+#[cfg(feature = "upload")]
+pub(crate) fn resumes(version: u16) {
+    defmt::info!("mission version {=u16} was uploaded before", version);
+}
+
+/// The mission of this version has been uploaded; `kept` tells whether it stands in the flash.
+#[cfg(feature = "upload")]
+pub(crate) fn uploaded(version: u16, kept: bool) {
+    if kept {
+        defmt::info!("mission version {=u16} is kept", version);
+    } else {
+        defmt::warn!(
+            "mission version {=u16} cannot be kept: after a reboot it has to come again",
+            version
+        );
+    }
+}
+
 #[cfg(not(feature = "auth"))]
 pub(crate) fn cannot_sign() {
     defmt::error!("configuration refused: it has a key, and this image was built without auth");
@@ -88,6 +107,10 @@ pub(crate) fn cannot_sign() {
 
 pub(crate) fn event(event: Event, relay: &Relay) {
     defmt::info!("event {}", event);
+    #[cfg(feature = "upload")]
+    if event == Event::Adopted {
+        defmt::info!("mission version {=u16} is flown", relay.version());
+    }
     if event == Event::SetpointChanged
         && let Some(place) = relay.setpoint()
     {

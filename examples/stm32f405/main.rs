@@ -19,11 +19,13 @@
 //! | `drone.rs` | what a drone does, whatever its links are; `fly_to` is where your autopilot comes in |
 //! | `config.rs` | the configuration, byte by byte |
 //! | `epoch.rs` | with `--features auth`, the number that rises at every start |
+//! | `uploads.rs`, `kept.rs` | with `--features upload`, the missions that were uploaded in flight: the log of them, and its use |
+//! | `flash.rs` | the sectors that hold these two, and everything unsafe about them |
 //! | `port.rs` | a serial port that an interrupt serves |
 //! | `clock.rs` | time and sleep |
 //! | `log.rs`, `silent.rs` | the log with `--features defmt`, and without |
 //! | `sink_uart.rs`, `sink_rtt.rs` | where it goes: a spare UART, or the debug probe with `--features rtt` |
-//! | `board.rs` | everything unsafe |
+//! | `board.rs` | everything else unsafe |
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -38,11 +40,18 @@ mod drone;
 #[cfg(all(target_os = "none", feature = "auth"))]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod epoch;
+#[cfg(all(target_os = "none", feature = "auth"))]
+mod flash;
+#[cfg(all(target_os = "none", feature = "upload"))]
+mod kept;
 #[cfg(target_os = "none")]
 #[cfg_attr(not(feature = "defmt"), path = "silent.rs")]
 mod log;
 #[cfg(target_os = "none")]
 mod port;
+#[cfg(all(target_os = "none", feature = "upload"))]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod uploads;
 #[cfg(target_os = "none")]
 mod wires;
 

@@ -22,6 +22,12 @@ pub(crate) const fn unsigned() {}
 #[cfg(feature = "auth")]
 pub(crate) const fn no_epoch() {}
 
+#[cfg(feature = "upload")]
+pub(crate) const fn resumes(_: u16) {}
+
+#[cfg(feature = "upload")]
+pub(crate) const fn uploaded(_: u16, _: bool) {}
+
 #[cfg(not(feature = "auth"))]
 pub(crate) const fn cannot_sign() {}
 

@@ -23,6 +23,12 @@ mod drone;
 #[path = "../stm32f405/epoch.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod epoch;
+#[cfg(all(target_os = "none", feature = "auth"))]
+#[path = "../stm32f405/flash.rs"]
+mod flash;
+#[cfg(all(target_os = "none", feature = "upload"))]
+#[path = "../stm32f405/kept.rs"]
+mod kept;
 #[cfg(target_os = "none")]
 #[cfg_attr(feature = "defmt", path = "../stm32f405/log.rs")]
 #[cfg_attr(not(feature = "defmt"), path = "../stm32f405/silent.rs")]
@@ -32,6 +38,10 @@ mod log;
 mod port;
 #[cfg(target_os = "none")]
 mod radio;
+#[cfg(all(target_os = "none", feature = "upload"))]
+#[path = "../stm32f405/uploads.rs"]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod uploads;
 
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]

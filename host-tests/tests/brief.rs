@@ -12,6 +12,8 @@
 mod epoch;
 #[path = "brief/secret.rs"]
 mod secret;
+#[path = "brief/uploads.rs"]
+mod uploads;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

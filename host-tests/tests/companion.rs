@@ -1,4 +1,4 @@
-//! `examples/linux_companion` as processes on pseudo-terminals, against the simulated chain.
+//! `examples/linux_companion` and `examples/linux_ground` as processes on pseudo-terminals, against the simulated chain.
 #![cfg(target_os = "linux")]
 #![allow(
     clippy::unwrap_used,
@@ -25,6 +25,8 @@ mod process;
 mod pty;
 #[path = "companion/signed.rs"]
 mod signed;
+#[path = "companion/upload.rs"]
+mod upload;
 
 use std::time::{Duration, Instant};
 

@@ -29,3 +29,5 @@ mod radio;
 mod signed;
 #[path = "qemu/silence.rs"]
 mod silence;
+#[path = "qemu/upload.rs"]
+mod upload;

@@ -79,15 +79,15 @@ fn steps() -> Vec<Step> {
         ),
         step(
             "clippy, auth",
-            "cargo clippy -p uav-relay --all-targets --features auth --locked -- -D warnings",
+            "cargo clippy -p uav-relay --lib --features auth --locked -- -D warnings",
         ),
         step(
             "clippy, target",
             "cargo clippy -p uav-relay --lib --examples --target thumbv7em-none-eabihf --locked -- -D warnings",
         ),
         step(
-            "clippy, target, auth, defmt",
-            "cargo clippy -p uav-relay --lib --examples --features auth,defmt --target thumbv7em-none-eabihf --locked -- -D warnings",
+            "clippy, target, upload, defmt",
+            "cargo clippy -p uav-relay --lib --examples --features upload,defmt --target thumbv7em-none-eabihf --locked -- -D warnings",
         ),
         step("tests", "cargo test --no-fail-fast --locked"),
         step("documentation", "cargo doc --workspace --no-deps --locked"),
@@ -104,12 +104,12 @@ fn steps() -> Vec<Step> {
             "cargo test -p uav-relay --lib --no-default-features --locked",
         ),
         step(
-            "relay that signs",
-            "cargo test -p uav-relay --lib --features auth --locked",
+            "Algorithm 1 and uploads",
+            "cargo test -p uav-relay --lib --no-default-features --features upload --locked",
         ),
         step(
-            "firmware that signs, with its log",
-            "cargo build -p uav-relay --release --target thumbv7em-none-eabihf --examples --features auth,defmt --locked",
+            "firmware that takes uploads, with its log",
+            "cargo build -p uav-relay --release --target thumbv7em-none-eabihf --examples --features upload,defmt --locked",
         ),
         step(
             "firmware with its log by the probe",
@@ -124,7 +124,7 @@ fn steps() -> Vec<Step> {
     steps.push(step("cost, and no panic", "cargo cost"));
     for (name, features) in [
         ("oldest compiler", ""),
-        ("oldest compiler, all", "auth,defmt"),
+        ("oldest compiler, all", "upload,defmt"),
     ] {
         let check = "cargo check -p uav-relay --locked --target-dir target/oldest";
         let command = format!("rustup run {OLDEST} {check} --features={features}");

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use super::uploads::{self, Record};
 use super::{MISSING, QEMU, config};
 
 /// How much faster than the wall clock the drone's own clock runs.
@@ -42,13 +43,15 @@ pub struct Emulator {
 pub type Sockets = [UnixStream; 3];
 
 impl Emulator {
-    /// Switches a drone on with `image`, and `block` at the place of its configuration. `folder` is made, and is its own.
+    /// Switches a drone on with `image`, `block` at the place of its configuration, and `kept` first in the log of its uploads. `folder`
+    /// is made, and is its own.
     ///
     /// # Errors
     /// [`MISSING`] if there is no QEMU; otherwise whatever went wrong, QEMU's own words included.
     pub fn start(
         image: &Path,
         block: &[u8],
+        kept: &[Record],
         folder: &Path,
         name: &str,
     ) -> Result<(Self, Sockets), String> {
@@ -57,22 +60,20 @@ impl Emulator {
         std::fs::create_dir_all(&folder).map_err(failed)?;
         let file = folder.join("block.bin");
         std::fs::write(&file, block).map_err(failed)?;
-        let log = std::fs::File::create(folder.join("qemu.txt")).map_err(failed)?;
+        let kept_file = folder.join("uploads.bin");
+        std::fs::write(&kept_file, log_of(kept)).map_err(failed)?;
+        let said = std::fs::File::create(folder.join("qemu.txt")).map_err(failed)?;
         let mut command = Command::new(QEMU);
         command
             .args(["-machine", "netduinoplus2", "-display", "none"])
             .args(["-monitor", "none", "-serial", "null"])
             .arg("-kernel")
             .arg(image)
-            .arg("-device")
-            .arg(format!(
-                "loader,file={},addr={:#x},force-raw=on",
-                file.display(),
-                config::ADDRESS
-            ))
+            .args(loaded(&file, config::ADDRESS))
+            .args(loaded(&kept_file, uploads::SECTORS[0]))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
-            .stderr(log);
+            .stderr(said);
         let mut listeners = Vec::new();
         for uart in UARTS {
             let path = folder.join(format!("{uart:?}"));
@@ -138,6 +139,27 @@ impl Emulator {
         _ = self.process.kill();
         _ = self.process.wait();
     }
+}
+
+/// The option that loads `file` into the flash.
+fn loaded(file: &Path, address: u32) -> [String; 2] {
+    let file = file.display();
+    [
+        "-device".to_owned(),
+        format!("loader,file={file},addr={address:#x},force-raw=on"),
+    ]
+}
+
+/// Two sectors that are blank behind `kept`.
+fn log_of(kept: &[Record]) -> Vec<u8> {
+    const BYTES: usize = 2 * 128 * 1024;
+    let mut bytes: Vec<u8> = kept
+        .iter()
+        .flatten()
+        .flat_map(|word| word.to_le_bytes())
+        .collect();
+    bytes.resize(BYTES, u8::MAX);
+    bytes
 }
 
 impl Drop for Emulator {

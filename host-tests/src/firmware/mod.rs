@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`config`] | the configuration block, byte by byte; the firmware's own file |
 //! | [`epoch`] | the number that rises at every start, and where it is kept; the firmware's own file |
+//! | [`uploads`] | the missions that were uploaded in flight, and where they are kept; the firmware's own file |
 //! | [`key`] | the network's key, from a file; the Linux companion's own file |
 //! | [`block`] | from a scenario to the block of one drone |
 //! | [`image`] | the image, built by cargo |
@@ -25,6 +26,8 @@ pub mod key;
 pub mod medium;
 #[cfg(unix)]
 pub mod network;
+#[path = "../../../examples/stm32f405/uploads.rs"]
+pub mod uploads;
 
 /// The emulator.
 pub const QEMU: &str = "qemu-system-arm";

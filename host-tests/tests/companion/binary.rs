@@ -1,17 +1,23 @@
-//! The example as a program. `cargo test` at the root has built it already, `cargo test -p host-tests` has not, and there is
+//! The examples as programs. `cargo test` at the root has built them already, `cargo test -p host-tests` has not, and there is
 //! no variable with its place as there is for a package's own binaries: so cargo is asked, which builds what is missing.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 
-/// Where the example is, built in the profile of the tests.
+/// Where the relay is, built in the profile of the tests.
 pub(crate) fn companion() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(build)
+    PATH.get_or_init(|| build("linux_companion"))
 }
 
-fn build() -> PathBuf {
+/// And the ground.
+pub(crate) fn ground() -> &'static Path {
+    static PATH: OnceLock<PathBuf> = OnceLock::new();
+    PATH.get_or_init(|| build("linux_ground"))
+}
+
+fn build(example: &str) -> PathBuf {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = manifest.parent().expect("the workspace is one up");
     // The target folder of these tests, so that nothing is built twice. Cargo holds no lock on it while tests run.
@@ -19,7 +25,7 @@ fn build() -> PathBuf {
     let mut cargo = Command::new(env!("CARGO"));
     cargo
         .current_dir(root)
-        .args(["build", "--locked", "--example", "linux_companion"])
+        .args(["build", "--locked", "--example", example])
         .args(["--message-format", "json-render-diagnostics"])
         .arg("--target-dir")
         .arg(target.expect("the folder for temporary files is in it"))
@@ -28,12 +34,12 @@ fn build() -> PathBuf {
         cargo.arg("--release");
     }
     let output = cargo.output().unwrap();
-    assert!(output.status.success(), "the example does not build");
+    assert!(output.status.success(), "{example} does not build");
     String::from_utf8(output.stdout)
         .unwrap()
         .lines()
         .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
-        .filter(|message| message["target"]["name"] == "linux_companion")
+        .filter(|message| message["target"]["name"] == example)
         .find_map(|message| message["executable"].as_str().map(PathBuf::from))
         .expect("cargo names the executable")
 }

@@ -141,6 +141,7 @@ const WRONG: &[(&[&str], &[&str])] = &[
         &["--field", "0:1e6", "--method", "altitude"],
         &["--method altitude", "align with --field"],
     ),
+    (&["--upload-file", "x"], &["--key-file", "not provided"]),
     (&["--nonsense"], &["--nonsense"]),
 ];
 

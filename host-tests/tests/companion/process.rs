@@ -1,14 +1,15 @@
-//! A relay as a process: its lines, its end, its use of the processor. It is killed when dropped.
+//! A relay, or the ground, as a process: its lines, its end, its use of the processor. It is killed when dropped.
 
 use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::binary::companion;
+use crate::binary::{companion, ground};
 
 /// How long anything may take that should be done in a moment: this machine may be busy.
 pub(crate) const LIMIT: Duration = Duration::from_secs(30);
@@ -45,7 +46,15 @@ fn lines_of(pipe: impl Read + Send + 'static) -> Receiver<String> {
 
 impl Relay {
     pub(crate) fn start(arguments: &[&str]) -> Self {
-        let mut child = Command::new(companion())
+        Self::run(companion(), arguments)
+    }
+
+    pub(crate) fn ground(arguments: &[&str]) -> Self {
+        Self::run(ground(), arguments)
+    }
+
+    fn run(program: &Path, arguments: &[&str]) -> Self {
+        let mut child = Command::new(program)
             .args(arguments)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())

@@ -7,7 +7,7 @@ use std::time::Duration;
 use rustix::fs::{Mode, OFlags, open};
 use rustix::io::{Errno, ioctl_fionbio};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use rustix::termios::tcgetattr;
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 /// Both sides. It is left as the system makes it, cooked and with echo: to make it raw is up to the relay.
 #[derive(Debug)]
@@ -76,4 +76,13 @@ impl Pty {
             }
         }
     }
+}
+
+/// Makes a tty raw that nobody has opened yet: on a channel that others use, it would send them back what it hears.
+pub(crate) fn make_raw(path: &str) {
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+    let tty = open(path, flags, Mode::empty()).unwrap();
+    let mut line = tcgetattr(&tty).unwrap();
+    line.make_raw();
+    tcsetattr(&tty, OptionalActions::Now, &line).unwrap();
 }

@@ -10,17 +10,17 @@ use crate::process::{Ended, Relay};
 use crate::{Chain, simulated};
 
 /// A file with a key, and a folder for the epochs of relays.
-struct Files(tempfile::TempDir);
+pub(crate) struct Files(tempfile::TempDir);
 
 impl Files {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let files = Self(tempfile::tempdir().unwrap());
         files.write("key", &"5eC2e7".repeat(11)[..64]);
         files.write("other", &"00000001".repeat(8));
         files
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
@@ -28,7 +28,7 @@ impl Files {
         std::fs::write(self.path(name), text).unwrap();
     }
 
-    fn options(&self, key: &str, epoch: &str) -> Vec<String> {
+    pub(crate) fn options(&self, key: &str, epoch: &str) -> Vec<String> {
         let text = |path: &Path| path.to_str().unwrap().to_owned();
         vec![
             "--key-file".to_owned(),

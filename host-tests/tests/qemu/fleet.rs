@@ -13,6 +13,7 @@ use host_tests::firmware::emulator::Emulator;
 use host_tests::firmware::image;
 use host_tests::firmware::medium::Medium;
 use host_tests::firmware::network::{self, Network};
+use host_tests::firmware::uploads::Record;
 use host_tests::sim::faults::{Faults, Injected};
 use host_tests::sim::link::LinkSpec;
 
@@ -70,13 +71,48 @@ pub(crate) struct Fleet {
 impl Fleet {
     /// Switches on one drone for each block, on `image`, with a medium of `faults` and `seed`.
     pub(crate) fn start(which: Image, blocks: &[Vec<u8>], faults: Faults, seed: u64) -> Self {
+        Self::begin(which, blocks, &[], None, faults, seed)
+    }
+
+    /// The same, with what each drone finds in the log of its uploads.
+    pub(crate) fn with_uploads(
+        which: Image,
+        blocks: &[Vec<u8>],
+        kept: &[Vec<Record>],
+        faults: Faults,
+        seed: u64,
+    ) -> Self {
+        Self::begin(which, blocks, kept, None, faults, seed)
+    }
+
+    /// The same, with a transmitter at the other end of `socket`.
+    pub(crate) fn with_transmitter(
+        which: Image,
+        blocks: &[Vec<u8>],
+        socket: UnixStream,
+        faults: Faults,
+        seed: u64,
+    ) -> Self {
+        Self::begin(which, blocks, &[], Some(socket), faults, seed)
+    }
+
+    fn begin(
+        which: Image,
+        blocks: &[Vec<u8>],
+        kept: &[Vec<Record>],
+        transmitter: Option<UnixStream>,
+        faults: Faults,
+        seed: u64,
+    ) -> Self {
         let (file, table) = (image(which.name()), table(which));
         let folder = tempfile::Builder::new().prefix("fleet").tempdir().unwrap();
         let (lines, new) = channel();
         let (mut drones, mut consoles, mut ports) = (Vec::new(), Vec::new(), Vec::new());
         for (drone, block) in (1..).zip(blocks) {
+            let kept = kept.get(drones.len()).map_or(&[][..], Vec::as_slice);
+            let name = format!("drone{drone}");
             let (emulator, [usart2, usart3, console]) =
-                Emulator::start(&file, block, folder.path(), &format!("drone{drone}"))
+                Emulator::start(&file, block, kept, folder.path(), &name)
                     .unwrap_or_else(|error| panic!("{error}"));
             drones.push(emulator);
             ports.push(usart2);
@@ -87,10 +123,17 @@ impl Fleet {
             let lines = lines.clone();
             std::thread::spawn(move || log::listen(console, drone, table, &lines));
         }
-        let hearers = match which {
-            Image::Wires => network::chain(blocks.len()),
-            Image::Radio => network::radio(blocks.len(), 2),
+        let (mut hearers, in_range) = match which {
+            Image::Wires => (network::chain(blocks.len()), 1),
+            Image::Radio => (network::radio(blocks.len(), 2), 2),
         };
+        if let Some(socket) = transmitter {
+            for hearers in hearers.iter_mut().take(in_range) {
+                hearers.push(ports.len());
+            }
+            hearers.push((0..in_range).collect());
+            ports.push(socket);
+        }
         let medium = Medium::new(
             ports.len(),
             LinkSpec::default(),

@@ -51,6 +51,15 @@ pub(crate) fn of_the_signing_image() -> Result<Vec<Row>, String> {
     table(&counted, SIGNED)
 }
 
+/// The same image with the feature `upload`: what that adds.
+pub(crate) fn of_the_uploading_image() -> Result<Vec<Row>, String> {
+    let counted = count(&build("cost", &["--features", "upload"])?)?;
+    if figure(&counted, "held")? != 1 {
+        return Err("an offer in the counting image: not held".to_owned());
+    }
+    table(&counted, UPLOADED)
+}
+
 fn figure(counted: &BTreeMap<String, u64>, name: &str) -> Result<u64, String> {
     counted
         .get(name)
@@ -103,6 +112,22 @@ const SIGNED: &[Counted] = &[
         &["refused"],
         None,
     ),
+];
+
+const UPLOADED: &[Counted] = &[
+    (
+        "`size_of::<Relay>()` with `upload`",
+        "bytes",
+        &["size_of_relay"],
+        None,
+    ),
+    (
+        "an offer of a new mission, taken",
+        "instructions",
+        &["offer"],
+        None,
+    ),
+    ("its frame", "bytes", &["offer_bytes"], Some(112)),
 ];
 
 /// A row of what the counting image reports: the largest of the figures with these names.

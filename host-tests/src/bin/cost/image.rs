@@ -56,9 +56,19 @@ const IMAGES: &[Image] = &[
         [48 * 1024, 6 * 1024, 2_304],
     ),
     (
+        "flash of that with `auth`, `membership` and `upload`",
+        &["--no-default-features", "--features", "upload"],
+        [51 * 1024, 6 * 1024, 2_176],
+    ),
+    (
         "flash of the relay image, everything and `auth`",
         &["--features", "auth"],
         [62 * 1024, 6 * 1024, 3_328],
+    ),
+    (
+        "flash of the relay image, everything and `upload`",
+        &["--features", "upload"],
+        [68 * 1024, 6 * 1024, 3_456],
     ),
     (
         "flash of the relay image, everything but `auth`",
@@ -180,7 +190,7 @@ pub(crate) fn deepest_stack(elf: &Path) -> Result<(u64, u64), String> {
     Ok((thread, EXCEPTION_FRAME + handler))
 }
 
-/// Links the relay image, with `auth` and without, with a panic handler that cannot be linked; and, as a control, one that does
+/// Links the relay image, with `auth`, with `upload` and without, with a panic handler that cannot be linked; and, as a control, one that does
 /// panic.
 pub(crate) fn no_panic() -> Result<(), String> {
     let link = |features: &[&str], flags: &[&str]| {
@@ -201,7 +211,7 @@ pub(crate) fn no_panic() -> Result<(), String> {
             .arg("--")
             .args(flags))
     };
-    for features in [&[][..], &["--features", "auth"]] {
+    for features in [&[][..], &["--features", "auth"], &["--features", "upload"]] {
         link(features, &["--cfg", "prove_no_panic"])
             .map_err(|error| format!("a panic is reachable in the relay image: {error}"))?;
     }

@@ -1,0 +1,55 @@
+//! What it costs to take a new mission.
+
+use cortex_m_semihosting::hprintln;
+use uav_relay::Auth;
+use uav_relay::FrameBuf;
+use uav_relay::Ground;
+use uav_relay::Instant;
+use uav_relay::Mission;
+use uav_relay::Port;
+use uav_relay::Settings;
+use uav_relay::Side;
+use uav_relay::Upload;
+use uav_relay::Wiring;
+use uav_relay::wire::frame::MAX_FRAME;
+
+use super::auth::KEY;
+use super::counter::{instructions, relay, sends};
+use super::missions::mission;
+
+/// The transmitter offers relay 1 the mission that this was loaded with, as version 1.
+pub(crate) fn upload() {
+    const THREE: Mission = mission(3);
+    let now = Instant::ZERO;
+    let of = |epoch| Auth { key: KEY, epoch };
+    let settings = Settings {
+        auth: Some(of(1)),
+        ..Settings::default()
+    };
+    let mut relay = relay(1, settings, THREE);
+    let mut ground = Ground::new(&THREE, Side::Upstream, 1, Wiring::Pair, of(2));
+    let Ok(upload) = Upload::new(&THREE, 1, *THREE.config()) else {
+        return;
+    };
+    let mut frame: FrameBuf = [0; MAX_FRAME];
+    if ground.upload(now, upload).is_err() {
+        return;
+    }
+    // Hellos first; the offer is what is longer than they are.
+    loop {
+        while let Some(len) = ground.poll_transmit(&mut frame) {
+            let bytes = frame.get(..len).unwrap_or_default();
+            let taken = instructions(|| relay.handle_bytes(now, Port::Upstream, bytes));
+            if relay.upload().is_some() {
+                hprintln!("offer {}", taken);
+                hprintln!("offer_bytes {}", len);
+                hprintln!("held {}", u32::from(relay.upload() == Some(&upload)));
+                return;
+            }
+        }
+        let Some((said, len)) = sends(&mut relay, now) else {
+            return;
+        };
+        ground.handle_bytes(said.get(..len).unwrap_or_default());
+    }
+}

@@ -1,0 +1,23 @@
+//! A file that is on the disk whole, or as it was before: written beside, synced, and put in its place.
+
+use std::fs::{File, rename};
+use std::io::Write as _;
+use std::path::Path;
+
+/// Makes `bytes` all that is in `file`.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn keep(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut beside = file.as_os_str().to_owned();
+    beside.push(".new");
+    let mut new = File::create(&beside)?;
+    new.write_all(bytes)?;
+    new.sync_all()?;
+    rename(&beside, file)?;
+    // The name too has to be on the disk.
+    let folder = file
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
+}

@@ -1,0 +1,132 @@
+//! The mission that the relays are loaded with, as options give it.
+
+use clap::Args;
+use uav_relay::channel::AirGround;
+use uav_relay::mission::MissionError;
+use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+
+use crate::command::{named, number};
+
+/// The options of a mission but for the number of relays.
+#[derive(Args, Debug)]
+pub(crate) struct MissionOptions {
+    /// Distance from transmitter to receiver, m, 1 to 1e6
+    #[arg(long, value_name = "M", default_value_t = 1000.0, allow_negative_numbers = true, value_parser = distance)]
+    pub(crate) distance: f32,
+    /// Altitude of every relay, m, 0.1 to 1e5
+    #[arg(long, value_name = "M", default_value_t = 20.0, allow_negative_numbers = true, value_parser = altitude)]
+    pub(crate) altitude: f32,
+    /// Altitudes to choose from, m, 0.1 to 1e5, --altitude among them; without it that alone
+    #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
+    pub(crate) band: Option<Band>,
+    /// Power of the transmitter, W, 1e-6 to 1e6
+    #[arg(long, value_name = "W", default_value_t = 80.0, allow_negative_numbers = true, value_parser = power)]
+    pub(crate) tx_power: f32,
+    /// Power of every relay, W, 1e-6 to 1e6
+    #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = power)]
+    pub(crate) uav_power: f32,
+    /// Interferer: power (W, 1e-6 to 1e9), place along and beside the line to the receiver (m, -1e7 to 1e7)
+    #[arg(long, value_name = "P,X,Y", default_value = "80,500,400", allow_hyphen_values = true, value_parser = interferer)]
+    pub(crate) interferer: Interferer,
+    /// Least distance between two relays, m, 0 to 1e5
+    #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = separation)]
+    pub(crate) min_separation: f32,
+}
+
+impl MissionOptions {
+    /// The parameters, for so many relays in this interference.
+    ///
+    /// # Errors
+    /// One line that says what is wrong.
+    pub(crate) fn config(
+        &self,
+        relays: u16,
+        interference: Interference,
+    ) -> Result<MissionConfig, String> {
+        // 2 GHz, excess losses of 0.1 dB with line of sight and 21 dB without: as the simulator has them, to the bit.
+        let channel =
+            Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).map_err(|error| error.to_string())?;
+        Ok(MissionConfig {
+            relays,
+            distance_m: self.distance,
+            min_separation_m: self.min_separation,
+            tx_power_w: self.tx_power,
+            common: Profile {
+                altitude_m: self.altitude,
+                power_w: self.uav_power,
+            },
+            channel,
+            band: self.band.unwrap_or(Band::at(self.altitude)),
+            interference,
+            tolerance: 1e-4,
+        })
+    }
+}
+
+/// The mission of these parameters; `prefix` is that of the options that gave them, "--" or "--new-".
+///
+/// # Errors
+/// One line that names the option and what is wrong.
+pub(crate) fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
+    let MissionConfig {
+        relays,
+        distance_m,
+        min_separation_m,
+        common,
+        band,
+        ..
+    } = config;
+    Mission::try_new(config).map_err(|error| match error {
+        MissionError::TooManyForDistance => format!(
+            "{prefix}min-separation {min_separation_m}: must be at most {prefix}distance {distance_m} / (--of {relays} - 1)"
+        ),
+        MissionError::Band => format!(
+            "{prefix}band {},{}: must be from LEAST to MOST, with {prefix}altitude {} among them",
+            band.least_m, band.most_m, common.altitude_m
+        ),
+        other => other.to_string(),
+    })
+}
+
+/// m, 1 to 1e6.
+pub(crate) fn distance(text: &str) -> Result<f32, String> {
+    number(text, 1.0, 1e6)
+}
+
+/// m, 0.1 to 1e5.
+pub(crate) fn altitude(text: &str) -> Result<f32, String> {
+    number(text, 0.1, 1e5)
+}
+
+/// W, 1e-6 to 1e6.
+pub(crate) fn power(text: &str) -> Result<f32, String> {
+    number(text, 1e-6, 1e6)
+}
+
+/// m, 0 to 1e5.
+pub(crate) fn separation(text: &str) -> Result<f32, String> {
+    number(text, 0.0, 1e5)
+}
+
+/// Power, W, and place, m.
+pub(crate) fn interferer(text: &str) -> Result<Interferer, String> {
+    let [power, x, y] = text.split(',').collect::<Vec<_>>()[..] else {
+        return Err("must be three numbers: P,X,Y".to_owned());
+    };
+    Ok(Interferer {
+        power_w: named("P", power, 1e-6, 1e9)?,
+        x_m: named("X", x, -1e7, 1e7)?,
+        y_m: named("Y", y, -1e7, 1e7)?,
+    })
+}
+
+/// Two altitudes, m.
+pub(crate) fn band(text: &str) -> Result<Band, String> {
+    let (least, most) = text
+        .split_once(',')
+        .ok_or("must be two numbers: LEAST,MOST")?;
+    Ok(Band {
+        least_m: named("LEAST", least, 0.1, 1e5)?,
+        most_m: named("MOST", most, 0.1, 1e5)?,
+    })
+}

@@ -1,0 +1,27 @@
+//! What the system is asked for: time and signals.
+
+use std::io;
+use std::os::unix::net::UnixStream;
+use std::time::Instant as Clock;
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+use uav_relay::Instant;
+
+/// Time since the start, by a clock that nobody sets.
+pub(crate) fn now(clock: Clock) -> Instant {
+    Instant::from_micros(u64::try_from(clock.elapsed().as_micros()).unwrap_or(u64::MAX))
+}
+
+/// A stream that gets a byte at SIGINT or SIGTERM, so that poll(2) notices.
+///
+/// # Errors
+/// One line that says what does not work.
+pub(crate) fn on_signals() -> Result<UnixStream, String> {
+    let pipe = || -> io::Result<UnixStream> {
+        let (ours, theirs) = UnixStream::pair()?;
+        signal_hook::low_level::pipe::register(SIGINT, theirs.try_clone()?)?;
+        signal_hook::low_level::pipe::register(SIGTERM, theirs)?;
+        Ok(ours)
+    };
+    pipe().map_err(|error| format!("cannot wait for signals: {error}"))
+}

@@ -1,0 +1,152 @@
+//! The command line, checked.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, ValueEnum};
+use uav_relay::{
+    Band, Duration, Interference, Interferer, Mission, MissionConfig, Profile, Side, Upload, Wiring,
+};
+
+use crate::command;
+use crate::key;
+use crate::mission::{
+    MissionOptions, altitude, band, distance, interferer, mission, power, separation,
+};
+
+/// Uploads a new mission to a chain of relays in flight. The options up to --min-separation say what the relays were loaded with; those
+/// that begin with --new- what is different from now on, and without any of them it is what they were loaded with. The number of
+/// relays stays.
+#[derive(Parser, Debug)]
+#[command(name = "linux_ground", disable_version_flag = true)]
+struct Options {
+    /// Tty toward the relay next to this end of the chain
+    #[arg(long, value_name = "TTY")]
+    tty: PathBuf,
+    /// The tty leads to one channel that all relays hear, in place of a wire
+    #[arg(long)]
+    shared: bool,
+    /// Which end of the chain this is
+    #[arg(long, value_name = "END", value_enum)]
+    end: End,
+    /// Bit/s on the tty, 1200 to 4000000
+    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1_200..=4_000_000))]
+    baud: u32,
+    /// Number of the network
+    #[arg(long, value_name = "W", default_value_t = 7, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(0..))]
+    network: u16,
+    /// File with the network's key, 64 hexadecimal digits
+    #[arg(long, value_name = "FILE")]
+    key_file: PathBuf,
+    /// File that keeps the number of this start, made if it is missing; it must never go back, and is no relay's
+    #[arg(long, value_name = "FILE")]
+    epoch_file: PathBuf,
+    /// Version of the new mission, 1 to 65535: larger than that of every upload before
+    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..))]
+    version: u16,
+    /// Seconds after which it gives up, 1 to 86400
+    #[arg(long, value_name = "S", default_value_t = 300, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    timeout: u64,
+    /// Number of relays, 1 to 1000
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    of: u16,
+    #[command(flatten)]
+    loaded: MissionOptions,
+    /// New distance from transmitter to receiver, m, 1 to 1e6
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = distance)]
+    new_distance: Option<f32>,
+    /// New altitude of every relay, m, 0.1 to 1e5
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = altitude)]
+    new_altitude: Option<f32>,
+    /// New altitudes to choose from, m, 0.1 to 1e5; without it those of --band, or the new altitude alone
+    #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
+    new_band: Option<Band>,
+    /// New power of the transmitter, W, 1e-6 to 1e6
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
+    new_tx_power: Option<f32>,
+    /// New power of every relay, W, 1e-6 to 1e6
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
+    new_uav_power: Option<f32>,
+    /// New interferer: power (W, 1e-6 to 1e9), place along and beside the line to the receiver (m, -1e7 to 1e7)
+    #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = interferer)]
+    new_interferer: Option<Interferer>,
+    /// New least distance between two relays, m, 0 to 1e5
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = separation)]
+    new_min_separation: Option<f32>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum End {
+    /// The transmitter, before relay 1
+    Tx,
+    /// The receiver, behind relay N
+    Rx,
+}
+
+/// What to upload, and where.
+pub(crate) struct Plan {
+    pub(crate) tty: PathBuf,
+    pub(crate) baud: u32,
+    pub(crate) loaded: Mission,
+    pub(crate) upload: Upload,
+    pub(crate) end: Side,
+    pub(crate) wiring: Wiring,
+    pub(crate) network: u16,
+    pub(crate) key: [u8; 32],
+    pub(crate) epoch_file: PathBuf,
+    pub(crate) timeout: Duration,
+}
+
+/// Reads the command line; where there is nothing to run, help or the mistake has been printed.
+pub(crate) fn read() -> Result<Plan, ExitCode> {
+    plan(command::read()?).map_err(|line| command::refuse(&line))
+}
+
+fn plan(options: Options) -> Result<Plan, String> {
+    let interference = Interference::Source(options.loaded.interferer);
+    let loaded = mission(options.loaded.config(options.of, interference)?, "--")?;
+    let config = changed(&options, loaded.config());
+    mission(config, "--new-")?;
+    let upload =
+        Upload::new(&loaded, options.version, config).map_err(|error| error.to_string())?;
+    Ok(Plan {
+        loaded,
+        upload,
+        end: match options.end {
+            End::Tx => Side::Upstream,
+            End::Rx => Side::Downstream,
+        },
+        wiring: if options.shared {
+            Wiring::Shared
+        } else {
+            Wiring::Pair
+        },
+        network: options.network,
+        key: key::load(&options.key_file)?,
+        timeout: Duration::from_millis(1_000 * options.timeout),
+        baud: options.baud,
+        tty: options.tty,
+        epoch_file: options.epoch_file,
+    })
+}
+
+fn changed(options: &Options, loaded: &MissionConfig) -> MissionConfig {
+    let altitude_m = options.new_altitude.unwrap_or(loaded.common.altitude_m);
+    let alone = Band::at(altitude_m);
+    MissionConfig {
+        distance_m: options.new_distance.unwrap_or(loaded.distance_m),
+        min_separation_m: options
+            .new_min_separation
+            .unwrap_or(loaded.min_separation_m),
+        tx_power_w: options.new_tx_power.unwrap_or(loaded.tx_power_w),
+        common: Profile {
+            altitude_m,
+            power_w: options.new_uav_power.unwrap_or(loaded.common.power_w),
+        },
+        band: options.new_band.or(options.loaded.band).unwrap_or(alone),
+        interference: options
+            .new_interferer
+            .map_or(loaded.interference, Interference::Source),
+        ..*loaded
+    }
+}

@@ -1,0 +1,183 @@
+//! The loop: move bytes, say how far the upload is, sleep.
+
+use std::os::fd::{AsFd, BorrowedFd};
+use std::time::Instant as Clock;
+
+use rustix::event::{PollFd, Timespec, poll};
+use rustix::io::Errno;
+use uav_relay::serial::SerialPort as _;
+use uav_relay::wire::digest::digest;
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{Auth, Ground, Instant, Key, Progress, Side};
+
+use crate::epoch;
+use crate::line::line;
+use crate::options::Plan;
+use crate::system::{now, on_signals};
+use crate::tty::Tty;
+
+/// A tty, and what it has not taken yet.
+struct Wire {
+    tty: Tty,
+    outgoing: Vec<u8>,
+}
+
+/// Uploads until the chain flies the new mission.
+///
+/// # Errors
+/// One line that says why it does not.
+pub(crate) fn upload(plan: &Plan) -> Result<(), String> {
+    let stop = on_signals()?;
+    let mut wire = Wire {
+        tty: Tty::open("--tty", &plan.tty, plan.baud)?,
+        outgoing: Vec::new(),
+    };
+    let clock = Clock::now();
+    let auth = Auth {
+        key: Key::new(plan.key),
+        epoch: epoch::next(&plan.epoch_file)?,
+    };
+    started(plan, wire.tty.name(), auth.epoch)?;
+    let mut ground = Ground::new(&plan.loaded, plan.end, plan.network, plan.wiring, auth);
+    let begun = now(clock);
+    ground
+        .upload(begun, plan.upload)
+        .map_err(|error| error.to_string())?;
+    let end = begun + plan.timeout;
+    let mut last = Progress::Idle;
+    loop {
+        wire.turn(&mut ground, now(clock));
+        if ground.progress() != last {
+            last = ground.progress();
+            say(now(clock), plan, last)?;
+        }
+        match last {
+            Progress::Flown { .. } => return Ok(()),
+            Progress::Outdated { version } => return Err(outdated(plan, version)),
+            _ => {}
+        }
+        if let Some(failure) = wire.tty.failure() {
+            return Err(failure.to_owned());
+        }
+        let time = now(clock);
+        if time >= end {
+            return Err(late(plan, last, ground.refused()));
+        }
+        let wake = ground.poll_timeout().map_or(end, |again| again.min(end));
+        if wire.sleep(time, wake, stop.as_fd())? {
+            return Err("stopped before the chain was known to fly it".to_owned());
+        }
+    }
+}
+
+impl Wire {
+    /// Moves what can be moved.
+    fn turn(&mut self, ground: &mut Ground, now: Instant) {
+        let mut bytes = [0; 256];
+        // What is wrong with the tty is in its failure.
+        while let Ok(count @ 1..) = self.tty.read(&mut bytes) {
+            ground.handle_bytes(bytes.get(..count).unwrap_or_default());
+        }
+        ground.handle_timeout(now);
+        let mut frame = [0; MAX_FRAME];
+        while let Some(len) = ground.poll_transmit(&mut frame) {
+            self.outgoing.extend(frame.get(..len).unwrap_or_default());
+        }
+        if !self.outgoing.is_empty() {
+            let sent = self.tty.write(&self.outgoing).unwrap_or(0);
+            self.outgoing.drain(..sent);
+        }
+    }
+
+    /// Sleeps until the tty needs it, or until `wake`; whether the program was told to end.
+    fn sleep(&mut self, now: Instant, wake: Instant, stop: BorrowedFd<'_>) -> Result<bool, String> {
+        let span = std::time::Duration::from_micros(wake.since(now).as_micros());
+        let timeout = Timespec::try_from(span).ok();
+        let mut fds = [
+            PollFd::from_borrowed_fd(stop, rustix::event::PollFlags::IN),
+            PollFd::from_borrowed_fd(self.tty.as_fd(), self.tty.interest()),
+        ];
+        match poll(&mut fds, timeout.as_ref()) {
+            Ok(_) => {}
+            Err(Errno::INTR) => return Ok(false),
+            Err(error) => return Err(format!("cannot sleep: {error}")),
+        }
+        let [stopped, events] = fds.map(|fd| fd.revents());
+        self.tty.noticed(events);
+        Ok(!stopped.is_empty())
+    }
+}
+
+const fn name(plan: &Plan) -> &'static str {
+    match plan.end {
+        Side::Upstream => "transmitter",
+        Side::Downstream => "receiver",
+    }
+}
+
+fn started(plan: &Plan, tty: &str, epoch: u32) -> Result<(), String> {
+    let (end, relays, network) = (name(plan), plan.loaded.relays(), plan.network);
+    let (base, baud) = (digest(&plan.loaded), plan.baud);
+    line(
+        Instant::ZERO,
+        format_args!(
+            "started: {end} of {relays} relays, network {network}, loaded mission 0x{base:04x}, {tty}, {baud} baud"
+        ),
+    )?;
+    line(
+        Instant::ZERO,
+        format_args!("signed: frames carry a tag, epoch {epoch}"),
+    )
+}
+
+fn say(now: Instant, plan: &Plan, progress: Progress) -> Result<(), String> {
+    let version = plan.upload.version();
+    match progress {
+        Progress::Offering => {
+            let digest = plan.upload.stamp().digest;
+            line(
+                now,
+                format_args!("offering: version {version}, mission 0x{digest:04x}"),
+            )
+        }
+        Progress::Held { by } => line(
+            now,
+            format_args!("held: relay {by} holds version {version}, and the others are asked"),
+        ),
+        Progress::Flown { by, view } => line(
+            now,
+            format_args!("flown: relay {by} flies version {version}, view {view} of the chain"),
+        ),
+        // The others are the program's end.
+        _ => Ok(()),
+    }
+}
+
+fn outdated(plan: &Plan, held: u16) -> String {
+    let version = plan.upload.version();
+    match held.checked_add(1) {
+        Some(next) => {
+            format!(
+                "--version {version}: must be within {next} to 65535, the relays hold version {held}"
+            )
+        }
+        None => {
+            format!("--version {version}: the relays hold version {held}, the last one there is")
+        }
+    }
+}
+
+fn late(plan: &Plan, progress: Progress, refused: u32) -> String {
+    let seconds = plan.timeout.as_micros() / 1_000_000;
+    let version = plan.upload.version();
+    let state = match progress {
+        Progress::Held { by } => {
+            format!("relay {by} holds version {version}, and the chain does not fly it yet")
+        }
+        _ => format!(
+            "no relay is known to hold version {version}: out of reach, or with another key, --network or mission than 0x{:04x}",
+            digest(&plan.loaded)
+        ),
+    };
+    format!("--timeout {seconds}: {state}; {refused} frames refused")
+}

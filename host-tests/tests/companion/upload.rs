@@ -1,0 +1,289 @@
+//! A new mission from a ground process to relays that keep it, and fly it when they are switched on again.
+
+use host_tests::brief;
+use host_tests::scenario::{Interference, Scenario, Source};
+use rustix::process::Signal;
+use uav_relay::Upload;
+use uav_relay::wire::upload::LENGTH;
+
+use crate::medium::{Medium, Noise, QUIET};
+use crate::process::{Ended, Relay};
+use crate::pty::make_raw;
+use crate::signed::Files;
+use crate::simulated;
+
+/// What is uploaded here, as the options of the ground and as a scenario.
+const NEW: [&str; 2] = ["--new-interferer", "80,700,-300"];
+
+fn new() -> Scenario {
+    Scenario {
+        interference: Interference::Sources(vec![Source {
+            power_w: 80.0,
+            x_m: 700.0,
+            y_m: -300.0,
+        }]),
+        ..Scenario::default()
+    }
+}
+
+/// Relay `index` of two, with a file for what is uploaded; `ttys` are its own options.
+fn relay(files: &Files, index: usize, ttys: &[&str]) -> Relay {
+    let mut options = files.options("key", &format!("epoch{index}"));
+    options.push("--upload-file".to_owned());
+    let file = files.path(&format!("upload{index}"));
+    options.push(file.to_str().unwrap().to_owned());
+    let number = index.to_string();
+    let mut arguments = vec!["--index", &number, "--of", "2"];
+    arguments.extend(["--quiet-ms", "500", "--lost-ms", "1500"]);
+    arguments.extend(ttys);
+    arguments.extend(options.iter().map(String::as_str));
+    Relay::start(&arguments)
+}
+
+/// The ground of two relays, which uploads [`NEW`] as `version`.
+fn ground(files: &Files, version: &str, more: &[&str]) -> Relay {
+    let options = files.options("key", "ground");
+    let mut arguments = vec!["--of", "2", "--version", version];
+    arguments.extend(NEW);
+    arguments.extend(more);
+    arguments.extend(options.iter().map(String::as_str));
+    Relay::ground(&arguments)
+}
+
+/// Over wires that are good and bad, from the transmitter.
+#[test]
+fn an_upload_reaches_two_relays_and_outlives_their_processes() {
+    let (loaded, uploaded) = (simulated(&Scenario::default(), 2), simulated(&new(), 2));
+    assert_ne!(loaded, uploaded);
+    for noise in [QUIET, Noise::bad(11)] {
+        let files = Files::new();
+        let (tx, wire) = (Medium::new(2, noise), Medium::new(2, noise));
+        let start = || {
+            let first = ["--upstream", tx.tty(1), "--downstream", wire.tty(0)];
+            [
+                relay(&files, 1, &first),
+                relay(&files, 2, &["--upstream", wire.tty(1)]),
+            ]
+        };
+        let mut relays = start();
+        for (relay, place) in relays.iter_mut().zip(&loaded) {
+            relay.settles_at(*place);
+        }
+        assert!(!files.path("upload1").exists());
+        let ends = ["--end", "tx", "--tty", tx.tty(0)];
+        let ended = ground(&files, "3", &ends).end();
+        assert_eq!(ended.status, Some(0), "{ended:?}");
+        let last = ended.stdout.last().unwrap();
+        assert!(
+            last.contains("flown: relay 1 flies version 3, view "),
+            "{last}"
+        );
+        for (relay, place) in relays.iter_mut().zip(&uploaded) {
+            // Both before the ground was told.
+            relay.line("uploaded: holds version 3");
+            relay.line("adopted: flies version 3");
+            relay.settles_at(*place);
+        }
+        // Both are killed, in the middle of whatever they do.
+        drop(relays);
+        let mut relays = start();
+        for (relay, place) in relays.iter_mut().zip(&uploaded) {
+            relay.line("resumed: flies version 3");
+            relay.settles_at(*place);
+            assert!(!relay.has_said("uploaded: ") && !relay.has_said("adopted: "));
+        }
+        let Ended { status, stderr, .. } = ground(&files, "2", &ends).end();
+        assert_eq!(
+            (status, &stderr[..]),
+            (
+                Some(1),
+                &["--version 2: must be within 4 to 65535, the relays hold version 3".to_owned()][..]
+            )
+        );
+    }
+}
+
+/// On one channel, from the receiver; and a relay that keeps nothing is handed it again.
+#[test]
+fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
+    let uploaded = simulated(&new(), 2);
+    let files = Files::new();
+    let channel = Medium::new(3, QUIET);
+    make_raw(channel.tty(0));
+    let start = |index: usize| relay(&files, index, &["--shared", channel.tty(index)]);
+    let mut relays = [start(1), start(2)];
+    for relay in &mut relays {
+        relay.line("converged: ");
+    }
+    let ended = ground(
+        &files,
+        "1",
+        &["--shared", "--end", "rx", "--tty", channel.tty(0)],
+    )
+    .end();
+    assert_eq!(ended.status, Some(0), "{ended:?}");
+    let last = ended.stdout.last().unwrap();
+    assert!(last.contains("flown: relay 2 flies version 1"), "{last}");
+    for (relay, place) in relays.iter_mut().zip(&uploaded) {
+        relay.settles_at(*place);
+    }
+    std::fs::remove_file(files.path("upload2")).unwrap();
+    drop(relays);
+    let mut relays = [start(1), start(2)];
+    relays[0].line("resumed: flies version 1");
+    relays[1].line("uploaded: holds version 1");
+    relays[1].line("adopted: flies version 1");
+    for (relay, place) in relays.iter_mut().zip(&uploaded) {
+        relay.settles_at(*place);
+    }
+    assert!(files.path("upload2").exists());
+}
+
+/// The file that a relay keeps of `config`, uploaded as version 5 to relays that were loaded with `base`.
+fn stored(base: &Scenario, config: &Scenario) -> Vec<u8> {
+    let [base, new] = [base, config].map(|scenario| brief::mission(scenario, 1, 1e-4).unwrap().0);
+    let upload = Upload::new(&base, 5, *new.config()).unwrap();
+    let mut bytes = vec![0; LENGTH];
+    assert_eq!(upload.encode(&mut bytes), Some(LENGTH));
+    let check = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
+    bytes.extend(check.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn a_file_that_is_of_no_use_is_named_and_not_used() {
+    let files = Files::new();
+    let file = files.path("upload");
+    let mut options = files.options("key", "epoch");
+    options.extend([
+        "--upload-file".to_owned(),
+        file.to_str().unwrap().to_owned(),
+    ]);
+    let mut arguments = vec!["--index", "1", "--of", "1"];
+    arguments.extend(options.iter().map(String::as_str));
+    let (loaded, uploaded) = (simulated(&Scenario::default(), 1), simulated(&new(), 1));
+    let good = stored(&Scenario::default(), &new());
+    let mut damaged = good.clone();
+    damaged[40] ^= 1;
+    let high = Scenario {
+        altitude_m: 21.0,
+        altitude_min_m: 21.0,
+        altitude_max_m: 21.0,
+        ..Scenario::default()
+    };
+    for (bytes, words) in [
+        (good.clone(), None),
+        (damaged, Some("is damaged, or no upload; not used")),
+        (
+            good[..LENGTH].to_vec(),
+            Some("is damaged, or no upload; not used"),
+        ),
+        (Vec::new(), Some("is damaged, or no upload; not used")),
+        (
+            stored(&high, &new()),
+            Some("is for relays that were loaded with mission 0x"),
+        ),
+    ] {
+        std::fs::write(&file, &bytes).unwrap();
+        let mut relay = Relay::start(&arguments);
+        let place = if words.is_none() { &uploaded } else { &loaded };
+        relay.settles_at(place[0]);
+        assert_eq!(relay.has_said("resumed: flies version 5"), words.is_none());
+        relay.signal(Signal::TERM);
+        let Ended { status, stderr, .. } = relay.end();
+        assert_eq!(status, Some(0));
+        assert_eq!(stderr.len(), words.iter().count(), "{stderr:?}");
+        for (line, words) in stderr.iter().zip(words) {
+            assert!(
+                line.contains(&format!("{}: {words}", file.display())),
+                "{line}"
+            );
+        }
+        assert_eq!(std::fs::read(&file).unwrap(), bytes);
+    }
+}
+
+#[test]
+fn the_ground_gives_up_in_time_where_nobody_answers() {
+    let files = Files::new();
+    let wire = Medium::new(1, QUIET);
+    let more = ["--end", "tx", "--tty", wire.tty(0), "--timeout", "2"];
+    let Ended { status, stderr, .. } = ground(&files, "7", &more).end();
+    assert_eq!((status, stderr.len()), (Some(1), 1), "{stderr:?}");
+    let line = "--timeout 2: no relay is known to hold version 7: ";
+    assert!(stderr[0].starts_with(line), "{stderr:?}");
+    assert!(stderr[0].ends_with("; 0 frames refused"), "{stderr:?}");
+}
+
+/// Options of the ground, and what the line must have in it.
+const WRONG: &[(&[&str], &[&str])] = &[
+    (&["--version", "0"], &["--version", "'0'", "1..=65535"]),
+    (
+        &["--version", "65536"],
+        &["--version", "'65536'", "1..=65535"],
+    ),
+    (&["--end", "up"], &["--end", "'up'", "tx, rx"]),
+    (&["--timeout", "0"], &["--timeout", "'0'", "1..=86400"]),
+    (&["--baud", "1199"], &["--baud", "'1199'", "1200..=4000000"]),
+    (&["--of", "0"], &["--of", "'0'", "1..=1000"]),
+    (
+        &["--new-interferer", "80,500"],
+        &["--new-interferer", "'80,500'", "P,X,Y"],
+    ),
+    (
+        &["--new-altitude", "0"],
+        &["--new-altitude", "'0'", "0.1 to 100000.0"],
+    ),
+    (
+        &["--new-band", "30,300"],
+        &["--new-band 30,300", "LEAST to MOST", "--new-altitude 20"],
+    ),
+    (
+        &["--new-min-separation", "501"],
+        &["--new-min-separation 501", "--new-distance 1000", "--of 3"],
+    ),
+    (
+        &["--min-separation", "501"],
+        &["--min-separation 501", "--distance 1000"],
+    ),
+    (
+        &["--key-file", "nowhere"],
+        &["--key-file nowhere", "cannot be read"],
+    ),
+];
+
+#[test]
+fn wrong_options_of_the_ground_are_named() {
+    let files = Files::new();
+    let good = files.options("key", "ground");
+    for &(wrong, parts) in WRONG {
+        let mut all = vec!["--tty", "a", "--end", "tx", "--of", "3", "--version", "1"];
+        all.extend(good.iter().map(String::as_str));
+        // What is given twice would be another mistake.
+        if let Some(at) = all.iter().position(|option| *option == wrong[0]) {
+            all.drain(at..at + 2);
+        }
+        all.extend(wrong);
+        let Ended { status, stderr, .. } = Relay::ground(&all).end();
+        assert_eq!((status, stderr.len()), (Some(2), 1), "{all:?}: {stderr:?}");
+        for part in parts {
+            assert!(
+                stderr[0].contains(part),
+                "{all:?}: {part} not in {}",
+                stderr[0]
+            );
+        }
+    }
+    let Ended { status, stderr, .. } = Relay::ground(&[]).end();
+    assert_eq!(status, Some(2));
+    for option in [
+        "--tty",
+        "--end",
+        "--of",
+        "--version",
+        "--key-file",
+        "--epoch-file",
+    ] {
+        assert!(stderr[0].contains(option), "{}", stderr[0]);
+    }
+}

@@ -1,0 +1,160 @@
+//! Emulated drones that are handed a new mission in flight, and some that were before they were switched on.
+
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+use host_tests::firmware::block::Flight;
+use host_tests::firmware::config::Secret;
+use host_tests::firmware::emulator::SPEED;
+use host_tests::firmware::uploads::{Record, record};
+use host_tests::scenario::{Interference, Scenario, Source};
+use host_tests::sim::faults::Faults;
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{Auth, Ground, Key, Progress, Side, Upload, Wiring};
+
+use crate::chain::{BAD_DAY, paper, simulated};
+use crate::fleet::{Fleet, Image, PATIENCE};
+
+const KEY: [u8; 32] = *b"three drones and one transmitter";
+
+/// What is uploaded: the interferer elsewhere, and drones that are higher and louder.
+fn moved(uavs: u16) -> Flight {
+    let scenario = Scenario {
+        interference: Interference::Sources(vec![Source {
+            power_w: 80.0,
+            x_m: 700.0,
+            y_m: -300.0,
+        }]),
+        altitude_m: 30.0,
+        altitude_min_m: 30.0,
+        altitude_max_m: 30.0,
+        uav_w: 1.5,
+        ..Scenario::default()
+    };
+    Flight::new(&scenario, uavs, 1e-4, 7).unwrap()
+}
+
+fn upload(loaded: &Flight, version: u16) -> Upload {
+    let uavs = loaded.mission().relays();
+    Upload::new(loaded.mission(), version, *moved(uavs).mission().config()).unwrap()
+}
+
+fn blocks(loaded: &Flight) -> Vec<Vec<u8>> {
+    let flight = loaded.clone().signed(Some(Secret {
+        key: KEY,
+        epoch: 77,
+    }));
+    (1..=loaded.mission().relays())
+        .map(|index| flight.block(index).unwrap().to_vec())
+        .collect()
+}
+
+/// The transmitter, at the end of a socket; its clock is as fast as the drones'.
+struct Station {
+    socket: UnixStream,
+    ground: Ground,
+    begun: Instant,
+}
+
+impl Station {
+    fn new(loaded: &Flight, wiring: Wiring, socket: UnixStream) -> Self {
+        let auth = Auth {
+            key: Key::new(KEY),
+            epoch: 5,
+        };
+        let pause = Duration::from_millis(5);
+        socket.set_read_timeout(Some(pause)).unwrap();
+        Self {
+            socket,
+            ground: Ground::new(loaded.mission(), Side::Upstream, 7, wiring, auth),
+            begun: Instant::now(),
+        }
+    }
+
+    fn now(&self) -> uav_relay::Instant {
+        let micros = self.begun.elapsed().mul_f64(SPEED).as_micros();
+        uav_relay::Instant::from_micros(u64::try_from(micros).unwrap())
+    }
+
+    /// Uploads, and says which relay flies it.
+    fn upload(&mut self, upload: Upload) -> u16 {
+        self.ground.upload(self.now(), upload).unwrap();
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let mut frame = [0; MAX_FRAME];
+            self.ground.handle_timeout(self.now());
+            while let Some(len) = self.ground.poll_transmit(&mut frame) {
+                self.socket.write_all(&frame[..len]).unwrap();
+            }
+            let progress = self.ground.progress();
+            if let Progress::Flown { by, .. } = progress {
+                return by;
+            }
+            assert!(Instant::now() < end, "{progress:?}");
+            let mut bytes = [0; 256];
+            match self.socket.read(&mut bytes) {
+                Ok(count) => self.ground.handle_bytes(&bytes[..count]),
+                Err(error) => assert_eq!(error.kind(), ErrorKind::WouldBlock),
+            }
+        }
+    }
+}
+
+#[test]
+fn three_fly_what_the_transmitter_uploads() {
+    let loaded = paper(3);
+    for (image, wiring, faults) in [
+        (Image::Wires, Wiring::Pair, Faults::default()),
+        (Image::Radio, Wiring::Shared, BAD_DAY),
+    ] {
+        let (ours, theirs) = UnixStream::pair().unwrap();
+        let mut fleet = Fleet::with_transmitter(image, &blocks(&loaded), theirs, faults, 1);
+        fleet.settle_at(&simulated(&loaded));
+        let mut station = Station::new(&loaded, wiring, ours);
+        let by = station.upload(upload(&loaded, 3));
+        assert!((1..=2).contains(&by), "{image:?}: relay {by}");
+        fleet.settle_at(&simulated(&moved(3)));
+        for drone in 1..=3 {
+            let said = |text: &str| fleet.of_drone(drone).any(|line| line.text == text);
+            assert!(said("event Uploaded") && said("mission version 3 is flown"));
+            // The emulator has no flash that can be written, and the drone flies all the same.
+            assert!(said(
+                "mission version 3 cannot be kept: after a reboot it has to come again"
+            ));
+        }
+    }
+}
+
+/// The log in the flash of each: version 2, version 3, and a record that a loss of power has cut short.
+#[test]
+fn three_fly_what_they_were_handed_before_they_were_switched_on() {
+    let loaded = paper(3);
+    let blocks = blocks(&loaded);
+    let flash: Vec<Vec<Record>> = blocks
+        .iter()
+        .map(|block| {
+            let check = u32::from_le_bytes(*block.last_chunk().unwrap());
+            let [old, new, mut cut] =
+                [2, 3, 4].map(|version| record(&upload(&loaded, version), check));
+            cut[11..].fill(u32::MAX);
+            vec![old, new, cut]
+        })
+        .collect();
+    let mut fleet = Fleet::with_uploads(Image::Wires, &blocks, &flash, Faults::default(), 1);
+    assert_eq!(fleet.places(), simulated(&moved(3)));
+    for drone in 1..=3 {
+        let said = fleet.of_drone(drone).nth(2).unwrap();
+        assert_eq!(said.text, "mission version 3 was uploaded before");
+    }
+    // With other blocks they have forgotten.
+    let fresh = paper(3).signed(Some(Secret {
+        key: KEY,
+        epoch: 78,
+    }));
+    let blocks: Vec<Vec<u8>> = (1..=3)
+        .map(|index| fresh.block(index).unwrap().to_vec())
+        .collect();
+    let mut fleet = Fleet::with_uploads(Image::Wires, &blocks, &flash, Faults::default(), 1);
+    assert_eq!(fleet.places(), simulated(&loaded));
+}
