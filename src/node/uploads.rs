@@ -9,9 +9,9 @@
 //! | --- | --- |
 //! | a hail of a node that holds an older mission | it is offered the newer one |
 //! | a hail of a node that holds a newer mission | a hail, so that it is offered here |
-//! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hail; a call for a view |
+//! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hail; an offer to the relay before, toward the leader; a call for a view |
 //! | any other offer | a hail |
-//! | a roster is due, and the node after holds an older mission | it is offered the newer one first |
+//! | a roster is due, and the node after holds an older mission or has not said which | it is offered the newer one first |
 //! | a roster that does not name the mission held | a hail, and no part in it |
 //! | a count of a view that was granted | its mission is flown: `Event::Adopted` |
 

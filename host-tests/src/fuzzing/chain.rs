@@ -5,7 +5,10 @@ mod agreement;
 use std::collections::VecDeque;
 
 use uav_relay::wire::auth::Auth;
-use uav_relay::{Duration, Instant, Mission, Placement, Port, Sample, Settings, Wiring};
+use uav_relay::{
+    Duration, Instant, Interference, Interferer, Mission, MissionConfig, Placement, Port, Sample,
+    Settings, Upload, Wiring,
+};
 
 use super::input::Input;
 use super::setting;
@@ -69,6 +72,8 @@ struct Chain {
     now: Instant,
     /// Of the next relay that is switched on: never the same twice.
     seed: u32,
+    /// Of the last mission that was uploaded.
+    version: u16,
 }
 
 impl Chain {
@@ -80,6 +85,7 @@ impl Chain {
             members: Vec::new(),
             now: Instant::ZERO,
             seed: u32::from(input.word()),
+            version: 0,
         };
         for index in 1..=mission.relays() {
             let settings = setting::settings(input, &mission, common);
@@ -123,7 +129,11 @@ impl Chain {
             12 => self.sample(at, input),
             14 => self.position(at, input),
             _ => {
-                for _ in 0..=input.below(MOST_ROUNDS) {
+                let rounds = input.below(MOST_ROUNDS);
+                if rounds == 0 {
+                    self.upload(at, input);
+                }
+                for _ in 0..=rounds {
                     self.round();
                 }
             }
@@ -266,6 +276,31 @@ impl Chain {
         };
         if let Some(member) = self.members.get_mut(at) {
             member.watched.position(self.now, self.now, place);
+        }
+        self.settle(at);
+    }
+
+    /// A relay's firmware hands it a mission that is newer than all before, with the interferer somewhere else.
+    fn upload(&mut self, at: usize, input: &mut Input<'_>) {
+        let config = *self.mission.config();
+        let Some(interferer) = self.mission.interferer() else {
+            return;
+        };
+        let moved = Interferer {
+            x_m: input.even(0.0, config.distance_m),
+            y_m: input.scaled(1e-3, config.distance_m),
+            ..*interferer
+        };
+        let config = MissionConfig {
+            interference: Interference::Source(moved),
+            ..config
+        };
+        self.version = self.version.saturating_add(1);
+        let Ok(upload) = Upload::new(&self.mission, self.version, config) else {
+            return;
+        };
+        if let Some(member) = self.members.get_mut(at) {
+            member.watched.upload(self.now, &upload);
         }
         self.settle(at);
     }

@@ -5,6 +5,7 @@ use uav_relay::guard::confines::Confines;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, MAX_FRAME};
 use uav_relay::wire::message::Message;
+use uav_relay::wire::upload::Upload;
 use uav_relay::{
     Event, Identity, Instant, Method, Mission, Placement, Port, Relay, Sample, Settings, Side,
     Stats, Wiring,
@@ -168,6 +169,12 @@ impl Watched {
     /// It is told that who fell silent at `side` has landed.
     pub fn forget(&mut self, now: Instant, side: Side) {
         heap::without(|| self.relay.forget(now, side));
+    }
+
+    /// Its firmware hands it a mission.
+    pub fn upload(&mut self, now: Instant, upload: &Upload) {
+        // What is no newer, or comes to a relay without a key, is refused.
+        _ = heap::without(|| self.relay.handle_upload(now, upload));
     }
 
     /// It is told to agree again.

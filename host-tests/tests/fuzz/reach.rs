@@ -87,6 +87,17 @@ fn chains_of_the_corpus_agree_by_every_method_over_bad_links() {
                 .all(|one| one.relay().phase() == Phase::Holding)
     });
     assert!(signed.count() > 0, "no signed chain agrees");
+    for shared in [false, true] {
+        let uploaded = chains.iter().filter(|relays| {
+            let wiring = relays[0].settings().wiring;
+            (wiring == Wiring::Shared) == shared
+                && relays.iter().all(|one| one.relay().version() == 2)
+        });
+        assert!(
+            uploaded.count() > 0,
+            "no chain is uploaded twice, shared: {shared}"
+        );
+    }
     for method in ["align", "altitude", "adjust", "field"] {
         for shared in [false, true] {
             let count = agreed.get(&(method, shared)).copied().unwrap_or(0);

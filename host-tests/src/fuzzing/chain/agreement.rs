@@ -37,9 +37,16 @@ impl Chain {
         }
         let quiet = self.members.iter().all(|member| member.arriving.is_empty());
         let target = leader.and_then(|leader| leader.watched.relay().target());
+        let version = leader.map(|leader| leader.watched.relay().version());
         quiet
             && self.members.iter().all(|member| {
+                let relay = member.watched.relay();
+                let newest = relay
+                    .upload()
+                    .is_none_or(|held| held.version() == relay.version());
                 phase(member) == Phase::Holding
+                    && newest
+                    && Some(relay.version()) == version
                     && member.watched.relay().mission().relays() == self.mission.relays()
                     && member.watched.relay().target().map(f32::to_bits) == target.map(f32::to_bits)
             })
