@@ -59,6 +59,45 @@ pub enum Progress {
 ///
 /// After every input call [`poll_transmit`](Self::poll_transmit) until it gives `None`, then wait for a byte or for
 /// [`poll_timeout`](Self::poll_timeout). It takes in anything, and what is not for it has no effect.
+///
+/// ```
+/// use uav_relay::wire::frame::MAX_FRAME;
+/// use uav_relay::{
+///     Auth, Ground, Instant, Interference, Interferer, Key, Mission, MissionConfig, Progress, Side, Upload, Wiring,
+/// };
+///
+/// # fn example(loaded: &Mission, mut send: impl FnMut(&[u8]), received: &[u8]) -> Result<Progress, Box<dyn core::error::Error>> {
+/// // The jammer has moved.
+/// let jammer = Interferer { power_w: 80.0, x_m: 700.0, y_m: -300.0 };
+/// let config = MissionConfig { interference: Interference::Source(jammer), ..*loaded.config() };
+/// let upload = Upload::new(loaded, 1, config)?;
+/// let auth = Auth { key: Key::new([7; 32]), epoch: 1 };
+/// let mut ground = Ground::new(loaded, Side::Upstream, 7, Wiring::Pair, auth);
+/// let now = Instant::ZERO;
+/// ground.upload(now, upload)?;
+///
+/// // One turn of its loop.
+/// ground.handle_bytes(received);
+/// ground.handle_timeout(now);
+/// let mut frame = [0; MAX_FRAME];
+/// while let Some(len) = ground.poll_transmit(&mut frame) {
+///     send(&frame[..len]);
+/// }
+/// # Ok(ground.progress())
+/// # }
+/// # use uav_relay::{Band, Channel, Profile, channel::AirGround};
+/// # let loaded = Mission::try_new(MissionConfig {
+/// #     relays: 1, distance_m: 1000.0, min_separation_m: 4.0, tx_power_w: 80.0,
+/// #     common: Profile { altitude_m: 20.0, power_w: 1.0 },
+/// #     channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?, band: Band::at(20.0),
+/// #     interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
+/// #     tolerance: 1e-4,
+/// # })?;
+/// # let mut sent = 0;
+/// # assert_eq!(example(&loaded, |_| sent += 1, &[])?, Progress::Offering);
+/// # assert_eq!(sent, 1, "a hello, before anything else");
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Ground {
     network: u16,
