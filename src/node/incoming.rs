@@ -63,6 +63,17 @@ impl Node {
             }
             return true;
         }
+        #[cfg(feature = "upload")]
+        if let Message::Offer(upload) = message
+            && !taken
+            && self.takes_uploads()
+        {
+            // It takes this relay for its neighbour: a hail alone would only make it say the same again.
+            if self.is_of_mission(side, upload.base()) {
+                self.on_offer(now, side, from, upload);
+            }
+            return true;
+        }
         if !taken {
             self.owe_hail(side, from, false);
             return false;

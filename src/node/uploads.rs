@@ -10,7 +10,7 @@
 //! | a hail of a node that holds an older mission | it is offered the newer one |
 //! | a hail of a node that holds a newer mission | a hail, so that it is offered here |
 //! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hail; an offer to the relay before, toward the leader; a call for a view |
-//! | any other offer | a hail |
+//! | an offer of one that is not newer | a hail |
 //! | a roster is due, and the node after holds an older mission or has not said which | it is offered the newer one first |
 //! | a roster that does not name the mission held | a hail, and no part in it |
 //! | a count of a view that was granted | its mission is flown: `Event::Adopted` |
@@ -76,15 +76,21 @@ impl Node {
         Some((to, hail))
     }
 
-    /// An offer from node `from` at `side`, for relays that were loaded with the same mission.
+    /// An offer from node `from` at `side`, for relays that were loaded with the same mission. Answered only by who holds as new
+    /// a mission then: any other answer would be answered by the same offer.
     pub(super) fn on_offer(&mut self, now: Instant, side: Side, from: u16, upload: &Upload) {
         if !self.takes_uploads() {
             return bump(&mut self.stats.unsigned);
         }
+        let stamp = upload.stamp();
         let beside = self.beside(side);
-        beside.holds = beside.holds.max(Some(upload.stamp()));
+        if beside.node() == from {
+            beside.holds = beside.holds.max(Some(stamp));
+        }
         self.hold(now, *upload);
-        self.owe_hail(side, from, false);
+        if self.members.held >= stamp {
+            self.owe_hail(side, from, false);
+        }
     }
 
     /// Whether `upload` is for these relays. None is for relays in a field, even if its base has the digest of their mission.

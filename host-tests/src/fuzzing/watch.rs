@@ -7,8 +7,8 @@ use uav_relay::wire::frame::{self, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::wire::upload::Upload;
 use uav_relay::{
-    Event, Identity, Instant, Method, Mission, Placement, Port, Relay, Sample, Settings, Side,
-    Stats, Wiring,
+    Event, Identity, Instant, Method, Mission, MissionConfig, Placement, Port, Relay, Sample,
+    Settings, Side, Stats, Wiring,
 };
 
 use super::counted::{all, intact};
@@ -65,6 +65,8 @@ pub struct Watched {
     tie: u16,
     /// View and number of the pass that its place is from, as far as that is known.
     held: Option<(u16, u16)>,
+    /// What it flew when it was looked at last.
+    flown: MissionConfig,
 }
 
 impl Watched {
@@ -95,6 +97,7 @@ impl Watched {
             number: 0,
             tie: 0,
             held: None,
+            flown: *mission.config(),
         })
     }
 
@@ -338,18 +341,20 @@ impl Watched {
             self.held = Some((self.view, self.number));
         }
         assert!(agreed.is_some() || self.agreed.is_none(), "taken away");
-        // A place of the mission before is held until the next agreement.
+        // A place of the mission before is held until the next agreement, and may have been agreed on just before that came.
+        let flown = core::mem::replace(&mut self.flown, *self.relay.mission().config());
         let Some(place) = agreed.filter(|_| agreed != self.agreed) else {
             return;
         };
         self.agreed = agreed;
-        let config = self.relay.mission().config();
-        assert!((0.0..=config.distance_m).contains(&place.x_m), "{place:?}");
-        let given = self.settings.profile.unwrap_or(config.common);
-        let held = place.altitude_m.to_bits() == given.altitude_m.to_bits();
-        let band = config.band.least_m..=config.band.most_m;
-        let chosen = !self.settings.hold_altitude && band.contains(&place.altitude_m);
-        assert!(held || chosen, "{place:?}, given {given:?}");
+        let sound = [flown, self.flown].iter().any(|config| {
+            let given = self.settings.profile.unwrap_or(config.common);
+            let held = place.altitude_m.to_bits() == given.altitude_m.to_bits();
+            let band = config.band.least_m..=config.band.most_m;
+            let chosen = !self.settings.hold_altitude && band.contains(&place.altitude_m);
+            (0.0..=config.distance_m).contains(&place.x_m) && (held || chosen)
+        });
+        assert!(sound, "{place:?} in {:?}", self.flown);
     }
 
     /// Whatever else it tells is in its range.

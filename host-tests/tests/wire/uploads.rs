@@ -101,7 +101,7 @@ fn a_newer_mission_is_held_told_and_offered_on_and_a_view_called_for() {
 }
 
 #[test]
-fn any_other_offer_is_answered_by_a_hail() {
+fn an_offer_that_is_not_newer_is_answered_by_a_hail() {
     let (mut relay, mut peers, base) = relay_4();
     let newer = upload(2, base);
     peers[1].says(&mut relay, NOW, &Said::Offer(newer));
@@ -119,11 +119,17 @@ fn any_other_offer_is_answered_by_a_hail() {
         relays: 7,
         ..upload(3, base)
     };
-    for other in [newer, rival, upload(1, base), fewer] {
+    // What cannot be held is not answered: it would only be offered again.
+    let answer = || vec![(5, hail(base, 5, stamp(&newer), FRESH | READY))];
+    for (other, answer) in [
+        (newer, answer()),
+        (rival, answer()),
+        (upload(1, base), answer()),
+        (fewer, vec![]),
+    ] {
         let mut after = relay.clone();
         peers[1].clone().says(&mut after, NOW, &Said::Offer(other));
-        let answer = hail(base, 5, stamp(&newer), FRESH | READY);
-        assert_eq!(said(&mut after, NOW), [(5, answer)], "{other:?}");
+        assert_eq!(said(&mut after, NOW), answer, "{other:?}");
         assert_eq!(held(&after), Some(stamp(&newer)));
         assert_eq!(events(&mut after), []);
         assert_eq!(after.stats().rejected(), 0);

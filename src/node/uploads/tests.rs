@@ -15,6 +15,10 @@ fn base() -> Mission {
 }
 
 fn upload(version: u16) -> Upload {
+    upload_to(&base(), version)
+}
+
+fn upload_to(base: &Mission, version: u16) -> Upload {
     let interference = Interference::Source(Interferer {
         power_w: 80.0,
         x_m: 700.0,
@@ -22,13 +26,17 @@ fn upload(version: u16) -> Upload {
     });
     let config = MissionConfig {
         interference,
-        ..paper(3)
+        ..*base.config()
     };
-    Upload::new(&base(), version, config).unwrap()
+    Upload::new(base, version, config).unwrap()
 }
 
 /// Relay 2 of 3, with or without a key.
 fn relay(signs: bool) -> Node {
+    relay_of(base(), 2, signs)
+}
+
+fn relay_of(mission: Mission, index: u16, signs: bool) -> Node {
     let settings = Settings {
         wiring: Wiring::Shared,
         auth: signs.then_some(Auth {
@@ -37,11 +45,8 @@ fn relay(signs: bool) -> Node {
         }),
         ..Settings::default()
     };
-    let identity = Identity {
-        network: 1,
-        index: 2,
-    };
-    let mut node = Node::new(base(), identity, settings, 1, Instant::ZERO);
+    let identity = Identity { network: 1, index };
+    let mut node = Node::new(mission, identity, settings, 1, Instant::ZERO);
     // What it says by itself after so long.
     node.handle_timeout(NOW);
     said(&mut node);
@@ -179,4 +184,24 @@ fn an_offer_for_other_relays_is_refused() {
     assert_eq!((node.stats.mission, node.members.held), (1, held));
     node.on_ground(NOW, Side::Upstream, &Message::Offer(stray));
     assert_eq!((node.stats.mission, node.members.held), (2, held));
+}
+
+/// Two that do not take each other for neighbours, but one of them the other: offers and hails must come to an end.
+#[test]
+fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
+    let five = Mission::try_new(paper(5)).unwrap();
+    let mut node = relay_of(five, 3, true);
+    let new = upload_to(&five, 1);
+    assert!(node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(new)));
+    assert_eq!((node.members.held, node.upstream.node()), (new.stamp(), 2));
+    let told = said(&mut node);
+    let hails = told.iter().filter(|(to, _)| *to == 1);
+    let hails: heapless::Vec<_, 8> = hails.collect();
+    assert!(
+        matches!(hails[..], [(1, Message::Hail(Hail { holds, .. }))] if *holds == new.stamp()),
+        "{told:?}"
+    );
+    let stray = upload_to(&base(), 2);
+    node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(stray));
+    assert_eq!((node.stats.mission, node.members.held), (1, new.stamp()));
 }
