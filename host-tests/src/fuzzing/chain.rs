@@ -1,14 +1,12 @@
 //! A chain of two to four relays on links that lose, double, reorder and damage what is sent.
 
 mod agreement;
+mod uploads;
 
 use std::collections::VecDeque;
 
 use uav_relay::wire::auth::Auth;
-use uav_relay::{
-    Duration, Instant, Interference, Interferer, Mission, MissionConfig, Placement, Port, Sample,
-    Settings, Upload, Wiring,
-};
+use uav_relay::{Duration, Instant, Mission, Placement, Port, Sample, Settings, Wiring};
 
 use super::input::Input;
 use super::setting;
@@ -276,31 +274,6 @@ impl Chain {
         };
         if let Some(member) = self.members.get_mut(at) {
             member.watched.position(self.now, self.now, place);
-        }
-        self.settle(at);
-    }
-
-    /// A relay's firmware hands it a mission that is newer than all before, with the interferer somewhere else.
-    fn upload(&mut self, at: usize, input: &mut Input<'_>) {
-        let config = *self.mission.config();
-        let Some(interferer) = self.mission.interferer() else {
-            return;
-        };
-        let moved = Interferer {
-            x_m: input.even(0.0, config.distance_m),
-            y_m: input.scaled(1e-3, config.distance_m),
-            ..*interferer
-        };
-        let config = MissionConfig {
-            interference: Interference::Source(moved),
-            ..config
-        };
-        self.version = self.version.saturating_add(1);
-        let Ok(upload) = Upload::new(&self.mission, self.version, config) else {
-            return;
-        };
-        if let Some(member) = self.members.get_mut(at) {
-            member.watched.upload(self.now, &upload);
         }
         self.settle(at);
     }

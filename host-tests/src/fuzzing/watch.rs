@@ -1,6 +1,8 @@
 //! A relay that is watched: after every input it is drained as a firmware drains it, and what its documentation promises
 //! must hold.
 
+mod number;
+
 use uav_relay::guard::confines::Confines;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, MAX_FRAME};
@@ -13,6 +15,7 @@ use uav_relay::{
 
 use super::counted::{all, intact};
 use super::heap;
+use number::number_of;
 
 /// Frames that a relay can owe at once: a pass or what came of one, a sign that it is busy; to either side a heartbeat, four
 /// hails, a fence, an offer and a hail to the ground; a hello to each of the eight nodes that it remembers.
@@ -382,23 +385,4 @@ impl Watched {
         let measured = self.relay.measured_per_w();
         assert!(measured.is_none_or(|upsilon| (1e-9..=1e32).contains(&upsilon)));
     }
-}
-
-/// The number of the pass that a message is of.
-const fn number_of(message: &Message<'_>) -> Option<u16> {
-    Some(match message {
-        Message::Sweep(sweep) => sweep.number,
-        Message::Verdict(answer) => answer.number,
-        Message::Busy { sweep } => *sweep,
-        Message::Wave(wave) => wave.number,
-        Message::Trace(trace) => trace.number,
-        Message::Token(token) => token.number,
-        Message::Moved(moved) => moved.number,
-        Message::Heartbeat { .. }
-        | Message::Hail(_)
-        | Message::Roster(_)
-        | Message::Count(_)
-        | Message::Fence { .. }
-        | Message::Offer(_) => return None,
-    })
 }

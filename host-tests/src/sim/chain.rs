@@ -4,6 +4,7 @@ mod air;
 mod ending;
 mod flight;
 mod ground;
+mod start;
 mod story;
 mod strike;
 
@@ -17,14 +18,14 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::node::settings::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::wire::upload::Upload;
-use uav_relay::{Identity, Instant, Method, Placement, Relay, Sample, Settings};
+use uav_relay::{Instant, Method, Placement, Relay, Sample};
 
 use flight::Flight;
 use ground::{Station, stations};
+use start::{Start, switched_on};
 
 use super::attack::{Attacker, Struck};
 use super::faults::Injected;
-use super::forge::NETWORK;
 use super::link::Line;
 use super::outcome::{Ending, Outcome, RelayEnd, Turning};
 use super::queue::{Happening, Queue};
@@ -380,45 +381,6 @@ impl Chain {
             self.queue.put(at, index, Happening::Wake);
         }
     }
-}
-
-/// A relay that is switched on.
-#[derive(Clone, Copy, Debug)]
-struct Start {
-    /// Which one, from 1.
-    index: u16,
-    /// For the how manieth time, from 1.
-    number: u32,
-    seed: u32,
-    now: Instant,
-}
-
-/// A relay of the run that has just been switched on, with what it has stored.
-fn switched_on(setup: &Setup, start: Start, stored: Option<&Upload>) -> Result<Relay, SetupError> {
-    let Start {
-        index,
-        number,
-        seed,
-        now,
-    } = start;
-    let own = setup.profiles.iter().find(|(of, _)| *of == index);
-    let settings = Settings {
-        profile: own.map(|(_, profile)| *profile),
-        hold_altitude: setup.held.contains(&index),
-        hop_time: setup.link.hop_time(),
-        auth: setup.proof(number).or(setup.settings.auth),
-        ..setup.settings
-    };
-    let identity = Identity {
-        network: NETWORK,
-        index,
-    };
-    let mut relay = Relay::new(setup.mission, identity, settings, seed, now)?;
-    if let Some(upload) = stored {
-        let resumed = relay.resume(upload);
-        debug_assert_eq!(resumed, Ok(()), "it was uploaded for this mission");
-    }
-    Ok(relay)
 }
 
 /// Runs `setup` to the end.

@@ -1,0 +1,22 @@
+//! Which pass a message is of.
+
+use uav_relay::wire::message::Message;
+
+/// The number of the pass that a message is of.
+pub(super) const fn number_of(message: &Message<'_>) -> Option<u16> {
+    Some(match message {
+        Message::Sweep(sweep) => sweep.number,
+        Message::Verdict(answer) => answer.number,
+        Message::Busy { sweep } => *sweep,
+        Message::Wave(wave) => wave.number,
+        Message::Trace(trace) => trace.number,
+        Message::Token(token) => token.number,
+        Message::Moved(moved) => moved.number,
+        Message::Heartbeat { .. }
+        | Message::Hail(_)
+        | Message::Roster(_)
+        | Message::Count(_)
+        | Message::Fence { .. }
+        | Message::Offer(_) => return None,
+    })
+}

@@ -1,0 +1,51 @@
+//! A relay of the run that is switched on.
+
+use uav_relay::node::settings::SetupError;
+use uav_relay::wire::upload::Upload;
+use uav_relay::{Identity, Instant, Relay, Settings};
+
+use super::super::forge::NETWORK;
+use super::super::setup::Setup;
+
+/// A relay that is switched on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    /// Which one, from 1.
+    pub(super) index: u16,
+    /// For the how manieth time, from 1.
+    pub(super) number: u32,
+    pub(super) seed: u32,
+    pub(super) now: Instant,
+}
+
+/// A relay of the run that has just been switched on, with what it has stored.
+pub(super) fn switched_on(
+    setup: &Setup,
+    start: Start,
+    stored: Option<&Upload>,
+) -> Result<Relay, SetupError> {
+    let Start {
+        index,
+        number,
+        seed,
+        now,
+    } = start;
+    let own = setup.profiles.iter().find(|(of, _)| *of == index);
+    let settings = Settings {
+        profile: own.map(|(_, profile)| *profile),
+        hold_altitude: setup.held.contains(&index),
+        hop_time: setup.link.hop_time(),
+        auth: setup.proof(number).or(setup.settings.auth),
+        ..setup.settings
+    };
+    let identity = Identity {
+        network: NETWORK,
+        index,
+    };
+    let mut relay = Relay::new(setup.mission, identity, settings, seed, now)?;
+    if let Some(upload) = stored {
+        let resumed = relay.resume(upload);
+        debug_assert_eq!(resumed, Ok(()), "it was uploaded for this mission");
+    }
+    Ok(relay)
+}
