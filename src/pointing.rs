@@ -46,17 +46,25 @@ impl Bearing {
         })
     }
 
-    /// The bearing of the node at `to` for the one at `from`, both in the plane above the line from transmitter to receiver:
-    /// azimuth 0 or pi. The ground stations are placements too, at altitude 0. `None` if both are at one place.
+    /// The bearing of the node at `to` for the one at `from`. The ground stations are placements too, at altitude 0. `None` if both
+    /// are at one place.
     pub fn between(from: Placement, to: Placement) -> Option<Self> {
-        Self::new(to.x_m - from.x_m, 0.0, to.altitude_m - from.altitude_m)
+        Self::new(
+            to.x_m - from.x_m,
+            to.y_m - from.y_m,
+            to.altitude_m - from.altitude_m,
+        )
     }
 
     /// The bearing of the mission's interferer, which is on the ground, for a relay at `from`; to turn a null toward it.
     /// `None` if the relay stands on it, or the interference has no place.
     pub fn to_interferer(from: Placement, mission: &Mission) -> Option<Self> {
         let interferer = mission.interferer()?;
-        Self::new(interferer.x_m - from.x_m, interferer.y_m, -from.altitude_m)
+        Self::new(
+            interferer.x_m - from.x_m,
+            interferer.y_m - from.y_m,
+            -from.altitude_m,
+        )
     }
 }
 

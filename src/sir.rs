@@ -5,26 +5,81 @@
 //! `host-tests/tests/placement.rs`.
 
 use crate::gain::Gain;
-use crate::mission::{Interferer, Mission, Profile};
+use crate::mission::{Interferer, Mission};
 
-/// A place in the vertical plane through transmitter and receiver.
+/// A place in the air.
+///
+/// Frame: x along the ground from the transmitter toward the receiver, y to the right of x as seen from above, h up.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Placement {
     /// Distance from the transmitter along the ground, m, in [0, D].
     pub x_m: f32,
+    /// Distance from the line through transmitter and receiver, m: to its right above 0, to its left below.
+    pub y_m: f32,
     /// Height above the ground, m.
     pub altitude_m: f32,
 }
 
+impl Placement {
+    /// The place right above the line, where the paper has all relays.
+    pub const fn on_line(x_m: f32, altitude_m: f32) -> Self {
+        CrossSection::on_line(altitude_m).at(x_m)
+    }
+
+    /// Where it is across the line.
+    pub const fn cross_section(self) -> CrossSection {
+        CrossSection {
+            y_m: self.y_m,
+            altitude_m: self.altitude_m,
+        }
+    }
+}
+
+/// Where a relay flies across the line from transmitter to receiver, wherever along it.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CrossSection {
+    /// Distance from the line, m: to its right above 0.
+    pub y_m: f32,
+    /// Height above the ground, m.
+    pub altitude_m: f32,
+}
+
+impl CrossSection {
+    /// Right above the line.
+    pub const fn on_line(altitude_m: f32) -> Self {
+        Self {
+            y_m: 0.0,
+            altitude_m,
+        }
+    }
+
+    /// The place there at `x_m`.
+    pub const fn at(self, x_m: f32) -> Placement {
+        Placement {
+            x_m,
+            y_m: self.y_m,
+            altitude_m: self.altitude_m,
+        }
+    }
+
+    /// The squared distance from `other`, m^2.
+    pub(crate) fn apart_squared(self, other: Self) -> f32 {
+        square(self.y_m - other.y_m) + square(self.altitude_m - other.altitude_m)
+    }
+}
+
 /// How little is heard of the interference at `at`, as a relay there sees it: the one term in which kinds of it differ.
 ///
-/// (X - x)^2 + Y^2 + h^2 in m^2 for an interferer; Upsilon(x) / `Upsilon_max`, 0 to 1, in a field. The SIR of a hop into
+/// (X - x)^2 + (Y - y)^2 + h^2 in m^2 for an interferer; Upsilon(x) / `Upsilon_max`, 0 to 1, in a field. The SIR of a hop into
 /// that place is the sender's gain times this, over the squared length of the hop.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {
-            square(interferer.x_m - at.x_m) + square(interferer.y_m) + square(at.altitude_m)
+            square(interferer.x_m - at.x_m)
+                + square(interferer.y_m - at.y_m)
+                + square(at.altitude_m)
         }
         None => mission
             .field()
@@ -32,11 +87,21 @@ pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     }
 }
 
+/// A relay as the hops beside it know it, wherever along the line it stands.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Station {
+    /// Where it flies across the line.
+    pub at: CrossSection,
+    /// Its transmit power, W.
+    pub power_w: f32,
+}
+
 /// A node that feeds a hop: where it stands and what its power is worth against the interference.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sender {
-    pub(crate) altitude_m: f32,
+    pub(crate) at: CrossSection,
     pub(crate) gain: Gain,
 }
 
@@ -44,35 +109,36 @@ impl Sender {
     /// The ground transmitter, node 0.
     pub const fn transmitter(mission: &Mission) -> Self {
         Self {
-            altitude_m: 0.0,
+            at: CrossSection::on_line(0.0),
             gain: mission.tx_gain(),
         }
     }
 
-    /// A relay with the given altitude and power.
-    pub const fn relay(mission: &Mission, profile: Profile) -> Self {
+    /// A relay.
+    pub const fn relay(mission: &Mission, relay: Station) -> Self {
         Self {
-            altitude_m: profile.altitude_m,
-            gain: mission.relay_gain(profile.power_w),
+            at: relay.at,
+            gain: mission.relay_gain(relay.power_w),
         }
     }
 
     /// SIR at a relay at `to`, fed by this node standing at `from_m` along x; infinite when both share one place.
     ///
-    /// With s = X - x0: A ((s - d)^2 + Y^2 + h^2) / (d^2 + (h - h0)^2), which is the paper's `SIR_1` for h0 = 0 and A =
-    /// `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`). In a field it is the expected SIR,
+    /// With s = X - x0: A ((s - d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2), which with y = y0 = 0 is the paper's
+    /// `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`). In a field it is the expected SIR,
     /// p Upsilon(x) / (eta d^2) and p Upsilon(x) / (`mu_los` d^2).
     pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
         let step = to.x_m - from_m;
-        let climb = to.altitude_m - self.altitude_m;
-        self.gain.value() * quiet(mission, to) / (square(step) + square(climb))
+        let across = to.cross_section().apart_squared(self.at);
+        self.gain.value() * quiet(mission, to) / (square(step) + across)
     }
 }
 
-/// SIR at the ground receiver, fed by a relay of `power_w` watts at `from`: K / (d^2 + h^2), the paper's `SIR_{N+1}`.
+/// SIR at the ground receiver, fed by a relay of `power_w` watts at `from`: K / (d^2 + y^2 + h^2), the paper's `SIR_{N+1}`.
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
-    mission.receiver_gain(power_w) / (square(distance) + square(from.altitude_m))
+    let across = square(from.y_m) + square(from.altitude_m);
+    mission.receiver_gain(power_w) / (square(distance) + across)
 }
 
 /// How SIR_1 behaves along x beyond Tx, x >= 0, at one altitude: the paper's Lemma 2, for any place of the interferer.
@@ -120,7 +186,7 @@ pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
         Turn::Hill(peak) => peak.min(mission.config().distance_m),
         _ => 0.0,
     };
-    Sender::transmitter(mission).sir_at(mission, 0.0, Placement { x_m, altitude_m })
+    Sender::transmitter(mission).sir_at(mission, 0.0, Placement::on_line(x_m, altitude_m))
 }
 
 pub(crate) const fn square(x: f32) -> f32 {
@@ -157,10 +223,7 @@ mod tests {
                     tx.sir_at(
                         &mission,
                         0.0,
-                        Placement {
-                            x_m: f32::from(i) * 0.1,
-                            altitude_m,
-                        },
+                        Placement::on_line(f32::from(i) * 0.1, altitude_m),
                     )
                 })
                 .fold(0.0, f32::max);

@@ -43,7 +43,7 @@ fn relay(mission: Mission, index: u16) -> Relay {
 }
 
 /// Frames a relay wants to send now: where to, the message, the bytes.
-fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message<'static>, Vec<u8>)> {
+fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message, Vec<u8>)> {
     let mut buffer: FrameBuf = [0; MAX_FRAME];
     let mut sent = Vec::new();
     while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {

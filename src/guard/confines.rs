@@ -17,6 +17,10 @@ pub struct Geofence {
     pub least_x_m: f32,
     /// The largest x, m: to 1e7.
     pub most_x_m: f32,
+    /// The least y, m from the line: -1e7 to `most_y_m`.
+    pub least_y_m: f32,
+    /// The largest y, m: to 1e7.
+    pub most_y_m: f32,
     /// The least altitude, m: -1e7 to `most_altitude_m`.
     pub least_altitude_m: f32,
     /// The largest altitude, m: to 1e7.
@@ -48,6 +52,8 @@ impl Confines {
             fence: Geofence {
                 least_x_m: 0.0,
                 most_x_m: config.distance_m,
+                least_y_m: config.lateral.least_m,
+                most_y_m: config.lateral.most_m,
                 least_altitude_m: config.band.least_m.min(profile.altitude_m),
                 most_altitude_m: config.band.most_m.max(profile.altitude_m),
             },
@@ -63,6 +69,9 @@ impl Confines {
         is_place(fence.least_x_m)
             && is_place(fence.most_x_m)
             && fence.least_x_m <= fence.most_x_m
+            && is_place(fence.least_y_m)
+            && is_place(fence.most_y_m)
+            && fence.least_y_m <= fence.most_y_m
             && is_place(fence.least_altitude_m)
             && is_place(fence.most_altitude_m)
             && fence.least_altitude_m <= fence.most_altitude_m
@@ -76,6 +85,7 @@ impl Confines {
         let fence = &self.fence;
         Placement {
             x_m: place.x_m.max(fence.least_x_m).min(fence.most_x_m),
+            y_m: place.y_m.max(fence.least_y_m).min(fence.most_y_m),
             altitude_m: place
                 .altitude_m
                 .max(fence.least_altitude_m)

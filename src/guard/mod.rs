@@ -248,14 +248,8 @@ impl Guard {
         // Whatever the limits ask for: toward a neighbour only as far as it has granted, back never beyond what was promised.
         let x_m = x_m.max(least.min(before.x_m)).min(most.max(before.x_m));
         let clear = self.kept.is_clear() && self.keeper.is_clear();
-        let wanted = Placement {
-            x_m,
-            altitude_m: if clear {
-                target.altitude_m
-            } else {
-                before.altitude_m
-            },
-        };
+        let across = if clear { target } else { before };
+        let wanted = across.cross_section().at(x_m);
         let next = self.confines.cut(wanted);
         self.hull.go(next.x_m, now);
         self.setpoint = Some(next);
@@ -327,5 +321,5 @@ fn is_place(x_m: f32) -> bool {
 
 #[inline(never)] // called from several places
 fn is_placement(place: Placement) -> bool {
-    is_place(place.x_m) && is_place(place.altitude_m)
+    is_place(place.x_m) && is_place(place.y_m) && is_place(place.altitude_m)
 }

@@ -16,7 +16,8 @@ pub const MAX_RELAYS: u16 = 1000;
 
 /// The parameters of a mission, as plain numbers; [`Mission::try_new`] checks them.
 ///
-/// Frame: x runs along the ground from the transmitter (0) to the receiver (`distance_m`), altitude is height above it.
+/// Frame: x runs along the ground from the transmitter (0) to the receiver (`distance_m`), y to its right as seen from above,
+/// altitude is height above the ground.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MissionConfig {
@@ -30,8 +31,10 @@ pub struct MissionConfig {
     pub tx_power_w: f32,
     /// What every relay holds that was given nothing of its own.
     pub common: Profile,
-    /// The altitudes that methods which choose altitudes may choose from; `common.altitude_m` is one of them.
+    /// The altitudes that methods which choose altitudes may choose from, within 0.1 to 1e5; `common.altitude_m` is one of them.
     pub band: Band,
+    /// The room beside the line that the joint method may use: y within -1e5 to 1e5, 0 among them.
+    pub lateral: Band,
     /// Path loss of the three kinds of link.
     pub channel: Channel,
     /// What degrades the hops.
@@ -73,6 +76,8 @@ pub enum MissionError {
     Common,
     /// `band` is not in order, not within 0.1 to 1e5, or leaves out `common.altitude_m`.
     Band,
+    /// `lateral` is not in order, not within -1e5 to 1e5, or leaves out 0.
+    Lateral,
     /// `interferer.power_w` is not within 1e-6 to 1e9.
     InterfererPower,
     /// `interferer.x_m` or `interferer.y_m` is not within -1e7 to 1e7.
@@ -99,6 +104,7 @@ impl core::fmt::Display for MissionError {
             Self::Band => {
                 "band must be within 0.1 to 1e5, from least to most, with common.altitude_m in it"
             }
+            Self::Lateral => "lateral must be within -1e5 to 1e5, from least to most, with 0 in it",
             Self::InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
             Self::InterfererPlace => "interferer.x_m and y_m must be within -1e7 to 1e7",
             Self::Field => "a field of interference needs the feature `field`",
@@ -141,6 +147,7 @@ impl Mission {
             tx_power_w,
             common,
             band,
+            lateral,
             channel,
             interference,
             tolerance,
@@ -160,8 +167,11 @@ impl Mission {
         if !common.is_valid() {
             return Err(MissionError::Common);
         }
-        if !band.is_valid() || !within(common.altitude_m, band.least_m, band.most_m) {
+        if !band.is_of_altitudes() || !within(common.altitude_m, band.least_m, band.most_m) {
             return Err(MissionError::Band);
+        }
+        if !lateral.is_room_beside() {
+            return Err(MissionError::Lateral);
         }
         if let Interference::Source(interferer) = &interference {
             if !within(interferer.power_w, 1e-6, 1e9) {
@@ -347,26 +357,27 @@ impl Mission {
         (f64::from(self.config.tx_power_w) / loss) as f32
     }
 
-    /// The least step in x between neighbours whose altitudes differ by `climb_m`, m: what keeps the separation asked for.
-    pub(crate) fn least_step(&self, climb_m: f32) -> f32 {
+    /// The least step in x between neighbours that are `across_squared` m^2 apart across the line: what keeps the separation
+    /// asked for.
+    pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
         let apart = self.config.min_separation_m;
-        if !(climb_m.abs() > 0.0) {
+        if !(across_squared > 0.0) {
             return apart;
         }
-        sqrt(apart * apart - climb_m * climb_m)
+        sqrt(apart * apart - across_squared)
     }
 
     /// The last place on its way that leaves the relays after `index` room to stand `min_separation_m` apart, m.
     ///
-    /// `climb_m` is by how much the altitudes of two neighbours among them may differ: what they are apart in height they need
-    /// not be along x.
-    pub(crate) fn end_for(&self, index: u16, climb_m: f32) -> f32 {
+    /// `across_squared` is how far apart across the line two neighbours among them may be, m^2: that much they need not be along
+    /// x.
+    pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         let behind = f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
             Heading::TowardTx => index.saturating_sub(1),
         });
         let distance_m = self.config.distance_m;
-        let least = self.least_step(climb_m);
+        let least = self.least_step(across_squared);
         let step = if least > 0.0 {
             least + distance_m * ROUNDING
         } else {

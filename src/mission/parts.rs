@@ -1,6 +1,7 @@
 //! What a mission is made of: interference, altitudes, what a relay brings along.
 
 use crate::field::Field;
+use crate::sir::{CrossSection, Station};
 
 /// The interferer (the paper's MSI), on the ground: a jammer, a base station, a licensed user.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -10,7 +11,7 @@ pub struct Interferer {
     pub power_w: f32,
     /// Place along the line from Tx (0) to Rx (D), m; before Tx or beyond Rx too.
     pub x_m: f32,
-    /// Distance from that line, m.
+    /// Distance from that line, m: to its right above 0, to its left below.
     pub y_m: f32,
 }
 
@@ -34,26 +35,34 @@ pub enum Heading {
     TowardTx,
 }
 
-/// The altitudes a relay may choose from.
+/// What a relay may choose from: altitudes, or distances to the side.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Band {
-    /// Lowest altitude, m: 0.1 to 1e5.
+    /// The lowest, m.
     pub least_m: f32,
-    /// Highest altitude, m: `least_m` to 1e5.
+    /// The highest, m: at least `least_m`.
     pub most_m: f32,
 }
 
 impl Band {
-    /// The band that is a single altitude.
-    pub const fn at(altitude_m: f32) -> Self {
+    /// No room to the side: relays stay in the vertical plane through transmitter and receiver, as in the paper.
+    pub const NONE: Self = Self::at(0.0);
+
+    /// The band that is a single number.
+    pub const fn at(at_m: f32) -> Self {
         Self {
-            least_m: altitude_m,
-            most_m: altitude_m,
+            least_m: at_m,
+            most_m: at_m,
         }
     }
 
-    /// From the lowest altitude to the highest, m.
+    /// The number in it that is nearest to `at_m`.
+    pub const fn nearest(self, at_m: f32) -> f32 {
+        at_m.max(self.least_m).min(self.most_m)
+    }
+
+    /// From the lowest to the highest, m.
     pub const fn span_m(self) -> f32 {
         self.most_m - self.least_m
     }
@@ -63,9 +72,14 @@ impl Band {
         !(self.least_m < self.most_m)
     }
 
-    /// Whether it is in order and within its range.
-    pub(super) const fn is_valid(self) -> bool {
+    /// Whether it is a band of altitudes: in order, and within 0.1 to 1e5.
+    pub(super) const fn is_of_altitudes(self) -> bool {
         within(self.least_m, 0.1, 1e5) && within(self.most_m, self.least_m, 1e5)
+    }
+
+    /// Whether it is room beside the line: in order, within -1e5 to 1e5, and the line itself in it.
+    pub(super) const fn is_room_beside(self) -> bool {
+        within(self.least_m, -1e5, 0.0) && within(self.most_m, 0.0, 1e5)
     }
 }
 
@@ -83,6 +97,14 @@ impl Profile {
     /// Whether both numbers are within their ranges.
     pub const fn is_valid(&self) -> bool {
         within(self.altitude_m, 0.1, 1e5) && within(self.power_w, 1e-6, 1e6)
+    }
+
+    /// The relay that flies at this altitude right above the line.
+    pub const fn on_line(self) -> Station {
+        Station {
+            at: CrossSection::on_line(self.altitude_m),
+            power_w: self.power_w,
+        }
     }
 }
 

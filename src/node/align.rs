@@ -1,11 +1,12 @@
 //! Algorithms 1 and 4 on board: a relay's share of a sweep of targets, and of its verdict.
 
 use super::MEMBERSHIP;
-use crate::mission::{Mission, Profile};
+use crate::mission::Mission;
 use crate::placement::PerTarget;
 use crate::placement::ladder::Ladder;
 use crate::placement::pass::{self, Behind};
 use crate::placement::verdict::Verdict;
+use crate::sir::Station;
 
 /// A sweep, as one relay sees it.
 #[derive(Clone, Debug)]
@@ -37,7 +38,7 @@ impl Sweeping {
         mission: &Mission,
         behind: Option<Behind>,
         index: u16,
-        own: Profile,
+        own: Station,
         measured_per_w: Option<f32>,
         from: &PerTarget,
     ) -> bool {
@@ -88,8 +89,9 @@ pub(crate) fn told(behind: Option<Behind>, from: &PerTarget) -> u32 {
     if !MEMBERSHIP {
         return 0;
     }
-    let held = behind.map_or([0.0; 2], |behind| {
-        [behind.profile.altitude_m, behind.profile.power_w]
+    let held = behind.map_or([0.0; 3], |behind| {
+        let Station { at, power_w } = behind.relay;
+        [at.y_m, at.altitude_m, power_w]
     });
     held.iter().chain(from).fold(0, |sum: u32, value| {
         sum.rotate_left(5).wrapping_add(value.to_bits())

@@ -3,7 +3,7 @@
 use super::event::Event;
 use super::exchange::{Next, Phase};
 use super::members::Members;
-use super::share::{ADJUST, ALTITUDE};
+use super::share::ADJUST;
 use super::stats::bump;
 use super::timers::Timer;
 use super::{GUARD, MEMBERSHIP, Node, Side};
@@ -46,7 +46,7 @@ impl Node {
         now: Instant,
         side: Side,
         from: u16,
-        message: &Message<'_>,
+        message: &Message,
     ) -> bool {
         #[cfg(feature = "upload")]
         if self.ground_side(from).is_some() {
@@ -97,7 +97,7 @@ impl Node {
         now: Instant,
         side: Side,
         from: u16,
-        message: &Message<'_>,
+        message: &Message,
     ) -> bool {
         let Some(told) = message.mission() else {
             return true;
@@ -161,7 +161,7 @@ impl Node {
     }
 
     /// A message of this mission, and of this view if it is of one, from the neighbour at `side`.
-    fn handle(&mut self, now: Instant, side: Side, message: &Message<'_>) {
+    fn handle(&mut self, now: Instant, side: Side, message: &Message) {
         if let Message::Heartbeat { answer, .. } = message {
             self.beside(side).signs.answer |= *answer;
             return;
@@ -198,8 +198,6 @@ impl Node {
         let next = match message {
             Message::Sweep(sweep) => share.on_sweep(own, sweep),
             Message::Verdict(answer) => share.on_verdict(own, answer),
-            Message::Wave(wave) if ALTITUDE => share.on_wave(own, wave),
-            Message::Trace(trace) if ALTITUDE => share.on_trace(own, *trace),
             Message::Token(token) if ADJUST => share.on_token(own, token),
             Message::Moved(moved) if ADJUST => share.on_moved(own, moved),
             // A chain has no more relays than its mission.

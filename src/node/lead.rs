@@ -2,8 +2,6 @@
 
 use super::settings::{Adjust, Method, Settings};
 use crate::mission::{Mission, Profile};
-use crate::placement::climb::Climb;
-use crate::placement::coarse::Coarse;
 use crate::placement::plan::Planner;
 use crate::placement::search::{Infeasible, Schedule, Search};
 use crate::wire::message::Turn;
@@ -17,10 +15,6 @@ pub(crate) enum Lead {
     Predicting(Planner),
     /// Trying targets at the altitudes held; whether the chain settles with what is agreed.
     Searching { search: Search, last: bool },
-    /// Solving it for the whole band of altitudes.
-    Surveying(Coarse),
-    /// Trying targets and altitudes.
-    Climbing(Climb),
     /// Algorithm 2.
     Adjusting(Rounds),
 }

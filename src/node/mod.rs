@@ -130,7 +130,7 @@ impl Node {
             members: Members::new(&mission, identity.index),
             mission,
             settings,
-            share: Share::new(&mission, leader, low, profile),
+            share: Share::new(leader, low, profile),
             meter: Meter::new(settings.measure),
             #[cfg(feature = "upload")]
             upload: None,

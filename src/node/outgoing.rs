@@ -10,7 +10,7 @@ use crate::wire::message::Message;
 
 impl Node {
     /// The next message to send, to which node at which side. Call until there is none.
-    pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message<'_>)> {
+    pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let heading = self.mission.heading();
         let (onward, backward) = (Side::onward(heading), Side::back(heading));
         let (next, before) = (self.partner(onward), self.partner(backward));

@@ -59,7 +59,7 @@ impl Meter {
         let power_w = match (sample, at) {
             (Sample::Interference { power_w }, _) => power_w,
             (Sample::FirstHop { sir }, Some(at)) => {
-                let squared = square(at.x_m) + square(at.altitude_m);
+                let squared = square(at.x_m) + square(at.y_m) + square(at.altitude_m);
                 mission.first_hop_power_w(squared) / sir
             }
             (Sample::FirstHop { .. }, None) => return false,

@@ -35,8 +35,8 @@ pub enum Method {
     /// The best places at the altitudes held: Algorithm 1, in a field Algorithm 4.
     #[default]
     Align,
-    /// Algorithm 1, and then the best altitudes with it, within the mission's band. Not in a field.
-    Altitude,
+    /// The best places, sides and altitudes together, within the mission's corridor. Not in a field.
+    Joint,
     /// Algorithm 1, and then Algorithm 2. Not in a field.
     Adjust(Adjust),
 }
@@ -199,7 +199,7 @@ pub(crate) fn check(
     }
     let able = match settings.method {
         Method::Align => true,
-        Method::Altitude => cfg!(feature = "altitude") && mission.interferer().is_some(),
+        Method::Joint => cfg!(feature = "altitude") && mission.interferer().is_some(),
         Method::Adjust(_) => cfg!(feature = "adjust") && mission.interferer().is_some(),
     };
     if !able {

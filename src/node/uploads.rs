@@ -43,7 +43,7 @@ impl Node {
     }
 
     /// A message from the ground at `side`; whether it is one for the ground to say.
-    pub(super) fn on_ground(&mut self, now: Instant, side: Side, message: &Message<'_>) -> bool {
+    pub(super) fn on_ground(&mut self, now: Instant, side: Side, message: &Message) -> bool {
         let base = self.members.digest;
         match message {
             Message::Offer(_) | Message::Hail(_) if message.mission() != Some(base) => {
@@ -174,7 +174,7 @@ impl Node {
     }
 
     /// What the neighbour at `side` has to be offered before anything else, if it is.
-    pub(super) fn offer(&self, side: Side) -> Option<Message<'static>> {
+    pub(super) fn offer(&self, side: Side) -> Option<Message> {
         let beside = match side {
             Side::Upstream => &self.upstream,
             Side::Downstream => &self.downstream,

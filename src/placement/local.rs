@@ -77,10 +77,7 @@ impl Hops {
         after: Option<Beside>,
     ) -> Self {
         let rx = Beside {
-            place: Placement {
-                x_m: mission.config().distance_m,
-                altitude_m: 0.0,
-            },
+            place: Placement::on_line(mission.config().distance_m, 0.0),
             apart_m: 0.0,
         };
         let to = after.unwrap_or(rx).place;
@@ -249,7 +246,7 @@ impl Search {
         if !(low <= high) {
             return -1.0;
         }
-        let at = |x_m| Placement { x_m, altitude_m };
+        let at = |x_m| Placement::on_line(x_m, altitude_m);
         // Past the interferer the hop into the relay may get better with its length: then an end of the row is best.
         let ends = self.weigh(at(low)).max(self.weigh(at(high)));
         for _ in 0..HALVINGS {
@@ -275,10 +272,10 @@ impl Search {
         }
         let part = |at: u8, of: u8| f32::from(at) / f32::from(of.saturating_sub(1).max(1));
         let (from, to) = (self.hops.before.place.x_m, self.hops.after.place.x_m);
-        _ = self.weigh(Placement {
-            x_m: (from + (to - from) * part(self.column, columns)).min(to),
-            altitude_m: self.altitude(part(self.row, rows)),
-        });
+        _ = self.weigh(Placement::on_line(
+            (from + (to - from) * part(self.column, columns)).min(to),
+            self.altitude(part(self.row, rows)),
+        ));
         self.row += 1;
         Some(1)
     }
@@ -295,7 +292,7 @@ mod tests {
 
     /// A relay at `altitude_m` in the middle of two that are 100 m apart at `beside_m`, who may go anywhere within the band.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> Search {
-        let at = |x_m, altitude_m| Placement { x_m, altitude_m };
+        let at = Placement::on_line;
         let beside = |x_m| Beside {
             place: at(x_m, beside_m),
             apart_m,

@@ -4,19 +4,16 @@
 //! | --- | --- |
 //! | how far one hop reaches for a target SIR | [`spacing`] toward Rx, [`retreat`] toward Tx in a field |
 //! | a pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass), [`verdict`]; [`search`] and [`scan`] say which come next; [`plan`] runs all of it for a whole chain without a message; [`promise`] whether it is the most |
-//! | a pass of targets and altitude levels | [`levels`], [`coded`], [`wave`]; [`climb`] says which come next; [`coarse`] predicts where to begin |
+//! | places, sides and altitudes together | [`joint`] |
 //! | one relay between its neighbours | [`local`]: Algorithm 2 |
 //! | how many relays | [`fleet`]: the fewest for a target, and the most any number can have |
 //! | one relay alone | [`single`]: Theorems 1 to 3, Algorithm 3 |
 //!
 //! The node walks the same functions one hop a relay.
 
-pub mod climb;
-pub mod coarse;
-pub mod coded;
 pub mod fleet;
+pub mod joint;
 pub mod ladder;
-pub mod levels;
 pub mod local;
 pub mod pass;
 pub mod plan;
@@ -27,7 +24,6 @@ pub mod search;
 pub mod single;
 pub mod spacing;
 pub mod verdict;
-pub mod wave;
 
 /// Up to one number a target: reaches, slacks or the targets themselves.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

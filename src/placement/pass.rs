@@ -9,16 +9,16 @@ use super::ladder::{Ladder, TARGETS};
 use super::retreat::Retreat;
 use super::spacing::{Hop, receiver_reach};
 use super::verdict::Verdict;
-use crate::mission::{Heading, Mission, Profile};
+use crate::mission::{Heading, Mission};
 use crate::root::sqrt;
-use crate::sir::{self, Placement, Sender, square};
+use crate::sir::{self, Sender, Station, square};
 
 /// The relay that a pass comes from, as its message tells.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Behind {
-    /// What it holds.
-    pub profile: Profile,
+    /// Where it flies across the line, and its power.
+    pub relay: Station,
     /// Upsilon as it measures it where it stands, 1/W, if it uses that instead of the agreed field. Means nothing toward Rx.
     pub measured_per_w: Option<f32>,
 }
@@ -32,7 +32,7 @@ pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([x_m; TARGETS])
 }
 
-/// Works out the `reaches` of relay `index`, which holds `own`, for as many of the rising `targets` as it can meet.
+/// Works out the `reaches` of relay `index`, `own`, for as many of the rising `targets` as it can meet.
 ///
 /// `behind` is the relay that the pass comes from and `from` its reaches, m; `None` for the first one, which begins at Tx or Rx.
 /// Bounded by a reach a target.
@@ -40,7 +40,7 @@ pub fn extend(
     mission: &Mission,
     behind: Option<Behind>,
     index: u16,
-    own: Profile,
+    own: Station,
     targets: &[f32],
     from: &[f32],
     reaches: &mut PerTarget,
@@ -49,9 +49,9 @@ pub fn extend(
     let pairs = targets.iter().zip(from);
     if let Some(interferer) = mission.interferer() {
         let sender = behind.map_or(Sender::transmitter(mission), |behind| {
-            Sender::relay(mission, behind.profile)
+            Sender::relay(mission, behind.relay)
         });
-        let hop = Hop::new(mission, interferer, sender, index, own.altitude_m, 0.0);
+        let hop = Hop::new(mission, interferer, sender, index, own.at, 0.0);
         for (&target, &from_m) in pairs {
             let Some(place) = hop.reach(target, from_m) else {
                 break;
@@ -61,7 +61,7 @@ pub fn extend(
             }
         }
     } else if let Some(field) = mission.field() {
-        let altitude_m = behind.map(|behind| behind.profile.altitude_m);
+        let altitude_m = behind.map(|behind| behind.relay.at.altitude_m);
         let measured = behind.and_then(|behind| behind.measured_per_w);
         let hop = Retreat::new(mission, own, index, altitude_m);
         for (&target, &from_m) in pairs {
@@ -84,13 +84,13 @@ pub fn extend(
     }
 }
 
-/// The verdict on the pass, by the last relay, which holds `own` and has these `reaches`.
+/// The verdict on the pass, by the last relay, `own`, which has these `reaches`.
 ///
 /// Toward Rx the slack of a target is reach + `d_max` - D; toward Tx it is the same seen from the other end, the farthest
 /// that the first hop may be minus the reach. `measured_per_w` is the last relay's own Upsilon, if it uses that.
 pub fn close(
     mission: &Mission,
-    own: Profile,
+    own: Station,
     measured_per_w: Option<f32>,
     ladder: Ladder,
     reaches: &[f32],
@@ -108,11 +108,11 @@ pub fn close(
     Verdict::new(mission, ladder, &targets, slacks)
 }
 
-/// By how much a chain whose last relay, which holds `own`, stands at `place` for `target` overshoots, m: not negative when it
+/// By how much a chain whose last relay, `own`, stands at `place` for `target` overshoots, m: not negative when it
 /// closes. `None` where Rx cannot be reached from anywhere.
 pub(super) fn slack(
     mission: &Mission,
-    own: Profile,
+    own: Station,
     measured_per_w: Option<f32>,
     target: f32,
     place: f32,
@@ -121,13 +121,10 @@ pub(super) fn slack(
         return receiver_reach(mission, own, target)
             .map(|last_hop| place - mission.config().distance_m + last_hop);
     };
-    let at = Placement {
-        x_m: place,
-        altitude_m: own.altitude_m,
-    };
+    let at = own.at.at(place);
     let quiet = measured_per_w.map_or(sir::quiet(mission, at), |upsilon| upsilon / field.largest());
     // Cut at 1e9 m, as the last hop toward Rx: an infinite slack would not be sent.
-    let squared = (mission.tx_gain().value() * quiet / target).min(1e18) - square(own.altitude_m);
+    let squared = (mission.tx_gain().value() * quiet / target).min(1e18) - square(own.at.altitude_m);
     // Where no place is near enough, by how much the square is negative: it stays continuous in the target.
     Some((sqrt(squared.abs()).copysign(squared) - place).max(-1e9))
 }

@@ -83,7 +83,7 @@ impl Planner {
                 mission,
                 self.behind,
                 self.index,
-                profile,
+                profile.on_line(),
                 &self.targets,
                 &self.reaches,
                 &mut reaches,
@@ -91,13 +91,13 @@ impl Planner {
             self.reaches = reaches;
             if let Some(next) = mission.after(self.index) {
                 self.behind = Some(Behind {
-                    profile,
+                    relay: profile.on_line(),
                     measured_per_w: None,
                 });
                 self.index = next;
                 continue;
             }
-            let verdict = pass::close(mission, profile, None, *self.search.ladder(), &self.reaches);
+            let verdict = pass::close(mission, profile.on_line(), None, *self.search.ladder(), &self.reaches);
             if let Some(commit) = verdict.commit
                 && let Some(&target) = self.targets.get(usize::from(commit))
             {
@@ -147,15 +147,12 @@ pub fn place(
     loop {
         let profile = profile_of(at);
         let mut reaches = PerTarget::new();
-        pass::extend(mission, behind, at, profile, &[target], &from, &mut reaches);
+        pass::extend(mission, behind, at, profile.on_line(), &[target], &from, &mut reaches);
         if at == index {
-            return reaches.first().map(|&x_m| Placement {
-                x_m,
-                altitude_m: profile.altitude_m,
-            });
+            return reaches.first().map(|&x_m| profile.on_line().at.at(x_m));
         }
         behind = Some(Behind {
-            profile,
+            relay: profile.on_line(),
             measured_per_w: None,
         });
         from = reaches;

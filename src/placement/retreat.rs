@@ -12,9 +12,9 @@
 //!
 //! Accuracy: `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` asserts it in f64.
 
-use crate::mission::{Mission, Profile};
+use crate::mission::Mission;
 use crate::root::sqrt;
-use crate::sir::square;
+use crate::sir::{Station, square};
 
 /// One hop, from where it is heard: ready to be evaluated for many targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -32,9 +32,9 @@ pub struct Retreat {
 }
 
 impl Retreat {
-    /// The hop that relay `index` feeds with what it holds, `own`, to a relay at `altitude_m`; `None` for the one to Rx.
-    pub fn new(mission: &Mission, own: Profile, index: u16, altitude_m: Option<f32>) -> Self {
-        let climb = own.altitude_m - altitude_m.unwrap_or(0.0);
+    /// The hop that relay `index`, `own`, feeds to a relay at `altitude_m`; `None` for the one to Rx.
+    pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
+        let climb = own.at.altitude_m - altitude_m.unwrap_or(0.0);
         Self {
             gain: match altitude_m {
                 Some(_) => mission.relay_gain(own.power_w).value(),
@@ -43,7 +43,7 @@ impl Retreat {
             climb_squared: square(climb),
             // The receiver stands on the ground: its altitude alone keeps the tail clear of it.
             least_step: match altitude_m {
-                Some(_) => mission.least_step(climb),
+                Some(_) => mission.least_step(square(climb)),
                 None => 0.0,
             },
             end_m: mission.end_for(index, 0.0),

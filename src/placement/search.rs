@@ -89,10 +89,8 @@ impl Search {
         let MissionConfig {
             distance_m, common, ..
         } = *mission.config();
-        let above_receiver = |profile: Profile| Placement {
-            x_m: distance_m,
-            altitude_m: profile.altitude_m,
-        };
+        let above_receiver =
+            |profile: Profile| Placement::on_line(distance_m, profile.altitude_m);
         // What the hop at either end can have at most, and what a chain of equals meets that takes no step at all.
         let (ceiling, start, met) = match mission.heading() {
             Heading::TowardRx => {
@@ -103,10 +101,7 @@ impl Search {
             }
             Heading::TowardTx => {
                 let ceiling = sir::at_receiver(mission, above_receiver(leader), leader.power_w);
-                let above_transmitter = Placement {
-                    x_m: 0.0,
-                    altitude_m: leader.altitude_m,
-                };
+                let above_transmitter = Placement::on_line(0.0, leader.altitude_m);
                 let met = sir::at_receiver(mission, above_transmitter, leader.power_w);
                 (ceiling, ceiling, met)
             }

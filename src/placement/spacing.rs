@@ -1,10 +1,11 @@
 //! How far a hop reaches: the closed forms of the paper's `d_1`, `d_k` and `d_max` as one stable rule.
 //!
-//! With the sender at (x0, h0), the node at (x0 + d, h), the interferer at (X, Y, 0), u = X - x0 and A the sender's gain,
-//! SIR >= gamma is
+//! With the sender at (x0, y0, h0), the node at (x0 + d, y, h), the interferer at (X, Y, 0), u = X - x0 and A the sender's
+//! gain, SIR >= gamma is
 //!
 //! ```text
-//! f(d) = -e d^2 - 2 u d + C >= 0,    e = gamma / A - 1,    C = u^2 + H,    H = Y^2 + h0 (2h - h0) - e (h - h0)^2
+//! f(d) = -e d^2 - 2 u d + C >= 0,    e = gamma / A - 1,    C = u^2 + H,
+//! H = (Y - y0) (Y + y0 - 2y) + h0 (2h - h0) - e ((y - y0)^2 + (h - h0)^2)
 //! ```
 //!
 //! The reach is the largest d in `[0, end - x0]` with f(d) >= 0. `end` if f is not negative there; else the largest root
@@ -24,9 +25,9 @@
 //! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement.rs` asserts it against a bisection of the
 //! SIR itself in f64.
 
-use crate::mission::{Interferer, Mission, Profile};
+use crate::mission::{Interferer, Mission};
 use crate::root::sqrt;
-use crate::sir::{Sender, square};
+use crate::sir::{CrossSection, Sender, Station, square};
 
 /// No hop is short enough for a target this far above its gain, and every term of f stays finite below it.
 const MOST_RATIO: f32 = 1e18;
@@ -39,12 +40,12 @@ pub struct Hop {
     sender: Sender,
     /// X, m.
     interferer_x_m: f32,
-    /// Y^2 + h^2, m^2.
+    /// (Y - y)^2 + h^2, m^2.
     aside_squared: f32,
-    /// Y^2 + h0 (2h - h0), m^2.
+    /// (Y - y0) (Y + y0 - 2y) + h0 (2h - h0), m^2.
     base: f32,
-    /// (h - h0)^2, m^2.
-    climb_squared: f32,
+    /// (y - y0)^2 + (h - h0)^2, m^2.
+    across_squared: f32,
     /// The least step to the node, m.
     least_step: f32,
     /// The last place the node may take, m.
@@ -52,30 +53,33 @@ pub struct Hop {
 }
 
 impl Hop {
-    /// The hop from `sender` to relay `index`, which holds `altitude_m`; neighbours among the relays after it may differ by
-    /// `climb_m` in altitude.
+    /// The hop from `sender` to relay `index`, which flies at `at`; neighbours among the relays after it may be `spread_squared`
+    /// m^2 apart across the line.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
         sender: Sender,
         index: u16,
-        altitude_m: f32,
-        climb_m: f32,
+        at: CrossSection,
+        spread_squared: f32,
     ) -> Self {
-        let climb = altitude_m - sender.altitude_m;
+        let (from, aside) = (sender.at, interferer.y_m);
+        let climb = at.altitude_m - from.altitude_m;
+        let across_squared = at.apart_squared(from);
         Self {
             sender,
             interferer_x_m: interferer.x_m,
-            aside_squared: square(interferer.y_m) + square(altitude_m),
-            base: square(interferer.y_m) + sender.altitude_m * (altitude_m + climb),
-            climb_squared: square(climb),
+            aside_squared: square(aside - at.y_m) + square(at.altitude_m),
+            base: (aside - from.y_m) * (aside + from.y_m - 2.0 * at.y_m)
+                + from.altitude_m * (at.altitude_m + climb),
+            across_squared,
             // The transmitter stands on the ground: its altitude alone keeps the head clear of it.
             least_step: if index <= 1 {
                 0.0
             } else {
-                mission.least_step(climb)
+                mission.least_step(across_squared)
             },
-            end_m: mission.end_for(index, climb_m),
+            end_m: mission.end_for(index, spread_squared),
         }
     }
 
@@ -94,11 +98,11 @@ impl Hop {
         }
         let u = self.interferer_x_m - from_m;
         // f(end) as the SIR's own two terms: expanded, they would cancel right next to the interferer.
-        if square(u - room) + self.aside_squared >= ratio * (square(room) + self.climb_squared) {
+        if square(u - room) + self.aside_squared >= ratio * (square(room) + self.across_squared) {
             return Some(self.end_m);
         }
         let e = self.sender.gain.excess(target);
-        let h = self.base - e * self.climb_squared;
+        let h = self.base - e * self.across_squared;
         let c = square(u) + h;
         let ahead = u >= 0.0;
         if c < 0.0 && (ahead || e <= 0.0) {
@@ -130,10 +134,11 @@ impl Hop {
 
 /// The farthest a relay may be from the receiver, m along x, for the receiver to meet `target`: the paper's `d_max`.
 ///
-/// sqrt(K / gamma - h^2), at most 1e9; `None` where even a relay right above the receiver is too weak. Not cut at D: it
+/// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` where even a relay right above the receiver is too weak. Not cut at D: it
 /// stays smooth in the target for the search that looks for its root.
-pub fn receiver_reach(mission: &Mission, profile: Profile, target: f32) -> Option<f32> {
-    let squared = mission.receiver_gain(profile.power_w) / target - square(profile.altitude_m);
+pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
+    let across = square(relay.at.y_m) + square(relay.at.altitude_m);
+    let squared = mission.receiver_gain(relay.power_w) / target - across;
     (squared >= 0.0).then(|| sqrt(squared).min(1e9))
 }
 
@@ -142,7 +147,7 @@ mod tests {
     use super::Hop;
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig};
-    use crate::sir::Sender;
+    use crate::sir::{CrossSection, Sender};
 
     fn first_hop(x_m: f32, distance_m: f32, altitude_m: f32) -> Hop {
         let interferer = Interferer {
@@ -157,7 +162,7 @@ mod tests {
         };
         let mission = Mission::try_new(config).unwrap();
         let sender = Sender::transmitter(&mission);
-        Hop::new(&mission, &interferer, sender, 1, altitude_m, 0.0)
+        Hop::new(&mission, &interferer, sender, 1, CrossSection::on_line(altitude_m), 0.0)
     }
 
     /// Behind the transmitter an interferer makes SIR_1 rise at first: at 10 m behind, from 1.04 above Tx to 1.22 at 45 m.

@@ -72,7 +72,7 @@ pub(crate) fn greeting(
 pub(crate) fn say(
     session: &mut Session,
     to: u16,
-    message: &Message<'_>,
+    message: &Message,
     header: &mut Header,
     frame: &mut FrameBuf,
 ) -> Option<usize> {

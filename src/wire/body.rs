@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::forming::Forming;
-use super::message::{Message, Turn};
+use super::message::{Message, TRIALS, Trial, Turn};
 #[cfg(feature = "upload")]
 use super::upload::{LENGTH, Terms};
 use crate::placement::PerTarget;
@@ -57,25 +57,15 @@ pub(super) struct At {
 
 /// The wire form of a message.
 #[derive(Serialize, Deserialize)]
-pub(super) enum Body<'a> {
+pub(super) enum Body {
     Sweep(Targets, PerTarget),
-    Verdict(Pass, Option<u8>, PerTarget),
+    Verdict(Pass, bool, Option<u8>, PerTarget),
     Busy([u8; 2]),
     Heartbeat([u8; 2], bool),
     Measured(Targets, f32, PerTarget),
-    Wave {
-        pass: Pass,
-        base: f32,
-        rise: f32,
-        targets: u8,
-        centre_m: f32,
-        width_m: f32,
-        levels: u8,
-        power_w: f32,
-        #[serde(borrow)]
-        reaches: &'a [u8],
-    },
-    Trace(Pass, Option<[u8; 2]>),
+    Aside(Targets, f32, PerTarget),
+    Course(Pass, f32, heapless::Vec<[f32; 4], TRIALS>),
+    Worth(Pass, Option<u8>, [f32; 17]),
     Token {
         pass: Pass,
         at: At,
@@ -96,21 +86,21 @@ pub(super) enum Body<'a> {
     Offer(Terms),
 }
 
-impl Body<'_> {
+impl Body {
     /// Bytes of the shortest encoding. postcard reads longer ones too, whose tag or count is padded with empty varint bytes,
     /// and how many it puts up with depends on the width of a usize: what one node took, another would refuse.
     pub(super) fn shortest(&self) -> usize {
         match self {
             Self::Sweep(_, reaches) => 20 + 4 * reaches.len(),
-            Self::Verdict(_, commit, slacks) => {
-                7 + usize::from(commit.is_some()) + 4 * slacks.len()
+            Self::Verdict(_, _, commit, slacks) => {
+                8 + usize::from(commit.is_some()) + 4 * slacks.len()
             }
             Self::Busy(_) => 3,
             Self::Heartbeat(..) => 4,
             Self::Measured(_, _, reaches) => 24 + 4 * reaches.len(),
-            Self::Wave { reaches, .. } => 28 + usize::from(reaches.len() > 127) + reaches.len(),
-            Self::Trace(_, None) => 6,
-            Self::Trace(_, Some(_)) => 8,
+            Self::Aside(_, _, reaches) => 24 + 4 * reaches.len(),
+            Self::Course(_, _, trials) => 10 + 16 * trials.len(),
+            Self::Worth(_, trial, _) => 74 + usize::from(trial.is_some()),
             Self::Token { .. } => 28,
             Self::Moved(..) => 18,
             Self::Hail(_) | Self::Roster(_) | Self::Count(_) => 14,
@@ -121,7 +111,7 @@ impl Body<'_> {
     }
 }
 
-impl Message<'_> {
+impl Message {
     /// Writes the body into `buffer` and returns how many bytes it takes, at most [`MAX_BODY`](super::message::MAX_BODY);
     /// `None` if it does not fit.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
@@ -133,40 +123,39 @@ impl Message<'_> {
                     anchor,
                     gap,
                     growth,
-                    altitude_m: sweep.profile.altitude_m,
-                    power_w: sweep.profile.power_w,
+                    altitude_m: sweep.relay.at.altitude_m,
+                    power_w: sweep.relay.power_w,
                 };
                 let reaches = sweep.reaches.clone();
                 match sweep.measured_per_w {
+                    _ if sweep.chosen => Body::Aside(targets, sweep.relay.at.y_m, reaches),
                     None => Body::Sweep(targets, reaches),
                     Some(upsilon_per_w) => Body::Measured(targets, upsilon_per_w, reaches),
                 }
             }
             Self::Verdict(answer) => Body::Verdict(
                 Pass::new(answer.number, answer.mission),
+                answer.own,
                 answer.verdict.commit,
                 answer.verdict.slacks.clone(),
             ),
             Self::Busy { sweep } => Body::Busy(sweep.to_le_bytes()),
             Self::Heartbeat { mission, answer } => Body::Heartbeat(mission.to_le_bytes(), *answer),
-            Self::Wave(wave) => {
-                let (base, rise, targets) = wave.rungs.parts();
-                let (centre_m, width_m, levels) = wave.levels.parts();
-                Body::Wave {
-                    pass: Pass::new(wave.number, wave.mission),
-                    base,
-                    rise,
-                    targets,
-                    centre_m,
-                    width_m,
-                    levels,
-                    power_w: wave.power_w,
-                    reaches: wave.reaches,
-                }
+            Self::Course(course) => {
+                let trials = course.trials.iter().map(|trial| {
+                    let Trial { target, place } = *trial;
+                    [target, place.x_m, place.y_m, place.altitude_m]
+                });
+                Body::Course(
+                    Pass::new(course.number, course.mission),
+                    course.power_w,
+                    trials.collect(),
+                )
             }
-            Self::Trace(trace) => Body::Trace(
-                Pass::new(trace.number, trace.mission),
-                trace.choice.map(|choice| [choice.target, choice.level]),
+            Self::Worth(worth) => Body::Worth(
+                Pass::new(worth.number, worth.mission),
+                worth.trial,
+                worth.outlook.parts(),
             ),
             Self::Token(token) => {
                 let (turn, explore_m, columns, rows) = turn_parts(token.turn);

@@ -3,23 +3,21 @@
 //! The types of `body` hold any bytes; what [`Message::decode`] makes of them holds none that a relay would have to doubt.
 
 use super::body::{At, Body, Targets};
-use super::message::{Answer, Message, MessageError, Moved, Sweep, Token, Trace, Turn, Wave};
+use super::message::{Answer, Course, Message, MessageError, Moved, Sweep, TRIALS, Token, Trial, Turn, Worth};
 use crate::field::is_upsilon;
 use crate::guard::Fence;
 use crate::mission::Profile;
 use crate::placement::PerTarget;
-use crate::placement::coded::{PLACES, WIDTH};
+use crate::placement::joint::Outlook;
 use crate::placement::ladder::{Ladder, TARGETS};
-use crate::placement::levels::{Levels, MOST_LEVELS};
 use crate::placement::local::Local;
 use crate::placement::verdict::Verdict;
-use crate::placement::wave::{Choice, Rungs};
-use crate::sir::Placement;
+use crate::sir::{CrossSection, Placement, Station};
 
 /// No slack or reach in metres is larger: a place is at most 1e6, a reach of the last hop is cut at 1e9.
 const FARTHEST_M: f32 = 2e9;
 
-impl<'a> Message<'a> {
+impl Message {
     /// The message in `bytes`, with every number in its range. Work linear in their number, at most
     /// [`MAX_BODY`](super::message::MAX_BODY) of use.
     ///
@@ -27,8 +25,8 @@ impl<'a> Message<'a> {
     /// [`MessageError::Encoding`] if it is not one message in its shortest form and nothing else, [`MessageError::Value`] for
     /// a number that is not finite or outside its range.
     #[inline(never)]
-    pub fn decode(bytes: &'a [u8]) -> Result<Self, MessageError> {
-        let (body, rest): (Body<'a>, _) =
+    pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
+        let (body, rest): (Body, _) =
             postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)?;
         if !rest.is_empty() || bytes.len() != body.shortest() {
             return Err(MessageError::Encoding);
@@ -38,13 +36,16 @@ impl<'a> Message<'a> {
 }
 
 /// The message that `body` is, if every number is in its range.
-fn checked(body: Body<'_>) -> Option<Message<'_>> {
+fn checked(body: Body) -> Option<Message> {
     Some(match body {
-        Body::Sweep(targets, reaches) => Message::Sweep(sweep(targets, None, reaches)?),
+        Body::Sweep(targets, reaches) => Message::Sweep(sweep(targets, None, None, reaches)?),
         Body::Measured(targets, upsilon_per_w, reaches) if cfg!(feature = "field") => {
-            Message::Sweep(sweep(targets, Some(upsilon_per_w), reaches)?)
+            Message::Sweep(sweep(targets, None, Some(upsilon_per_w), reaches)?)
         }
-        Body::Verdict(pass, commit, slacks) => {
+        Body::Aside(targets, y_m, reaches) if cfg!(feature = "altitude") => {
+            Message::Sweep(sweep(targets, Some(y_m), None, reaches)?)
+        }
+        Body::Verdict(pass, own, commit, slacks) => {
             let known = commit.is_none_or(|target| usize::from(target) < TARGETS);
             if !(in_range(&slacks, -FARTHEST_M) && known) {
                 return None;
@@ -53,6 +54,7 @@ fn checked(body: Body<'_>) -> Option<Message<'_>> {
                 number: pass.number(),
                 mission: pass.mission(),
                 verdict: Verdict { commit, slacks },
+                own,
             })
         }
         Body::Busy(number) => Message::Busy {
@@ -62,41 +64,27 @@ fn checked(body: Body<'_>) -> Option<Message<'_>> {
             mission: u16::from_le_bytes(mission),
             answer,
         },
-        Body::Wave {
-            pass,
-            base,
-            rise,
-            targets,
-            centre_m,
-            width_m,
-            levels,
-            power_w,
-            reaches,
-        } if cfg!(feature = "altitude") => {
-            let pairs = usize::from(targets) * usize::from(levels);
-            if pairs > PLACES || reaches.len() != WIDTH * pairs {
-                return None;
-            }
-            Message::Wave(Wave {
+        Body::Course(pass, power_w, trials) if cfg!(feature = "altitude") => {
+            let mut course = Course {
                 number: pass.number(),
                 mission: pass.mission(),
-                rungs: Rungs::from_parts(base, rise, targets)?,
-                levels: Levels::from_parts(centre_m, width_m, levels)?,
-                power_w: profile(centre_m, power_w)?.power_w,
-                reaches,
-            })
+                power_w: profile(1.0, power_w)?.power_w,
+                trials: heapless::Vec::new(),
+            };
+            for parts in trials {
+                course.trials.push(trial(parts)?).ok()?;
+            }
+            Message::Course(course)
         }
-        Body::Trace(pass, choice) if cfg!(feature = "altitude") => {
-            let choice = choice.map(|[target, level]| Choice { target, level });
-            let most = MOST_LEVELS;
-            let fits = |choice: Choice| choice.target < most && choice.level < most;
-            if !choice.is_none_or(fits) {
+        Body::Worth(pass, trial, outlook) if cfg!(feature = "altitude") => {
+            if trial.is_some_and(|trial| usize::from(trial) >= TRIALS) {
                 return None;
             }
-            Message::Trace(Trace {
+            Message::Worth(Worth {
                 number: pass.number(),
                 mission: pass.mission(),
-                choice,
+                trial,
+                outlook: Outlook::from_parts(outlook)?,
             })
         }
         Body::Token {
@@ -139,15 +127,30 @@ fn checked(body: Body<'_>) -> Option<Message<'_>> {
     })
 }
 
-fn sweep(targets: Targets, measured_per_w: Option<f32>, reaches: PerTarget) -> Option<Sweep> {
+/// A sweep of these parts, at the cross-section chosen if there is a `y_m`.
+fn sweep(
+    targets: Targets,
+    y_m: Option<f32>,
+    measured_per_w: Option<f32>,
+    reaches: PerTarget,
+) -> Option<Sweep> {
     let ladder = Ladder::from_parts(targets.anchor, targets.gap, targets.growth)?;
     let fits = reaches.len() <= ladder.len() && in_range(&reaches, 0.0);
     let measured = measured_per_w.is_none_or(is_upsilon);
-    (fits && measured).then_some(Sweep {
+    let beside = y_m.is_none_or(is_beside);
+    let own = profile(targets.altitude_m, targets.power_w)?;
+    (fits && measured && beside).then_some(Sweep {
         number: targets.pass.number(),
         mission: targets.pass.mission(),
         ladder,
-        profile: profile(targets.altitude_m, targets.power_w)?,
+        relay: Station {
+            at: CrossSection {
+                y_m: y_m.unwrap_or(0.0),
+                altitude_m: own.altitude_m,
+            },
+            power_w: own.power_w,
+        },
+        chosen: y_m.is_some(),
         measured_per_w,
         reaches,
     })
@@ -183,13 +186,31 @@ fn turn_from_parts(turn: u8, explore_m: f32, columns: u8, rows: u8) -> Option<Tu
     }
 }
 
-/// The place, if it may be one.
+/// The place above the line, if it may be one.
 fn place(at: At) -> Option<Placement> {
-    let sound = (0.0..=1e6).contains(&at.x_m) && (0.1..=1e5).contains(&at.altitude_m);
-    sound.then_some(Placement {
-        x_m: at.x_m,
-        altitude_m: at.altitude_m,
-    })
+    let place = Placement::on_line(at.x_m, at.altitude_m);
+    is_place(place).then_some(place)
+}
+
+/// Whether a relay may be there.
+fn is_place(at: Placement) -> bool {
+    (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
+}
+
+/// Whether a relay may be so far from the line, m.
+fn is_beside(y_m: f32) -> bool {
+    (-1e5..=1e5).contains(&y_m)
+}
+
+/// A trial, if its numbers are in range.
+fn trial([target, x_m, y_m, altitude_m]: [f32; 4]) -> Option<Trial> {
+    let place = Placement {
+        x_m,
+        y_m,
+        altitude_m,
+    };
+    let sound = (f32::MIN_POSITIVE..=1e30).contains(&target) && is_place(place);
+    sound.then_some(Trial { target, place })
 }
 
 /// The profile of these numbers, if they are in range.

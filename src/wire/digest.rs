@@ -40,10 +40,9 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
     for number in [c.channel.mu_los(), c.channel.mu_nlos(), c.channel.eta()] {
         crc.update(&number.to_le_bytes());
     }
-    // A band of one altitude leaves the digest as it was before there were bands.
-    if !c.band.is_single() {
-        crc.update(&c.band.least_m.to_le_bytes());
-        crc.update(&c.band.most_m.to_le_bytes());
+    for band in [c.band, c.lateral] {
+        crc.update(&band.least_m.to_le_bytes());
+        crc.update(&band.most_m.to_le_bytes());
     }
     let [a, b, ..] = crc.finish().to_le_bytes();
     u16::from_le_bytes([a, b])

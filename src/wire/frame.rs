@@ -79,7 +79,7 @@ impl core::error::Error for FrameError {}
 /// Writes the frame for `message` into `out` and returns its length, delimiter included; 0 if a node number is too large.
 ///
 /// Work linear in the length of the frame, at most [`MAX_FRAME`] bytes.
-pub fn encode(header: Header, message: &Message<'_>, out: &mut FrameBuf) -> usize {
+pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
     let len = body(out).and_then(|body| message.encode(body));
     close(header, 0, len, None, out)
 }
@@ -88,7 +88,7 @@ pub fn encode(header: Header, message: &Message<'_>, out: &mut FrameBuf) -> usiz
 #[cfg(feature = "auth")]
 pub(crate) fn encode_signed(
     header: Header,
-    message: &Message<'_>,
+    message: &Message,
     signer: Signer<'_>,
     out: &mut FrameBuf,
 ) -> usize {
@@ -224,7 +224,7 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
 ///
 /// # Errors
 /// [`FrameError`] says what is wrong; a hello is no message.
-pub fn decode(plain: &[u8]) -> Result<(Header, Message<'_>), FrameError> {
+pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     let Opened {
         header,
         body,

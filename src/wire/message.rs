@@ -4,26 +4,22 @@ use super::digest::Stamp;
 #[cfg(feature = "upload")]
 use super::upload::Upload;
 use crate::guard::Fence;
-use crate::mission::Profile;
 use crate::placement::PerTarget;
-use crate::placement::coded::{PLACES, WIDTH};
+use crate::placement::joint::Outlook;
 use crate::placement::ladder::Ladder;
-use crate::placement::levels::Levels;
 use crate::placement::local::Local;
 use crate::placement::verdict::Verdict;
-use crate::placement::wave::{Choice, Rungs};
-use crate::sir::Placement;
+use crate::sir::{Placement, Station};
 
-/// The longest body: a wave with a place for every pair of a target and a level, or a sweep with what was measured.
-pub const MAX_BODY: usize = if cfg!(feature = "altitude") {
-    29 + WIDTH * PLACES
-} else {
-    88
-};
+/// The longest body: a sweep of sixteen targets with what was measured, or from aside of the line.
+pub const MAX_BODY: usize = 88;
+
+/// The most trials of one course.
+pub const TRIALS: usize = 4;
 
 /// One message between neighbours. *Onward* is the way a pass goes: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]
-pub enum Message<'a> {
+pub enum Message {
     /// Onward: targets, and how far the sender reaches for each.
     Sweep(Sweep),
     /// Back: what became of them. It acknowledges the sweep of the same number.
@@ -40,10 +36,10 @@ pub enum Message<'a> {
         /// Whether the sender asks for a heartbeat in return.
         answer: bool,
     },
-    /// Onward: targets, altitude levels, and how far the sender reaches for each pair.
-    Wave(Wave<'a>),
-    /// Back: which of them were chosen.
-    Trace(Trace),
+    /// Onward: where the sender would be in each of a few trials.
+    Course(Course),
+    /// Back: which of them is gone by, and what the rest of the chain is worth about it.
+    Worth(Worth),
     /// Onward: whose turn it is to move.
     Token(Token),
     /// Back: who has moved where.
@@ -66,7 +62,7 @@ pub enum Message<'a> {
     Offer(Upload),
 }
 
-impl Message<'_> {
+impl Message {
     /// The digest of the sender's mission; a [`Message::Busy`] bears none.
     pub const fn mission(&self) -> Option<u16> {
         match self {
@@ -74,8 +70,8 @@ impl Message<'_> {
             Self::Verdict(answer) => Some(answer.mission),
             Self::Busy { .. } => None,
             Self::Heartbeat { mission, .. } | Self::Fence { mission, .. } => Some(*mission),
-            Self::Wave(wave) => Some(wave.mission),
-            Self::Trace(trace) => Some(trace.mission),
+            Self::Course(course) => Some(course.mission),
+            Self::Worth(worth) => Some(worth.mission),
             Self::Token(token) => Some(token.mission),
             Self::Moved(moved) => Some(moved.mission),
             Self::Hail(hail) => Some(hail.mission),
@@ -92,8 +88,8 @@ impl Message<'_> {
             self,
             Self::Sweep(_)
                 | Self::Verdict(_)
-                | Self::Wave(_)
-                | Self::Trace(_)
+                | Self::Course(_)
+                | Self::Worth(_)
                 | Self::Token(_)
                 | Self::Moved(_)
         )
@@ -108,7 +104,7 @@ impl Message<'_> {
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,
-            Self::Sweep(_) | Self::Wave(_) | Self::Token(_) | Self::Roster(_)
+            Self::Sweep(_) | Self::Course(_) | Self::Token(_) | Self::Roster(_)
         )
     }
 }
@@ -122,8 +118,10 @@ pub struct Sweep {
     pub mission: u16,
     /// The targets.
     pub ladder: Ladder,
-    /// What the sender holds.
-    pub profile: Profile,
+    /// Where the sender flies across the line, and its power.
+    pub relay: Station,
+    /// Whether relays are to be where the joint method has each of them across the line, and not where they were given.
+    pub chosen: bool,
     /// Upsilon as the sender measures it where it stands, 1/W, in a closed loop.
     pub measured_per_w: Option<f32>,
     /// The sender's place for each target, m along x; shorter than the ladder where the upper targets cannot be met.
@@ -139,34 +137,44 @@ pub struct Answer {
     pub mission: u16,
     /// What became of the targets.
     pub verdict: Verdict,
+    /// Whether the sender or a relay after it differs from what the mission says of all.
+    pub own: bool,
 }
 
-/// One pass of targets and altitude levels.
+/// One pass of the joint method: a few trials of a target and of a step by every relay.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Wave<'a> {
+pub struct Course {
     /// Number of the pass, wrapping.
     pub number: u16,
     /// [`super::digest::digest`] of the sender.
     pub mission: u16,
-    /// The targets.
-    pub rungs: Rungs,
-    /// The sender's levels.
-    pub levels: Levels,
     /// The sender's transmit power, W.
     pub power_w: f32,
-    /// The sender's place for each pair, target by target, as in [`crate::placement::coded`].
-    pub reaches: &'a [u8],
+    /// For each trial its target, linear SIR, and where the sender is then. Every next one takes a smaller part of the step.
+    pub trials: heapless::Vec<Trial, TRIALS>,
 }
 
-/// What was chosen of a wave, as it travels back.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Trace {
+/// One trial of a course.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Trial {
+    /// Linear SIR.
+    pub target: f32,
+    /// Where the sender is.
+    pub place: Placement,
+}
+
+/// What came of a course, as it travels back.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Worth {
     /// Number of the pass.
     pub number: u16,
     /// [`super::digest::digest`] of the sender.
     pub mission: u16,
-    /// The target, and the level that the receiver takes for it; `None` if no target was met.
-    pub choice: Option<Choice>,
+    /// The trial that is gone by; `None` if none got through.
+    pub trial: Option<u8>,
+    /// What the rest of the chain is worth about where the receiver is in that trial.
+    pub outlook: Outlook,
 }
 
 /// One turn of Algorithm 2.

@@ -15,7 +15,7 @@ use crate::mission::{
 };
 
 /// Bytes of an upload as it is stored; those of the body of an offer.
-pub const LENGTH: usize = 75;
+pub const LENGTH: usize = 83;
 
 /// A mission with a version.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -139,7 +139,7 @@ impl Upload {
     }
 }
 
-/// The wire form: version and base, and the numbers in the order of the digest, the band last.
+/// The wire form: version and base, and the numbers in the order of the digest, the bands last.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Terms {
     /// The number is the version, the mission the base.
@@ -147,7 +147,7 @@ pub(super) struct Terms {
     relays: [u8; 2],
     numbers: [f32; 9],
     factors: [f64; 3],
-    band: [f32; 2],
+    bands: [f32; 4],
 }
 
 impl Terms {
@@ -172,13 +172,18 @@ impl Terms {
                 c.tolerance,
             ],
             factors: [c.channel.mu_los(), c.channel.mu_nlos(), c.channel.eta()],
-            band: [c.band.least_m, c.band.most_m],
+            bands: [
+                c.band.least_m,
+                c.band.most_m,
+                c.lateral.least_m,
+                c.lateral.most_m,
+            ],
         }
     }
 
     pub(super) fn upload(self) -> Option<Upload> {
         let [mu_los, mu_nlos, eta] = self.factors;
-        let [least_m, most_m] = self.band;
+        let [least_m, most_m, left_m, right_m] = self.bands;
         let [
             distance_m,
             min_separation_m,
@@ -200,6 +205,10 @@ impl Terms {
                 power_w,
             },
             band: Band { least_m, most_m },
+            lateral: Band {
+                least_m: left_m,
+                most_m: right_m,
+            },
             channel: Channel::from_factors(mu_los, mu_nlos, eta)?,
             interference: Interference::Source(Interferer {
                 power_w: from_w,

@@ -211,7 +211,7 @@ fn flipped(plain: &[u8]) {
 }
 
 /// What follows from the ranges of a message.
-fn look_at(message: &Message<'_>) {
+fn look_at(message: &Message) {
     match message {
         Message::Sweep(sweep) => {
             let targets = sweep.ladder.targets();

@@ -23,7 +23,7 @@ impl Flying {
         self.is(|message| matches!(message, Message::Token(token) if token.turn == Turn::Stop))
     }
 
-    pub(crate) fn is(&self, what: impl Fn(&Message<'_>) -> bool) -> bool {
+    pub(crate) fn is(&self, what: impl Fn(&Message) -> bool) -> bool {
         let mut deframer = Deframer::new();
         self.bytes.iter().any(|&byte| match deframer.push(byte) {
             Some(Ok(plain)) => what(&frame::decode(plain).unwrap().1),

@@ -308,7 +308,7 @@ impl Said {
 
     /// The message that says this.
     #[expect(clippy::too_many_lines, reason = "an arm for each message")]
-    pub(crate) fn message(&self) -> Message<'_> {
+    pub(crate) fn message(&self) -> Message {
         let per_target = |numbers: &[f32]| PerTarget::from_slice(numbers).unwrap();
         match *self {
             Self::Sweep {

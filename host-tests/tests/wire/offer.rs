@@ -143,7 +143,7 @@ impl Offer {
     }
 
     /// The message that says this. Only the crate can make it of any numbers: each of them must be found again in it.
-    pub(crate) fn message(&self) -> Message<'static> {
+    pub(crate) fn message(&self) -> Message {
         let upload = Upload::decode(&self.body()).unwrap();
         let config = upload.config();
         assert_eq!((upload.version(), upload.base()), (self.version, self.base));

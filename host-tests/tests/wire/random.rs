@@ -12,7 +12,7 @@ use super::golden::only_frame;
 use super::strategies::{bodies, headers, measured, messages, sweeps, waves};
 
 /// Bodies are compared rather than messages: bytes tell -0 from 0.
-fn body_of(message: &Message<'_>) -> Vec<u8> {
+fn body_of(message: &Message) -> Vec<u8> {
     let mut body = [0; MAX_BODY];
     let len = message.encode(&mut body).unwrap();
     body[..len].to_vec()

@@ -1,14 +1,10 @@
 //! What the leader works out before it begins a pass: its prediction, the targets or altitudes to try next.
 
-use core::task::Poll;
-
 use super::super::adjust::Turning;
 use super::super::exchange::Next;
 use super::super::lead::Lead;
 use super::super::settings::Method;
-use super::{ADJUST, ALTITUDE, LEVELS_AT_ONCE, Own, Pass, Share};
-use crate::placement::climb::{Attempt, Climb};
-use crate::placement::coarse::Coarse;
+use super::{ADJUST, Own, Share};
 use crate::placement::ladder::Ladder;
 use crate::placement::local::Beside;
 use crate::placement::pass::origins;
@@ -53,23 +49,6 @@ impl Share {
                 self.search_with(own, ladder, last)?;
                 Ok(true)
             }
-            Lead::Surveying(coarse) if ALTITUDE => {
-                let Some(interferer) = mission.interferer() else {
-                    return Err(Infeasible);
-                };
-                let found =
-                    coarse.step(mission, interferer, profile, &mut self.wave, LEVELS_AT_ONCE);
-                if let Poll::Ready(predicted) = found {
-                    self.climb(own, predicted);
-                }
-                Ok(false)
-            }
-            Lead::Climbing(climb) if ALTITUDE && climb.is_vain() => {
-                // Nothing better than what Algorithm 1 gave: agree on that once more.
-                let target = climb.target();
-                self.search_with(own, Some(Ladder::single(target)), true)?;
-                Ok(true)
-            }
             _ => Ok(true),
         }
     }
@@ -104,19 +83,6 @@ impl Share {
         Ok(())
     }
 
-    #[inline(never)]
-    pub(super) fn climb(&mut self, own: Own<'_>, predicted: Option<(f32, u8)>) {
-        let target = self.target.unwrap_or(1.0);
-        let tolerance = own.mission.config().tolerance;
-        self.lead = Lead::Climbing(Climb::new(target, tolerance, predicted));
-    }
-
-    #[inline(never)]
-    pub(super) fn survey(&mut self, own: Own<'_>, target: f32) {
-        let coarse = Coarse::new(own.mission, target, &mut self.wave);
-        self.lead = Lead::Surveying(coarse);
-    }
-
     /// The leader begins the pass it has planned.
     pub(super) fn begin_pass(&mut self, own: Own<'_>) -> Next {
         let mission = own.mission;
@@ -125,14 +91,6 @@ impl Share {
                 let ladder = *search.ladder();
                 self.begin();
                 self.sweep_on(own, ladder, None, &origins(mission))
-            }
-            Lead::Climbing(climb) if ALTITUDE => {
-                let Attempt { rungs, levels } = climb.attempt();
-                self.begin();
-                let levels = self.levels(own, levels);
-                self.wave.begin(mission, rungs, levels);
-                self.pass = Pass::Wave;
-                self.go_on_with_wave(own)
             }
             Lead::Adjusting(rounds) if ADJUST => {
                 let (turn, sir) = (rounds.turn(), rounds.sir);

@@ -8,7 +8,6 @@ mod leader;
 mod roll;
 mod sweeps;
 mod turns;
-mod waves;
 
 use super::MEMBERSHIP;
 use super::adjust::Turning;
@@ -18,17 +17,12 @@ use super::lead::Lead;
 use super::settings::Settings;
 use crate::mission::{Band, Mission, Profile};
 use crate::placement::ladder::Ladder;
-use crate::placement::levels::{Levels, TUBE};
 use crate::placement::search::Infeasible;
-use crate::placement::wave::{Choice, Wave};
-use crate::sir::Placement;
+use crate::sir::{CrossSection, Placement, Station};
 use crate::wire::digest::Stamp;
-use crate::wire::message::{self, Answer, Count, Message, Moved, Roster, Sweep, Token, Trace};
+use crate::wire::message::{Answer, Count, Message, Moved, Roster, Sweep, Token};
 
 use roll::Rolling;
-
-/// Hops evaluated in one call of `work` on a pass of altitude levels, and 64 more at most.
-const LEVELS_AT_ONCE: u16 = 32;
 
 /// Places weighed in one call of `work` in Algorithm 2, and a row of 24 more at most.
 const PLACES_AT_ONCE: u16 = 600;
@@ -85,11 +79,10 @@ impl Own<'_> {
     }
 }
 
-/// What the current pass carries. The [`Wave`] is kept beside it: it is long, and worked on where it is.
+/// What the current pass carries.
 #[derive(Clone, Debug)]
 enum Pass {
     Sweep(Sweeping),
-    Wave,
     Turn(Turning),
     Roll(Rolling),
 }
@@ -99,17 +92,12 @@ enum Pass {
 pub(crate) struct Share {
     exchange: Exchange,
     pass: Pass,
-    wave: Wave,
-    /// What the relay before has to choose for what has come back of the wave.
-    choice: Option<Choice>,
-    /// The altitudes to weigh in the next tube.
-    tube: Levels,
     lead: Lead,
     sweeps: u32,
     /// What this relay was given.
     profile: Profile,
-    /// The altitude chosen for it, m; a sweep goes back to the one it was given.
-    altitude_m: f32,
+    /// Where it is to be across the line.
+    at: CrossSection,
     /// Where the neighbour toward Rx stands, as far as it has said.
     after: Option<Placement>,
     setpoint: Option<Placement>,
@@ -119,7 +107,6 @@ pub(crate) struct Share {
 impl Share {
     /// A relay that has just been switched on. The leader numbers its passes from `number` on, and has work to do.
     pub(crate) const fn new(
-        mission: &Mission,
         leader: bool,
         number: u16,
         profile: Profile,
@@ -127,13 +114,10 @@ impl Share {
         Self {
             exchange: Exchange::new(if leader { Phase::Planning } else { Phase::Idle }, number),
             pass: Pass::Sweep(Sweeping::new(Ladder::single(1.0))),
-            wave: Wave::new(mission),
-            choice: None,
-            tube: Levels::held(profile.altitude_m, TUBE),
             lead: Lead::No,
             sweeps: 0,
             profile,
-            altitude_m: profile.altitude_m,
+            at: profile.on_line().at,
             after: None,
             setpoint: None,
             target: None,
@@ -150,9 +134,8 @@ impl Share {
     /// Another mission is flown from now on, in which this relay is given `profile`. It stays where it is.
     pub(crate) fn load(&mut self, profile: Profile) {
         self.profile = profile;
-        self.tube = Levels::held(profile.altitude_m, TUBE);
         if self.setpoint.is_none() {
-            self.altitude_m = profile.altitude_m;
+            self.at = profile.on_line().at;
         }
     }
 
@@ -173,7 +156,6 @@ impl Share {
     pub(crate) fn work(&mut self, own: Own<'_>) -> Next {
         if self.exchange.phase == Phase::Waiting {
             return match &self.pass {
-                Pass::Wave if ALTITUDE => self.go_on_with_wave(own),
                 Pass::Turn(_) if ADJUST => self.go_on_with_turn(own),
                 _ => Next::Stale,
             };
@@ -186,7 +168,7 @@ impl Share {
     }
 
     /// What to hand onward, while an answer is awaited.
-    pub(crate) fn onward(&self, own: Own<'_>) -> Option<Message<'_>> {
+    pub(crate) fn onward(&self, own: Own<'_>) -> Option<Message> {
         if self.exchange.phase != Phase::Waiting {
             return None;
         }
@@ -196,17 +178,10 @@ impl Share {
                 number,
                 mission,
                 ladder: sweeping.ladder,
-                profile: self.profile,
+                relay: self.station(),
+                chosen: false,
                 measured_per_w: own.measured_per_w,
                 reaches: sweeping.reaches.clone(),
-            })),
-            Pass::Wave if ALTITUDE => Some(Message::Wave(message::Wave {
-                number,
-                mission,
-                rungs: self.wave.rungs(),
-                levels: self.wave.levels(),
-                power_w: self.profile.power_w,
-                reaches: self.wave.reaches(),
             })),
             Pass::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Token(Token {
@@ -235,11 +210,11 @@ impl Share {
 
     /// Whether the current pass is one on which relays compute for a while.
     pub(crate) const fn is_slow(&self) -> bool {
-        matches!(self.pass, Pass::Wave | Pass::Turn(_))
+        matches!(self.pass, Pass::Turn(_))
     }
 
     /// What to hand back, once it is known.
-    pub(crate) fn back(&self, own: Own<'_>) -> Option<Message<'_>> {
+    pub(crate) fn back(&self, own: Own<'_>) -> Option<Message> {
         if !self.exchange.is_answered() {
             return None;
         }
@@ -249,11 +224,7 @@ impl Share {
                 number,
                 mission,
                 verdict: sweeping.verdict.clone(),
-            })),
-            Pass::Wave if ALTITUDE => Some(Message::Trace(Trace {
-                number,
-                mission,
-                choice: self.choice,
+                own: false,
             })),
             Pass::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Moved(Moved {
@@ -306,7 +277,15 @@ impl Share {
     /// What this relay holds.
     pub(crate) const fn profile(&self) -> Profile {
         Profile {
-            altitude_m: self.altitude_m,
+            altitude_m: self.at.altitude_m,
+            power_w: self.profile.power_w,
+        }
+    }
+
+    /// What it is on a pass.
+    const fn station(&self) -> Station {
+        Station {
+            at: self.at,
             power_w: self.profile.power_w,
         }
     }

@@ -252,7 +252,7 @@ mod tests {
     }
 
     fn share(held: &Held) -> Share {
-        Share::new(&held.mission, false, 0, held.mission.config().common)
+        Share::new(false, 0, held.mission.config().common)
     }
 
     /// The leader was switched on again in the midst of a call, and has been offered another mission.

@@ -4,19 +4,17 @@ use super::super::align::{Sweeping, told};
 use super::super::exchange::{Next, Phase};
 use super::super::lead::{Lead, Rounds};
 use super::super::settings::Method;
-use super::{ADJUST, ALTITUDE, Own, Pass, Share};
+use super::{ADJUST, Own, Pass, Share};
 use crate::placement::PerTarget;
 use crate::placement::ladder::Ladder;
-use crate::placement::levels::{Levels, TUBE};
 use crate::placement::pass::Behind;
-use crate::sir::Placement;
 use crate::wire::message::{Answer, Sweep};
 
 impl Share {
     /// A sweep from the relay before.
     pub(crate) fn on_sweep(&mut self, own: Own<'_>, sweep: &Sweep) -> Next {
         let behind = Behind {
-            profile: sweep.profile,
+            relay: sweep.relay,
             measured_per_w: sweep.measured_per_w,
         };
         let told = told(Some(behind), &sweep.reaches);
@@ -49,7 +47,7 @@ impl Share {
             own.mission,
             behind,
             own.index,
-            self.profile,
+            self.profile.on_line(),
             own.measured_per_w,
             from,
         );
@@ -78,10 +76,8 @@ impl Share {
             return Next::Stale;
         };
         if let Some((x_m, target)) = sweeping.agreed() {
-            let altitude_m = self.profile.altitude_m;
-            self.altitude_m = altitude_m;
-            self.tube = Levels::held(altitude_m, TUBE);
-            self.setpoint = Some(Placement { x_m, altitude_m });
+            self.at = self.profile.on_line().at;
+            self.setpoint = Some(self.at.at(x_m));
             self.target = Some(target);
             return self.agree(own);
         }
@@ -107,15 +103,6 @@ impl Share {
             match own.settings.method {
                 Method::Adjust(adjust) if ADJUST => {
                     self.lead = Lead::Adjusting(Rounds::new(adjust));
-                    self.exchange.phase = Phase::Answered;
-                    return Next::Work { moved: true };
-                }
-                Method::Altitude if ALTITUDE && !own.mission.config().band.is_single() => {
-                    if own.settings.predict {
-                        self.survey(own, target);
-                    } else {
-                        self.climb(own, None);
-                    }
                     self.exchange.phase = Phase::Answered;
                     return Next::Work { moved: true };
                 }

@@ -64,7 +64,7 @@ impl Share {
             Poll::Ready(None) => self.pass_on_turn(own, false),
             Poll::Ready(Some(place)) => {
                 self.setpoint = Some(place);
-                self.altitude_m = place.altitude_m;
+                self.at = place.cross_section();
                 self.pass_on_turn(own, true)
             }
         }

@@ -53,7 +53,7 @@ fn relay_of(mission: Mission, index: u16, signs: bool) -> Node {
     node
 }
 
-fn said(node: &mut Node) -> heapless::Vec<(u16, Message<'static>), 8> {
+fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
     let mut said = heapless::Vec::new();
     while let Some((_, to, message)) = node.poll_message(NOW) {
         let message = match message {
@@ -69,7 +69,7 @@ fn said(node: &mut Node) -> heapless::Vec<(u16, Message<'static>), 8> {
 }
 
 /// A hail of a neighbour that has taken relay 2.
-fn hail(node: &Node, holds: Stamp) -> Message<'static> {
+fn hail(node: &Node, holds: Stamp) -> Message {
     Message::Hail(Hail {
         mission: node.members.digest,
         newest: 0,
@@ -83,7 +83,7 @@ fn hail(node: &Node, holds: Stamp) -> Message<'static> {
     })
 }
 
-fn roster(stamp: Stamp) -> Message<'static> {
+fn roster(stamp: Stamp) -> Message {
     Message::Roster(Roster {
         stamp,
         view: 1,

@@ -37,7 +37,7 @@ impl Growing {
             mission,
             self.behind,
             index,
-            profile,
+            profile.on_line(),
             &[target],
             &self.from,
             &mut reaches,
@@ -45,13 +45,10 @@ impl Growing {
         let x_m = *reaches.first()?;
         self.from = reaches;
         self.behind = Some(Behind {
-            profile,
+            relay: profile.on_line(),
             measured_per_w: None,
         });
-        Some(Placement {
-            x_m,
-            altitude_m: profile.altitude_m,
-        })
+        Some(profile.on_line().at.at(x_m))
     }
 }
 
@@ -88,7 +85,7 @@ fn toward_rx(
         level = level && !((profile.altitude_m - altitude_m).abs() > 0.0);
         // As the last of its chain it may go to the very end.
         let place = chain.next(&mission, index, profile, target)?;
-        let ends = pass::slack(&mission, profile, None, target, place.x_m)
+        let ends = pass::slack(&mission, profile.on_line(), None, target, place.x_m)
             .is_some_and(|slack| slack >= 0.0);
         // With room to be left for those behind it, a chain may end sooner than one that grows without knowing its length.
         if ends && meets(&mission, target, profile_of) {
@@ -120,7 +117,7 @@ fn walk(
         let place = chain.next(mission, index, profile, target)?;
         visit(index, place);
         let Some(next) = mission.after(index) else {
-            return pass::slack(mission, profile, None, target, place.x_m);
+            return pass::slack(mission, profile.on_line(), None, target, place.x_m);
         };
         index = next;
     }

@@ -45,7 +45,7 @@ struct Step {
 impl Equals<'_> {
     /// l_N: the place nearest to Tx from which Rx still hears relay N.
     fn last(&self) -> Option<f32> {
-        let hop = Retreat::new(self.mission, self.profile, self.mission.relays(), None);
+        let hop = Retreat::new(self.mission, self.profile.on_line(), self.mission.relays(), None);
         hop.reach(self.target, self.mission.config().distance_m, 1.0)
     }
 
@@ -58,8 +58,8 @@ impl Equals<'_> {
     /// The longest hop into `y` from relay `index`.
     fn step(&self, index: u16, y: f32) -> Option<Step> {
         let altitude_m = self.profile.altitude_m;
-        let hop = Retreat::new(self.mission, self.profile, index, Some(altitude_m));
-        let at = Placement { x_m: y, altitude_m };
+        let hop = Retreat::new(self.mission, self.profile.on_line(), index, Some(altitude_m));
+        let at = Placement::on_line(y, altitude_m);
         let from_m = hop.reach(self.target, y, sir::quiet(self.mission, at))?;
         Some(Step { to_m: y, from_m })
     }
@@ -116,10 +116,7 @@ impl Equals<'_> {
     }
 
     fn first_hop_meets(&self, x_m: f32) -> bool {
-        let at = Placement {
-            x_m,
-            altitude_m: self.profile.altitude_m,
-        };
+        let at = Placement::on_line(x_m, self.profile.altitude_m);
         Sender::transmitter(self.mission).sir_at(self.mission, 0.0, at) >= self.target
     }
 
@@ -244,10 +241,7 @@ pub(super) fn places(
     };
     let mut set = |index: u16, x_m: f32| {
         if let Some(place) = places.get_mut(usize::from(index).wrapping_sub(1)) {
-            *place = Placement {
-                x_m,
-                altitude_m: profile.altitude_m,
-            };
+            *place = Placement::on_line(x_m, profile.altitude_m);
         }
     };
     let head = equals.ranges(&mut set).and_then(|low| equals.head(low));

@@ -52,10 +52,7 @@ struct Two<'a> {
 
 impl Two<'_> {
     fn at(&self, x_m: f32) -> Placement {
-        Placement {
-            x_m,
-            altitude_m: self.profile.altitude_m,
-        }
+        Placement::on_line(x_m, self.profile.altitude_m)
     }
 
     fn first(&self, x_m: f32) -> f32 {

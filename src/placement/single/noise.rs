@@ -45,7 +45,7 @@ pub fn best_place(mission: &Mission, profile: Profile, noise: Noise) -> Found {
         .min(d);
     let (first, second) = snr(x_m);
     Found {
-        place: Placement { x_m, altitude_m: h },
+        place: Placement::on_line(x_m, h),
         sir: first.min(second),
     }
 }

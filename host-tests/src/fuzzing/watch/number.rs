@@ -3,7 +3,7 @@
 use uav_relay::wire::message::Message;
 
 /// The number of the pass that a message is of.
-pub(super) const fn number_of(message: &Message<'_>) -> Option<u16> {
+pub(super) const fn number_of(message: &Message) -> Option<u16> {
     Some(match message {
         Message::Sweep(sweep) => sweep.number,
         Message::Verdict(answer) => answer.number,
