@@ -367,6 +367,17 @@ impl Mission {
         sqrt(apart * apart - across_squared)
     }
 
+    /// The same with room for rounding.
+    pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
+        let distance_m = self.config.distance_m;
+        let least = self.least_step(across_squared);
+        if least > 0.0 {
+            least + distance_m * ROUNDING
+        } else {
+            distance_m * FINEST_STEP
+        }
+    }
+
     /// The last place on its way that leaves the relays after `index` room to stand `min_separation_m` apart, m.
     ///
     /// `across_squared` is how far apart across the line two neighbours among them may be, m^2: that much they need not be along
@@ -377,12 +388,7 @@ impl Mission {
             Heading::TowardTx => index.saturating_sub(1),
         });
         let distance_m = self.config.distance_m;
-        let least = self.least_step(across_squared);
-        let step = if least > 0.0 {
-            least + distance_m * ROUNDING
-        } else {
-            distance_m * FINEST_STEP
-        };
+        let step = self.step_with_room(across_squared);
         match self.heading() {
             Heading::TowardRx => (distance_m - behind * step).max(0.0),
             Heading::TowardTx => (behind * step).min(distance_m),

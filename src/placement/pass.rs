@@ -51,7 +51,8 @@ pub fn extend(
         let sender = behind.map_or(Sender::transmitter(mission), |behind| {
             Sender::relay(mission, behind.relay)
         });
-        let hop = Hop::new(mission, interferer, sender, index, own.at, 0.0);
+        let end_m = mission.end_for(index, 0.0);
+        let hop = Hop::new(mission, interferer, sender, index, own.at, end_m);
         for (&target, &from_m) in pairs {
             let Some(place) = hop.reach(target, from_m) else {
                 break;

@@ -53,15 +53,14 @@ pub struct Hop {
 }
 
 impl Hop {
-    /// The hop from `sender` to relay `index`, which flies at `at`; neighbours among the relays after it may be `spread_squared`
-    /// m^2 apart across the line.
+    /// The hop from `sender` to relay `index`, which flies at `at` and goes no farther than `end_m`.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
         sender: Sender,
         index: u16,
         at: CrossSection,
-        spread_squared: f32,
+        end_m: f32,
     ) -> Self {
         let (from, aside) = (sender.at, interferer.y_m);
         let climb = at.altitude_m - from.altitude_m;
@@ -79,7 +78,7 @@ impl Hop {
             } else {
                 mission.least_step(across_squared)
             },
-            end_m: mission.end_for(index, spread_squared),
+            end_m,
         }
     }
 
@@ -132,6 +131,32 @@ impl Hop {
     }
 }
 
+impl Hop {
+    /// The reach as a smooth function of everything: without a least step, and behind `from_m` where the hop across takes more than
+    /// there is. `None` where there is none at all.
+    pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
+        let ratio = self.sender.gain.ratio(target);
+        if !(ratio <= MOST_RATIO) {
+            return None;
+        }
+        let u = self.interferer_x_m - from_m;
+        let e = self.sender.gain.excess(target);
+        let h = self.base - e * self.across_squared;
+        let discriminant = ratio * square(u) + e * h;
+        if !(e > 0.0) {
+            let room = self.end_m - from_m;
+            let all = square(u - room) + self.aside_squared >= ratio * (square(room) + self.across_squared);
+            if all || discriminant < 0.0 || !(u >= 0.0) { return Some(self.end_m.max(from_m)); }
+        }
+        if discriminant < 0.0 {
+            return None;
+        }
+        let r = sqrt(discriminant);
+        let d = if u >= 0.0 { (square(u) + h) / (u + r) } else { (r - u) / e };
+        Some((from_m + d).min(self.end_m.max(from_m)))
+    }
+}
+
 /// The farthest a relay may be from the receiver, m along x, for the receiver to meet `target`: the paper's `d_max`.
 ///
 /// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` where even a relay right above the receiver is too weak. Not cut at D: it
@@ -162,7 +187,8 @@ mod tests {
         };
         let mission = Mission::try_new(config).unwrap();
         let sender = Sender::transmitter(&mission);
-        Hop::new(&mission, &interferer, sender, 1, CrossSection::on_line(altitude_m), 0.0)
+        let end_m = mission.end_for(1, 0.0);
+        Hop::new(&mission, &interferer, sender, 1, CrossSection::on_line(altitude_m), end_m)
     }
 
     /// Behind the transmitter an interferer makes SIR_1 rise at first: at 10 m behind, from 1.04 above Tx to 1.22 at 45 m.

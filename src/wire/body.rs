@@ -10,6 +10,7 @@ use super::message::{Message, TRIALS, Trial, Turn};
 #[cfg(feature = "upload")]
 use super::upload::{LENGTH, Terms};
 use crate::placement::PerTarget;
+use crate::placement::joint::outlook::PARTS;
 use crate::placement::local::Local;
 use crate::sir::Placement;
 
@@ -65,7 +66,7 @@ pub(super) enum Body {
     Measured(Targets, f32, PerTarget),
     Aside(Targets, f32, PerTarget),
     Course(Pass, f32, heapless::Vec<[f32; 4], TRIALS>),
-    Worth(Pass, Option<u8>, [f32; 17]),
+    Worth(Pass, Option<u8>, [f32; PARTS]),
     Token {
         pass: Pass,
         at: At,

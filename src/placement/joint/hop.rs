@@ -1,81 +1,73 @@
 //! How far a hop reaches when everything it depends on is moved a little: the reach with its first and second derivatives.
 //!
-//! A hop leads from (x, v), v = (y, h), to (x', w), w = (y', h'). With c = gamma / A, the target against the sender's gain,
-//! and sigma = ln gamma its reach x' = R(x, v, sigma, w) is the root of
+//! A hop leads from p to p', with c = gamma / A, the target against the sender's gain, and the interferer at m. Where it is as
+//! long as it may be,
 //!
 //! ```text
-//! 2 F = (X - x')^2 + (Y - y')^2 + h'^2 - c ((x' - x)^2 + (y' - y)^2 + (h' - h)^2) = 0
+//! 2 F = |p' - m|^2 - c |p' - p|^2 = 0
 //! ```
 //!
-//! at which F falls, so a = -F_x' = (X - x') + c (x' - x) > 0. F is quadratic, and its derivatives in z = (x, v, sigma, w) are
-//! products of two numbers; those of R follow by differentiating F(R(z), z) = 0 once and twice:
+//! and one coordinate of p' follows from the other two, w, and from p (see [`Axis`]): p'_1 = R(z), z = (p_1, p_2, p_3, w_2, w_3).
+//! F is quadratic, so its derivatives are products of two numbers, or constants; those of R follow by differentiating
+//! F(R(z), z) = 0 once and twice, with a = -dF/dp'_1 = (m - p')_1 + c (p' - p)_1:
 //!
 //! ```text
-//! R_z = F_z / a,    R_zz' = (F_zz' + F_x'z R_z' + R_z F_x'z' + (1 - c) R_z R_z') / a
+//! R_z = F_z / a,    R_zz' = (F_zz' + F_1z R_z' + R_z F_1z' + (1 - c) R_z R_z') / a
 //! ```
 //!
-//! The last hop ends on the ground at Rx, and what is left of it is L(w, sigma) = sqrt(K / gamma - y'^2 - h'^2).
-//! Accuracy: `derivatives_agree_with_differences` in `host-tests/tests/joint_derivatives.rs`.
+//! and by ln gamma R = -c |p' - p|^2 / 2a. Accuracy: `derivatives_agree_with_differences` in this file.
 
-use crate::mission::Interferer;
-use crate::sir::{Placement, square};
+use super::axis::Triple;
+use crate::sir::square;
 
-/// What a reach depends on, in this order: x, y, h, sigma of where the hop begins, y', h' of where it ends.
-pub(super) type Row = [f32; 6];
+/// What a reach depends on: where the hop begins, three coordinates, and the two that are free of where it ends.
+pub(super) type Row = [f32; 5];
 
 /// A reach's derivatives.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reach {
     pub(super) slope: Row,
-    pub(super) bend: [Row; 6],
+    pub(super) bend: [Row; 5],
+    /// By ln gamma, m.
+    pub(super) by_target: f32,
 }
 
 impl Reach {
-    /// That of a hop that ends where it ends whatever is moved.
+    /// That of a hop that ends where it ends, whatever is moved.
     pub(super) const FIXED: Self = Self {
-        slope: [0.0; 6],
-        bend: [[0.0; 6]; 6],
+        slope: [0.0; 5],
+        bend: [[0.0; 5]; 5],
+        by_target: 0.0,
     };
 
-    /// The derivatives of the reach `to` from `from`, for the target `c` times as large as the sender's gain; `None` at the
-    /// very tip of a hop, where it has none.
-    pub(super) fn new(interferer: &Interferer, c: f32, from: Placement, to: Placement) -> Option<Self> {
-        let (d, dy, dh) = (
-            to.x_m - from.x_m,
-            to.y_m - from.y_m,
-            to.altitude_m - from.altitude_m,
-        );
-        let a = interferer.x_m - to.x_m + c * d;
-        let length = square(d) + square(dy) + square(dh);
-        // Within rounding of a double root.
-        if !(square(a) > 1e-9 * c * length) || !(a > 0.0) {
-            return None;
+    /// Of the hop `from` - `to`, with the interferer at `source` and the coordinate first that follows. [`Reach::FIXED`] where none
+    /// does: at the very rim of what can be reached.
+    pub(super) fn new(c: f32, source: Triple, from: Triple, to: Triple) -> Self {
+        let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
+        let (d, dy, dz) = (x - x0, y - y0, z - z0);
+        let a = sx - x + c * d;
+        let length = square(d) + square(dy) + square(dz);
+        if !(square(a) > 1e-9 * c * length) {
+            return Self::FIXED;
         }
-        let slope = [
-            c * d,
-            c * dy,
-            c * dh,
-            -0.5 * c * length,
-            to.y_m - interferer.y_m - c * dy,
-            to.altitude_m - c * dh,
-        ]
-        .map(|f| f / a);
-        let (cd, cy, ch) = (c * d, c * dy, c * dh);
-        let f = [
-            [-c, 0.0, 0.0, cd, 0.0, 0.0],
-            [0.0, -c, 0.0, cy, c, 0.0],
-            [0.0, 0.0, -c, ch, 0.0, c],
-            [cd, cy, ch, -0.5 * c * length, -cy, -ch],
-            [0.0, c, 0.0, -cy, 1.0 - c, 0.0],
-            [0.0, 0.0, c, -ch, 0.0, 1.0 - c],
+        let slope = [c * d, c * dy, c * dz, y - sy - c * dy, z - sz - c * dz].map(|f| f / a);
+        let mut bend = [
+            [-c, 0.0, 0.0, 0.0, 0.0],
+            [0.0, -c, 0.0, c, 0.0],
+            [0.0, 0.0, -c, 0.0, c],
+            [0.0, c, 0.0, 1.0 - c, 0.0],
+            [0.0, 0.0, c, 0.0, 1.0 - c],
         ];
-        let across = [c, 0.0, 0.0, -cd, 0.0, 0.0];
-        let mut bend = f;
-        for ((row, r), f) in bend.iter_mut().zip(slope).zip(across) {
-            for ((cell, r2), f2) in row.iter_mut().zip(slope).zip(across) {
+        let mixed = [c, 0.0, 0.0, 0.0, 0.0];
+        for ((row, r), f) in bend.iter_mut().zip(slope).zip(mixed) {
+            for ((cell, r2), f2) in row.iter_mut().zip(slope).zip(mixed) {
                 *cell = (*cell + f * r2 + r * f2 + (1.0 - c) * r * r2) / a;
             }
         }
-        Some(Self { slope, bend })
+        Self {
+            slope,
+            bend,
+            by_target: -0.5 * c * length / a,
+        }
     }
 }

@@ -1,0 +1,168 @@
+//! From iteration to iteration: how far the target is raised, which part of the step is taken, whom to believe.
+//!
+//! A pass back gives the slack's slope by ln gamma and what the steps should gain. A pass forward tries them with the target that they
+//! should just allow. It is taken if the target at which the slack would be zero is higher than before; else a smaller part of the step
+//! is tried, and in the end a smaller region in which the derivatives are trusted.
+
+use super::outlook::Outlook;
+
+/// Parts of the step that are tried, one after the other.
+pub(crate) const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
+
+/// What is trusted at first, of a relay's distance from the interferer and of ln gamma.
+const TRUST: f32 = 0.5;
+
+/// Trust below which nothing is gained any more.
+const LEAST_TRUST: f32 = 1e-4;
+
+/// Hops as long as D in all lose half of it for each e-fold of the target: less than that is a chain that does not feel it yet.
+const LEAST_SLOPE: f32 = 0.3;
+
+/// How close to the optimum is close enough, in ln gamma.
+const CLOSE: f32 = 3e-6;
+
+/// Iterations after which what there is has to do.
+const ITERATIONS: u8 = 40;
+
+/// What to do next.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Turn {
+    /// Try this part of the step with this target, in ln gamma.
+    Try { share: f32, sigma: f32 },
+    /// Raise the target as far as the chain goes as it stands.
+    Raise,
+    /// Work out the steps anew.
+    Again,
+    /// It is over.
+    Over,
+}
+
+/// The state of an ascent.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Ascent {
+    /// The target of the nominal chain, in ln gamma, and its slack, m.
+    pub(crate) sigma: f32,
+    pub(crate) slack: f32,
+    /// The least target that may be tried.
+    floor: f32,
+    distance_m: f32,
+    /// The slack's slope by ln gamma, m.
+    pub(crate) slope: f32,
+    linear: f32,
+    square: f32,
+    pub(crate) trust: f32,
+    /// Which of the shares is tried.
+    share: u8,
+    iterations: u8,
+    idle: u8,
+}
+
+impl Ascent {
+    /// From a chain that has `slack` for the target `sigma`.
+    pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
+        Self {
+            sigma,
+            slack,
+            floor,
+            distance_m,
+            slope: -1.0,
+            linear: 0.0,
+            square: 0.0,
+            trust: TRUST,
+            share: 0,
+            iterations: 0,
+            idle: 0,
+        }
+    }
+
+    /// The target at which the nominal chain's slack would be zero.
+    pub(crate) fn estimate(&self) -> f32 {
+        self.sigma - self.slack / self.slope
+    }
+
+    /// A pass back begins.
+    pub(crate) const fn look_back(&mut self) {
+        (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
+    }
+
+    /// A part of the chain has been looked through.
+    pub(crate) fn add(&mut self, outlook: &Outlook) {
+        self.slope += outlook.by_target;
+        self.linear += outlook.linear;
+        self.square += outlook.square;
+    }
+
+    /// The pass back has come to the head.
+    pub(crate) fn weighed(&mut self) -> Turn {
+        self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
+        self.share = 0;
+        self.iterations = self.iterations.saturating_add(1);
+        if self.iterations > ITERATIONS || !(self.linear + self.square).is_finite() {
+            return Turn::Over;
+        }
+        // More than enough, and no use for it but a higher target.
+        if self.slack > 1e-4 * self.distance_m && self.linear + self.square < 0.1 * self.slack {
+            return Turn::Raise;
+        }
+        self.attempt()
+    }
+
+    /// The target for each part of the step.
+    pub(crate) fn sigma_for(&self, share: f32) -> f32 {
+        let gain = (self.linear + self.square * share) * share;
+        let by = (self.slack + gain.max(0.0)) / -self.slope;
+        (self.sigma + by.clamp(-self.trust, self.trust)).max(self.floor)
+    }
+
+    fn attempt(&self) -> Turn {
+        match SHARES.get(usize::from(self.share)) {
+            Some(&share) => Turn::Try {
+                share,
+                sigma: self.sigma_for(share),
+            },
+            None => Turn::Again,
+        }
+    }
+
+    /// Whether a trial that has `slack` for `sigma` is better than the nominal chain.
+    pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
+        let by = sigma - slack / self.slope - self.estimate();
+        by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
+    }
+
+    /// The current trial came to nothing: the next part, or less trust.
+    pub(crate) fn failed(&mut self) -> Turn {
+        self.share = self.share.saturating_add(1);
+        let turn = self.attempt();
+        if turn == Turn::Again {
+            self.trust *= 0.2;
+            if self.trust < LEAST_TRUST {
+                return Turn::Over;
+            }
+        }
+        turn
+    }
+
+    /// The trial with `share` is the nominal chain from now on.
+    pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> Turn {
+        let before = self.estimate();
+        (self.sigma, self.slack) = (sigma, slack);
+        self.idle = if self.estimate() - before < CLOSE {
+            self.idle + 1
+        } else {
+            0
+        };
+        if share >= 1.0 {
+            self.trust = (2.0 * self.trust).min(1.0);
+        }
+        if self.idle >= 2 { Turn::Over } else { Turn::Again }
+    }
+
+    /// The target has been raised as far as the chain goes.
+    pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> Turn {
+        let gained = sigma - self.sigma > 1e-5;
+        (self.sigma, self.slack) = (sigma, slack);
+        self.trust = TRUST;
+        if gained { Turn::Again } else { Turn::Over }
+    }
+}

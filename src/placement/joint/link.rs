@@ -1,0 +1,295 @@
+//! One relay of a chain under trial, with the hop into it: where it goes, and what that is worth to the relay before.
+
+use super::axis::{Axis, Triple};
+use super::hop::Reach;
+use super::outlook::Outlook;
+use super::policy::Policy;
+use crate::mission::{Band, Interferer, Mission};
+use crate::placement::spacing::Hop;
+use crate::root::sqrt;
+use crate::sir::{CrossSection, Placement, Sender, square};
+
+/// Where a relay may fly across the line.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Room {
+    /// Distances to the side, m.
+    pub lateral: Band,
+    /// Altitudes, m.
+    pub band: Band,
+}
+
+impl Room {
+    /// All that the mission leaves.
+    pub const fn of(mission: &Mission) -> Self {
+        let config = mission.config();
+        Self {
+            lateral: config.lateral,
+            band: config.band,
+        }
+    }
+
+    /// The same for a relay that keeps to one altitude.
+    pub const fn at_altitude(self, altitude_m: f32) -> Self {
+        Self {
+            band: Band::at(altitude_m),
+            ..self
+        }
+    }
+
+    /// What of it is nearest to `at`.
+    pub const fn nearest(self, at: CrossSection) -> CrossSection {
+        CrossSection {
+            y_m: self.lateral.nearest(at.y_m),
+            altitude_m: self.band.nearest(at.altitude_m),
+        }
+    }
+}
+
+/// How near the rim of what a hop reaches a relay goes, in squares.
+const RIM: f32 = 0.9995;
+
+/// What one part of the least separation that is missing costs, in parts of D: a slope that no gain of slack outweighs.
+const STIFFNESS: f32 = 100.0;
+
+/// The least separation is taken for that much larger, so that what is left missing is none.
+const MARGIN: f32 = 1.0005;
+
+/// A relay, as its place is chosen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Link<'a> {
+    interferer: &'a Interferer,
+    sender: Sender,
+    room: Room,
+    distance_m: f32,
+    /// The least distance to the sender, m.
+    apart_m: f32,
+    /// The hop for a reach of the relay.
+    mission: &'a Mission,
+}
+
+impl<'a> Link<'a> {
+    /// The relay that `sender` feeds and `room` is left to; `first` if that is Tx, from which it may stand as near as it likes.
+    pub(crate) fn new(
+        mission: &'a Mission,
+        interferer: &'a Interferer,
+        sender: Sender,
+        first: bool,
+        room: Room,
+    ) -> Self {
+        let config = mission.config();
+        Self {
+            interferer,
+            sender,
+            room,
+            distance_m: config.distance_m,
+            apart_m: if first { 0.0 } else { MARGIN * config.min_separation_m },
+            mission,
+        }
+    }
+
+    /// The place at `wanted`, or as far toward it as the hop goes, for `target`, with the sender at `from_m` along x; `None` where no
+    /// hop meets it. Beyond Rx nobody goes.
+    pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
+        let at = self.room.nearest(self.within_reach(target, from_m, wanted));
+        let hop = Hop::new(self.mission, self.interferer, self.sender, 1, at, self.distance_m);
+        Some(at.at(hop.stretched(target, from_m)?))
+    }
+
+    /// `wanted`, or the place across the line nearest to it on the way there that a hop reaches without going back along x.
+    ///
+    /// What a hop reaches for c > 1 is a ball: its middle is (p - m) / (c - 1) beyond the sender's place p, its radius sqrt(c) |p - m| /
+    /// (c - 1).
+    fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> CrossSection {
+        let Sender { at: from, gain } = self.sender;
+        let e = gain.excess(target);
+        let m = self.interferer;
+        if !(e > 0.0) {
+            return wanted;
+        }
+        let (ahead, aside, above) = (m.x_m - from_m, from.y_m - m.y_m, from.altitude_m);
+        let squared = square(ahead) + square(aside) + square(above);
+        let rim = (RIM * gain.ratio(target) * squared - square(ahead.max(0.0))) / square(e);
+        let (cy, ch) = (aside / e, above / e);
+        let (wy, wh) = (wanted.y_m - from.y_m, wanted.altitude_m - from.altitude_m);
+        if square(wy - cy) + square(wh - ch) <= rim {
+            return wanted;
+        }
+        // |share w - c|^2 = rim
+        let (a, b) = (square(wy) + square(wh), wy * cy + wh * ch);
+        let root = square(b) - a * (square(cy) + square(ch) - rim);
+        let share = if root >= 0.0 && a > 0.0 {
+            ((b + sqrt(root)) / a).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        CrossSection {
+            y_m: from.y_m + share * wy,
+            altitude_m: from.altitude_m + share * wh,
+        }
+    }
+
+    /// Where the relay goes across the line for `share` of its `policy`, when the sender is at `from` instead of `change` before that.
+    pub(crate) fn wanted(
+        &self,
+        target: f32,
+        from: Placement,
+        nominal: Placement,
+        policy: &Policy,
+        share: f32,
+        change: Triple,
+    ) -> CrossSection {
+        let by = policy.apply(share, change);
+        let [_, a, b] = policy.axis.first(triple(nominal));
+        let (a, b) = (a + by[0], b + by[1]);
+        match policy.axis {
+            Axis::X => CrossSection {
+                y_m: a,
+                altitude_m: b,
+            },
+            Axis::Y => {
+                let b = self.room.band.nearest(b);
+                let y = self.along(policy, target, from, [a.max(from.x_m).min(self.distance_m), b]);
+                CrossSection {
+                    y_m: y.unwrap_or(nominal.y_m),
+                    altitude_m: b,
+                }
+            }
+            Axis::H => {
+                let b = self.room.lateral.nearest(b);
+                let h = self.along(policy, target, from, [a.max(from.x_m).min(self.distance_m), b]);
+                CrossSection {
+                    y_m: b,
+                    altitude_m: h.unwrap_or(nominal.altitude_m),
+                }
+            }
+        }
+    }
+
+    /// The coordinate that follows from the other two, `at`, by the hop `from` the sender.
+    fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
+        let gain = self.sender.gain;
+        let (e, c) = (gain.excess(target), gain.ratio(target));
+        let [m, m1, m2] = policy.axis.first(self.source());
+        let [p, p1, p2] = policy.axis.first(triple(from));
+        let [a, b] = at;
+        let u = if policy.rising { m - p } else { p - m };
+        let rest = square(m1 - a) + square(m2 - b) - c * (square(a - p1) + square(b - p2));
+        let root = c * square(u) + e * rest;
+        if !(e > 0.0 && root >= 0.0) {
+            return None;
+        }
+        let r = sqrt(root);
+        let d = if u >= 0.0 {
+            (square(u) + rest) / (u + r)
+        } else {
+            (r - u) / e
+        };
+        Some(if policy.rising { p + d } else { p - d })
+    }
+
+    const fn source(&self) -> Triple {
+        [self.interferer.x_m, self.interferer.y_m, 0.0]
+    }
+
+    /// By how much the relay at `to` is nearer to the interferer than a hop of the least separation allows, in squares, m^2, and the
+    /// weight of that: |p' - p|^2 = |p' - m|^2 / c is then less than d_min^2.
+    fn near(&self, c: f32, to: Placement) -> (f32, f32) {
+        if !(self.apart_m > 0.0) {
+            return (0.0, 0.0);
+        }
+        let m = self.interferer;
+        let least = c * square(self.apart_m);
+        let squared = square(m.x_m - to.x_m) + square(m.y_m - to.y_m) + square(to.altitude_m);
+        let weight = STIFFNESS * self.distance_m / square(least);
+        ((least - squared).max(0.0), weight)
+    }
+
+    /// What the relay at `to` takes off the slack for being there, m.
+    pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
+        let (near, weight) = self.near(self.sender.gain.ratio(target), to);
+        0.5 * weight * square(near)
+    }
+
+    /// What the relay before, at `from`, sees of the slack through this relay at `to`, which moves by up to `trust` of its distance
+    /// from the interferer, and its policy; `after` is what it sees itself.
+    ///
+    /// Work: some 400 multiplications and two square roots.
+    pub(crate) fn weigh(
+        &self,
+        target: f32,
+        trust: f32,
+        from: Placement,
+        to: Placement,
+        after: &Outlook,
+    ) -> (Outlook, Policy) {
+        let c = self.sender.gain.ratio(target);
+        let source = self.source();
+        let place = triple(to);
+        let mut after = *after;
+        let (near, weight) = self.near(c, to);
+        let [dx, dy, dh] = minus(source, place);
+        if near > 0.0 {
+            let slope = [2.0 * dx, 2.0 * dy, 2.0 * dh];
+            after.penalise(weight, near, slope, c * square(self.apart_m));
+        }
+        let Room { lateral, band } = self.room;
+        let low = [from.x_m, lateral.least_m, band.least_m];
+        let high = [self.distance_m, lateral.most_m, band.most_m];
+        let (low, high) = (minus(low, place), minus(high, place));
+        let (axis, normal) = self.axis(c, from, to, low, high);
+        let hop = if to.x_m >= self.distance_m {
+            Reach::FIXED
+        } else {
+            let [source, from, place] = [source, triple(from), place].map(|p| axis.first(p));
+            Reach::new(c, source, from, place)
+        };
+        let far = trust * sqrt(square(dx) + square(dy) + square(dh));
+        let [_, l1, l2] = axis.first(low.map(|low| low.max(-far).min(0.0)));
+        let [_, h1, h2] = axis.first(high.map(|high| high.min(far).max(0.0)));
+        let (before, policy) = after.before(axis, &hop, [l1, l2], [h1, h2]);
+        let policy = Policy {
+            rising: normal < 0.0,
+            ..policy
+        };
+        (before, policy)
+    }
+
+    /// The coordinate that is to follow, one that is not at an end of its room `low` to `high`, and the slope of F by it: the steeper,
+    /// the better.
+    fn axis(
+        &self,
+        c: f32,
+        from: Placement,
+        to: Placement,
+        low: Triple,
+        high: Triple,
+    ) -> (Axis, f32) {
+        let rounding = 1e-6 * self.distance_m;
+        let [dx, dy, dh] = minus(triple(to), self.source());
+        let [hx, hy, hh] = minus(triple(to), triple(from));
+        let [nx, ny, nh] = [dx - c * hx, dy - c * hy, dh - c * hh];
+        let ([lx, ly, lh], [_, uy, uh]) = (low, high);
+        let mut best = (Axis::X, nx);
+        // Rather x, by which the chain gets on.
+        let mut steepest = if lx >= -rounding { 0.0 } else { 1.5 * nx.abs() };
+        for (axis, normal, low, high) in [(Axis::Y, ny, ly, uy), (Axis::H, nh, lh, uh)] {
+            let free = low < -rounding && high > rounding;
+            if c > 1.0 && free && normal.abs() > steepest {
+                steepest = normal.abs();
+                best = (axis, normal);
+            }
+        }
+        best
+    }
+}
+
+/// The coordinates of a place.
+pub(super) const fn triple(place: Placement) -> Triple {
+    [place.x_m, place.y_m, place.altitude_m]
+}
+
+/// One place as seen from another.
+pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
+    [a - x, b - y, c - z]
+}
