@@ -14,6 +14,12 @@ pub(crate) struct Sweeping {
     pub(crate) ladder: Ladder,
     /// What it came with, as [`told`] sums it up.
     pub(crate) told: u32,
+    /// Whether it is of relays where the joint method has them, and if this one has not worked that out yet, from which relay the pass
+    /// came; `reaches` are that one's then.
+    pub(crate) chosen: bool,
+    pub(crate) put_off: Option<Option<Behind>>,
+    /// Whether a relay after this one differs from what the mission says of all.
+    pub(crate) own: bool,
     /// This relay's place for each target.
     pub(crate) reaches: PerTarget,
     pub(crate) verdict: Verdict,
@@ -24,6 +30,9 @@ impl Sweeping {
         Self {
             ladder,
             told: 0,
+            chosen: false,
+            put_off: None,
+            own: false,
             reaches: PerTarget::new(),
             verdict: Verdict {
                 commit: None,
@@ -39,20 +48,20 @@ impl Sweeping {
         behind: Option<Behind>,
         index: u16,
         own: Station,
+        end_m: Option<f32>,
         measured_per_w: Option<f32>,
         from: &PerTarget,
     ) -> bool {
         self.told = told(behind, from);
         let targets = self.ladder.targets();
-        pass::extend(
-            mission,
-            behind,
-            index,
-            own,
-            &targets,
-            from,
-            &mut self.reaches,
-        );
+        let reaches = &mut self.reaches;
+        match end_m {
+            Some(end_m) => {
+                let own = (index, own);
+                pass::extend_chosen(mission, behind, own, end_m, &targets, from, reaches);
+            }
+            None => pass::extend(mission, behind, index, own, &targets, from, reaches),
+        }
         let last = mission.after(index).is_none();
         if last {
             self.verdict = pass::close(mission, own, measured_per_w, self.ladder, &self.reaches);

@@ -51,6 +51,8 @@ pub(crate) enum Next {
         /// Whether the setpoint has moved.
         moved: bool,
     },
+    /// Call `work` after a pause; what there is to say stays.
+    Think,
     /// Hand the pass onward, and again until something comes back.
     Forward {
         /// Whether the setpoint has moved.

@@ -8,6 +8,7 @@ use super::exchange::Phase;
 use super::liveness::tick;
 use super::members::Members;
 use super::stats::bump;
+use super::settings::Method;
 use super::timers::Timer;
 use super::{MEMBERSHIP, Node, PAUSE, Side};
 use crate::mission::{Heading, Mission};
@@ -246,6 +247,9 @@ impl Node {
         self.beside(Side::back(heading)).agree_with_caller();
         self.beside(Side::onward(heading)).agree(place == relays);
         self.share.renew(leads);
+        if self.settings.method == Method::Joint {
+            self.timers.set(Timer::Work, now + PAUSE);
+        }
         self.timers.stop(Timer::Call);
         bump(&mut self.stats.views);
         self.pending.raise(Event::Reformed);

@@ -3,7 +3,7 @@
 use super::event::Event;
 use super::exchange::{Next, Phase};
 use super::members::Members;
-use super::share::ADJUST;
+use super::share::{ADJUST, ALTITUDE};
 use super::stats::bump;
 use super::timers::Timer;
 use super::{GUARD, MEMBERSHIP, Node, Side};
@@ -198,6 +198,8 @@ impl Node {
         let next = match message {
             Message::Sweep(sweep) => share.on_sweep(own, sweep),
             Message::Verdict(answer) => share.on_verdict(own, answer),
+            Message::Course(course) if ALTITUDE => share.on_course(own, course),
+            Message::Worth(worth) if ALTITUDE => share.on_worth(own, worth),
             Message::Token(token) if ADJUST => share.on_token(own, token),
             Message::Moved(moved) if ADJUST => share.on_moved(own, moved),
             // A chain has no more relays than its mission.

@@ -2,9 +2,17 @@
 
 use super::settings::{Adjust, Method, Settings};
 use crate::mission::{Mission, Profile};
+use crate::placement::joint::Solver;
+use crate::placement::joint::ascent::Ascent;
 use crate::placement::plan::Planner;
 use crate::placement::search::{Infeasible, Schedule, Search};
 use crate::wire::message::Turn;
+
+/// The most relays whose chain is solved in one relay, without a message; longer ones are solved by messages.
+pub(crate) const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };
+
+/// A chain being solved by the joint method.
+pub(crate) type Chain = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
 /// What the leader is at.
 #[derive(Clone, Debug)]
@@ -13,6 +21,10 @@ pub(crate) enum Lead {
     No,
     /// Solving the chain from the mission.
     Predicting(Planner),
+    /// The same by the joint method: every relay does that, not the leader alone.
+    Solving(Chain),
+    /// The joint method by messages.
+    Ascending(Ascent),
     /// Trying targets at the altitudes held; whether the chain settles with what is agreed.
     Searching { search: Search, last: bool },
     /// Algorithm 2.

@@ -60,7 +60,7 @@ use exchange::{Next, Phase};
 use members::Members;
 use repeats::Repeats;
 use sample::{Meter, Sample};
-use settings::{Identity, Settings, Wiring};
+use settings::{Identity, Method, Settings, Wiring};
 use share::{Own, Share};
 pub use side::Side;
 use stats::{Stats, bump};
@@ -150,9 +150,10 @@ impl Node {
                 node.timers.set(side.timer(), now + settings.quiet);
             }
         }
-        if leader {
+        if leader || settings.method == Method::Joint {
             node.timers.set(Timer::Work, now + PAUSE);
-        } else if MEMBERSHIP {
+        }
+        if !leader && MEMBERSHIP {
             // Until then the first pass should have come, were this the beginning.
             let first = settings.hop_time.times(2 * u32::from(relays));
             node.timers.set(Timer::Call, now + settings.quiet + first);
@@ -245,6 +246,7 @@ impl Node {
                 self.timers.stop(Timer::Repeat);
                 self.timers.set(Timer::Work, now + PAUSE);
             }
+            Next::Think => return self.timers.set(Timer::Work, now + PAUSE),
             Next::Forward { moved: to } => {
                 moved = to;
                 self.repeats.heard();

@@ -9,7 +9,7 @@ use super::ladder::{Ladder, TARGETS};
 use super::retreat::Retreat;
 use super::spacing::{Hop, receiver_reach};
 use super::verdict::Verdict;
-use crate::mission::{Heading, Mission};
+use crate::mission::{Heading, Interferer, Mission};
 use crate::root::sqrt;
 use crate::sir::{self, Sender, Station, square};
 
@@ -48,19 +48,8 @@ pub fn extend(
     reaches.clear();
     let pairs = targets.iter().zip(from);
     if let Some(interferer) = mission.interferer() {
-        let sender = behind.map_or(Sender::transmitter(mission), |behind| {
-            Sender::relay(mission, behind.relay)
-        });
         let end_m = mission.end_for(index, 0.0);
-        let hop = Hop::new(mission, interferer, sender, index, own.at, end_m);
-        for (&target, &from_m) in pairs {
-            let Some(place) = hop.reach(target, from_m) else {
-                break;
-            };
-            if reaches.push(place).is_err() {
-                break;
-            }
-        }
+        toward_rx(mission, interferer, behind, (index, own), end_m, pairs, reaches);
     } else if let Some(field) = mission.field() {
         let altitude_m = behind.map(|behind| behind.relay.at.altitude_m);
         let measured = behind.and_then(|behind| behind.measured_per_w);
@@ -82,6 +71,47 @@ pub fn extend(
                 break;
             }
         }
+    }
+}
+
+/// The same toward Rx for a relay that goes no farther than `end_m`.
+fn toward_rx<'a>(
+    mission: &Mission,
+    interferer: &Interferer,
+    behind: Option<Behind>,
+    (index, own): (u16, Station),
+    end_m: f32,
+    pairs: impl Iterator<Item = (&'a f32, &'a f32)>,
+    reaches: &mut PerTarget,
+) {
+    let sender = behind.map_or(Sender::transmitter(mission), |behind| {
+        Sender::relay(mission, behind.relay)
+    });
+    let hop = Hop::new(mission, interferer, sender, index, own.at, end_m);
+    for (&target, &from_m) in pairs {
+        let Some(place) = hop.reach(target, from_m) else {
+            break;
+        };
+        if reaches.push(place).is_err() {
+            break;
+        }
+    }
+}
+
+/// As [`extend`], for relay `index` of a chain by the joint method, which goes no farther than `end_m`, m along x.
+pub fn extend_chosen(
+    mission: &Mission,
+    behind: Option<Behind>,
+    (index, own): (u16, Station),
+    end_m: f32,
+    targets: &[f32],
+    from: &[f32],
+    reaches: &mut PerTarget,
+) {
+    reaches.clear();
+    if let Some(interferer) = mission.interferer() {
+        let pairs = targets.iter().zip(from);
+        toward_rx(mission, interferer, behind, (index, own), end_m, pairs, reaches);
     }
 }
 

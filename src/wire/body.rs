@@ -6,10 +6,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::forming::Forming;
-use super::message::{Message, TRIALS, Trial, Turn};
+use super::message::{Message, Turn};
 #[cfg(feature = "upload")]
 use super::upload::{LENGTH, Terms};
 use crate::placement::PerTarget;
+use crate::placement::joint::course::{TRIALS, Trial};
 use crate::placement::joint::outlook::PARTS;
 use crate::placement::local::Local;
 use crate::sir::Placement;
@@ -65,8 +66,9 @@ pub(super) enum Body {
     Heartbeat([u8; 2], bool),
     Measured(Targets, f32, PerTarget),
     Aside(Targets, f32, PerTarget),
-    Course(Pass, f32, heapless::Vec<[f32; 4], TRIALS>),
-    Worth(Pass, Option<u8>, [f32; PARTS]),
+    /// Power, trust, slope and estimate; for each trial target, penalty and place.
+    Course(Pass, [f32; 4], heapless::Vec<[f32; 5], TRIALS>),
+    Worth(Pass, Option<u8>, f32, [f32; PARTS]),
     Token {
         pass: Pass,
         at: At,
@@ -100,8 +102,8 @@ impl Body {
             Self::Heartbeat(..) => 4,
             Self::Measured(_, _, reaches) => 24 + 4 * reaches.len(),
             Self::Aside(_, _, reaches) => 24 + 4 * reaches.len(),
-            Self::Course(_, _, trials) => 10 + 16 * trials.len(),
-            Self::Worth(_, trial, _) => 74 + usize::from(trial.is_some()),
+            Self::Course(_, _, trials) => 22 + 20 * trials.len(),
+            Self::Worth(_, trial, ..) => 58 + usize::from(trial.is_some()),
             Self::Token { .. } => 28,
             Self::Moved(..) => 18,
             Self::Hail(_) | Self::Roster(_) | Self::Count(_) => 14,
@@ -144,18 +146,28 @@ impl Message {
             Self::Heartbeat { mission, answer } => Body::Heartbeat(mission.to_le_bytes(), *answer),
             Self::Course(course) => {
                 let trials = course.trials.iter().map(|trial| {
-                    let Trial { target, place } = *trial;
-                    [target, place.x_m, place.y_m, place.altitude_m]
+                    let Trial {
+                        target,
+                        penalty_m,
+                        place,
+                    } = *trial;
+                    [target, penalty_m, place.x_m, place.y_m, place.altitude_m]
                 });
                 Body::Course(
                     Pass::new(course.number, course.mission),
-                    course.power_w,
+                    [
+                        course.power_w,
+                        course.bar.trust,
+                        course.bar.slope,
+                        course.bar.estimate,
+                    ],
                     trials.collect(),
                 )
             }
             Self::Worth(worth) => Body::Worth(
                 Pass::new(worth.number, worth.mission),
                 worth.trial,
+                worth.slack_m,
                 worth.outlook.parts(),
             ),
             Self::Token(token) => {

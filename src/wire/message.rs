@@ -6,6 +6,7 @@ use super::upload::Upload;
 use crate::guard::Fence;
 use crate::placement::PerTarget;
 use crate::placement::joint::Outlook;
+use crate::placement::joint::course::{Bar, Trials};
 use crate::placement::ladder::Ladder;
 use crate::placement::local::Local;
 use crate::placement::verdict::Verdict;
@@ -13,9 +14,6 @@ use crate::sir::{Placement, Station};
 
 /// The longest body: a sweep of sixteen targets with what was measured, or from aside of the line.
 pub const MAX_BODY: usize = 88;
-
-/// The most trials of one course.
-pub const TRIALS: usize = 4;
 
 /// One message between neighbours. *Onward* is the way a pass goes: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]
@@ -150,18 +148,10 @@ pub struct Course {
     pub mission: u16,
     /// The sender's transmit power, W.
     pub power_w: f32,
-    /// For each trial its target, linear SIR, and where the sender is then. Every next one takes a smaller part of the step.
-    pub trials: heapless::Vec<Trial, TRIALS>,
-}
-
-/// One trial of a course.
-#[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Trial {
-    /// Linear SIR.
-    pub target: f32,
-    /// Where the sender is.
-    pub place: Placement,
+    /// By what they are judged.
+    pub bar: Bar,
+    /// A few trials, and where the sender is in each of them.
+    pub trials: Trials,
 }
 
 /// What came of a course, as it travels back.
@@ -173,7 +163,9 @@ pub struct Worth {
     pub mission: u16,
     /// The trial that is gone by; `None` if none got through.
     pub trial: Option<u8>,
-    /// What the rest of the chain is worth about where the receiver is in that trial.
+    /// Its slack, m.
+    pub slack_m: f32,
+    /// What the rest of the chain is worth about where the receiver is in it, or in the last one before.
     pub outlook: Outlook,
 }
 

@@ -4,7 +4,7 @@ use super::super::adjust::Turning;
 use super::super::exchange::Next;
 use super::super::lead::Lead;
 use super::super::settings::Method;
-use super::{ADJUST, Own, Share};
+use super::{ADJUST, ALTITUDE, Own, Share};
 use crate::placement::ladder::Ladder;
 use crate::placement::local::Beside;
 use crate::placement::pass::origins;
@@ -20,6 +20,13 @@ const FIELD_HOPS_AT_ONCE: u16 = 8;
 impl Share {
     /// Goes on with the leader's computation; whether the next pass can begin.
     pub(super) fn plan(&mut self, own: Own<'_>) -> Result<bool, Infeasible> {
+        if ALTITUDE && own.settings.method == Method::Joint && self.chosen.is_none() {
+            if let Some(target) = self.solve(own) {
+                self.search_chosen(own, target)?;
+                return Ok(true);
+            }
+            return Ok(false);
+        }
         let (mission, profile) = (own.mission, self.profile);
         match &mut self.lead {
             Lead::No => {
@@ -89,8 +96,14 @@ impl Share {
         match &self.lead {
             Lead::Searching { search, .. } => {
                 let ladder = *search.ladder();
+                let chosen = own.settings.method == Method::Joint && self.chosen.is_some();
                 self.begin();
-                self.sweep_on(own, ladder, None, &origins(mission))
+                self.sweep_on(own, ladder, chosen, None, &origins(mission))
+            }
+            Lead::Ascending(ascent) if ALTITUDE => {
+                let ascent = *ascent;
+                self.begin();
+                self.set_course(own, ascent)
             }
             Lead::Adjusting(rounds) if ADJUST => {
                 let (turn, sir) = (rounds.turn(), rounds.sir);

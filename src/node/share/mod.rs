@@ -1,9 +1,10 @@
 //! A relay's share of every algorithm: what it does with a pass, and with what comes back of it.
 //!
-//! [`exchange`](super::exchange) has the state table. What a pass carries is one of three: targets (`sweeps`), targets and
-//! altitude levels (`waves`), or a token (`turns`). The call for a new view (`roll`) is a pass like them. `leader` has what comes
+//! [`exchange`](super::exchange) has the state table. What a pass carries is one of three: targets (`sweeps`), trials of the joint
+//! method (`courses`), or a token (`turns`). The call for a new view (`roll`) is a pass like them. `leader` has what comes
 //! before a pass begins.
 
+mod courses;
 mod leader;
 mod roll;
 mod sweeps;
@@ -16,11 +17,13 @@ use super::exchange::{Exchange, Next, Phase};
 use super::lead::Lead;
 use super::settings::Settings;
 use crate::mission::{Band, Mission, Profile};
+use crate::placement::joint::Outlook;
+use crate::placement::joint::course::Coursing;
 use crate::placement::ladder::Ladder;
 use crate::placement::search::Infeasible;
 use crate::sir::{CrossSection, Placement, Station};
 use crate::wire::digest::Stamp;
-use crate::wire::message::{Answer, Count, Message, Moved, Roster, Sweep, Token};
+use crate::wire::message::{Answer, Count, Course, Message, Moved, Roster, Sweep, Token, Worth};
 
 use roll::Rolling;
 
@@ -83,8 +86,18 @@ impl Own<'_> {
 #[derive(Clone, Debug)]
 enum Pass {
     Sweep(Sweeping),
+    Course(Coursing),
     Turn(Turning),
     Roll(Rolling),
+}
+
+/// Where the joint method has a relay.
+#[derive(Clone, Copy, Debug)]
+struct Chosen {
+    /// Across the line.
+    at: CrossSection,
+    /// And no farther along it, m.
+    end_m: f32,
 }
 
 /// A relay's share of the algorithms.
@@ -96,8 +109,12 @@ pub(crate) struct Share {
     sweeps: u32,
     /// What this relay was given.
     profile: Profile,
+    /// Where the joint method has it in this view, once that is known.
+    chosen: Option<Chosen>,
     /// Where it is to be across the line.
     at: CrossSection,
+    /// What came of the last course, as the relay before is to know it.
+    worth: Option<(Option<u8>, f32, Outlook)>,
     /// Where the neighbour toward Rx stands, as far as it has said.
     after: Option<Placement>,
     setpoint: Option<Placement>,
@@ -117,7 +134,9 @@ impl Share {
             lead: Lead::No,
             sweeps: 0,
             profile,
+            chosen: None,
             at: profile.on_line().at,
+            worth: None,
             after: None,
             setpoint: None,
             target: None,
@@ -134,6 +153,7 @@ impl Share {
     /// Another mission is flown from now on, in which this relay is given `profile`. It stays where it is.
     pub(crate) fn load(&mut self, profile: Profile) {
         self.profile = profile;
+        self.chosen = None;
         if self.setpoint.is_none() {
             self.at = profile.on_line().at;
         }
@@ -152,13 +172,19 @@ impl Share {
 
     /// Goes on with a computation: the relay's own share of the current pass, or the leader's next pass.
     ///
-    /// Bounded by 16 hops of 16 reaches, half as many in a field, 96 hops of a wave, or 624 places of Algorithm 2.
+    /// Bounded by 16 hops of 16 reaches, half as many in a field, ten relays of the joint method, or 624 places of Algorithm 2.
     pub(crate) fn work(&mut self, own: Own<'_>) -> Next {
         if self.exchange.phase == Phase::Waiting {
-            return match &self.pass {
-                Pass::Turn(_) if ADJUST => self.go_on_with_turn(own),
-                _ => Next::Stale,
-            };
+            match &self.pass {
+                Pass::Turn(_) if ADJUST => return self.go_on_with_turn(own),
+                Pass::Sweep(sweeping) if ALTITUDE && sweeping.put_off.is_some() => {
+                    return self.go_on_with_sweep(own);
+                }
+                _ => {}
+            }
+        }
+        if own.index != own.mission.leader() || self.exchange.phase == Phase::Waiting {
+            return self.think(own);
         }
         match self.plan(own) {
             Ok(true) => self.begin_pass(own),
@@ -178,10 +204,17 @@ impl Share {
                 number,
                 mission,
                 ladder: sweeping.ladder,
-                relay: self.station(),
-                chosen: false,
+                relay: self.station_for(sweeping.chosen),
+                chosen: sweeping.chosen,
                 measured_per_w: own.measured_per_w,
                 reaches: sweeping.reaches.clone(),
+            })),
+            Pass::Course(coursing) if ALTITUDE => Some(Message::Course(Course {
+                number,
+                mission,
+                power_w: self.profile.power_w,
+                bar: coursing.bar,
+                trials: coursing.own.clone(),
             })),
             Pass::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Token(Token {
@@ -210,7 +243,11 @@ impl Share {
 
     /// Whether the current pass is one on which relays compute for a while.
     pub(crate) const fn is_slow(&self) -> bool {
-        matches!(self.pass, Pass::Turn(_))
+        match &self.pass {
+            Pass::Turn(_) => true,
+            Pass::Sweep(sweeping) => sweeping.chosen,
+            _ => false,
+        }
     }
 
     /// What to hand back, once it is known.
@@ -224,8 +261,17 @@ impl Share {
                 number,
                 mission,
                 verdict: sweeping.verdict.clone(),
-                own: false,
+                own: sweeping.own || self.differs(own),
             })),
+            Pass::Course(_) if ALTITUDE => self.worth.map(|(trial, slack_m, outlook)| {
+                Message::Worth(Worth {
+                    number,
+                    mission,
+                    trial,
+                    slack_m,
+                    outlook,
+                })
+            }),
             Pass::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Moved(Moved {
                     number,
@@ -282,11 +328,12 @@ impl Share {
         }
     }
 
-    /// What it is on a pass.
-    const fn station(&self) -> Station {
-        Station {
-            at: self.at,
-            power_w: self.profile.power_w,
+    /// What it is on a sweep: of the joint method, or where it was given to be.
+    fn station_for(&self, chosen: bool) -> Station {
+        let given = self.profile.on_line();
+        match self.chosen {
+            Some(Chosen { at, .. }) if chosen => Station { at, ..given },
+            _ => given,
         }
     }
 

@@ -139,6 +139,7 @@ impl Share {
     pub(crate) fn renew(&mut self, leader: bool) {
         self.lead = Lead::No;
         self.after = None;
+        self.chosen = None;
         self.exchange.renew(if leader {
             Phase::Planning
         } else {

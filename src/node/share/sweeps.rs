@@ -4,10 +4,11 @@ use super::super::align::{Sweeping, told};
 use super::super::exchange::{Next, Phase};
 use super::super::lead::{Lead, Rounds};
 use super::super::settings::Method;
-use super::{ADJUST, Own, Pass, Share};
+use super::{ADJUST, ALTITUDE, Chosen, Own, Pass, Share};
 use crate::placement::PerTarget;
 use crate::placement::ladder::Ladder;
 use crate::placement::pass::Behind;
+use crate::sir::Station;
 use crate::wire::message::{Answer, Sweep};
 
 impl Share {
@@ -19,13 +20,18 @@ impl Share {
         };
         let told = told(Some(behind), &sweep.reaches);
         let same = matches!(&self.pass, Pass::Sweep(sweeping)
-            if sweeping.ladder == sweep.ladder && sweeping.told == told);
+            if sweeping.ladder == sweep.ladder
+                && sweeping.chosen == sweep.chosen
+                && sweeping.told == told);
         let arrival = self.exchange.arrival(sweep.number, same);
         if let Some(next) = arrival.refused(self.exchange) {
             return next;
         }
+        if sweep.chosen && own.mission.interferer().is_none() {
+            return Next::Stale;
+        }
         self.exchange.take(sweep.number);
-        self.sweep_on(own, sweep.ladder, Some(behind), &sweep.reaches)
+        self.sweep_on(own, sweep.ladder, sweep.chosen, Some(behind), &sweep.reaches)
     }
 
     /// Works out this relay's share of a sweep.
@@ -33,6 +39,7 @@ impl Share {
         &mut self,
         own: Own<'_>,
         ladder: Ladder,
+        chosen: bool,
         behind: Option<Behind>,
         from: &PerTarget,
     ) -> Next {
@@ -43,15 +50,32 @@ impl Share {
             return Next::Stale;
         };
         sweeping.ladder = ladder;
+        sweeping.chosen = chosen;
+        self.exchange.phase = Phase::Waiting;
+        if ALTITUDE && chosen && self.chosen.is_none() {
+            // First it has to find out where it is to be.
+            sweeping.told = told(behind, from);
+            sweeping.reaches.clone_from(from);
+            sweeping.put_off = Some(behind);
+            return Next::Work { moved: false };
+        }
+        sweeping.put_off = None;
+        sweeping.own = false;
+        let end_m = self.chosen.filter(|_| chosen).map(|chosen| chosen.end_m);
+        let given = self.profile.on_line();
+        let station = match self.chosen {
+            Some(Chosen { at, .. }) if chosen => Station { at, ..given },
+            _ => given,
+        };
         let known = sweeping.reach(
             own.mission,
             behind,
             own.index,
-            self.profile.on_line(),
+            station,
+            end_m,
             own.measured_per_w,
             from,
         );
-        self.exchange.phase = Phase::Waiting;
         if known {
             self.conclude_sweep(own)
         } else {
@@ -63,8 +87,10 @@ impl Share {
     pub(crate) fn on_verdict(&mut self, own: Own<'_>, answer: &Answer) -> Next {
         if let Pass::Sweep(sweeping) = &mut self.pass
             && self.exchange.awaits(answer.number)
+            && sweeping.put_off.is_none()
             && sweeping.take(&answer.verdict)
         {
+            sweeping.own = answer.own;
             return self.conclude_sweep(own);
         }
         Next::Stale
@@ -76,7 +102,8 @@ impl Share {
             return Next::Stale;
         };
         if let Some((x_m, target)) = sweeping.agreed() {
-            self.at = self.profile.on_line().at;
+            let chosen = sweeping.chosen;
+            self.at = self.station_for(chosen).at;
             self.setpoint = Some(self.at.at(x_m));
             self.target = Some(target);
             return self.agree(own);
@@ -103,6 +130,11 @@ impl Share {
             match own.settings.method {
                 Method::Adjust(adjust) if ADJUST => {
                     self.lead = Lead::Adjusting(Rounds::new(adjust));
+                    self.exchange.phase = Phase::Answered;
+                    return Next::Work { moved: true };
+                }
+                Method::Joint if ALTITUDE && self.is_mixed(own) => {
+                    self.begin_ascent(own, target);
                     self.exchange.phase = Phase::Answered;
                     return Next::Work { moved: true };
                 }

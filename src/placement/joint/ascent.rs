@@ -4,13 +4,15 @@
 //! should just allow. It is taken if the target at which the slack would be zero is higher than before; else a smaller part of the step
 //! is tried, and in the end a smaller region in which the derivatives are trusted.
 
+use super::course::{Bar, Trial, Trials};
 use super::outlook::Outlook;
+use crate::sir::Placement;
 
 /// Parts of the step that are tried, one after the other.
 pub(crate) const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
 /// What is trusted at first, of a relay's distance from the interferer and of ln gamma.
-const TRUST: f32 = 0.5;
+pub(crate) const TRUST: f32 = 0.5;
 
 /// Trust below which nothing is gained any more.
 const LEAST_TRUST: f32 = 1e-4;
@@ -156,6 +158,55 @@ impl Ascent {
             self.trust = (2.0 * self.trust).min(1.0);
         }
         if self.idle >= 2 { Turn::Over } else { Turn::Again }
+    }
+
+    /// The next course, as the head says it.
+    pub(crate) fn course(&self) -> (Bar, Trials) {
+        let trial = |sigma: f32| Trial {
+            target: libm::expf(sigma),
+            penalty_m: 0.0,
+            place: Placement::default(),
+        };
+        if self.iterations == 0 {
+            return (Bar::FIRST, [self.sigma].map(trial).into_iter().collect());
+        }
+        let bar = Bar {
+            trust: self.trust,
+            slope: self.slope,
+            estimate: self.estimate(),
+        };
+        let trials = SHARES.map(|share| trial(self.sigma_for(share)));
+        (bar, trials.into_iter().collect())
+    }
+
+    /// What came of it.
+    pub(crate) fn heard(&mut self, trial: Option<u8>, slack: f32, outlook: &Outlook) -> Turn {
+        let turn = match trial.map(usize::from) {
+            Some(_) if self.iterations == 0 => {
+                self.slack = slack;
+                Turn::Again
+            }
+            Some(at) => {
+                let share = SHARES.get(at).copied().unwrap_or(1.0);
+                let sigma = self.sigma_for(share);
+                self.taken(share, sigma, slack)
+            }
+            None => {
+                self.trust *= 0.2;
+                if self.trust < LEAST_TRUST {
+                    Turn::Over
+                } else {
+                    Turn::Again
+                }
+            }
+        };
+        self.look_back();
+        self.add(outlook);
+        match self.weighed() {
+            _ if turn == Turn::Over => turn,
+            Turn::Over => Turn::Over,
+            _ => Turn::Again,
+        }
     }
 
     /// The target has been raised as far as the chain goes.

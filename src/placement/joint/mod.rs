@@ -14,10 +14,12 @@
 //! | `ascent` | how far the target is raised, and what is taken of a step |
 //! | `starts`, `seek`, `cells` | where an ascent begins; the target of a chain that does not change; a place in six bytes |
 //! | [`solver`] | a whole chain without a message |
+//! | [`course`] | one relay's share where relays hold what the others do not know |
 
-mod ascent;
+pub(crate) mod ascent;
 mod axis;
 mod cells;
+pub mod course;
 mod hop;
 pub mod link;
 pub mod outlook;

@@ -1,0 +1,216 @@
+//! One relay's share of the joint method by messages, where relays hold what the others do not know.
+//!
+//! A course goes from the head to the tail with a few trials, each of a target and of a part of the step; every relay works out where
+//! it is in each of them. The tail says which one is gone by, and on the way back every relay works out its next step.
+
+use super::ascent::{SHARES, TRUST};
+use super::link::{Link, Room, minus, triple};
+use super::outlook::Outlook;
+use super::policy::Policy;
+use crate::mission::Mission;
+use crate::root::sqrt;
+use crate::sir::{CrossSection, Placement, Sender};
+
+/// The most trials of one course.
+pub const TRIALS: usize = SHARES.len();
+
+/// One trial of a course.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Trial {
+    /// Linear SIR.
+    pub target: f32,
+    /// What relays up to the sender take off the slack for being too near the interferer, m.
+    pub penalty_m: f32,
+    /// Where the sender is.
+    pub place: Placement,
+}
+
+/// Trials of a course, the one with the whole step first.
+pub type Trials = heapless::Vec<Trial, TRIALS>;
+
+/// By what the tail judges the trials, in ln gamma and m.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Bar {
+    /// How far of its distance from the interferer a relay may step, 0 to 1.
+    pub trust: f32,
+    /// The slack's slope by ln gamma, m, below 0.
+    pub slope: f32,
+    /// The logarithm of the target that is to be exceeded.
+    pub estimate: f32,
+}
+
+impl Bar {
+    /// Of the first course: relays are where they have chosen to be, and whatever comes of it is gone by.
+    pub(crate) const FIRST: Self = Self {
+        trust: TRUST,
+        slope: -1.0,
+        estimate: -1e3,
+    };
+
+    /// Whether it is that of a first course.
+    pub(crate) fn begins(self) -> bool {
+        self.estimate <= -1e3
+    }
+
+    /// The trust after a course of which `trial` is gone by.
+    pub(crate) const fn trust_after(self, trial: Option<u8>) -> f32 {
+        match trial {
+            None => 0.2 * self.trust,
+            Some(0) if self.estimate > -1e3 => (2.0 * self.trust).min(1.0),
+            Some(_) => self.trust,
+        }
+    }
+}
+
+/// A relay on a course.
+#[derive(Clone, Debug)]
+pub(crate) struct Coursing {
+    pub(crate) bar: Bar,
+    /// What the sender says, and where this relay is then.
+    pub(crate) told: Trials,
+    pub(crate) own: Trials,
+    /// The sender's power, W; none of Tx.
+    pub(crate) power_in_w: Option<f32>,
+    /// The target, the sender's place and its own in the trial that was gone by last; none before the first course.
+    nominal: Option<(f32, Placement, Placement)>,
+    policy: Policy,
+}
+
+/// What a relay is on a course.
+#[derive(Clone, Copy)]
+pub(crate) struct Courser<'a> {
+    pub(crate) mission: &'a Mission,
+    /// What its power is worth, and that of the relay or of Tx before it; across the line the sender is where the trial has it.
+    pub(crate) power_w: f32,
+    pub(crate) gain_in: crate::gain::Gain,
+    pub(crate) first: bool,
+    pub(crate) room: Room,
+}
+
+impl<'a> Courser<'a> {
+    fn link(&self, from: Placement) -> Option<Link<'a>> {
+        let sender = Sender {
+            at: from.cross_section(),
+            gain: self.gain_in,
+        };
+        let interferer = self.mission.interferer()?;
+        Some(Link::new(self.mission, interferer, sender, self.first, self.room))
+    }
+
+    /// The slack at Rx of a trial of the tail, m, and its outlook.
+    fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
+        let reach_m = sqrt(self.mission.receiver_gain(self.power_w) / target);
+        Outlook::tail(reach_m, self.mission.config().distance_m, at)
+    }
+}
+
+impl Coursing {
+    pub(crate) const fn new(bar: Bar) -> Self {
+        Self {
+            bar,
+            told: Trials::new(),
+            own: Trials::new(),
+            power_in_w: None,
+            nominal: None,
+            policy: Policy::NONE,
+        }
+    }
+
+    /// Where this relay is in the trials of a new course, for as many as it can take part in; at first it is at `wanted`.
+    pub(crate) fn take(&mut self, relay: Courser<'_>, bar: Bar, told: &Trials, wanted: CrossSection) {
+        self.bar = bar;
+        self.told.clone_from(told);
+        self.own.clear();
+        for (trial, share) in told.iter().zip(SHARES) {
+            let Some(own) = self.attempt(relay, *trial, share, wanted) else {
+                break;
+            };
+            _ = self.own.push(own);
+        }
+    }
+
+    fn attempt(
+        &self,
+        relay: Courser<'_>,
+        told: Trial,
+        share: f32,
+        wanted: CrossSection,
+    ) -> Option<Trial> {
+        let from = told.place;
+        let link = relay.link(from)?;
+        let wanted = match self.nominal {
+            None => wanted,
+            Some((_, before, own)) => {
+                let change = minus(triple(from), triple(before));
+                link.wanted(told.target, from, own, &self.policy, share, change)
+            }
+        };
+        let place = link.at(told.target, from.x_m, wanted)?;
+        Some(Trial {
+            place,
+            penalty_m: told.penalty_m + link.penalty(told.target, place),
+            ..told
+        })
+    }
+
+    /// What the tail says of the trials: the one that is gone by, its slack, m, and what Rx sees; `None` for all if there never was one.
+    pub(crate) fn close(&self, relay: Courser<'_>) -> (Option<u8>, f32, Outlook) {
+        let mut best: (f32, Option<u8>, f32) = (0.0, None, 0.0);
+        for (trial, number) in self.own.iter().zip(0..) {
+            let slack = relay.tail(trial.target, trial.place).0 - trial.penalty_m;
+            let by = libm::logf(trial.target) - slack / self.bar.slope - self.bar.estimate;
+            if by > best.0 {
+                best = (by, Some(number), slack);
+            }
+        }
+        let (_, trial, slack_m) = best;
+        let (target, at) = match (self.chosen(trial), self.nominal) {
+            (Some((told, own)), _) => (told.target, own.place),
+            (None, Some((target, _, own))) => (target, own),
+            (None, None) => return (None, 0.0, Outlook::default()),
+        };
+        (trial, slack_m, relay.tail(target, at).1)
+    }
+
+    fn chosen(&self, trial: Option<u8>) -> Option<(Trial, Trial)> {
+        let at = usize::from(trial?);
+        Some((*self.told.get(at)?, *self.own.get(at)?))
+    }
+
+    /// Whether this relay can go by `trial`.
+    pub(crate) fn has(&self, trial: Option<u8>) -> bool {
+        match trial {
+            Some(_) => self.chosen(trial).is_some(),
+            None => true,
+        }
+    }
+
+    /// Goes by `trial`, of which the relay after sees `after`: what this one tells the relay before.
+    pub(crate) fn conclude(
+        &mut self,
+        relay: Courser<'_>,
+        trial: Option<u8>,
+        after: &Outlook,
+    ) -> Outlook {
+        if let Some((told, own)) = self.chosen(trial) {
+            self.nominal = Some((told.target, told.place, own.place));
+        }
+        let Some((target, from, own)) = self.nominal else {
+            return *after;
+        };
+        let Some(link) = relay.link(from) else {
+            return *after;
+        };
+        let trust = self.bar.trust_after(trial);
+        let (outlook, policy) = link.weigh(target, trust, from, own, after);
+        self.policy = policy;
+        outlook
+    }
+
+    /// Where this relay is across the line in the trial that was gone by last.
+    pub(crate) fn at(&self) -> Option<CrossSection> {
+        self.nominal.map(|(_, _, own)| own.cross_section())
+    }
+}
