@@ -24,6 +24,7 @@ const MISSION: Mission = Mission::new(MissionConfig {
     },
     channel: CHANNEL,
     band: Band::at(20.0),
+    lateral: Band::NONE,
     interference: Interference::Source(Interferer {
         power_w: 80.0,
         x_m: 500.0,

@@ -217,14 +217,8 @@ mod tests {
     #[test]
     fn neighbours_are_ahead_or_behind_and_the_interferer_is_aside_and_below() {
         let mission = Mission::try_new(paper(1)).unwrap();
-        let relay = Placement {
-            x_m: 350.0,
-            altitude_m: 20.0,
-        };
-        let receiver = Placement {
-            x_m: 1000.0,
-            altitude_m: 0.0,
-        };
+        let relay = Placement::on_line(350.0, 20.0);
+        let receiver = Placement::on_line(1000.0, 0.0);
         let ahead = Bearing::between(relay, receiver).unwrap();
         assert!(ahead.azimuth_rad.abs() < 1e-6 && ahead.elevation_rad < 0.0);
         assert!((ahead.distance_m - 650.307_6).abs() < 1e-3);

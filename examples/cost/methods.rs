@@ -92,25 +92,25 @@ pub(crate) fn methods() {
         predict: false,
         ..Settings::default()
     };
-    let mut climb = Flight::new(
+    let mut joint = Flight::new(
         HIGH,
         Settings {
-            method: Method::Altitude,
+            method: Method::Joint,
             ..settings
         },
     );
-    hprintln!("altitude_settled {}", u32::from(climb.settle(20_000)));
-    hprintln!("altitude {}", climb.most);
-    hprintln!("wave_bytes {}", climb.longest);
-    let mut survey = Flight::new(
+    hprintln!("joint_settled {}", u32::from(joint.settle(20_000)));
+    hprintln!("joint {}", joint.most);
+    hprintln!("joint_bytes {}", joint.longest);
+    let mut predicted = Flight::new(
         HIGH,
         Settings {
-            method: Method::Altitude,
+            method: Method::Joint,
             ..Settings::default()
         },
     );
-    hprintln!("survey_settled {}", u32::from(survey.settle(20_000)));
-    hprintln!("survey {}", survey.most);
+    hprintln!("predicted_settled {}", u32::from(predicted.settle(20_000)));
+    hprintln!("predicted {}", predicted.most);
     let adjust = Adjust {
         rounds: 2,
         ..Adjust::default()

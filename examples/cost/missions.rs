@@ -29,6 +29,7 @@ pub(crate) const fn mission(relays: u16) -> Mission {
         },
         channel: CHANNEL,
         band: Band::at(20.0),
+        lateral: Band::NONE,
         interference: Interference::Source(Interferer {
             power_w: 80.0,
             x_m: 500.0,

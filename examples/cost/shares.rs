@@ -1,41 +1,20 @@
-//! What one relay's share of a wave, of a turn and of a measurement costs.
+//! What one relay's share of a turn and of a measurement costs.
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use uav_relay::Local;
 use uav_relay::Placement;
 use uav_relay::field::estimate::Estimator;
-use uav_relay::placement::levels::Levels;
 use uav_relay::placement::local::Beside;
 use uav_relay::placement::local::Hops;
 use uav_relay::placement::local::Search;
-use uav_relay::placement::wave::Rungs;
-use uav_relay::placement::wave::Wave;
 
 use super::counter::instructions;
 use super::missions::{HIGH, INTERFERER};
 
-/// A wave of sixteen levels and four targets, and a tube, through a middle relay; the local search of Algorithm 2.
+/// The local search of Algorithm 2, and an estimate of what is measured.
 pub(crate) fn shares() {
-    let common = HIGH.config().common;
-    let band = HIGH.config().band;
-    let mut wave = Wave::new(&HIGH);
-    for (name, levels, count) in [
-        ("wave_16", Levels::even(band, 16), 4),
-        ("tube", Levels::tube(100.0, 20.0), 7),
-        ("wave_64", Levels::even(band, 64), 1),
-    ] {
-        wave.begin(&HIGH, Rungs::new(0.7, 0.1, count), levels);
-        while !wave.step(&HIGH, &INTERFERER, 1, 64) {}
-        wave.hand_over(&HIGH, common.power_w);
-        let (mut all, mut done) = (0, false);
-        while !done {
-            all += instructions(|| done = wave.step(&HIGH, &INTERFERER, 2, 96));
-        }
-        hprintln!("{} {}", name, all);
-    }
-    hprintln!("size_of_wave {}", size_of::<Wave>());
-    let place = |x_m, altitude_m| Placement { x_m, altitude_m };
+    let place = Placement::on_line;
     let beside = |place| Beside {
         place,
         apart_m: 4.0,

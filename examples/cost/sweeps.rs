@@ -22,9 +22,9 @@ pub(crate) fn reach() {
     let middle = Hop::new(
         &MISSION,
         &INTERFERER,
-        Sender::relay(&MISSION, common),
+        Sender::relay(&MISSION, common.on_line()),
         4,
-        common.altitude_m,
+        common.on_line().at,
         0.0,
     );
     let mut most = 0;

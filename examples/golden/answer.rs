@@ -10,7 +10,7 @@ use uav_relay::wire::message::{Answer, Message, MessageError};
 pub const READY: &[u8] = b"ready\0";
 
 /// Answers what it hears: a good frame with itself, decoded and encoded again, and behind a sweep a verdict whose slacks are
-/// the sweep's targets; a bad frame with a digit that says why, and a delimiter.
+/// the sweep's targets, with a word about own profiles that is the sweep's about places chosen; a bad frame with a digit that says why, and a delimiter.
 pub struct Answerer {
     deframer: Deframer,
 }
@@ -55,6 +55,7 @@ impl Answerer {
                     commit: None,
                     slacks: sweep.ladder.targets(),
                 },
+                own: sweep.chosen,
             }));
         }
     }

@@ -19,13 +19,19 @@ pub(crate) struct MissionOptions {
     /// Altitudes to choose from, m, 0.1 to 1e5, --altitude among them; without it that alone
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     pub(crate) band: Option<Band>,
+    /// Room to the left of the line to the receiver, as y in m, -1e5 to 0, for places that `joint` chooses
+    #[arg(long = "lateral-min-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = left)]
+    pub(crate) lateral_min: f32,
+    /// Room to its right, as y in m, 0 to 1e5
+    #[arg(long = "lateral-max-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = right)]
+    pub(crate) lateral_max: f32,
     /// Power of the transmitter, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", default_value_t = 80.0, allow_negative_numbers = true, value_parser = power)]
     pub(crate) tx_power: f32,
     /// Power of every relay, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = power)]
     pub(crate) uav_power: f32,
-    /// Interferer: power (W, 1e-6 to 1e9), place along and beside the line to the receiver (m, -1e7 to 1e7)
+    /// Interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7)
     #[arg(long, value_name = "P,X,Y", default_value = "80,500,400", allow_hyphen_values = true, value_parser = interferer)]
     pub(crate) interferer: Interferer,
     /// Least distance between two relays, m, 0 to 1e5
@@ -57,6 +63,10 @@ impl MissionOptions {
             },
             channel,
             band: self.band.unwrap_or(Band::at(self.altitude)),
+            lateral: Band {
+                least_m: self.lateral_min,
+                most_m: self.lateral_max,
+            },
             interference,
             tolerance: 1e-4,
         })
@@ -96,6 +106,16 @@ pub(crate) fn distance(text: &str) -> Result<f32, String> {
 /// m, 0.1 to 1e5.
 pub(crate) fn altitude(text: &str) -> Result<f32, String> {
     number(text, 0.1, 1e5)
+}
+
+/// y, m, -1e5 to 0.
+pub(crate) fn left(text: &str) -> Result<f32, String> {
+    number(text, -1e5, 0.0)
+}
+
+/// y, m, 0 to 1e5.
+pub(crate) fn right(text: &str) -> Result<f32, String> {
+    number(text, 0.0, 1e5)
 }
 
 /// W, 1e-6 to 1e6.

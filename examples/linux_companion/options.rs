@@ -75,8 +75,9 @@ struct Options {
 enum Method {
     /// Algorithm 1, in a field Algorithm 4
     Align,
-    /// Joint distance and altitude
-    Altitude,
+    /// Places, sides and altitudes together
+    #[value(alias = "altitude")]
+    Joint,
     /// Algorithm 1, then Algorithm 2
     Adjust,
 }
@@ -146,7 +147,7 @@ fn plan(options: &Options) -> Result<Plan, String> {
     let settings = Settings {
         method: match options.method {
             Method::Align => uav_relay::Method::Align,
-            Method::Altitude => uav_relay::Method::Altitude,
+            Method::Joint => uav_relay::Method::Joint,
             Method::Adjust => uav_relay::Method::Adjust(Adjust::default()),
         },
         wiring: match ttys {

@@ -150,14 +150,15 @@ impl Report {
     }
 }
 
-/// Replace this by what your autopilot wants to hear: `place.x_m` metres from the transmitter toward the receiver, at
-/// `place.altitude_m` above the ground.
+/// Replace this by what your autopilot wants to hear: `place.x_m` metres from the transmitter toward the receiver,
+/// `place.y_m` to the right of that line as seen from above, at `place.altitude_m` above the ground.
 fn fly_to(now: Instant, place: Placement) -> Result<(), String> {
     line(
         now,
         format_args!(
-            "setpoint: x {} m, altitude {} m",
+            "setpoint: x {} m, y {} m, altitude {} m",
             Exact(place.x_m),
+            Exact(place.y_m),
             Exact(place.altitude_m)
         ),
     )

@@ -11,7 +11,7 @@ use uav_relay::{
 use crate::command;
 use crate::key;
 use crate::mission::{
-    MissionOptions, altitude, band, distance, interferer, mission, power, separation,
+    MissionOptions, altitude, band, distance, interferer, left, mission, power, right, separation,
 };
 
 /// Uploads a new mission to a chain of relays in flight. The options up to --min-separation say what the relays were loaded with; those
@@ -61,13 +61,19 @@ struct Options {
     /// New altitudes to choose from, m, 0.1 to 1e5; without it those of --band, or the new altitude alone
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     new_band: Option<Band>,
+    /// New room to the left of the line to the receiver, as y in m, -1e5 to 0
+    #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = left)]
+    new_lateral_min: Option<f32>,
+    /// New room to its right, as y in m, 0 to 1e5
+    #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = right)]
+    new_lateral_max: Option<f32>,
     /// New power of the transmitter, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
     new_tx_power: Option<f32>,
     /// New power of every relay, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
     new_uav_power: Option<f32>,
-    /// New interferer: power (W, 1e-6 to 1e9), place along and beside the line to the receiver (m, -1e7 to 1e7)
+    /// New interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7)
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = interferer)]
     new_interferer: Option<Interferer>,
     /// New least distance between two relays, m, 0 to 1e5
@@ -144,6 +150,10 @@ fn changed(options: &Options, loaded: &MissionConfig) -> MissionConfig {
             power_w: options.new_uav_power.unwrap_or(loaded.common.power_w),
         },
         band: options.new_band.or(options.loaded.band).unwrap_or(alone),
+        lateral: Band {
+            least_m: options.new_lateral_min.unwrap_or(loaded.lateral.least_m),
+            most_m: options.new_lateral_max.unwrap_or(loaded.lateral.most_m),
+        },
         interference: options
             .new_interferer
             .map_or(loaded.interference, Interference::Source),

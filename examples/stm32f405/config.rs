@@ -11,7 +11,7 @@
 //! | 8 | u16 | index: which relay this is, 1 (next to the transmitter) to N |
 //! | 10 | u16 | network: frames of any other are ignored |
 //! | 12 | u16 | relays N |
-//! | 14 | u8 | method: 0 align, 1 altitude, 2 adjust |
+//! | 14 | u8 | method: 0 align, 1 joint, 2 adjust |
 //! | 15 | u8 | 1 if this relay keeps to its altitude when altitudes are chosen, else 0 |
 //! | 16 | f32 | distance, m |
 //! | 20 | f32 | least separation, m |
@@ -30,16 +30,18 @@
 //! | 84 | f64 | weight of line of sight between drone and ground, 0 to 1 |
 //! | 92 | f32 | lowest altitude of the band, m |
 //! | 96 | f32 | highest altitude of the band, m |
-//! | 100 | f32 | adjust: how far a relay may go up or down in one turn, m; 0 with another method |
-//! | 104 | u16 | adjust: rounds at most, 1 to 65535; 0 with another method |
-//! | 106 | u16 | points of the field, 1 to [`MAX_POINTS`]; 0 where there is an interferer |
-//! | 108 | f32 | the most interference that may be measured, W; 0 without samples |
-//! | 112 | u32 | samples to take at a place; 0 where nothing is measured |
-//! | 116 + 8 k | f32 | x of point k of the field, counted from 0, m; 0 behind the last one |
-//! | 120 + 8 k | f32 | Upsilon of point k, 1/W; 0 behind the last one |
-//! | 244 | u32 | the least epoch that this relay signs with, 1 to 4294967294; 0 without a key |
-//! | 248 | 32 bytes | the network's key, by which frames carry a tag; all 0 where there is none |
-//! | 280 | u32 | CRC-32C of bytes 0 to 279 |
+//! | 100 | f32 | y of the left edge of the room beside the line, m: 0 or less |
+//! | 104 | f32 | y of its right edge, m: 0 or more |
+//! | 108 | f32 | adjust: how far a relay may go up or down in one turn, m; 0 with another method |
+//! | 112 | u16 | adjust: rounds at most, 1 to 65535; 0 with another method |
+//! | 114 | u16 | points of the field, 1 to [`MAX_POINTS`]; 0 where there is an interferer |
+//! | 116 | f32 | the most interference that may be measured, W; 0 without samples |
+//! | 120 | u32 | samples to take at a place; 0 where nothing is measured |
+//! | 124 + 8 k | f32 | x of point k of the field, counted from 0, m; 0 behind the last one |
+//! | 128 + 8 k | f32 | Upsilon of point k, 1/W; 0 behind the last one |
+//! | 252 | u32 | the least epoch that this relay signs with, 1 to 4294967294; 0 without a key |
+//! | 256 | 32 bytes | the network's key, by which frames carry a tag; all 0 where there is none |
+//! | 288 | u32 | CRC-32C of bytes 0 to 287 |
 //!
 //! The ranges are those of [`MissionConfig`], [`Channel::new`], [`Profile`], [`Adjust`], [`Measure`] and [`Field`].
 
@@ -59,10 +61,10 @@ pub const ADDRESS: u32 = 0x080E_0000;
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// The version of the table above.
-pub const VERSION: u16 = 3;
+pub const VERSION: u16 = 4;
 
 /// Bytes of a block.
-pub const LEN: usize = 284;
+pub const LEN: usize = 292;
 
 /// Points of a field that a block has room for.
 pub const MAX_POINTS: usize = 16;
@@ -74,7 +76,7 @@ const CHECKED: usize = LEN - 4;
 const SECRET: usize = CHECKED - 36;
 
 /// [`LEN`] as the block states it.
-const LEN_FIELD: u16 = 284;
+const LEN_FIELD: u16 = 292;
 
 /// A block as it is stored.
 pub type Block = [u8; LEN];
@@ -231,10 +233,8 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
         excess_nlos: rest.f64(),
         los_weight: rest.f64(),
     };
-    let band = Band {
-        least_m: rest.f32(),
-        most_m: rest.f32(),
-    };
+    let band = rest.band();
+    let lateral = rest.band();
     let method = rest.method(method)?;
     let points = rest.u16();
     let measure = rest.measure()?;
@@ -247,6 +247,7 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
         tx_power_w,
         common,
         band,
+        lateral,
         channel,
         interference,
         tolerance,
@@ -307,7 +308,7 @@ pub fn write(config: &Config, numbers: &ChannelNumbers, secret: Option<Secret>) 
     };
     let (method, rounds, explore_m) = match config.method {
         Method::Align => (0, 0, 0.0),
-        Method::Altitude => (1, 0, 0.0),
+        Method::Joint => (1, 0, 0.0),
         Method::Adjust(adjust) => (2, adjust.rounds, adjust.explore_m),
     };
     let (i_max_w, samples) = config
@@ -348,7 +349,13 @@ pub fn write(config: &Config, numbers: &ChannelNumbers, secret: Option<Secret>) 
     ] {
         bytes.extend(number.to_le_bytes());
     }
-    for number in [mission.band.least_m, mission.band.most_m, explore_m] {
+    for number in [
+        mission.band.least_m,
+        mission.band.most_m,
+        mission.lateral.least_m,
+        mission.lateral.most_m,
+        explore_m,
+    ] {
         bytes.extend(number.to_le_bytes());
     }
     for number in [rounds, u16::try_from(points.len()).unwrap_or(u16::MAX)] {
@@ -415,6 +422,14 @@ impl Reader<'_> {
             power_w: self.f32(),
         }
     }
+
+    fn band(&mut self) -> Band {
+        Band {
+            least_m: self.f32(),
+            most_m: self.f32(),
+        }
+    }
+
     /// The method of this number; what adjust needs is 0 for the others.
     fn method(&mut self, number: u8) -> Result<Method, ConfigError> {
         let explore_m = self.f32();
@@ -422,7 +437,7 @@ impl Reader<'_> {
         let unused = explore_m.to_bits() == 0 && rounds == 0;
         match number {
             0 if unused => Ok(Method::Align),
-            1 if unused => Ok(Method::Altitude),
+            1 if unused => Ok(Method::Joint),
             2 if rounds > 0 && (0.0..=1e5).contains(&explore_m) => Ok(Method::Adjust(Adjust {
                 rounds,
                 explore_m,

@@ -179,8 +179,8 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
     Err(CannotSign)
 }
 
-/// Replace this by what your autopilot wants to hear: `place.x_m` metres from the transmitter toward the receiver, at
-/// `place.altitude_m` above the ground.
+/// Replace this by what your autopilot wants to hear: `place.x_m` metres from the transmitter toward the receiver,
+/// `place.y_m` to the right of that line as seen from above, at `place.altitude_m` above the ground.
 fn fly_to(place: Placement) {
     core::hint::black_box(place);
     // The control of the proof that no panic is reachable: with this one the image must not link.

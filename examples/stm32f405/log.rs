@@ -116,9 +116,11 @@ pub(crate) fn event(event: Event, relay: &Relay) {
     {
         let target = relay.target().unwrap_or_default();
         defmt::info!(
-            "setpoint x {=f32} m ({=u32:#010x}) altitude {=f32} m ({=u32:#010x}) target {=f32} ({=u32:#010x})",
+            "setpoint x {=f32} m ({=u32:#010x}) y {=f32} m ({=u32:#010x}) altitude {=f32} m ({=u32:#010x}) target {=f32} ({=u32:#010x})",
             place.x_m,
             place.x_m.to_bits(),
+            place.y_m,
+            place.y_m.to_bits(),
             place.altitude_m,
             place.altitude_m.to_bits(),
             target,

@@ -6,7 +6,7 @@
 //!
 //! Nothing is erased in flight, since that stops the CPU for a second or two: records are appended, first to the sector with the
 //! newest, then to the other. At each start whichever does not have the newest is made blank, if it is not. A sector of 128 KiB has
-//! room for 1638 records, so at least as many uploads are kept from one start to the next; what comes after them is flown all the same.
+//! room for 1489 records, so at least as many uploads are kept from one start to the next; what comes after them is flown all the same.
 
 use uav_relay::Upload;
 use uav_relay::wire::crc::Crc32c;
@@ -17,7 +17,7 @@ use uav_relay::wire::upload::LENGTH;
 pub const SECTORS: [u32; 2] = [0x0806_0000, 0x0808_0000];
 
 /// Words of a record.
-pub const WORDS: usize = 20;
+pub const WORDS: usize = 22;
 
 /// A record; all ones where nothing is written.
 pub type Record = [u32; WORDS];

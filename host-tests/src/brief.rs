@@ -80,6 +80,10 @@ pub fn mission(
             least_m: narrow(scenario.altitude_min_m),
             most_m: narrow(scenario.altitude_max_m),
         },
+        lateral: Band {
+            least_m: narrow(scenario.lateral_min_m),
+            most_m: narrow(scenario.lateral_max_m),
+        },
         channel: channel(scenario).map_err(Refusal::Channel)?,
         interference,
         tolerance: narrow(tolerance),
@@ -111,7 +115,9 @@ pub fn mission(
 pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     match &scenario.interference {
         Interference::Sources(sources) if sources.len() > 1 => {
-            several::hypothetical(&Scene::new(scenario, 1)?)
+            let scene = Scene::new(scenario, 1)?;
+            let one = several::hypothetical(&scene)?;
+            Some(one.sided(&scene, scenario.lateral_min_m, scenario.lateral_max_m))
         }
         _ => None,
     }
@@ -233,6 +239,7 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
         tx_power_w: narrow(link.tx_w),
         common,
         band: Band::at(common.altitude_m),
+        lateral: Band::NONE,
         channel,
         interference: uav_relay::Interference::Source(Interferer {
             power_w: narrow(link.interferer_w),
@@ -272,6 +279,7 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
         tx_power_w: narrow(link.tx_w),
         common,
         band: Band::at(common.altitude_m),
+        lateral: Band::NONE,
         channel: Channel::new(
             UNIT_CARRIER_HZ,
             link.mu_los,

@@ -11,7 +11,7 @@ pub mod timeline;
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use uav_relay::sir::{Sender, at_receiver};
+use uav_relay::sir::{Sender, Station, at_receiver};
 use uav_relay::{Mission, Placement, Profile};
 
 pub use attack::AttackReport;
@@ -27,6 +27,8 @@ pub struct RelayReport {
     pub index: u16,
     /// Distance from the transmitter, m.
     pub x_m: f64,
+    /// Distance from the line to the receiver, m: to its right above 0.
+    pub y_m: f64,
     /// Altitude, m.
     pub h_m: f64,
     /// SIR of the hop that ends here, linear.
@@ -54,7 +56,11 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
         sirs.push(f64::from(
             sender.sir_at(mission, from_m, *place).min(f32::MAX),
         ));
-        sender = Sender::relay(mission, *profile);
+        let relay = Station {
+            at: place.cross_section(),
+            power_w: profile.power_w,
+        };
+        sender = Sender::relay(mission, relay);
         from_m = place.x_m;
     }
     if let Some((place, profile)) = places.last() {
@@ -70,6 +76,7 @@ fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport> {
         .map(|(index, ((place, _), &sir))| RelayReport {
             index,
             x_m: f64::from(place.x_m),
+            y_m: f64::from(place.y_m),
             h_m: f64::from(place.altitude_m),
             sir,
             sir_db: db(sir),
@@ -79,23 +86,52 @@ fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport> {
 }
 
 /// The relays and Rx as a table to read, those that are lost at their last places among them; nothing where no relay has a
-/// place.
-fn hops_table(relays: &[RelayReport], lost: &[LostReport], rx_sir: Option<f64>) -> String {
+/// place. With y where there is `room` beside the line.
+fn hops_table(
+    relays: &[RelayReport],
+    lost: &[LostReport],
+    rx_sir: Option<f64>,
+    room: bool,
+) -> String {
+    let aside = |words: &dyn Fn() -> String| {
+        if room {
+            format!(" {:>12}", words())
+        } else {
+            String::new()
+        }
+    };
     let mut text = String::new();
     if !(relays.is_empty() && lost.is_empty()) {
         _ = writeln!(
             text,
-            "{:>6} {:>12} {:>10} {:>12} {:>9}",
-            "relay", "x [m]", "h [m]", "SIR", "SIR [dB]"
+            "{:>6} {:>12}{} {:>10} {:>12} {:>9}",
+            "relay",
+            "x [m]",
+            aside(&|| "y [m]".to_owned()),
+            "h [m]",
+            "SIR",
+            "SIR [dB]"
         );
         let kept = relays.iter().map(|relay| {
             let line = format!(
-                "{:>6} {:>12.3} {:>10.2} {:>12.6} {:>9.3}",
-                relay.index, relay.x_m, relay.h_m, relay.sir, relay.sir_db
+                "{:>6} {:>12.3}{} {:>10.2} {:>12.6} {:>9.3}",
+                relay.index,
+                relay.x_m,
+                aside(&|| format!("{:.3}", relay.y_m)),
+                relay.h_m,
+                relay.sir,
+                relay.sir_db
             );
             (relay.index, line)
         });
-        let gone = lost.iter().map(|relay| (relay.index, lost_line(relay)));
+        let gone = lost.iter().map(|relay| {
+            let y = || {
+                relay
+                    .y_m
+                    .map_or_else(|| "-".to_owned(), |y_m| format!("{y_m:.3}"))
+            };
+            (relay.index, lost_line(relay, &aside(&y)))
+        });
         let mut lines: Vec<(u16, String)> = kept.chain(gone).collect();
         lines.sort_by_key(|(index, _)| *index);
         for (_, line) in lines {
@@ -105,9 +141,10 @@ fn hops_table(relays: &[RelayReport], lost: &[LostReport], rx_sir: Option<f64>) 
     if let Some(rx_sir) = rx_sir {
         _ = writeln!(
             text,
-            "{:>6} {:>12} {:>10} {:>12.6} {:>9.3}",
+            "{:>6} {:>12}{} {:>10} {:>12.6} {:>9.3}",
             "Rx",
             "",
+            aside(&String::new),
             "",
             rx_sir,
             db(rx_sir)
@@ -116,10 +153,10 @@ fn hops_table(relays: &[RelayReport], lost: &[LostReport], rx_sir: Option<f64>) 
     text
 }
 
-fn lost_line(relay: &LostReport) -> String {
+fn lost_line(relay: &LostReport, aside: &str) -> String {
     let place = relay.x_m.zip(relay.h_m).map_or_else(
-        || format!("{:>12} {:>10}", "-", "-"),
-        |(x_m, h_m)| format!("{x_m:>12.3} {h_m:>10.2}"),
+        || format!("{:>12}{aside} {:>10}", "-", "-"),
+        |(x_m, h_m)| format!("{x_m:>12.3}{aside} {h_m:>10.2}"),
     );
     format!("{:>6} {place} {:>12}", relay.index, relay.why)
 }

@@ -22,7 +22,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::gain::Gain;
 use uav_relay::placement::local::{Beside, Hops, Search};
-use uav_relay::sir::{Sender, at_receiver};
+use uav_relay::sir::{self, Sender, at_receiver};
 use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig, Placement, Profile};
 
 /// X = 500, Y = 150, all relays at 220 m to begin with, 20 m to 300 m allowed, 4 m apart.
@@ -139,10 +139,7 @@ fn the_grid_moves_where_a_separate_program_moves() {
     let (mission, _) = of_link(&link, 1e-4).unwrap();
     let interferer = *mission.interferer().unwrap();
     let apart_m = 4.0;
-    let mut places = [300.0_f32, 400.0, 500.0, 600.0].map(|x_m| Placement {
-        x_m,
-        altitude_m: 100.0,
-    });
+    let mut places = [300.0_f32, 400.0, 500.0, 600.0].map(|x_m| Placement::on_line(x_m, 100.0));
     let how = Local::Grid {
         columns: 41,
         rows: 21,
@@ -155,8 +152,8 @@ fn the_grid_moves_where_a_separate_program_moves() {
             from = place.x_m;
             sender = Sender::relay(
                 &mission,
-                Profile {
-                    altitude_m: place.altitude_m,
+                sir::Station {
+                    at: place.cross_section(),
                     power_w: 1.0,
                 },
             );
@@ -230,9 +227,8 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
         };
         let (mission, _) = of_link(&link, 1e-4).unwrap();
         let interferer = *mission.interferer().unwrap();
-        let mut place = |low: f32, high: f32| Placement {
-            x_m: rng.random_range(low..high),
-            altitude_m: rng.random_range(30.0..200.0),
+        let mut place = |low: f32, high: f32| {
+            Placement::on_line(rng.random_range(low..high), rng.random_range(30.0..200.0))
         };
         let (a, b, c) = (place(50.0, 250.0), place(380.0, 550.0), place(680.0, 950.0));
         let beside = |place| Beside { place, apart_m };

@@ -34,7 +34,7 @@ fn setup(link: &Link, band: Band) -> Option<Setup> {
     };
     let mut setup = Setup::new(Mission::try_new(config).ok()?);
     setup.profiles = profiles;
-    setup.settings.method = Method::Altitude;
+    setup.settings.method = Method::Joint;
     Some(setup)
 }
 

@@ -96,7 +96,7 @@ fn refusal(arguments: &[&str]) -> String {
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;
-    let mut bytes: Vec<u8> = b"UAVR\x03\0\x1C\x01\x03\0\x07\0\x05\0".to_vec();
+    let mut bytes: Vec<u8> = b"UAVR\x04\0\x24\x01\x03\0\x07\0\x05\0".to_vec();
     bytes.extend([method, u8::from(hold)]);
     for number in [1000.0_f32, 4.0, 80.0, 20.0, 1.0, 20.0, 1.0] {
         bytes.extend(number.to_le_bytes());
@@ -107,12 +107,12 @@ fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8]
     for number in [2e9_f64, libm::pow(10.0, 0.01), libm::pow(10.0, 2.1), 1.0] {
         bytes.extend(number.to_le_bytes());
     }
-    for number in band.into_iter().chain([explore_m]) {
+    for number in band.into_iter().chain([0.0, 0.0, explore_m]) {
         bytes.extend(number.to_le_bytes());
     }
     bytes.extend(rounds.to_le_bytes());
     bytes.extend(rest);
-    bytes.resize(280, 0);
+    bytes.resize(288, 0);
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
     bytes.extend(crc.to_le_bytes());
     bytes
@@ -132,7 +132,7 @@ fn a_block_is_what_the_table_says() {
     let own = scenario.relays.entry(3).or_default();
     own.altitude_m = Some(20.0);
     let flight = Flight::new(&scenario, 5, 1e-4, 7).unwrap();
-    let block = flight.clone().by(Method::Altitude).block(3).unwrap();
+    let block = flight.clone().by(Method::Joint).block(3).unwrap();
     assert_eq!(by_hand((1, true, 0.0, 0), [20.0, 300.0], PAPER), block);
     let adjust = Method::Adjust(Adjust {
         rounds: 0x1234,
@@ -174,7 +174,7 @@ fn a_drone_reads_what_it_is_to_do() {
         explore_m: 0.0,
         local: Local::Fine,
     });
-    for method in [Method::Align, Method::Altitude, adjust] {
+    for method in [Method::Align, Method::Joint, adjust] {
         let flight = Flight::new(&scenario, 6, 1e-4, 9).unwrap().by(method);
         for index in 1..=6 {
             let config = reads(&flight.block(index).unwrap()).unwrap();
@@ -215,7 +215,7 @@ fn a_block_that_cannot_say_it_is_not_written() {
             BlockError::Changed,
         ),
         (
-            of(&in_a_field(3)).by(Method::Altitude),
+            of(&in_a_field(3)).by(Method::Joint),
             BlockError::Config(ConfigError::Method),
         ),
         (
@@ -319,17 +319,29 @@ fn a_number_out_of_range_is_named() {
             &19.5_f32.to_le_bytes(),
             ConfigError::Mission(MissionError::Band),
         ),
+        (100, &nan, ConfigError::Mission(MissionError::Lateral)),
+        (
+            100,
+            &0.5_f32.to_le_bytes(),
+            ConfigError::Mission(MissionError::Lateral),
+        ),
+        (104, &nan, ConfigError::Mission(MissionError::Lateral)),
+        (
+            104,
+            &(-0.5_f32).to_le_bytes(),
+            ConfigError::Mission(MissionError::Lateral),
+        ),
         // Nobody adjusts, nothing is measured, and there is no field.
-        (100, &1.0_f32.to_le_bytes(), ConfigError::Adjust),
-        (100, &(-0.0_f32).to_le_bytes(), ConfigError::Adjust),
-        (104, &[1, 0], ConfigError::Adjust),
-        (106, &[17, 0], ConfigError::Points),
-        (106, &[0xFF; 2], ConfigError::Points),
-        (106, &[1, 0], ConfigError::Interferer),
-        (108, &1.0_f32.to_le_bytes(), ConfigError::Measure),
-        (112, &[100, 0], ConfigError::Measure),
-        (116, &[1], ConfigError::Unused),
-        (243, &[0x80], ConfigError::Unused),
+        (108, &1.0_f32.to_le_bytes(), ConfigError::Adjust),
+        (108, &(-0.0_f32).to_le_bytes(), ConfigError::Adjust),
+        (112, &[1, 0], ConfigError::Adjust),
+        (114, &[17, 0], ConfigError::Points),
+        (114, &[0xFF; 2], ConfigError::Points),
+        (114, &[1, 0], ConfigError::Interferer),
+        (116, &1.0_f32.to_le_bytes(), ConfigError::Measure),
+        (120, &[100, 0], ConfigError::Measure),
+        (124, &[1], ConfigError::Unused),
+        (251, &[0x80], ConfigError::Unused),
     ] {
         assert_eq!(reads(&with(at, bytes)), Err(error), "byte {at}");
     }
@@ -349,8 +361,8 @@ fn the_ranges_of_adjust_and_measure_are_those_of_a_relay() {
         (1e5_f32.next_up(), 100, false),
     ] {
         let block = with(14, &[2]);
-        let block = changed(block, 100, &explore_m.to_le_bytes());
-        let block = changed(block, 104, &rounds.to_le_bytes());
+        let block = changed(block, 108, &explore_m.to_le_bytes());
+        let block = changed(block, 112, &rounds.to_le_bytes());
         let adjust = Adjust {
             rounds,
             explore_m,
@@ -374,8 +386,8 @@ fn the_ranges_of_adjust_and_measure_are_those_of_a_relay() {
         (1e-30_f32.next_down(), 100, false),
         (1e6_f32.next_up(), 100, false),
     ] {
-        let block = changed(field(2), 108, &i_max_w.to_le_bytes());
-        let block = changed(block, 112, &samples.to_le_bytes());
+        let block = changed(field(2), 116, &i_max_w.to_le_bytes());
+        let block = changed(block, 120, &samples.to_le_bytes());
         let expected = if good {
             Ok(Some(Measure { i_max_w, samples }))
         } else {
@@ -394,22 +406,22 @@ fn a_field_out_of_range_is_named() {
         (44, &one, ConfigError::Interferer),
         (48, &one, ConfigError::Interferer),
         (52, &one, ConfigError::Interferer),
-        (106, &[2, 0], ConfigError::Unused),
-        (106, &[4, 0], ConfigError::Field(FieldError::Order)),
+        (114, &[2, 0], ConfigError::Unused),
+        (114, &[4, 0], ConfigError::Field(FieldError::Order)),
         // Without points it is an interferer, and the points are not 0.
-        (106, &[0, 0], ConfigError::Unused),
-        (106, &[17, 0], ConfigError::Points),
-        (116, &nan, ConfigError::Field(FieldError::Place)),
+        (114, &[0, 0], ConfigError::Unused),
+        (114, &[17, 0], ConfigError::Points),
+        (124, &nan, ConfigError::Field(FieldError::Place)),
         (
-            116,
+            124,
             &2e7_f32.to_le_bytes(),
             ConfigError::Field(FieldError::Place),
         ),
-        (124, &[0; 4], ConfigError::Field(FieldError::Order)),
-        (128, &nan, ConfigError::Field(FieldError::Upsilon)),
-        (136, &[0; 4], ConfigError::Field(FieldError::Upsilon)),
-        (140, &one, ConfigError::Unused),
-        (240, &one, ConfigError::Unused),
+        (132, &[0; 4], ConfigError::Field(FieldError::Order)),
+        (136, &nan, ConfigError::Field(FieldError::Upsilon)),
+        (144, &[0; 4], ConfigError::Field(FieldError::Upsilon)),
+        (148, &one, ConfigError::Unused),
+        (248, &one, ConfigError::Unused),
     ] {
         assert_eq!(
             reads(&changed(field(3), at, bytes)),
@@ -500,7 +512,7 @@ fn the_command_writes_what_the_relay_is_to_do() {
         reads(&block).unwrap()
     };
     assert_eq!(written(&["--method", "align"]), reads(&paper()).unwrap());
-    assert_eq!(written(&["--method", "altitude"]).method, Method::Altitude);
+    assert_eq!(written(&["--method", "joint"]).method, Method::Joint);
     let adjust = Adjust::default();
     assert_eq!(
         written(&["--method", "adjust"]).method,

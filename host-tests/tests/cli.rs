@@ -73,7 +73,7 @@ fn the_json_has_every_field_of_the_contract() {
     assert_eq!(relays.len(), 3);
     for (index, relay) in (1..).zip(relays) {
         assert_eq!(relay["index"].as_u64(), Some(index));
-        for key in ["x_m", "h_m", "sir", "sir_db"] {
+        for key in ["x_m", "y_m", "h_m", "sir", "sir_db"] {
             assert!(relay[key].is_number(), "{key} in {relay}");
         }
     }
@@ -101,6 +101,19 @@ fn the_default_is_eight_relays_by_align_and_a_table() {
     );
     assert!(table.contains("cost: 1 sweeps, 14 messages"), "{table}");
     assert_eq!(table.lines().count(), 1 + 8 + 1 + 2, "{table}");
+}
+
+/// Where there is room beside the line the table says y, and `altitude` is another name for `joint`.
+#[test]
+fn the_table_has_y_where_there_is_room_beside_the_line() {
+    let side = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/side.toml");
+    let table = |arguments: &[&str]| String::from_utf8(chain(arguments).stdout).unwrap();
+    let beside = table(&["--scenario", side, "--uavs", "2", "--method", "altitude"]);
+    assert!(
+        beside.contains("y [m]") && beside.contains("by `joint`"),
+        "{beside}"
+    );
+    assert!(!table(&["--uavs", "2"]).contains("y [m]"));
 }
 
 #[test]
@@ -204,7 +217,7 @@ fn a_method_says_what_scenario_it_needs() {
         assert_eq!(status, 2);
         assert!(line.contains(method) && line.contains("[field]"), "{line}");
     }
-    for method in ["align", "align-step", "adjust", "altitude"] {
+    for method in ["align", "align-step", "adjust", "joint"] {
         let (status, line) = refusal(&["--scenario", &example("field.toml"), "--method", method]);
         assert_eq!(status, 2);
         assert!(
@@ -228,7 +241,7 @@ fn a_method_says_what_scenario_it_needs() {
     }
 }
 
-/// What is asked of `altitude` and `adjust`, through the tool itself.
+/// What is asked of `joint` and `adjust`, through the tool itself.
 #[test]
 fn the_joint_figures_hold() {
     let file = example("altitudes.toml");
@@ -238,7 +251,7 @@ fn the_joint_figures_hold() {
         ("8", 1.235_66, 1.235_783_8),
         ("50", 6.497_73, 6.498_377_7),
     ] {
-        let report = json(&["--scenario", &file, "--uavs", uavs, "--method", "altitude"]);
+        let report = json(&["--scenario", &file, "--uavs", uavs, "--method", "joint"]);
         let sir = report["sir"].as_f64().unwrap();
         assert!(sir >= least && sir <= best * (1.0 + 1e-6), "{uavs}: {sir}");
         assert!(report["sweeps"].as_u64().unwrap() <= 17, "{report}");
@@ -325,12 +338,13 @@ fn a_step_that_is_too_large_says_so() {
     assert!(report.get("best_sir").is_none());
 }
 
-/// With one interferer `adjust` and `altitude` draw the chain they choose; a field is drawn without an interferer.
+/// With one interferer `adjust` and `joint` draw the chain they choose; a field is drawn without an interferer.
 #[test]
 fn every_method_can_be_drawn() {
     let folder = tempfile::tempdir().unwrap();
     for (scenario, method) in [
-        ("altitudes.toml", "altitude"),
+        ("altitudes.toml", "joint"),
+        ("side.toml", "joint"),
         ("altitudes.toml", "adjust"),
         ("field.toml", "stochastic"),
     ] {

@@ -41,12 +41,12 @@ use pty::Pty;
 use rustix::process::Signal;
 use uav_relay::{Adjust, Method};
 
-/// Bits of x, altitude and target of every relay, as the simulated chain has them.
-fn simulated(scenario: &Scenario, relays: u16) -> Vec<[u32; 3]> {
+/// Bits of x, y, altitude and target of every relay, as the simulated chain has them.
+fn simulated(scenario: &Scenario, relays: u16) -> Vec<[u32; 4]> {
     simulated_by(Method::Align, scenario, relays)
 }
 
-fn simulated_by(method: Method, scenario: &Scenario, relays: u16) -> Vec<[u32; 3]> {
+fn simulated_by(method: Method, scenario: &Scenario, relays: u16) -> Vec<[u32; 4]> {
     let (mission, _) = brief::mission(scenario, relays, 1e-4).unwrap();
     let mut setup = Setup::new(mission);
     setup.settings.method = method;
@@ -54,7 +54,13 @@ fn simulated_by(method: Method, scenario: &Scenario, relays: u16) -> Vec<[u32; 3
     assert_eq!(outcome.ending, Ending::Settled);
     let ends = outcome.relays.iter().map(|relay| {
         let place = relay.setpoint.unwrap();
-        [place.x_m, place.altitude_m, relay.target.unwrap()].map(f32::to_bits)
+        [
+            place.x_m,
+            place.y_m,
+            place.altitude_m,
+            relay.target.unwrap(),
+        ]
+        .map(f32::to_bits)
     });
     ends.collect()
 }
@@ -103,7 +109,7 @@ impl Chain {
         Relay::start(&arguments)
     }
 
-    fn settled(&mut self) -> Vec<[u32; 3]> {
+    fn settled(&mut self) -> Vec<[u32; 4]> {
         self.relays.iter_mut().map(Relay::settled).collect()
     }
 }
@@ -187,10 +193,14 @@ fn three_processes_choose_the_altitudes_of_the_simulated_chain() {
     let given = ["--altitude", "60", "--band", "20,300"];
     let options = [&given[..], &["--interferer", "80,500,150", "--method"]].concat();
     let adjust = Method::Adjust(Adjust::default());
-    for (name, method) in [("altitude", Method::Altitude), ("adjust", adjust)] {
+    for (name, method) in [("joint", Method::Joint), ("adjust", adjust)] {
         let expected = simulated_by(method, &scenario, 3);
         let before = 60.0_f32.to_bits();
-        assert!(expected.iter().all(|[_, altitude, _]| *altitude != before));
+        assert!(
+            expected
+                .iter()
+                .all(|[_, _, altitude, _]| *altitude != before)
+        );
         let mut chain = Chain::start(3, QUIET, &[&options[..], &[name]].concat());
         for (relay, expected) in chain.relays.iter_mut().zip(expected) {
             relay.settles_at(expected);

@@ -58,7 +58,7 @@ fn left(outcome: &Outcome) -> Vec<u16> {
 }
 
 /// Where a chain of just the relays `left` of `setup` ends when nothing happens to it, and the SIR it meets, to the bit.
-fn alone(setup: &Setup, left: &[u16]) -> (Vec<Option<(u32, u32)>>, u32) {
+fn alone(setup: &Setup, left: &[u16]) -> (Vec<Option<[u32; 3]>>, u32) {
     let relays = u16::try_from(left.len()).unwrap();
     let mut clean = Setup::new(setup.mission.with_relays(relays).unwrap());
     clean.settings.predict = setup.settings.predict;
@@ -84,7 +84,7 @@ fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {
     for (at, relay) in relays.iter().enumerate() {
         let place = relay
             .setpoint
-            .map(|place| (place.x_m.to_bits(), place.altitude_m.to_bits()));
+            .map(|place| [place.x_m, place.y_m, place.altitude_m].map(f32::to_bits));
         if usize::from(relay.index) != at + 1 || usize::from(relay.relays) != left.len() {
             return Err(format!(
                 "relay {} is {} of {}",

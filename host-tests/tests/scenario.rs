@@ -87,6 +87,10 @@ fn geometry_and_power_rows() -> Vec<Row> {
     let separations = (["-1e-9", "0", "1e5", "100001"], "0 to 1e5 m");
     let low = "distance_m = 9\naltitude_m = 1e5\naltitude_min_m = @";
     let high = "distance_m = 9\naltitude_m = 0.1\naltitude_max_m = @";
+    let left = "distance_m = 9\naltitude_m = 9\nlateral_min_m = @";
+    let right = "distance_m = 9\naltitude_m = 9\nlateral_max_m = @";
+    let lefts = (["-100001", "-1e5", "0", "0.5"], "-1e5 to 0 m");
+    let rights = (["-0.5", "0", "1e5", "100001"], "0 to 1e5 m");
     let apart = "distance_m = 9\naltitude_m = 9\nmin_separation_m = @";
     vec![
         row(
@@ -101,6 +105,8 @@ fn geometry_and_power_rows() -> Vec<Row> {
         ),
         row("geometry.altitude_min_m", geometry(low), ALTITUDES),
         row("geometry.altitude_max_m", geometry(high), ALTITUDES),
+        row("geometry.lateral_min_m", geometry(left), lefts),
+        row("geometry.lateral_max_m", geometry(right), rights),
         row("geometry.min_separation_m", geometry(apart), separations),
         row("power.tx_w", power("tx_w = @\nuav_w = 1"), POWERS),
         row("power.uav_w", power("tx_w = 1\nuav_w = @"), POWERS),
@@ -273,6 +279,8 @@ fn every_required_key_is_missed() {
     let optional = [
         "altitude_min_m",
         "altitude_max_m",
+        "lateral_min_m",
+        "lateral_max_m",
         "min_separation_m",
         "channel.",
         "relay[1].a",
@@ -333,7 +341,7 @@ fn every_table_refuses_unknown_keys_and_lists_its_own() {
         (
             small("").replacen("distance_m", "distnce_m = 5\ndistance_m", 1),
             "geometry.distnce_m = 5",
-            "distance_m, altitude_m, altitude_min_m, altitude_max_m, min_separation_m",
+            "distance_m, altitude_m, altitude_min_m, altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m",
         ),
         (
             small("").replacen("tx_w", "tx_mw = 5\ntx_w", 1),
@@ -681,6 +689,8 @@ fn a_file_with_every_key_means_what_it_says() {
         altitude_m = 25            # no decimal point needed
         altitude_min_m = 20.0
         altitude_max_m = 120.0
+        lateral_min_m = -30
+        lateral_max_m = 45.0
         min_separation_m = 4.5
         [power]
         tx_w = 80.0
@@ -711,6 +721,8 @@ fn a_file_with_every_key_means_what_it_says() {
         altitude_m: 25.0,
         altitude_min_m: 20.0,
         altitude_max_m: 120.0,
+        lateral_min_m: -30.0,
+        lateral_max_m: 45.0,
         min_separation_m: 4.5,
         tx_w: 80.0,
         uav_w: 2.0,

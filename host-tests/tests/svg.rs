@@ -8,6 +8,8 @@
     missing_docs
 )]
 
+#[path = "svg/above.rs"]
+mod above;
 #[path = "svg/lost.rs"]
 mod lost;
 #[path = "svg/replaced.rs"]

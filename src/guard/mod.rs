@@ -59,7 +59,7 @@ mod tie;
 
 use crate::node::Side;
 use crate::node::stats::bump;
-use crate::sir::Placement;
+use crate::sir::{CrossSection, Placement};
 use crate::time::Instant;
 
 use confines::Confines;
@@ -125,8 +125,8 @@ pub struct Guard {
     found: Option<Placement>,
     setpoint: Option<Placement>,
     hull: Hull,
-    /// The altitude reported last, m.
-    altitude_m: f32,
+    /// Where the relay was across the line when it was reported last.
+    across: CrossSection,
     kept: Kept,
     keeper: Keeper,
     refused: u32,
@@ -149,7 +149,7 @@ impl Guard {
             found: None,
             setpoint: None,
             hull: Hull::unknown(now),
-            altitude_m: 0.0,
+            across: CrossSection::on_line(0.0),
             refused: 0,
         }
     }
@@ -176,7 +176,7 @@ impl Guard {
         if !is_placement(place) {
             return bump(&mut self.refused);
         }
-        self.altitude_m = place.altitude_m;
+        self.across = place.cross_section();
         if self.setpoint.is_some() {
             self.hull.report(at, place.x_m, &self.confines);
         } else if at >= self.born && self.confines.holds(place.x_m) {
@@ -286,11 +286,13 @@ impl Guard {
     /// Whether the setpoint is the agreed place, cut to the box, and the relay was reported to be there since.
     pub fn is_there(&self) -> bool {
         let off = self.confines.rounding();
+        let near = |is: f32, to_be: f32| (to_be - is).abs() <= self.confines.hover_m + off;
         match (self.target, self.setpoint) {
             (Some(target), Some(setpoint)) => {
                 (target.x_m - setpoint.x_m).abs() <= off
                     && self.hull.is_still()
-                    && (target.altitude_m - self.altitude_m).abs() <= self.confines.hover_m + off
+                    && near(self.across.y_m, target.y_m)
+                    && near(self.across.altitude_m, target.altitude_m)
             }
             _ => false,
         }

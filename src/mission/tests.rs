@@ -24,6 +24,7 @@ pub(crate) fn paper(relays: u16) -> MissionConfig {
             power_w: 1.0,
         },
         band: Band::at(20.0),
+        lateral: Band::NONE,
         channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
         interference: Interference::Source(interferer()),
         tolerance: 1e-4,

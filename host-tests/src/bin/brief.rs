@@ -59,8 +59,9 @@ struct Options {
 enum Method {
     /// Algorithm 1, in a field Algorithm 4
     Align,
-    /// Joint distance and altitude
-    Altitude,
+    /// Places, sides and altitudes together
+    #[value(alias = "altitude")]
+    Joint,
     /// Algorithm 1, then Algorithm 2
     Adjust,
 }
@@ -102,7 +103,7 @@ fn run(options: &Options) -> Result<String, String> {
         .map_or("default scenario".into(), |file| file.to_string_lossy());
     let method = match options.method {
         Method::Align => uav_relay::Method::Align,
-        Method::Altitude => uav_relay::Method::Altitude,
+        Method::Joint => uav_relay::Method::Joint,
         Method::Adjust => uav_relay::Method::Adjust(Adjust {
             rounds: options.rounds,
             explore_m: options.explore_m,

@@ -24,7 +24,7 @@ const MOST_UNDER_WAY: usize = 24;
 /// Rounds of deliveries and wake-ups in one operation.
 const MOST_ROUNDS: u8 = 128;
 
-/// What rounding may take from a place, as a part of D: a step of its f32, or two of its code in a wave.
+/// What rounding may take from a place, as a part of D: a step of its f32.
 const ROUNDING: f64 = 1.3e-7;
 
 /// Reads `data` as a mission, what each relay is set to, and then as what happens to the frames between them.
@@ -267,9 +267,10 @@ impl Chain {
 
     /// A relay finds out where it is.
     fn position(&mut self, at: usize, input: &mut Input<'_>) {
-        let distance_m = self.mission.config().distance_m;
+        let config = self.mission.config();
         let place = Placement {
-            x_m: input.even(0.0, distance_m),
+            x_m: input.even(0.0, config.distance_m),
+            y_m: setting::aside(input, config.lateral),
             altitude_m: input.scaled(0.1, 1e5),
         };
         if let Some(member) = self.members.get_mut(at) {
@@ -377,5 +378,6 @@ impl Chain {
 fn distance(one: Placement, other: Placement) -> f64 {
     let step = f64::from(other.x_m) - f64::from(one.x_m);
     let climb = f64::from(other.altitude_m) - f64::from(one.altitude_m);
-    step.hypot(climb)
+    let aside = f64::from(other.y_m) - f64::from(one.y_m);
+    step.hypot(climb).hypot(aside)
 }

@@ -50,6 +50,8 @@ fn look_at(scenario: &Scenario) {
     within(scenario.altitude_m, 0.1, 1e5);
     within(scenario.altitude_min_m, 0.1, scenario.altitude_m);
     within(scenario.altitude_max_m, scenario.altitude_m, 1e5);
+    within(scenario.lateral_min_m, -1e5, 0.0);
+    within(scenario.lateral_max_m, 0.0, 1e5);
     within(scenario.min_separation_m, 0.0, 1e5);
     within(scenario.tx_w, 1e-6, 1e6);
     within(scenario.uav_w, 1e-6, 1e6);
@@ -105,6 +107,8 @@ fn look_at_mission(mission: &Mission) {
         config.common.power_w,
         config.band.least_m,
         config.band.most_m,
+        config.lateral.least_m,
+        config.lateral.most_m,
         config.tolerance,
     ];
     assert!(

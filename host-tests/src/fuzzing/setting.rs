@@ -28,12 +28,11 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
 /// Half of the missions are the paper's with little changed: a few bytes get a relay far there. The other half draws every
 /// number from the whole of its range.
 pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
-    let kind = input.below(12);
+    let kind = input.below(14);
     let relays = u16::from(input.below(most.max(1))) + 1;
-    let config = if kind < 6 {
-        tame(kind, relays)?
-    } else {
-        wild(input, kind, relays)?
+    let config = match kind {
+        6..=12 => wild(input, kind, relays)?,
+        _ => tame(kind, relays)?,
     };
     Mission::try_new(config).ok()
 }
@@ -51,6 +50,7 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
         },
         channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).ok()?,
         band: Band::at(20.0),
+        lateral: Band::NONE,
         interference: Interference::Source(Interferer {
             power_w: 80.0,
             x_m: 500.0,
@@ -80,8 +80,25 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
             interference: Interference::Field(UNEVEN),
             ..paper
         },
-        _ => MissionConfig {
+        5 => MissionConfig {
             interference: Interference::Field(STEEP),
+            ..paper
+        },
+        // Room above and to both sides.
+        _ => MissionConfig {
+            band: Band {
+                least_m: 20.0,
+                most_m: 300.0,
+            },
+            lateral: Band {
+                least_m: -280.0,
+                most_m: 280.0,
+            },
+            interference: Interference::Source(Interferer {
+                power_w: 80.0,
+                x_m: 500.0,
+                y_m: 150.0,
+            }),
             ..paper
         },
     })
@@ -100,10 +117,18 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
         0.0
     };
     let interference = match kind {
-        6..9 => Interference::Source(interferer(input, distance_m)),
         9 => Interference::Field(WILD),
         10 => Interference::Field(EVEN),
-        _ => Interference::Field(STEEP),
+        11 => Interference::Field(STEEP),
+        _ => Interference::Source(interferer(input, distance_m)),
+    };
+    let lateral = if kind == 12 {
+        Band {
+            least_m: -input.scaled(1e-3, 1e5),
+            most_m: input.scaled(1e-3, 1e5),
+        }
+    } else {
+        Band::NONE
     };
     Some(MissionConfig {
         relays,
@@ -116,9 +141,19 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
         },
         channel: channel(input)?,
         band: Band { least_m, most_m },
+        lateral,
         interference,
         tolerance: input.scaled(1e-6, 0.1),
     })
+}
+
+/// How far from the line a drone is, m: in the room beside it or out of it, where there is some.
+pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
+    if lateral.is_single() {
+        0.0
+    } else {
+        input.mostly(|input| 1.5 * input.even(lateral.least_m, lateral.most_m))
+    }
 }
 
 /// On the link or far away, on its line or aside.
@@ -130,9 +165,10 @@ fn interferer(input: &mut Input<'_>, distance_m: f32) -> Interferer {
         2 => input.even(-1e7, 1e7),
         _ => distance_m,
     };
-    let y_m = match input.below(3) {
+    let y_m = match input.below(4) {
         0 => 0.0,
         1 => input.scaled(1e-3, distance_m),
+        2 => -input.scaled(1e-3, distance_m),
         _ => input.even(-1e7, 1e7),
     };
     Interferer { power_w, x_m, y_m }
@@ -179,7 +215,7 @@ pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Se
 pub fn of_chain(input: &mut Input<'_>, mission: &Mission) -> Settings {
     let how = input.byte();
     let method = match how % 4 {
-        1 if mission.interferer().is_some() => Method::Altitude,
+        1 if mission.interferer().is_some() => Method::Joint,
         2 if mission.interferer().is_some() => Method::Adjust(adjust(input)),
         _ => Method::Align,
     };

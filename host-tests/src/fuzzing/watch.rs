@@ -327,9 +327,12 @@ impl Watched {
         };
         if let Some(Confines { fence, .. }) = self.settings.guard {
             let x = fence.least_x_m..=fence.most_x_m;
+            let y = fence.least_y_m..=fence.most_y_m;
             let altitude = fence.least_altitude_m..=fence.most_altitude_m;
             assert!(
-                x.contains(&place.x_m) && altitude.contains(&place.altitude_m),
+                x.contains(&place.x_m)
+                    && y.contains(&place.y_m)
+                    && altitude.contains(&place.altitude_m),
                 "{place:?} outside of {fence:?}"
             );
         } else {
@@ -337,7 +340,7 @@ impl Watched {
         }
     }
 
-    /// A place that was agreed on is finite, on the link, at an altitude that this relay may hold.
+    /// A place that was agreed on is finite, on the link or in the room beside it, at an altitude that this relay may hold.
     fn look_at_agreed(&mut self, events: &[Event]) {
         let agreed = self.relay.agreed();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {
@@ -355,7 +358,9 @@ impl Watched {
             let held = place.altitude_m.to_bits() == given.altitude_m.to_bits();
             let band = config.band.least_m..=config.band.most_m;
             let chosen = !self.settings.hold_altitude && band.contains(&place.altitude_m);
-            (0.0..=config.distance_m).contains(&place.x_m) && (held || chosen)
+            let beside = config.lateral.least_m..=config.lateral.most_m;
+            let on_link = (0.0..=config.distance_m).contains(&place.x_m);
+            on_link && beside.contains(&place.y_m) && (held || chosen)
         });
         assert!(sound, "{place:?} in {:?}", self.flown);
     }

@@ -1,4 +1,4 @@
-//! Plans that choose altitudes too, against one interferer: a chain of relays is run in the planner, with the messages and
+//! Plans that choose altitudes and sides too, against one interferer: a chain of relays is run in the planner, with the messages and
 //! all, and ends where it would end in the air.
 
 use uav_relay::{Method, Placement};
@@ -13,7 +13,7 @@ use crate::sim::setup::Setup;
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, relays, tolerance)?;
     let mut setup = Setup::new(briefed.mission);
-    setup.settings.method = Method::Altitude;
+    setup.settings.method = Method::Joint;
     setup.profiles.clone_from(&briefed.own);
     setup.held.clone_from(&briefed.held);
     let mut chain = Chain::new(setup).map_err(|error| NoPlan::Wrong(error.to_string()))?;
@@ -24,7 +24,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     let Some(places) = places.filter(|_| outcome.ending == Ending::Settled) else {
         return Err(source::nothing());
     };
-    Ok(briefed.plan(&places, "joint altitude and distance", false))
+    Ok(briefed.plan(&places, "the joint method", false))
 }
 
 /// The altitudes of the band at which a common one is tried: what many relays can do, few cannot do worse when each may choose.

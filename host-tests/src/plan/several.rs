@@ -88,7 +88,7 @@ impl Planner<'_> {
         };
         let by_one = match source::plan(&self.with_one(), &ask) {
             Ok(plan) => {
-                let sir = scene.chain_sir(&wide(&plan.chain()));
+                let sir = scene.chain_sir(&plan.chain());
                 Some((plan, sir))
             }
             Err(NoPlan::Unmet(..)) => None,
@@ -125,7 +125,7 @@ impl Planner<'_> {
                 relay.holds = true;
             }
         }
-        starts.extend(start.map(|plan| wide(&plan.chain())));
+        starts.extend(start.and_then(|plan| on_line(&plan.chain())));
         starts
             .into_iter()
             .filter_map(|start| polish(&scene, &start, scene.band))
@@ -207,7 +207,7 @@ impl Candidates {
             _ => return Err(source::nothing()),
         };
         // Relays that share one place hear each other infinitely well.
-        let sirs = self.scene.hop_sirs(&wide(&plan.chain()));
+        let sirs = self.scene.hop_sirs(&plan.chain());
         Ok(Plan {
             sirs: sirs
                 .into_iter()
@@ -225,24 +225,23 @@ impl Best {
     fn new(scene: &Scene, places: &[(f64, f64)], proven: bool) -> Self {
         let places: Vec<Placement> = places
             .iter()
-            .map(|&(x, h)| Placement {
-                x_m: narrow(x),
-                altitude_m: narrow(h),
-            })
+            .map(|&(x, h)| Placement::on_line(narrow(x), narrow(h)))
             .collect();
         Self {
-            sir: scene.chain_sir(&wide(&places)),
+            sir: scene.chain_sir(&places),
             places,
             proven,
         }
     }
 }
 
-fn wide(places: &[Placement]) -> Vec<(f64, f64)> {
-    places
-        .iter()
-        .map(|place| (f64::from(place.x_m), f64::from(place.altitude_m)))
-        .collect()
+/// The places as (x, h), m, where all are right above the line.
+fn on_line(places: &[Placement]) -> Option<Vec<(f64, f64)>> {
+    let each = places.iter().map(|place| {
+        let above = (f64::from(place.x_m), f64::from(place.altitude_m));
+        (place.y_m.to_bits() == 0).then_some(above)
+    });
+    each.collect()
 }
 
 /// One relay at `x_m`: the best altitude of a fine scan of the band, closed in on four times.

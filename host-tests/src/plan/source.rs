@@ -10,6 +10,17 @@ use crate::scenario::Scenario;
 
 pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     match ask.number {
+        Number::Of(1) if is_beside(scenario, ask) => {
+            let above = Plan {
+                proven: false,
+                ..alone(scenario, ask)?
+            };
+            let beside = altitude::best(scenario, 1, ask.tolerance);
+            Ok(beside
+                .ok()
+                .filter(|plan| plan.sir() > above.sir())
+                .unwrap_or(above))
+        }
         Number::Of(1) => alone(scenario, ask),
         Number::Of(relays) if ask.free_altitude => altitude::best(scenario, relays, ask.tolerance),
         Number::Of(relays) => best(scenario, relays, ask.tolerance),
@@ -18,6 +29,12 @@ pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
         }
         Number::Meeting(target) => level(scenario, target, ask.tolerance),
     }
+}
+
+/// Whether the only relay may go beside the line, which the theorems leave out.
+fn is_beside(scenario: &Scenario, ask: &Ask) -> bool {
+    let room = scenario.lateral_min_m < scenario.lateral_max_m;
+    room && ask.free_altitude && ask.x_m.is_none()
 }
 
 /// The fewest relays at the altitudes they hold, by eq. (Opt).

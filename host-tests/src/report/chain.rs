@@ -114,6 +114,9 @@ pub struct ChainReport {
     pub attack: Option<AttackReport>,
     /// Seed of every random draw.
     pub seed: u64,
+    /// Whether there is room beside the line: the table then says where in it a relay is.
+    #[serde(skip)]
+    pub room: bool,
 }
 
 impl ChainReport {
@@ -186,6 +189,7 @@ impl ChainReport {
             timeline,
             attack: None,
             seed,
+            room: !mission.config().lateral.is_single(),
         }
     }
 
@@ -224,12 +228,13 @@ impl ChainReport {
             recovery: Vec::new(),
             attack: None,
             seed,
+            room: false,
         }
     }
 
     /// The report as a table to read, and what it cost.
     pub fn table(&self) -> String {
-        let mut text = super::hops_table(&self.relays, &self.lost, self.rx_sir);
+        let mut text = super::hops_table(&self.relays, &self.lost, self.rx_sir, self.room);
         if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
             _ = writeln!(
                 text,

@@ -13,6 +13,9 @@ pub struct LostReport {
     /// Where it was told to fly last: distance from the transmitter, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub x_m: Option<f64>,
+    /// Distance from the line there, m: to its right above 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y_m: Option<f64>,
     /// Altitude there, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub h_m: Option<f64>,
@@ -64,6 +67,7 @@ pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostRepo
         .map(|(index, relay)| LostReport {
             index,
             x_m: relay.setpoint.map(|place| f64::from(place.x_m)),
+            y_m: relay.setpoint.map(|place| f64::from(place.y_m)),
             h_m: relay.setpoint.map(|place| f64::from(place.altitude_m)),
             version: offered(&outcome.moments).map(|_| relay.version),
             why: match outcome.ending {

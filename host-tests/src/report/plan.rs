@@ -14,7 +14,7 @@ pub struct HypotheticalReport {
     pub power_w: f64,
     /// Its place along x, m.
     pub x_m: f64,
-    /// Its distance from that line, m.
+    /// Its distance from that line, m: to its right above 0.
     pub y_m: f64,
     /// How far the interference that a relay receives from it is from that of all, on average over where relays may be, W.
     pub mean_abs_error_w: f64,
@@ -84,6 +84,9 @@ pub struct PlanReport {
     /// For several interferers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hypothetical: Option<HypotheticalReport>,
+    /// Whether there is room beside the line: the table then says where in it a relay is.
+    #[serde(skip)]
+    pub room: bool,
 }
 
 /// The data rate at an SIR (linear) over a bandwidth, bit/s: Shannon's, with the interference as noise.
@@ -138,6 +141,7 @@ impl PlanReport {
             rx_sir,
             rx_sir_db: rx_sir.map(db),
             hypothetical,
+            room: !plan.mission.config().lateral.is_single(),
         }
     }
 
@@ -158,7 +162,7 @@ impl PlanReport {
 
     /// The report as a table to read.
     pub fn table(&self) -> String {
-        let mut text = super::hops_table(&self.relays, &[], self.rx_sir);
+        let mut text = super::hops_table(&self.relays, &[], self.rx_sir, self.room);
         let (Some(uavs), Some(sir), Some(sir_db)) = (self.uavs, self.sir, self.sir_db) else {
             return text;
         };

@@ -37,6 +37,11 @@ struct RawGeometry {
     altitude_m: f64,
     altitude_min_m: Option<f64>,
     altitude_max_m: Option<f64>,
+    /// Relays stay above the line unless the file gives them room beside it.
+    #[serde(default)]
+    lateral_min_m: f64,
+    #[serde(default)]
+    lateral_max_m: f64,
     /// No separation is asked for unless the file does.
     #[serde(default)]
     min_separation_m: f64,
@@ -136,6 +141,8 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
         altitude_m,
         altitude_min_m,
         altitude_max_m,
+        lateral_min_m: geometry.lateral_min_m,
+        lateral_max_m: geometry.lateral_max_m,
         min_separation_m: geometry.min_separation_m,
         tx_w: raw.power.tx_w,
         uav_w: raw.power.uav_w,

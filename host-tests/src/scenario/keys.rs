@@ -88,6 +88,8 @@ const GEOMETRY: Keys = &[
     required("altitude_m", Number(ALTITUDE)),
     optional("altitude_min_m", Number(ALTITUDE)),
     optional("altitude_max_m", Number(ALTITUDE)),
+    optional("lateral_min_m", Number(range(-1e5, 0.0, "m"))),
+    optional("lateral_max_m", Number(range(0.0, 1e5, "m"))),
     optional("min_separation_m", Number(range(0.0, 1e5, "m"))),
 ];
 

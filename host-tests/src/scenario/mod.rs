@@ -16,7 +16,8 @@ use std::path::Path;
 
 pub use error::{Problem, ScenarioError};
 
-/// Everything a host tool has to know about a flight, in SI units, with x along the line from Tx (x = 0) to Rx.
+/// Everything a host tool has to know about a flight, in SI units, with x along the line from Tx (x = 0) to Rx and y to the
+/// right of it as seen from above.
 ///
 /// A value that came from [`Scenario::load`] or [`Scenario::parse`] lies within the ranges given here.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +30,10 @@ pub struct Scenario {
     pub altitude_min_m: f64,
     /// Highest altitude the joint methods may choose, in metres, `altitude_m` (its default) to 1e5.
     pub altitude_max_m: f64,
+    /// How far to the left of the line the joint method may choose places, as y in metres, -1e5 to 0 (its default).
+    pub lateral_min_m: f64,
+    /// How far to its right, as y in metres, 0 (its default) to 1e5.
+    pub lateral_max_m: f64,
     /// Smallest distance allowed between two relays, in metres, 0 (its default) to 1e5.
     pub min_separation_m: f64,
     /// Transmit power of Tx, in watts, 1e-6 to 1e6.
@@ -83,7 +88,7 @@ pub struct Source {
     pub power_w: f64,
     /// Place along the line from Tx to Rx, in metres, -1e7 to 1e7 (0 is Tx; beyond Rx is allowed).
     pub x_m: f64,
-    /// Offset from that line on the ground, in metres, -1e7 to 1e7.
+    /// Offset from that line on the ground, in metres, -1e7 to 1e7: to its right above 0.
     pub y_m: f64,
 }
 
@@ -136,6 +141,8 @@ impl Default for Scenario {
             altitude_m: 20.0,
             altitude_min_m: 20.0,
             altitude_max_m: 20.0,
+            lateral_min_m: 0.0,
+            lateral_max_m: 0.0,
             min_separation_m: 4.0,
             tx_w: 80.0,
             uav_w: 1.0,

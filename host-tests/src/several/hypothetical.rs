@@ -10,7 +10,7 @@
 
 use super::mesh::{Centre, graded};
 use super::raster::{Raster, Weighed};
-use super::scene::Scene;
+use super::scene::{Place, Scene};
 use super::simplex::{Corner, minimise};
 use crate::scenario::Source;
 
@@ -19,6 +19,10 @@ const COARSE: usize = 400;
 
 /// About how many the search ends with.
 const FINE: usize = 4_000;
+
+/// Steps along the line and aside in which both sides are compared.
+const ALONG: u32 = 64;
+const ASIDE: u32 = 8;
 
 /// About how many the error that is reported was measured on.
 const REPORTED: usize = 60_000;
@@ -42,7 +46,7 @@ pub struct Hypothetical {
     pub power_w: f64,
     /// Coordinate x_H along the line from Tx to Rx, metres.
     pub x_m: f64,
-    /// Offset y_H from that line, metres, >= 0.
+    /// Offset y_H from that line, metres: to its right above 0.
     pub y_m: f64,
     /// Mean absolute error of the interference that a relay receives, watts.
     pub mean_abs_error_w: f64,
@@ -51,6 +55,41 @@ pub struct Hypothetical {
 }
 
 impl Hypothetical {
+    /// The same on that side of the line on which it errs less, for relays with room from `least_m` to `most_m` (metres)
+    /// beside the line. Above the line both sides are the same.
+    #[must_use]
+    pub fn sided(self, scene: &Scene, least_m: f64, most_m: f64) -> Self {
+        let other = Self {
+            y_m: -self.y_m,
+            ..self
+        };
+        let part = |i: u32, steps: u32| f64::from(i) / f64::from(steps);
+        let aside = (0..=ASIDE).map(|i| least_m + part(i, ASIDE) * (most_m - least_m));
+        let rows = aside.flat_map(|y| [scene.band.least_m, scene.band.most_m].map(|h| (y, h)));
+        let places: Vec<Place> = rows
+            .flat_map(|(y, h)| (0..=ALONG).map(move |i| (part(i, ALONG), y, h)))
+            .map(|(share, y, h)| Place {
+                x: share * scene.distance_m,
+                y,
+                h,
+            })
+            .collect();
+        // By factors: what is next to an interferer would else outweigh all the rest.
+        let error = |one: &Self| -> f64 {
+            let each = places.iter().map(|at| {
+                let (dx, dy) = (at.x - one.x_m, at.y - one.y_m);
+                let alone = one.power_w / (scene.eta * (dx * dx + dy * dy + at.h * at.h));
+                (alone / scene.interference_w(*at)).ln().abs()
+            });
+            each.sum()
+        };
+        if error(&other) < error(&self) {
+            other
+        } else {
+            self
+        }
+    }
+
     /// As an interferer of a scenario.
     pub fn source(&self) -> Source {
         Source {

@@ -5,8 +5,8 @@
 //! much SIR it costs is known only by comparing with the best chain against the true sum: [`optimum`] for relays that hold
 //! one altitude (exact), [`best_common_altitude`] where that altitude may be chosen, [`polish`] for relays that differ.
 //!
-//! Everything is f64, in SI units, with x along the ground from Tx (0) to Rx (D); SIRs are linear. As everywhere, a relay
-//! never stands behind the one before it.
+//! Everything is f64, in SI units, with x along the ground from Tx (0) to Rx (D), y to the right of it; SIRs are linear. As
+//! everywhere, a relay never stands behind the one before it. Chains that are placed here stand above the line (y = 0).
 
 mod altitude;
 mod crossing;
@@ -26,4 +26,4 @@ pub use hypothetical::{Fit, Hypothetical, fit, hypothetical};
 pub use optimum::{Chain, optimum};
 pub use polish::{Polished, polish};
 pub use raster::{Raster, Weighed};
-pub use scene::{Relay, Scene};
+pub use scene::{Place, Relay, Scene};

@@ -166,7 +166,7 @@ impl Turn<'_> {
     /// From where to where the relay may move along x at altitude `h`, metres; the wrong way round where there is no room.
     fn room(&self, h: f64) -> (f64, f64) {
         let aside = |apart: f64, climb: f64| (apart * apart - climb * climb).max(0.0).sqrt();
-        let low = self.before.x + aside(self.apart_before, h - self.before.h);
+        let low = self.before.at.x + aside(self.apart_before, h - self.before.at.h);
         let high = match self.next {
             Some((x, next_h)) => x - aside(self.scene.min_separation_m, next_h - h),
             None => self.scene.distance_m,

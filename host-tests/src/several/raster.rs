@@ -117,7 +117,7 @@ impl Raster {
                     x,
                     h_squared: h * h,
                     weight: width * height,
-                    truth: scene.interference_w(x, h) * scene.eta,
+                    truth: scene.interference_w((x, h)) * scene.eta,
                 });
             }
         }

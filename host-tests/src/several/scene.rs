@@ -1,7 +1,7 @@
 //! Who speaks and who disturbs: a chain of relays under several interferers whose powers add up.
 
-use uav_relay::Channel;
 use uav_relay::channel::AirGround;
+use uav_relay::{Channel, Placement};
 
 use crate::reference::joint::Band;
 use crate::scenario::{self, Interference, Scenario, Source};
@@ -38,6 +38,28 @@ pub struct Scene {
     pub band: Band,
     /// The relays from Tx to Rx; their number is N.
     pub relays: Vec<Relay>,
+}
+
+/// Where a relay stands, in metres: x along the line, y to the right of it, h > 0 above the ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) h: f64,
+}
+
+impl From<(f64, f64)> for Place {
+    /// (x, h), right above the line.
+    fn from((x, h): (f64, f64)) -> Self {
+        Self { x, y: 0.0, h }
+    }
+}
+
+impl From<Placement> for Place {
+    fn from(place: Placement) -> Self {
+        let [x, y, h] = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
+        Self { x, y, h }
+    }
 }
 
 impl Scene {
@@ -77,12 +99,13 @@ impl Scene {
         })
     }
 
-    /// Interference power that a relay at `x` metres and altitude `h` metres (> 0) receives, watts: the sum over all sources.
-    pub fn interference_w(&self, x: f64, h: f64) -> f64 {
-        let each = self
-            .sources
-            .iter()
-            .map(|source| received_w(source.power_w, self.eta, x - source.x_m, source.y_m, h));
+    /// Interference power that a relay there receives, watts: the sum over all sources.
+    pub fn interference_w(&self, at: impl Into<Place>) -> f64 {
+        let Place { x, y, h } = at.into();
+        let each = self.sources.iter().map(|source| {
+            let (dx, dy) = (x - source.x_m, y - source.y_m);
+            received_w(source.power_w, self.eta, dx, dy, h)
+        });
         each.sum()
     }
 
@@ -95,10 +118,10 @@ impl Scene {
         each.sum()
     }
 
-    /// SIR (linear) of the N + 1 hops of a chain whose relay k stands at `places[k - 1]`, (x, h) in metres with h > 0.
+    /// SIR (linear) of the N + 1 hops of a chain whose relay k stands at `places[k - 1]`.
     ///
     /// Infinite where two relays share a place; empty unless there is one place per relay, and at least one relay.
-    pub fn hop_sirs(&self, places: &[(f64, f64)]) -> Vec<f64> {
+    pub fn hop_sirs(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         if places.len() != self.relays.len() {
             return Vec::new();
         }
@@ -115,7 +138,7 @@ impl Scene {
     }
 
     /// SIR (linear) of the worst hop of a chain; 0 where [`Scene::hop_sirs`] is empty.
-    pub fn chain_sir(&self, places: &[(f64, f64)]) -> f64 {
+    pub fn chain_sir(&self, places: &[impl Copy + Into<Place>]) -> f64 {
         let sirs = self.hop_sirs(places).into_iter();
         sirs.reduce(f64::min).unwrap_or(0.0)
     }
@@ -123,41 +146,46 @@ impl Scene {
     /// Tx, as the one who speaks.
     pub(super) fn tx(&self) -> Sender {
         Sender {
-            x: 0.0,
-            h: 0.0,
+            at: Place::from((0.0, 0.0)),
             power_w: self.tx_w,
             factor: self.eta,
         }
     }
 
-    /// A relay at (x, h), as the one who speaks to another.
-    pub(super) fn sender(&self, (x, h): (f64, f64), relay: &Relay) -> Sender {
+    /// A relay there, as the one who speaks to another.
+    pub(super) fn sender(&self, at: impl Into<Place>, relay: &Relay) -> Sender {
         Sender {
-            x,
-            h,
+            at: at.into(),
             power_w: relay.power_w,
             factor: self.mu_los,
         }
     }
 
-    /// SIR (linear) at a relay at (x, h), metres.
-    pub(super) fn sir_at(&self, from: Sender, (x, h): (f64, f64)) -> f64 {
-        let signal = received_w(from.power_w, from.factor, x - from.x, 0.0, h - from.h);
-        signal / self.interference_w(x, h)
+    /// SIR (linear) at a relay there.
+    pub(super) fn sir_at(&self, from: Sender, at: impl Into<Place>) -> f64 {
+        let (to, by) = (at.into(), from.at);
+        let signal = received_w(
+            from.power_w,
+            from.factor,
+            to.x - by.x,
+            to.y - by.y,
+            to.h - by.h,
+        );
+        signal / self.interference_w(to)
     }
 
-    /// SIR (linear) at Rx of what `relay`, the last one, sends from (x, h), metres.
-    pub(super) fn sir_at_rx(&self, (x, h): (f64, f64), relay: &Relay) -> f64 {
-        let signal = received_w(relay.power_w, self.eta, self.distance_m - x, 0.0, h);
+    /// SIR (linear) at Rx of what `relay`, the last one, sends from there.
+    pub(super) fn sir_at_rx(&self, at: impl Into<Place>, relay: &Relay) -> f64 {
+        let Place { x, y, h } = at.into();
+        let signal = received_w(relay.power_w, self.eta, self.distance_m - x, y, h);
         signal / self.interference_rx_w()
     }
 }
 
-/// One who speaks to a relay: where, in metres, and how loud.
+/// One who speaks to a relay: where, and how loud.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sender {
-    pub(super) x: f64,
-    pub(super) h: f64,
+    pub(super) at: Place,
     power_w: f64,
     factor: f64,
 }

@@ -354,7 +354,14 @@ impl Chain {
             let chosen = self.setup.settings.method != Method::Align
                 && !self.setup.held.contains(&by)
                 && (config.band.least_m..=config.band.most_m).contains(&place.altitude_m);
+            let beside = config.lateral.least_m..=config.lateral.most_m;
+            let aside = if self.setup.settings.method == Method::Joint {
+                beside.contains(&place.y_m)
+            } else {
+                place.y_m.to_bits() == 0
+            };
             let inside = (0.0..=end).contains(&place.x_m)
+                && aside
                 && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
             self.outcome.unsafe_setpoints += u64::from(!inside);
             // With a new mission it stays where it is until the next agreement.

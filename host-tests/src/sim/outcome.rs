@@ -134,15 +134,10 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Where the relays were told to fly, to the bit: x and altitude; `None` for one that was told nothing.
-    pub fn bits(&self) -> Vec<Option<(u32, u32)>> {
-        self.relays
-            .iter()
-            .map(|relay| {
-                relay
-                    .setpoint
-                    .map(|place| (place.x_m.to_bits(), place.altitude_m.to_bits()))
-            })
-            .collect()
+    /// Where the relays were told to fly, to the bit: x, y and altitude; `None` for one that was told nothing.
+    pub fn bits(&self) -> Vec<Option<[u32; 3]>> {
+        let bits = |place: Placement| [place.x_m, place.y_m, place.altitude_m].map(f32::to_bits);
+        let places = self.relays.iter().map(|relay| relay.setpoint);
+        places.map(|place| place.map(bits)).collect()
     }
 }

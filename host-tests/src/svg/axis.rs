@@ -3,12 +3,13 @@
 use super::canvas::{Canvas, Point};
 
 /// A straight map from a quantity to a coordinate of the picture.
+#[derive(Clone, Copy)]
 pub(super) struct Scale {
     from: (f64, f64),
     to: (f64, f64),
 }
 
-/// Both scales of the plot.
+/// Both scales of a plot: along the line, and up from the ground or, seen from above, aside.
 pub(super) struct Frame {
     pub(super) x: Scale,
     pub(super) h: Scale,
@@ -24,6 +25,11 @@ impl Scale {
     pub(super) fn at(&self, value: f64) -> f64 {
         let share = ((value - self.from.0) / (self.from.1 - self.from.0)).clamp(0.0, 1.0);
         self.to.0 + share * (self.to.1 - self.to.0)
+    }
+
+    /// Whether a quantity is on the scale.
+    pub(super) fn holds(&self, value: f64) -> bool {
+        (self.from.0..=self.from.1).contains(&value)
     }
 
     /// Round quantities within the scale, at most `most` of them or so, and how many decimals they need.
@@ -61,10 +67,11 @@ pub(super) fn round_step(least: f64) -> f64 {
         .unwrap_or(10.0 * power)
 }
 
-/// Draws grid, axes, ticks and the axes' names.
-pub(super) fn draw(canvas: &mut Canvas, frame: &Frame) {
+/// Draws grid, axes, ticks and the axes' names; `upright` is that of the vertical one.
+pub(super) fn draw(canvas: &mut Canvas, frame: &Frame, upright: &str) {
     let (left, right) = frame.x.to;
-    let (bottom, top) = frame.h.to;
+    let (low, high) = frame.h.to;
+    let (bottom, top) = (low.max(high), low.min(high));
     let (ticks, decimals) = frame.h.ticks(8.0);
     for tick in ticks {
         let y = frame.h.at(tick);
@@ -81,5 +88,5 @@ pub(super) fn draw(canvas: &mut Canvas, frame: &Frame) {
     canvas.line((left, top), (left, bottom), "axis");
     canvas.line((left, bottom), (right, bottom), "axis");
     canvas.text((f64::midpoint(left, right), bottom + 31.0), "axis", "x (m)");
-    canvas.upward((14.0, f64::midpoint(top, bottom)), "axis", "h (m)");
+    canvas.upward((14.0, f64::midpoint(top, bottom)), "axis", upright);
 }

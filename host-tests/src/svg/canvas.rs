@@ -72,6 +72,15 @@ impl Canvas {
         ));
     }
 
+    /// An edge of the room beside the line.
+    pub(super) fn edge(&mut self, (x1, y1): Point, (x2, y2): Point) {
+        let [x1, y1, x2, y2] = [x1, y1, x2, y2].map(short);
+        self.put(format_args!(
+            "<line class=\"edge\" x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\" \
+             style=\"stroke:#009e73;stroke-dasharray:6 3\"/>\n"
+        ));
+    }
+
     /// A sample of a hop's line, in the legend.
     pub(super) fn swatch(&mut self, (x, y): Point, length: f64, (colour, width): (&str, f64)) {
         let [x, y, end, width] = [x, y, x + length, width].map(short);
@@ -95,7 +104,7 @@ impl Canvas {
         ));
     }
 
-    /// A relay, with a tooltip: the only use of a circle, so that there are as many circles as relays.
+    /// A relay, with a tooltip: the only use of a circle, so that there are as many circles as relays in each view.
     pub(super) fn relay(
         &mut self,
         (x, y): Point,

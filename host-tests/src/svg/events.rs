@@ -1,13 +1,13 @@
 //! What happened to the chain, as a strip below the picture: one sign for each event, evenly spaced, whenever it was.
 
 use super::canvas::Canvas;
-use super::{HEIGHT, Picture, WIDTH};
+use super::{Picture, WIDTH, bottom};
 
 /// Height of the strip.
 const STRIP: f64 = 84.0;
 
-/// The line of events below the rest of the picture.
-const LINE: f64 = HEIGHT + 48.0;
+/// From the rest of the picture down to the line of events.
+const LINE: f64 = 48.0;
 
 /// From either edge to the first and the last event.
 const MARGIN: f64 = 52.0;
@@ -33,22 +33,20 @@ pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
         return;
     }
     let events = shown(&picture.events);
-    canvas.text(
-        (24.0, HEIGHT + 9.0),
-        "start",
-        "What happened, not to scale:",
-    );
-    canvas.line((24.0, LINE), (WIDTH - 24.0, LINE), "time");
+    let top = bottom(picture);
+    let line = top + LINE;
+    canvas.text((24.0, top + 9.0), "start", "What happened, not to scale:");
+    canvas.line((24.0, line), (WIDTH - 24.0, line), "time");
     let gaps = (events.len() as f64 - 1.0).max(1.0);
     for (place, (time, words)) in events.iter().enumerate() {
         let x = MARGIN + place as f64 * (WIDTH - 2.0 * MARGIN) / gaps;
         // Neighbours stand below and above the line in turn.
         let (first, second) = if place % 2 == 0 {
-            (LINE + 16.0, LINE + 27.0)
+            (line + 16.0, line + 27.0)
         } else {
-            (LINE - 20.0, LINE - 9.0)
+            (line - 20.0, line - 9.0)
         };
-        canvas.disc((x, LINE), 2.5, "ground");
+        canvas.disc((x, line), 2.5, "ground");
         canvas.text((x, first), "bold event", time);
         canvas.text((x, second), "event", words);
     }

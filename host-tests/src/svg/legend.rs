@@ -3,17 +3,17 @@
 use super::canvas::Canvas;
 use super::hops::CLASSES;
 use super::nodes::cross;
-use super::{HEIGHT, Picture};
+use super::{Picture, bottom};
 
 /// Draws the legend below the plot.
 pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
-    let row = HEIGHT - 27.0;
+    let row = bottom(picture) - 27.0;
     canvas.text((24.0, row + 3.6), "start", "Hop SIR above the worst hop's:");
     for ((_, colour, width, words), left) in CLASSES.into_iter().zip([188.0, 264.0, 333.0, 402.0]) {
         canvas.swatch((left, row), 18.0, (colour, width));
         canvas.text((left + 22.0, row + 3.6), "start", words);
     }
-    let row = HEIGHT - 10.0;
+    let row = bottom(picture) - 10.0;
     canvas.text((24.0, row + 3.6), "start", "Numbers at hops: SIR in dB");
     canvas.disc((197.0, row), 4.0, "relay");
     canvas.text((210.0, row + 3.6), "start", "relay");

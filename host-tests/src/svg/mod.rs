@@ -1,8 +1,9 @@
-//! A picture of the chain in the x-h plane, as one self-contained SVG file.
+//! A picture of the chain from the side, and from above where there is room beside the line, as one self-contained SVG file.
 //!
 //! The markup is written here by hand: it is a handful of shapes, the order and the digits of every attribute stay
 //! ours (the same run gives the same bytes), and a crate would bring nothing but a second vocabulary.
 
+mod above;
 mod axis;
 mod canvas;
 mod events;
@@ -13,6 +14,8 @@ mod nodes;
 mod sources;
 
 use axis::{Frame, Scale};
+use uav_relay::Mission;
+
 use canvas::Canvas;
 use labels::Labels;
 
@@ -39,6 +42,8 @@ pub struct Picture {
     pub replaced: Vec<(f64, f64, f64)>,
     /// The relays from Tx to Rx: place along x and altitude, both in metres. One that is not finite is left out.
     pub nodes: Vec<(f64, f64)>,
+    /// Where relays may stand beside the line: the chain is drawn from above, too.
+    pub room: Option<Room>,
     /// Linear SIR of every hop, one more than there are relays in the chain, above 0; any other value is drawn grey and without a number.
     pub hop_sir: Vec<f64>,
     /// The relays that went silent, each 1 to N: they are crossed out, and their hops are dashed.
@@ -49,6 +54,17 @@ pub struct Picture {
     pub events: Vec<(f64, String)>,
 }
 
+/// The room beside the line, and who stands where in it; y is to the right of x as seen from above, in metres.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Room {
+    /// Its left edge, 0 or less.
+    pub least_m: f64,
+    /// Its right edge, 0 or more.
+    pub most_m: f64,
+    /// y of each relay, from Tx to Rx.
+    pub y_m: Vec<f64>,
+}
+
 /// Draws the chain as an SVG document.
 ///
 /// Numbers beside hops (their SIR in dB) and relays are thinned out until none covers another; every hop and relay
@@ -56,14 +72,14 @@ pub struct Picture {
 #[must_use]
 pub fn draw(picture: &Picture) -> String {
     let frame = frame(picture);
-    let mut canvas = Canvas::new(WIDTH, HEIGHT + events::height(picture));
+    let mut canvas = Canvas::new(WIDTH, bottom(picture) + events::height(picture));
     let mut labels = Labels::inside((LEFT, TOP), (RIGHT, BOTTOM));
     let hops = hops::of(picture, &frame);
     canvas.describe(&format!("Relay chain: {}", summary(picture)));
     title(&mut canvas, picture);
-    axis::draw(&mut canvas, &frame);
+    axis::draw(&mut canvas, &frame, "h (m)");
     hops::draw(&mut canvas, &mut labels, &hops);
-    nodes::relays(&mut canvas, &mut labels, &frame, picture);
+    nodes::relays(&mut canvas, &mut labels, &frame, picture, "h");
     sources::replaced(&mut canvas, &mut labels, &frame, picture);
     sources::draw(&mut canvas, &mut labels, &frame, picture);
     nodes::ends(&mut canvas, &mut labels, &frame, length(picture));
@@ -71,9 +87,31 @@ pub fn draw(picture: &Picture) -> String {
     sources::label_replaced(&mut canvas, &mut labels, &frame, picture);
     hops::label(&mut canvas, &mut labels, &hops);
     nodes::label(&mut canvas, &mut labels, &frame, picture);
+    if let Some(room) = &picture.room {
+        above::draw(&mut canvas, &frame, picture, room);
+    }
     legend::draw(&mut canvas, picture);
     events::draw(&mut canvas, picture);
     canvas.finish()
+}
+
+/// The room beside the line in `mission`, if there is any, with relays at these y, m.
+pub fn room(mission: &Mission, y_m: impl IntoIterator<Item = f64>) -> Option<Room> {
+    let lateral = mission.config().lateral;
+    (!lateral.is_single()).then(|| Room {
+        least_m: f64::from(lateral.least_m),
+        most_m: f64::from(lateral.most_m),
+        y_m: y_m.into_iter().collect(),
+    })
+}
+
+/// Where the legend ends.
+fn bottom(picture: &Picture) -> f64 {
+    if picture.room.is_some() {
+        HEIGHT + above::HEIGHT
+    } else {
+        HEIGHT
+    }
 }
 
 /// The distance from Tx to Rx, or 1 m where it makes no sense: a picture has to have a width.

@@ -27,8 +27,14 @@ pub(super) fn radius(picture: &Picture, frame: &Frame) -> f64 {
     (0.22 * spacing).clamp(0.5, 4.0)
 }
 
-/// Draws the relays.
-pub(super) fn relays(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
+/// Draws the relays; `upright` is what the vertical axis shows.
+pub(super) fn relays(
+    canvas: &mut Canvas,
+    labels: &mut Labels,
+    frame: &Frame,
+    picture: &Picture,
+    upright: &str,
+) {
     let radius = radius(picture, frame);
     let rim = (0.3 * radius).min(1.1);
     for (number, (x, h)) in placed(picture) {
@@ -45,7 +51,7 @@ pub(super) fn relays(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pi
             at,
             (radius, rim),
             class,
-            &format!("relay {number}: x = {x:.2} m, h = {h:.2} m{note}"),
+            &format!("relay {number}: x = {x:.2} m, {upright} = {h:.2} m{note}"),
         );
         let mut half = radius;
         if lost {

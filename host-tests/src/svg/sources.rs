@@ -156,6 +156,63 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
     }
 }
 
+/// Interferers as they are seen from above: the place of each, and what is to be said of it.
+pub(super) type Seen = Vec<(Point, String, &'static str)>;
+
+/// Draws the markers at their places; those farther aside than the plot, or along x, at its edge.
+pub(super) fn from_above(
+    canvas: &mut Canvas,
+    labels: &mut Labels,
+    frame: &Frame,
+    picture: &Picture,
+) -> Seen {
+    let mut seen = Vec::new();
+    for (all, class, tip) in [
+        (
+            &picture.replaced,
+            "before",
+            "interferer of the mission before",
+        ),
+        (&picture.interferers, "source", "interferer"),
+    ] {
+        let (inside, _) = sorted(all, length(picture));
+        for source @ (power, x, y) in inside {
+            let at = frame.at((x, y));
+            canvas.marked(&diamond(at), class, &format!("{tip}: {}", whole(source)));
+            labels.take(Area::around(at, (12.0, 12.0)));
+            let beyond = if frame.h.holds(y) {
+                String::new()
+            } else {
+                format!(", y = {} m", plain(y))
+            };
+            seen.push(if class == "before" {
+                (at, "before".to_owned(), "faint halo")
+            } else {
+                (at, format!("{} W{beyond}", plain(power)), "halo")
+            });
+        }
+    }
+    seen
+}
+
+/// Says what they are, as far as there is room.
+pub(super) fn label_from_above(canvas: &mut Canvas, labels: &mut Labels, seen: &Seen) {
+    for ((x, y), words, class) in seen {
+        let wide = width(words, SIZE) + 4.0;
+        let (aside, clear) = (0.5 * wide + 8.0, 7.0 + 0.5 * LINE);
+        let places = [
+            (*x, y + clear),
+            (*x, y - clear),
+            (x + aside, *y),
+            (x - aside, *y),
+        ];
+        let free = |at: &Point| labels.try_take(Area::around(*at, (wide, LINE)));
+        if let Some(at) = places.into_iter().find(free) {
+            canvas.text((at.0, at.1 + 0.36 * SIZE), class, words);
+        }
+    }
+}
+
 /// Two lines above a marker, as low as there is room, tied to it when they are not next to it.
 fn words(
     canvas: &mut Canvas,

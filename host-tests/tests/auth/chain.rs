@@ -94,7 +94,7 @@ fn other_methods_choose_the_same() {
     };
     let mut setup = Setup::new(brief::mission(&scenario, 5, 1e-4).unwrap().0);
     for method in [
-        Method::Altitude,
+        Method::Joint,
         Method::Adjust(Adjust {
             rounds: 20,
             ..Adjust::default()
@@ -135,8 +135,7 @@ fn whoever_is_rebooted_rejoins() {
         let mut setup = Setup::new(mission(8));
         setup.settings.wiring = wiring;
         let simulated = settle(setup).bits();
-        let without_target =
-            |place: &Option<(u32, u32, u32)>| place.map(|(x, altitude, _)| (x, altitude));
+        let without_target = |place: &Option<([u32; 3], u32)>| place.map(|(at, _)| at);
         assert_eq!(
             places.iter().map(without_target).collect::<Vec<_>>(),
             simulated

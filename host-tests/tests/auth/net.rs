@@ -339,16 +339,13 @@ impl Net {
     }
 
     /// Where the relays were told to fly, and for which target, to the bit.
-    pub(crate) fn bits(&self) -> Vec<Option<(u32, u32, u32)>> {
+    pub(crate) fn bits(&self) -> Vec<Option<([u32; 3], u32)>> {
         self.relays
             .iter()
             .map(|relay| {
                 let (place, target) = (relay.setpoint()?, relay.target()?);
-                Some((
-                    place.x_m.to_bits(),
-                    place.altitude_m.to_bits(),
-                    target.to_bits(),
-                ))
+                let at = [place.x_m, place.y_m, place.altitude_m].map(f32::to_bits);
+                Some((at, target.to_bits()))
             })
             .collect()
     }

@@ -23,7 +23,7 @@ fn key_and_epoch_stand_where_the_table_says() {
     let block = flight().signed(Some(SECRET)).block(3).unwrap();
     let mut bytes = [4, 3, 2, 1].to_vec();
     bytes.extend(SECRET.key);
-    assert_eq!(block, with(244, &bytes));
+    assert_eq!(block, with(252, &bytes));
     assert_eq!(secret(&block), Ok(Some(SECRET)));
     assert_eq!(reads(&block), reads(&paper()), "nothing else changes");
     assert_eq!(secret(&paper()), Ok(None));
@@ -38,7 +38,7 @@ fn a_key_without_an_epoch_is_refused_and_the_other_way_round() {
         assert_eq!(block, Err(BlockError::Config(ConfigError::Secret)));
         let mut bytes = epoch.to_le_bytes().to_vec();
         bytes.extend(key);
-        assert_eq!(secret(&with(244, &bytes)), Err(ConfigError::Secret));
+        assert_eq!(secret(&with(252, &bytes)), Err(ConfigError::Secret));
     }
     let epoch = 0xFFFF_FFFE;
     let most = Some(Secret { key, epoch });

@@ -142,9 +142,9 @@ fn of_two_uploads_the_later_one_is_flown() {
 fn every_key_is_that_of_a_scenario_file() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("other.toml");
-    let text = "[geometry]\ndistance_m = 900\naltitude_m = 60\naltitude_min_m = 40\naltitude_max_m = 120\nmin_separation_m = 5\n[power]\ntx_w = 70\nuav_w = 2\n[[interferer]]\npower_w = 60\nx_m = 300\ny_m = 200\n";
+    let text = "[geometry]\ndistance_m = 900\naltitude_m = 60\naltitude_min_m = 40\naltitude_max_m = 120\nlateral_min_m = -30\nlateral_max_m = 40\nmin_separation_m = 5\n[power]\ntx_w = 70\nuav_w = 2\n[[interferer]]\npower_w = 60\nx_m = 300\ny_m = 200\n";
     std::fs::write(&file, text).unwrap();
-    let shared = ["--method", "altitude", "--uavs", "5"];
+    let shared = ["--method", "joint", "--uavs", "5"];
     let expected = json(
         &[
             &["--scenario", file.to_str().unwrap(), "--tolerance", "0.01"],
@@ -152,7 +152,7 @@ fn every_key_is_that_of_a_scenario_file() {
         ]
         .concat(),
     );
-    let upload = "5:distance_m=900,altitude_m=60,altitude_min_m=40,altitude_max_m=120,min_separation_m=5,tx_w=70,uav_w=2,power_w=60,x_m=300,y_m=200,tolerance=0.01";
+    let upload = "5:distance_m=900,altitude_m=60,altitude_min_m=40,altitude_max_m=120,lateral_min_m=-30,lateral_max_m=40,min_separation_m=5,tx_w=70,uav_w=2,power_w=60,x_m=300,y_m=200,tolerance=0.01";
     let report = json(&[&["--upload", upload], &shared[..]].concat());
     assert_eq!(places(&report), places(&expected));
     // A band of one altitude goes with it.

@@ -98,7 +98,7 @@ const WRONG: &[(&[&str], &[&str])] = &[
     ),
     (
         &["--method", "stochastic"],
-        &["--method", "'stochastic'", "align, altitude, adjust"],
+        &["--method", "'stochastic'", "align, joint, adjust"],
     ),
     (&["--band", "20"], &["--band", "'20'", "LEAST,MOST"]),
     (

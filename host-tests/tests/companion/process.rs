@@ -95,15 +95,15 @@ impl Relay {
         self.seen.iter().any(|line| line.contains(part))
     }
 
-    /// Bits of x, altitude and target, once the relay has them.
-    pub(crate) fn settled(&mut self) -> [u32; 3] {
+    /// Bits of x, y, altitude and target, once the relay has them.
+    pub(crate) fn settled(&mut self) -> [u32; 4] {
         let setpoint = bits(&self.line("setpoint: "));
         let target = bits(&self.line("converged: "));
-        [setpoint[0], setpoint[1], target[0]]
+        [setpoint[0], setpoint[1], setpoint[2], target[0]]
     }
 
-    /// Waits until it has agreed on these bits of x, altitude and target: it may agree on others on its way there.
-    pub(crate) fn settles_at(&mut self, expected: [u32; 3]) {
+    /// Waits until it has agreed on these bits of x, y, altitude and target: it may agree on others on its way there.
+    pub(crate) fn settles_at(&mut self, expected: [u32; 4]) {
         let mut place = Vec::new();
         loop {
             let line = self.line(" (0x");

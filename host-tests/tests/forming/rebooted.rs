@@ -79,7 +79,7 @@ fn a_relay_rebooted_in_a_settled_chain_gets_a_place_by_a_new_view() {
 #[test]
 fn a_relay_rebooted_in_the_agreement_on_altitudes_still_meets_the_target() {
     let settings = Settings {
-        method: Method::Altitude,
+        method: Method::Joint,
         ..Settings::default()
     };
     let mut longest = 0;

@@ -14,7 +14,7 @@ fn method(watched: &Watched) -> &'static str {
     match watched.settings().method {
         _ if watched.relay().mission().field().is_some() => "field",
         Method::Align => "align",
-        Method::Altitude => "altitude",
+        Method::Joint => "joint",
         Method::Adjust(_) => "adjust",
     }
 }
@@ -98,7 +98,7 @@ fn chains_of_the_corpus_agree_by_every_method_over_bad_links() {
             "no chain is uploaded twice, shared: {shared}"
         );
     }
-    for method in ["align", "altitude", "adjust", "field"] {
+    for method in ["align", "joint", "adjust", "field"] {
         for shared in [false, true] {
             let count = agreed.get(&(method, shared)).copied().unwrap_or(0);
             assert!(count > 0, "no chain agrees by {method}, shared: {shared}");

@@ -74,7 +74,7 @@ fn frame() -> Vec<Vec<u8>> {
 
 fn scenario() -> Vec<Vec<u8>> {
     let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples");
-    ["scenario", "several", "field", "altitudes"]
+    ["scenario", "several", "field", "altitudes", "side"]
         .iter()
         .map(|name| fs::read(format!("{examples}/{name}.toml")).unwrap())
         .collect()
@@ -84,9 +84,11 @@ fn scenario() -> Vec<Vec<u8>> {
 fn missions() -> Vec<Vec<u8>> {
     // Unsigned, and signed.
     let align = (0..6).flat_map(|mission| [0, 8].map(|how| vec![mission, 3, how]));
-    let altitude = [1, 33, 65, 73].map(|how| vec![1, 3, how]);
+    let joint = [1, 13]
+        .into_iter()
+        .flat_map(|mission| [1, 33, 65, 73].map(|how| vec![mission, 3, how]));
     let adjust = [vec![1, 3, 2, 0, 2, 20, 0], vec![1, 3, 2, 65, 2, 20, 0, 5]];
-    align.chain(altitude).chain(adjust).collect()
+    align.chain(joint).chain(adjust).collect()
 }
 
 /// A chain that is switched on, told to agree in the end, and run for so many rounds.

@@ -12,8 +12,23 @@ pub(crate) fn instant(at_s: f64) -> Instant {
     Instant::from_micros((at_s * 1e6).round() as u64)
 }
 
-/// A point in the vertical plane, m.
-pub(crate) type Point = (f64, f64);
+/// A place in the air: x, y and altitude, m.
+pub(crate) type Point = [f64; 3];
+
+/// From one place to another, m.
+pub(crate) fn way(from: Point, to: Point) -> Point {
+    [to[0] - from[0], to[1] - from[1], to[2] - from[2]]
+}
+
+/// How long that is, m.
+pub(crate) fn length([dx, dy, dh]: Point) -> f64 {
+    dx.hypot(dy).hypot(dh)
+}
+
+/// As far from `at` as `share` of `way` leads.
+pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
+    [0, 1, 2].map(|part| at[part] + share * way[part])
+}
 
 #[derive(Debug)]
 pub(crate) struct Drone {
@@ -97,12 +112,12 @@ impl Drone {
             self.goal = self.orders.pop_front().unwrap().1;
         }
         self.was = self.at;
-        let (dx, dh) = (self.goal.0 - self.at.0, self.goal.1 - self.at.1);
-        let (left, way) = (dx.hypot(dh), self.speed * step_s);
-        self.at = if left <= way {
+        let to_go = way(self.at, self.goal);
+        let (left, step) = (length(to_go), self.speed * step_s);
+        self.at = if left <= step {
             self.goal
         } else {
-            (self.at.0 + dx / left * way, self.at.1 + dh / left * way)
+            along(self.at, to_go, step / left)
         };
     }
 
@@ -112,13 +127,13 @@ impl Drone {
             self.next_report_s = now_s + rng.random_range(0.02..=1.0) * board.every_s;
             let off = hover_m * rng.random_range(-1.0..=1.0);
             let arrives_s = now_s + rng.random_range(0.0..=1.0) * board.stale_s;
-            self.reports
-                .push_back((now_s, arrives_s, (self.at.0 + off, self.at.1)));
+            let [x, y, h] = self.at;
+            self.reports.push_back((now_s, arrives_s, [x + off, y, h]));
         }
         while self.reports.front().is_some_and(|report| report.1 <= now_s) {
-            let (at_s, _, (x, h)) = self.reports.pop_front().unwrap();
+            let (at_s, _, at) = self.reports.pop_front().unwrap();
             if let Some(guard) = &mut self.guard {
-                guard.position(instant(at_s), place((x, h)));
+                guard.position(instant(at_s), place(at));
             }
         }
     }
@@ -140,6 +155,10 @@ impl Drone {
             "{setpoint:?}"
         );
         assert!(
+            (fence.least_y_m..=fence.most_y_m).contains(&setpoint.y_m),
+            "{setpoint:?}"
+        );
+        assert!(
             (fence.least_altitude_m..=fence.most_altitude_m).contains(&setpoint.altitude_m),
             "{setpoint:?}"
         );
@@ -147,7 +166,7 @@ impl Drone {
         // In the order in which they were given.
         let before_s = self.orders.back().map_or(0.0, |order| order.0);
         let due_s = (now_s + lag_s * rng.random_range(0.0..=0.99)).max(before_s);
-        let point = (f64::from(setpoint.x_m), f64::from(setpoint.altitude_m));
+        let point = [setpoint.x_m, setpoint.y_m, setpoint.altitude_m].map(f64::from);
         self.orders.push_back((due_s, point));
     }
 
@@ -163,8 +182,8 @@ impl Drone {
 
     /// From the lowest to the highest x where it may be from now on if nobody tells it anything any more.
     pub(crate) fn stretch(&self) -> (f64, f64) {
-        let mut ends = (self.at.0.min(self.goal.0), self.at.0.max(self.goal.0));
-        for (_, (x, _)) in &self.orders {
+        let mut ends = (self.at[0].min(self.goal[0]), self.at[0].max(self.goal[0]));
+        for (_, [x, ..]) in &self.orders {
             ends = (ends.0.min(*x), ends.1.max(*x));
         }
         ends
@@ -176,9 +195,11 @@ pub(crate) fn node(k: usize) -> u16 {
     k as u16 + 1
 }
 
-pub(crate) fn place((x, h): Point) -> Placement {
+pub(crate) fn place(at: Point) -> Placement {
+    let [x_m, y_m, altitude_m] = at.map(|part| part as f32);
     Placement {
-        x_m: x as f32,
-        altitude_m: h as f32,
+        x_m,
+        y_m,
+        altitude_m,
     }
 }

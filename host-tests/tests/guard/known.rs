@@ -4,7 +4,7 @@ use uav_relay::guard::Hindrance;
 use uav_relay::guard::confines::{Confines, Geofence};
 use uav_relay::{Duration, Side};
 
-use crate::drone::{Point, place};
+use crate::drone::{Point, place, way};
 use crate::world::World;
 
 const SPEED: f64 = 10.0;
@@ -14,6 +14,8 @@ fn world(relays: usize, from_m: f64, step_m: f64) -> World {
         fence: Geofence {
             least_x_m: 0.0,
             most_x_m: 1000.0,
+            least_y_m: -100.0,
+            most_y_m: 100.0,
             least_altitude_m: 20.0,
             most_altitude_m: 120.0,
         },
@@ -30,7 +32,7 @@ fn world(relays: usize, from_m: f64, step_m: f64) -> World {
 
 fn row(relays: usize, from_m: f64, step_m: f64) -> Vec<Point> {
     (0..relays)
-        .map(|k| (from_m + step_m * k as f64, 50.0))
+        .map(|k| [from_m + step_m * k as f64, 0.0, 50.0])
         .collect()
 }
 
@@ -61,7 +63,10 @@ fn a_tight_row_shifts_either_way() {
         let start = row(12, 400.0, 10.0);
         commit(&mut world, &start);
         let agreed_s = time(&mut world);
-        let targets: Vec<Point> = start.iter().map(|(x, h)| (x + shift_m, *h)).collect();
+        let targets: Vec<Point> = start
+            .iter()
+            .map(|[x, y, h]| [x + shift_m, *y, *h])
+            .collect();
         commit(&mut world, &targets);
         let shifted_s = time(&mut world);
         println!(
@@ -77,11 +82,11 @@ fn a_tight_row_shifts_either_way() {
 fn places_too_close_are_approached() {
     let mut world = world(5, 100.0, 100.0);
     let targets = [
-        (50.0, 30.0),
-        (300.0, 40.0),
-        (304.0, 50.0),
-        (308.0, 60.0),
-        (600.0, 70.0),
+        [50.0, 10.0, 30.0],
+        [300.0, -20.0, 40.0],
+        [304.0, 30.0, 50.0],
+        [308.0, -40.0, 60.0],
+        [600.0, 50.0, 70.0],
     ];
     commit(&mut world, &targets);
     for _ in 0..3000 {
@@ -96,11 +101,9 @@ fn places_too_close_are_approached() {
         );
     }
     for k in 1..4 {
-        assert!((ends[k].0 - targets[k].0).abs() < 10.1, "{ends:?}");
-        assert!(
-            (ends[k].1 - targets[k].1).abs() < 0.1,
-            "altitudes are free: {ends:?}"
-        );
+        let [dx, dy, dh] = way(targets[k], ends[k]);
+        assert!(dx.abs() < 10.1, "{ends:?}");
+        assert!(dy.hypot(dh) < 0.1, "across the line is free: {ends:?}");
     }
     let close = |k: usize, side| {
         world.drones[k].guard.as_ref().unwrap().hindrance(side) == Some(Hindrance::Close)

@@ -6,7 +6,7 @@
 //! | separation | log-uniform 1 m to 50 m; in 5 % 0 |
 //! | D | 0.1 % to 50 % more than the relays take at the separation in 40 %; else 2 to 20 times that |
 //! | reports off by | 0 in 70 %; else up to a twentieth of the separation |
-//! | start and agreed places | in order, the separation apart, crowded at Tx, at Rx, in the middle, or spread |
+//! | start and agreed places | anywhere across the line; in order, the separation apart along x, crowded at Tx, at Rx, in the middle, or spread |
 //! | agreements | 0 to 6 in 200 s, each heard by a relay with 80 %, up to 60 s late; 20 % closer along x than the separation |
 //! | speed | changes every 20 s on average, 0 in 25 %, else 1 m/s to 40 m/s |
 //! | medium | loses 0 to 50 %, duplicates 0 to 30 %, delays up to 0.1 s to 8 s |
@@ -20,7 +20,7 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::guard::confines::{Confines, Geofence};
 use uav_relay::{Duration, Side};
 
-use crate::drone::{Board, Point, place};
+use crate::drone::{Board, Point, length, place, way};
 use crate::medium::Faults;
 use crate::world::{World, beside};
 
@@ -85,6 +85,8 @@ fn confines(rng: &mut ChaCha8Rng) -> Confines {
         fence: Geofence {
             least_x_m: 0.0,
             most_x_m: 0.0,
+            least_y_m: -80.0,
+            most_y_m: 40.0,
             least_altitude_m: 20.0,
             most_altitude_m: 120.0,
         },
@@ -125,10 +127,11 @@ fn places(rng: &mut ChaCha8Rng, confines: &Confines, relays: usize) -> Vec<Point
     (0..relays)
         .map(|k| {
             let x = spare[k] + step * k as f64;
-            (
-                f64::from(x as f32),
-                f64::from(rng.random_range(20.0..=120.0_f32)),
-            )
+            let (y, h): (f32, f32) = (
+                rng.random_range(-80.0..=40.0),
+                rng.random_range(20.0..=120.0),
+            );
+            [x as f32, y, h].map(f64::from)
         })
         .collect()
 }
@@ -330,7 +333,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     let distance = f64::from(world.confines.fence.most_x_m);
     let (begun_s, allowed_s) = (
         world.now_s,
-        left.len() as f64 * (10.0 + distance.hypot(100.0) / SLOWEST),
+        left.len() as f64 * (10.0 + length([distance, 120.0, 100.0]) / SLOWEST),
     );
     while !left
         .iter()
@@ -343,7 +346,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
             left.iter()
                 .map(|k| (
                     k,
-                    world.drones[*k].at.0,
+                    world.drones[*k].at[0],
                     targets.len(),
                     world.drones[*k].guard
                 ))
@@ -355,7 +358,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     for (k, target) in left.iter().zip(&targets) {
         let at = world.drones[*k].at;
         assert!(
-            (at.0 - target.0).abs() <= off && (at.1 - target.1).abs() <= off,
+            way(at, *target).iter().all(|part| part.abs() <= off),
             "{at:?} {target:?}"
         );
     }

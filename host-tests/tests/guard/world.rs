@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::Side;
 use uav_relay::guard::confines::Confines;
 
-use crate::drone::{Board, Drone, Point, node};
+use crate::drone::{Board, Drone, Point, along, length, node, way};
 use crate::medium::{Faults, Medium};
 
 /// Between two looks at everything, s.
@@ -178,14 +178,14 @@ pub(crate) fn beside(k: usize, relays: usize) -> [Option<usize>; 2] {
 
 /// How close two drones come that both fly straight on during a step, m.
 fn nearest(one: (Point, Point), other: (Point, Point)) -> f64 {
-    let from = (one.0.0 - other.0.0, one.0.1 - other.0.1);
-    let to = (one.1.0 - other.1.0, one.1.1 - other.1.1);
-    let way = (to.0 - from.0, to.1 - from.1);
-    let length = way.0 * way.0 + way.1 * way.1;
-    let share = if length > 0.0 {
-        (-(from.0 * way.0 + from.1 * way.1) / length).clamp(0.0, 1.0)
+    let (from, to) = (way(other.0, one.0), way(other.1, one.1));
+    let change = way(from, to);
+    let product = |a: Point, b: Point| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let squared = product(change, change);
+    let share = if squared > 0.0 {
+        (-product(from, change) / squared).clamp(0.0, 1.0)
     } else {
         0.0
     };
-    (from.0 + share * way.0).hypot(from.1 + share * way.1)
+    length(along(from, change, share))
 }

@@ -21,7 +21,7 @@ fn flight(rng: &mut ChaCha8Rng) -> FlightSpec {
     let start = (0..8)
         .map(|_| {
             x_m += f64::from(SEPARATION_M) + 0.01 + rng.random_range(0.0..60.0_f64);
-            (x_m, 20.0)
+            [x_m, 0.0, 20.0]
         })
         .collect();
     FlightSpec {

@@ -172,7 +172,7 @@ fn a_chain_that_chooses_altitudes_or_takes_turns_forms_anew() {
         explore_m: 30.0,
         local: Local::Fine,
     };
-    for method in [Method::Altitude, Method::Adjust(adjust)] {
+    for method in [Method::Joint, Method::Adjust(adjust)] {
         for index in 1..=5 {
             let mut setup = Setup::on_shared_channel(Mission::try_new(config).unwrap());
             setup.settings.method = method;

@@ -28,10 +28,10 @@ impl World<'_> {
         })
     }
 
-    fn places(&self) -> Vec<(u32, u32)> {
+    fn places(&self) -> Vec<[u32; 3]> {
         let setpoints = self.relays.iter().filter_map(Relay::setpoint);
         setpoints
-            .map(|place| (place.x_m.to_bits(), place.altitude_m.to_bits()))
+            .map(|place| [place.x_m, place.y_m, place.altitude_m].map(f32::to_bits))
             .collect()
     }
 

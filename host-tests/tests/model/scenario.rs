@@ -54,8 +54,8 @@ impl Kind {
 /// What an undisturbed chain agrees on.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Calm {
-    /// x and altitude of every relay, as their bits.
-    pub(crate) places: Vec<(u32, u32)>,
+    /// x, y and altitude of every relay, as their bits.
+    pub(crate) places: Vec<[u32; 3]>,
     /// The target, as its bits.
     pub(crate) target: u32,
     /// Virtual time that it takes, µs.
@@ -227,7 +227,7 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     let common = Settings {
         predict: rng.random_bool(0.8),
         method: if kind == Kind::Altitude {
-            Method::Altitude
+            Method::Joint
         } else {
             Method::Adjust(turns(rng, narrow.most_m))
         },

@@ -72,7 +72,7 @@ pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
             let message = frame::decode(plain).ok()?.1;
             let number = match &message {
                 Message::Sweep(sweep) => sweep.number,
-                Message::Wave(wave) => wave.number,
+                Message::Course(course) => course.number,
                 Message::Token(token) => token.number,
                 _ => return None,
             };

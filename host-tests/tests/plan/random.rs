@@ -68,6 +68,8 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
         altitude_m,
         altitude_min_m: round((altitude_m * rng.random_range(0.5..1.0)).max(0.2)).min(altitude_m),
         altitude_max_m: round(altitude_m * rng.random_range(1.0..6.0)).max(altitude_m),
+        lateral_min_m: 0.0,
+        lateral_max_m: 0.0,
         min_separation_m: if rng.random() {
             0.0
         } else {

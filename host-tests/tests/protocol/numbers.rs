@@ -121,7 +121,7 @@ fn the_same_number_with_other_reaches_or_another_profile_is_not_the_same_pass() 
     let changes: [fn(&mut Sweep); 4] = [
         |_| {},
         |sweep| sweep.reaches[0] += 1.0,
-        |sweep| sweep.profile.power_w *= 2.0,
+        |sweep| sweep.relay.power_w *= 2.0,
         |sweep| sweep.measured_per_w = Some(2.0),
     ];
     for (which, change) in changes.into_iter().enumerate() {

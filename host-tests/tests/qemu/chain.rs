@@ -22,7 +22,7 @@ pub(crate) fn paper(uavs: u16) -> Flight {
 }
 
 /// Where the simulated chain settles, to the bit.
-pub(crate) fn simulated(flight: &Flight) -> Vec<(u32, u32)> {
+pub(crate) fn simulated(flight: &Flight) -> Vec<[u32; 3]> {
     let mut setup = Setup::new(*flight.mission());
     setup.profiles = flight.profiles().to_vec();
     setup.held = flight.held().to_vec();
@@ -34,7 +34,7 @@ pub(crate) fn simulated(flight: &Flight) -> Vec<(u32, u32)> {
         .iter()
         .map(|relay| {
             let place = relay.setpoint.unwrap();
-            (place.x_m.to_bits(), place.altitude_m.to_bits())
+            [place.x_m, place.y_m, place.altitude_m].map(f32::to_bits)
         })
         .collect()
 }

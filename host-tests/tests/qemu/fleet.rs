@@ -194,7 +194,7 @@ impl Fleet {
     }
 
     /// Waits until every drone has been told where to fly, and gives the bits of those places.
-    pub(crate) fn places(&mut self) -> Vec<(u32, u32)> {
+    pub(crate) fn places(&mut self) -> Vec<[u32; 3]> {
         let drones = u16::try_from(self.drones.len()).unwrap();
         let last = |lines: &[Line], drone| {
             let mut lines = lines.iter().rev().filter(|line| line.drone == drone);
@@ -209,7 +209,7 @@ impl Fleet {
     }
 
     /// Waits until the chain has agreed on `places`, to the bit: it may agree on others on its way there.
-    pub(crate) fn settle_at(&mut self, places: &[(u32, u32)]) {
+    pub(crate) fn settle_at(&mut self, places: &[[u32; 3]]) {
         assert_eq!(self.drones.len(), places.len());
         self.wait("agreement on these places", |lines| {
             (1..).zip(places).all(|(drone, place)| {

@@ -31,11 +31,11 @@ impl Line {
         u32::from_str_radix(rest.split_once(')')?.0, 16).ok()
     }
 
-    /// The bits of x and altitude, if this is a setpoint.
-    pub(crate) fn setpoint(&self) -> Option<(u32, u32)> {
+    /// The bits of x, y and altitude, if this is a setpoint.
+    pub(crate) fn setpoint(&self) -> Option<[u32; 3]> {
         self.text
             .starts_with("setpoint")
-            .then(|| (self.bits(" x ").unwrap(), self.bits(" altitude ").unwrap()))
+            .then(|| [" x ", " y ", " altitude "].map(|label| self.bits(label).unwrap()))
     }
 
     /// The counter `name` of a line that lists them.

@@ -76,15 +76,15 @@ fn settles(flight: &Flight) {
 
 #[test]
 fn five_choose_the_altitudes_of_the_simulated_chain() {
-    let flight = past(50.0, None, Method::Altitude);
+    let flight = past(50.0, None, Method::Joint);
     let low = 20.0_f32.to_bits();
     let places = simulated(&flight);
-    assert!(places.iter().all(|(_, altitude)| *altitude != low));
+    assert!(places.iter().all(|[.., altitude]| *altitude != low));
     settles(&flight);
     // One of them may not.
-    let flight = past(50.0, Some((4, 200.0)), Method::Altitude);
+    let flight = past(50.0, Some((4, 200.0)), Method::Joint);
     let held = simulated(&flight);
-    assert_eq!(held[3].1, 200.0_f32.to_bits());
+    assert_eq!(held[3][2], 200.0_f32.to_bits());
     assert_ne!(held, places);
     settles(&flight);
 }
@@ -92,10 +92,10 @@ fn five_choose_the_altitudes_of_the_simulated_chain() {
 /// From this interferer they get away along the link, and no altitude is better than theirs.
 #[test]
 fn five_stay_low_where_the_simulated_chain_does() {
-    let flight = past(150.0, None, Method::Altitude);
+    let flight = past(150.0, None, Method::Joint);
     let low = 20.0_f32.to_bits();
     let places = simulated(&flight);
-    assert!(places.iter().all(|(_, altitude)| *altitude == low));
+    assert!(places.iter().all(|[.., altitude]| *altitude == low));
     settles(&flight);
 }
 

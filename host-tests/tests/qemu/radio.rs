@@ -31,7 +31,7 @@ fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
     let left = [1, 2, 4, 5];
     let formed = simulated(&paper(4));
     // Each logs that it has been counted, then its new place, then the agreement.
-    let story = |lines: &[Line], drone: u16, place: &(u32, u32)| {
+    let story = |lines: &[Line], drone: u16, place: &[u32; 3]| {
         let mut new = lines[before..].iter().filter(|line| line.drone == drone);
         let counted = new.find(|line| line.text == "event Reformed")?;
         new.find(|line| line.setpoint() == Some(*place))?;

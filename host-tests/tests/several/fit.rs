@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use host_tests::brief;
 use host_tests::cases::{self, Case};
 use host_tests::random::seed;
 use host_tests::scenario::{Interference, Scenario, Source};
@@ -174,4 +175,37 @@ fn extreme_scenes_have_a_finite_fit() {
         ..of(1.0, (0.1, 0.1), &[(0.0, 0.0, 1.0)])
     };
     assert_eq!(hypothetical(&nobody), None);
+}
+
+/// Relays with room beside the line are told on which side the interferers are; above the line that makes no difference.
+#[test]
+fn with_room_beside_the_line_the_side_is_known() {
+    let source = |x_m: f64, y_m: f64| Source {
+        power_w: 50.0,
+        x_m,
+        y_m,
+    };
+    for side in [-1.0, 1.0] {
+        let scenario = Scenario {
+            lateral_min_m: -200.0,
+            lateral_max_m: 150.0,
+            interference: Interference::Sources(vec![
+                source(300.0, side * 250.0),
+                source(700.0, side * 120.0),
+                source(500.0, side * -900.0),
+            ]),
+            ..Scenario::default()
+        };
+        let one = brief::hypothetical(&scenario).unwrap();
+        assert!(one.y_m * side > 50.0, "{one:?}");
+        let (mission, _) = brief::mission(&scenario, 4, 1e-4).unwrap();
+        let told = f64::from(mission.interferer().unwrap().y_m);
+        assert!((told / one.y_m - 1.0).abs() < 1e-6, "{told} {one:?}");
+        let level = Scenario {
+            lateral_min_m: 0.0,
+            lateral_max_m: 0.0,
+            ..scenario
+        };
+        assert!(brief::hypothetical(&level).unwrap().y_m > 0.0);
+    }
 }

@@ -73,6 +73,8 @@ pub(crate) fn scenario(
         altitude_m,
         altitude_min_m: altitude_m,
         altitude_max_m,
+        lateral_min_m: 0.0,
+        lateral_max_m: 0.0,
         min_separation_m,
         tx_w: uav_w * log_uniform(rng, 0.3, 100.0),
         uav_w,

@@ -100,7 +100,7 @@ fn a_scene_is_what_the_scenario_says() {
     ];
     assert_eq!(scene.relays, want);
     assert!(scene.hop_sirs(&[(1.0, 20.0)]).is_empty());
-    assert_eq!(scene.chain_sir(&[]), 0.0);
+    assert_eq!(scene.chain_sir(&[] as &[(f64, f64)]), 0.0);
 }
 
 #[test]

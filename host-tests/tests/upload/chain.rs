@@ -66,7 +66,7 @@ fn a_new_band_of_altitudes_is_climbed_into_from_where_the_relays_are() {
         ..*base.config()
     };
     for method in [
-        Method::Altitude,
+        Method::Joint,
         Method::Adjust(Adjust {
             rounds: 20,
             explore_m: 10.0,

@@ -156,15 +156,18 @@ fn an_old_report_frees_nothing() {
 fn a_start_too_close_is_opened_before_anything_else() {
     let mut pair = Pair::new([100.0, 500.0], [104.0, 600.0]);
     let high = |x_m| Placement {
-        x_m,
-        altitude_m: 90.0,
+        y_m: 30.0,
+        ..Placement::on_line(x_m, 90.0)
     };
     pair.kept.guard.commit(high(600.0));
     pair.keeper.guard.commit(high(500.0));
     pair.talk();
     assert_eq!(pair.setpoints(), Both(94.0, 600.0));
-    let low = |one: &One| one.guard.setpoint().unwrap().altitude_m < 60.0;
-    assert!(low(&pair.keeper) && low(&pair.kept), "both altitudes wait");
+    let low = |one: &One| one.guard.setpoint().unwrap().cross_section() == at(0.0).cross_section();
+    assert!(
+        low(&pair.keeper) && low(&pair.kept),
+        "both altitudes wait, and what is aside"
+    );
     pair.keeper.is_at(94.0);
     pair.kept.is_at(200.0);
     pair.talk();

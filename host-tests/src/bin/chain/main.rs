@@ -18,7 +18,7 @@ use host_tests::sim::chain::Chain;
 use host_tests::sim::faults::Faults;
 use host_tests::sim::outcome::{Outcome, RelayEnd};
 use host_tests::sim::setup::Setup;
-use host_tests::svg::{self, Picture};
+use host_tests::svg::{self, Picture, room};
 use indicatif::{ProgressBar, ProgressStyle};
 use uav_relay::{Measure, Mission, Placement, Schedule, Wiring};
 
@@ -132,7 +132,7 @@ fn setup(options: &Options, mission: Mission) -> Result<Setup, Failure> {
         _ => Schedule::Bracketed,
     };
     setup.settings.method = match options.method {
-        Method::Altitude => uav_relay::Method::Altitude,
+        Method::Joint => uav_relay::Method::Joint,
         Method::Adjust => uav_relay::Method::Adjust(uav_relay::Adjust {
             rounds: options.rounds,
             explore_m: options.explore_m,
@@ -233,6 +233,11 @@ fn picture(
         let at = |place: Placement| (f64::from(place.x_m), f64::from(place.altitude_m));
         relay.setpoint.map_or((f64::NAN, f64::NAN), at)
     };
+    let aside = outcome.relays.iter().map(|relay| {
+        relay
+            .setpoint
+            .map_or(f64::NAN, |place| f64::from(place.y_m))
+    });
     let nodes = if report.relays.is_empty() && report.lost.is_empty() {
         Vec::new()
     } else {
@@ -252,6 +257,7 @@ fn picture(
         interferers,
         replaced,
         nodes,
+        room: room(mission, aside),
         hop_sir,
         lost,
         left_out,

@@ -61,7 +61,7 @@ pub(crate) struct Options {
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,
-    /// Draw the chain in the x-h plane, with each hop's SIR
+    /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
     #[command(flatten)]
@@ -76,8 +76,9 @@ pub(crate) enum Method {
     AlignStep,
     /// Algorithm 1, then Algorithm 2
     Adjust,
-    /// Joint distance and altitude
-    Altitude,
+    /// Places, sides and altitudes together
+    #[value(alias = "altitude")]
+    Joint,
     /// Algorithm 4 with bracketed targets
     Stochastic,
     /// Algorithm 4 with the fixed step

@@ -14,7 +14,7 @@ use crate::hostile::instant;
 pub(crate) struct Uploads {
     /// The ground uploads the mission of the scenario with other parameters S virtual seconds after the start, and the chain
     /// flies it. Keys as in a scenario file: x_m, y_m and power_w of the interferer, altitude_m, altitude_min_m,
-    /// altitude_max_m, min_separation_m, distance_m, tx_w, uav_w; and tolerance. Repeatable: versions count from 1
+    /// altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m, distance_m, tx_w, uav_w; and tolerance. Repeatable: versions count from 1
     #[arg(long, value_name = "S[:KEY=VALUE,..]", value_parser = planned)]
     upload: Vec<Planned>,
     /// Which end of the link uploads
@@ -57,6 +57,8 @@ enum Key {
     Altitude,
     Floor,
     Ceiling,
+    Left,
+    Right,
     Separation,
     Distance,
     TxPower,
@@ -65,13 +67,15 @@ enum Key {
 }
 
 /// The names of the keys, and the ranges of their values: those of a scenario file and of `--tolerance`.
-const KEYS: [(&str, Key, f64, f64); 11] = [
+const KEYS: [(&str, Key, f64, f64); 13] = [
     ("x_m", Key::X, -1e7, 1e7),
     ("y_m", Key::Y, -1e7, 1e7),
     ("power_w", Key::Power, 1e-6, 1e9),
     ("altitude_m", Key::Altitude, 0.1, 1e5),
     ("altitude_min_m", Key::Floor, 0.1, 1e5),
     ("altitude_max_m", Key::Ceiling, 0.1, 1e5),
+    ("lateral_min_m", Key::Left, -1e5, 0.0),
+    ("lateral_max_m", Key::Right, 0.0, 1e5),
     ("min_separation_m", Key::Separation, 0.0, 1e5),
     ("distance_m", Key::Distance, 1.0, 1e6),
     ("tx_w", Key::TxPower, 1e-6, 1e6),
@@ -149,6 +153,10 @@ impl Planned {
             band: Band {
                 least_m: to(Key::Floor, band.least_m),
                 most_m: to(Key::Ceiling, band.most_m),
+            },
+            lateral: Band {
+                least_m: to(Key::Left, base.lateral.least_m),
+                most_m: to(Key::Right, base.lateral.most_m),
             },
             interference: Interference::Source(Interferer {
                 power_w: to(Key::Power, at.power_w),

@@ -13,8 +13,8 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     let settled = [
         "settled",
         "agreed",
-        "altitude_settled",
-        "survey_settled",
+        "joint_settled",
+        "predicted_settled",
         "adjust_settled",
         "field_settled",
     ];
@@ -191,31 +191,6 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     (
-        "a wave of 16 levels and 4 targets, a relay's share",
-        "instructions",
-        &["wave_16"],
-        None,
-    ),
-    (
-        "a tube of 9 levels and 7 targets",
-        "instructions",
-        &["tube"],
-        None,
-    ),
-    (
-        "a wave of 64 levels and 1 target",
-        "instructions",
-        &["wave_64"],
-        None,
-    ),
-    (
-        "the longest wave's frame here",
-        "bytes",
-        &["wave_bytes"],
-        Some(237),
-    ),
-    ("RAM of a wave", "bytes", &["size_of_wave"], None),
-    (
         "one evaluation of both hops in Algorithm 2",
         "instructions",
         &["evaluation"],
@@ -260,11 +235,12 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     (
-        "the costliest call while altitudes are chosen",
+        "the costliest call of the joint method",
         "instructions",
-        &["altitude", "survey"],
+        &["joint", "predicted"],
         None,
     ),
+    ("its longest frame", "bytes", &["joint_bytes"], None),
     (
         "the costliest call of Algorithm 2",
         "instructions",
@@ -287,8 +263,8 @@ const CALLS: &[&str] = &[
     "verdict",
     "verdict_at_head",
     "predict",
-    "altitude",
-    "survey",
+    "joint",
+    "predicted",
     "adjust",
     "field",
     "sample",

@@ -9,7 +9,7 @@ use host_tests::command::{self, Failure};
 use host_tests::plan::{self, Ask, NoPlan, Plan};
 use host_tests::report::PlanReport;
 use host_tests::scenario::Scenario;
-use host_tests::svg::{self, Picture};
+use host_tests::svg::{self, Picture, room};
 
 use options::{Altitude, Options};
 
@@ -70,6 +70,10 @@ fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
             .iter()
             .map(|(place, _)| (f64::from(place.x_m), f64::from(place.altitude_m)))
             .collect(),
+        room: room(
+            &plan.mission,
+            plan.places.iter().map(|(place, _)| f64::from(place.y_m)),
+        ),
         hop_sir: plan.sirs.clone(),
         ..Picture::default()
     }

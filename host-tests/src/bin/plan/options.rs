@@ -31,7 +31,7 @@ pub(crate) struct Options {
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,
-    /// Draw the chain in the x-h plane, with each hop's SIR
+    /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
 }

@@ -5,7 +5,7 @@ use uav_relay::{Phase, Schedule};
 use super::{Chain, Member};
 
 /// Wake-ups and deliveries that a chain may take to agree once nothing is lost any more: 24 passes of 4 relays, each in 65
-/// portions, a leader's survey of the band in some ten thousand, and before that a few minutes of probation, with a few dozen
+/// portions, and before that a few minutes of probation, with a few dozen
 /// hails a second.
 const PATIENCE: usize = 40_000;
 

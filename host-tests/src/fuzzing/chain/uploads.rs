@@ -14,7 +14,7 @@ impl Chain {
         };
         let moved = Interferer {
             x_m: input.even(0.0, config.distance_m),
-            y_m: input.scaled(1e-3, config.distance_m),
+            y_m: input.even(-config.distance_m, config.distance_m),
             ..*interferer
         };
         let config = MissionConfig {

@@ -4,12 +4,16 @@ use uav_relay::{Duration, Instant, Placement};
 
 use super::super::queue::Happening;
 use super::Chain;
+use crate::command::narrow;
+
+/// A place in the air: x, y and altitude, m.
+type Point = [f64; 3];
 
 /// How drones fly.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FlightSpec {
-    /// Where each one hovers when it is switched on: x and altitude, m.
-    pub start: Vec<(f64, f64)>,
+    /// Where each one hovers when it is switched on: x, y and altitude, m.
+    pub start: Vec<[f64; 3]>,
     /// How fast each one flies, m/s, above 0.
     pub speed_mps: Vec<f64>,
     /// Between two reports of where a drone is, and two steps of the flight.
@@ -25,21 +29,22 @@ pub(super) struct Flight {
 
 #[derive(Clone, Copy, Debug)]
 struct Drone {
-    at: (f64, f64),
-    goal: (f64, f64),
+    at: Point,
+    goal: Point,
     speed_mps: f64,
 }
 
 impl Drone {
     /// Flies straight to its goal for `step_s` seconds.
     fn fly(&mut self, step_s: f64) {
-        let (dx, dh) = (self.goal.0 - self.at.0, self.goal.1 - self.at.1);
-        let (left, way) = (dx.hypot(dh), self.speed_mps * step_s);
-        self.at = if left <= way {
-            self.goal
-        } else {
-            (self.at.0 + dx / left * way, self.at.1 + dh / left * way)
-        };
+        let (left, way) = (apart(self.at, self.goal), self.speed_mps * step_s);
+        if left <= way {
+            self.at = self.goal;
+            return;
+        }
+        for (at, goal) in self.at.iter_mut().zip(self.goal) {
+            *at += (goal - *at) / left * way;
+        }
     }
 }
 
@@ -63,8 +68,7 @@ impl Flight {
         let mut nearest = f64::INFINITY;
         for (at, one) in self.drones.iter().enumerate() {
             for other in self.drones.iter().skip(at + 1) {
-                let apart = (one.at.0 - other.at.0).hypot(one.at.1 - other.at.1);
-                nearest = nearest.min(apart);
+                nearest = nearest.min(apart(one.at, other.at));
             }
         }
         nearest
@@ -98,7 +102,7 @@ impl Chain {
             }
             member.relay.handle_position(now, now, placement(drone.at));
             if let Some(place) = member.relay.setpoint() {
-                drone.goal = (f64::from(place.x_m), f64::from(place.altitude_m));
+                drone.goal = point(place);
             }
             self.drain(index);
         }
@@ -116,19 +120,28 @@ impl Chain {
         living
             .filter(|(member, _)| member.killed.is_none())
             .all(|(member, drone)| {
-                member.relay.agreed().is_some_and(|place| {
-                    let off_m = (f64::from(place.x_m) - drone.at.0)
-                        .hypot(f64::from(place.altitude_m) - drone.at.1);
-                    off_m < 1e-3
-                })
+                let agreed = member.relay.agreed();
+                agreed.is_some_and(|place| apart(point(place), drone.at) < 1e-3)
             })
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "a place in metres")]
-fn placement((x_m, altitude_m): (f64, f64)) -> Placement {
+/// How far apart two places are, m.
+fn apart(one: Point, other: Point) -> f64 {
+    let [x, y, h] = one;
+    let [other_x, other_y, other_h] = other;
+    (x - other_x).hypot(y - other_y).hypot(h - other_h)
+}
+
+fn point(place: Placement) -> Point {
+    [place.x_m, place.y_m, place.altitude_m].map(f64::from)
+}
+
+fn placement(at: Point) -> Placement {
+    let [x_m, y_m, altitude_m] = at.map(narrow);
     Placement {
-        x_m: x_m as f32,
-        altitude_m: altitude_m as f32,
+        x_m,
+        y_m,
+        altitude_m,
     }
 }

@@ -1,0 +1,218 @@
+//! The view from above: where there is room beside the line, and nowhere else.
+
+use host_tests::svg::{Picture, Room, draw};
+use roxmltree::{Document, Node};
+
+use super::{all, chain, extent, has_text, level, number, tip};
+
+/// The view from the side ends here, the legend's height less.
+const SIDE: f64 = 282.0;
+
+/// A chain that swings out to the left of an interferer on its right, over `edge` of the room's half.
+fn swung(relays: usize, edge: f64) -> Picture {
+    let picture = chain(relays, 1000.0, |share| 20.0 + 800.0 * share * (1.0 - share));
+    let share = |number: usize| number as f64 / (relays as f64 + 1.0);
+    let y_m =
+        (1..=relays).map(|number| -4.0 * edge * 280.0 * share(number) * (1.0 - share(number)));
+    Picture {
+        interferers: vec![(80.0, 500.0, 150.0)],
+        room: Some(Room {
+            least_m: -280.0,
+            most_m: 280.0,
+            y_m: y_m.collect(),
+        }),
+        ..picture
+    }
+}
+
+fn gallery() -> Vec<Picture> {
+    let mut pictures: Vec<Picture> = [1, 2, 8, 20, 50, 1000]
+        .map(|relays| swung(relays, 0.9))
+        .into();
+    pictures.push(swung(8, 0.0));
+    pictures.push(Picture {
+        interferers: vec![
+            (80.0, 500.0, 0.0),
+            (40.0, 100.0, 279.0),
+            (5.0, 900.0, -3000.0),
+            (1.0, 5000.0, 20.0),
+        ],
+        replaced: vec![(30.0, 200.0, -100.0)],
+        lost: vec![3],
+        left_out: vec![5],
+        events: vec![(5.0, "relay 3 silent".to_owned())],
+        ..swung(8, 1.0)
+    });
+    let mut narrow = swung(8, 0.01);
+    narrow.room = narrow.room.map(|room| Room {
+        least_m: 0.0,
+        most_m: 3.0,
+        ..room
+    });
+    pictures.push(narrow);
+    pictures
+}
+
+/// Height of the picture, and where the shapes of this class are in it: from the side, and from above.
+fn parts<'a>(
+    document: &'a Document<'a>,
+    tag: &'a str,
+    class: &'a str,
+    key: &str,
+) -> [Vec<Node<'a, 'a>>; 2] {
+    let (side, above) = all(document, tag, class)
+        .into_iter()
+        .partition(|node| number(node, key) < SIDE);
+    [side, above]
+}
+
+#[test]
+fn without_room_beside_the_line_there_is_one_view() {
+    let svg = draw(&level(8));
+    let document = Document::parse(&svg).unwrap();
+    assert!(!has_text(&document, "from above") && !has_text(&document, "y (m)"));
+    assert!(all(&document, "line", "edge").is_empty());
+}
+
+#[test]
+fn both_views_have_every_relay_and_every_hop_inside_the_frame() {
+    for picture in gallery() {
+        let svg = draw(&picture);
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+        let document = Document::parse(&svg).unwrap();
+        let high = number(&document.root_element(), "height");
+        let relays = picture.nodes.len();
+        for view in parts(&document, "circle", "relay", "cy") {
+            assert_eq!(view.len(), relays);
+        }
+        let hops = relays + 1 - picture.left_out.len();
+        for view in parts(&document, "line", "hop", "y1") {
+            assert_eq!(view.len(), hops);
+        }
+        for node in document.descendants() {
+            for (names, limit) in [
+                (["x1", "x2", "cx", "x"], 480.0),
+                (["y1", "y2", "cy", "y"], high),
+            ] {
+                for value in names.iter().filter_map(|name| node.attribute(*name)) {
+                    let value: f64 = value.parse().unwrap();
+                    assert!((0.0..=limit).contains(&value), "{node:?}");
+                }
+            }
+        }
+        for wanted in ["from the side", "from above", "h (m)", "y (m)"] {
+            assert!(has_text(&document, wanted), "{wanted}");
+        }
+    }
+}
+
+/// y grows downward: it is to the right of x. The places of relays, interferer and edges are to one scale.
+#[test]
+fn the_view_from_above_is_to_scale() {
+    let picture = swung(8, 0.9);
+    let svg = draw(&picture);
+    let document = Document::parse(&svg).unwrap();
+    let edges: Vec<f64> = all(&document, "line", "edge")
+        .iter()
+        .map(|line| number(line, "y1"))
+        .collect();
+    let [left, right] = edges[..] else {
+        panic!("{edges:?}")
+    };
+    assert!(left < right, "{edges:?}");
+    let at = |y: f64| left + (y + 280.0) / 560.0 * (right - left);
+    let [_, above] = parts(&document, "circle", "relay", "cy");
+    let room = picture.room.unwrap();
+    for ((circle, y), number_of) in above.iter().zip(room.y_m).zip(1..) {
+        assert!((number(circle, "cy") - at(y)).abs() < 0.02, "{number_of}");
+        assert!(
+            tip(circle).contains(&format!("y = {y:.2} m")),
+            "{}",
+            tip(circle)
+        );
+    }
+    let marks = all(&document, "path", "source");
+    let tops: Vec<(f64, f64)> = marks
+        .iter()
+        .filter(|mark| mark.children().any(|child| child.has_tag_name("title")))
+        .map(|mark| {
+            let start = mark.attribute("d").unwrap()[1..].split('L').next().unwrap();
+            let (x, y) = start.split_once(' ').unwrap();
+            (x.parse().unwrap(), y.parse().unwrap())
+        })
+        .collect();
+    // From the side it is on the ground, from above at its place: the top corner is 6 above.
+    let [side, above] = tops[..] else {
+        panic!("{tops:?}")
+    };
+    assert_eq!(side.0, above.0);
+    assert!((above.1 + 6.0 - at(150.0)).abs() < 0.02, "{tops:?}");
+}
+
+#[test]
+fn words_never_cover_each_other_in_either_view() {
+    for picture in gallery() {
+        let svg = draw(&picture);
+        let document = Document::parse(&svg).unwrap();
+        let mut extents: Vec<([f64; 4], String)> = Vec::new();
+        for (class, size) in [
+            ("sir", 10.0),
+            ("node", 9.0),
+            ("faint", 10.0),
+            ("bold", 10.0),
+        ] {
+            let texts = all(&document, "text", class);
+            extents.extend(
+                texts
+                    .iter()
+                    .map(|text| (extent(text, size), super::words(text))),
+            );
+        }
+        for (index, (a, one)) in extents.iter().enumerate() {
+            for (b, other) in &extents[..index] {
+                let apart = a[1] <= b[0] || b[1] <= a[0] || a[3] <= b[2] || b[3] <= a[2];
+                assert!(apart, "{one} at {a:?} covers {other} at {b:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_hop_of_a_short_chain_has_its_number_in_both_views_and_every_relay_from_above() {
+    for relays in [1, 2, 8] {
+        let svg = draw(&swung(relays, 0.9));
+        let document = Document::parse(&svg).unwrap();
+        for view in parts(&document, "text", "sir", "y") {
+            assert_eq!(view.len(), relays + 1);
+        }
+        let [_, above] = parts(&document, "text", "node", "y");
+        assert_eq!(above.len(), relays);
+    }
+}
+
+#[test]
+fn hostile_rooms_still_make_a_picture() {
+    for room in [
+        Room::default(),
+        Room {
+            least_m: f64::NAN,
+            most_m: f64::INFINITY,
+            y_m: vec![f64::NAN, 1e300, -1e308],
+        },
+        Room {
+            least_m: -1e300,
+            most_m: 1e-300,
+            y_m: vec![0.0; 99],
+        },
+    ] {
+        let svg = draw(&Picture {
+            room: Some(room.clone()),
+            ..level(8)
+        });
+        assert!(
+            !svg.contains("NaN") && !svg.contains("inf"),
+            "{room:?} {svg}"
+        );
+        Document::parse(&svg).unwrap();
+    }
+}
