@@ -4,7 +4,7 @@ use uav_relay::mission::MAX_RELAYS;
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};
-use uav_relay::wire::message::Message;
+use uav_relay::wire::message::{Message, TRIALS, Trial};
 use uav_relay::{Identity, Instant, Mission, Port, Relay, Stats};
 
 use super::cobs::stuffed;
@@ -222,10 +222,23 @@ fn look_at(message: &Message) {
                 "{targets:?}"
             );
             assert!(sweep.reaches.len() <= targets.len());
-            assert!(sweep.relay.at.altitude_m > 0.0 && sweep.relay.power_w > 0.0);
+            assert!(is_beside(sweep.relay.at.y_m) && is_flown(sweep.relay.at.altitude_m));
+            assert!((1e-6..=1e6).contains(&sweep.relay.power_w));
+            let across = sweep.chosen || sweep.relay.at.y_m.to_bits() == 0;
+            assert!(across && !(sweep.chosen && sweep.measured_per_w.is_some()));
         }
         Message::Course(course) => {
-            assert!(course.trials.iter().all(|trial| is_target(trial.target)));
+            assert!((1e-6..=1e6).contains(&course.power_w));
+            assert!(course.trials.len() <= TRIALS);
+            for Trial { target, place } in &course.trials {
+                assert!(is_target(*target) && (0.0..=1e6).contains(&place.x_m));
+                assert!(is_beside(place.y_m) && is_flown(place.altitude_m));
+            }
+        }
+        Message::Worth(worth) => {
+            assert!(worth.trial.is_none_or(|trial| usize::from(trial) < TRIALS));
+            let parts = worth.outlook.parts();
+            assert!(parts.iter().all(|part| part.is_finite()), "{parts:?}");
         }
         Message::Token(token) => {
             assert!(token.place.x_m.is_finite() && token.place.altitude_m > 0.0);
@@ -254,10 +267,18 @@ fn look_at(message: &Message) {
             let same = Mission::try_new(*upload.config()).is_ok();
             assert!(same && upload.version() > 0, "{upload:?}");
         }
-        Message::Busy { .. } | Message::Heartbeat { .. } | Message::Worth(_) => {}
+        Message::Busy { .. } | Message::Heartbeat { .. } => {}
     }
 }
 
 fn is_target(sir: f32) -> bool {
     (f32::MIN_POSITIVE..=f32::MAX).contains(&sir)
+}
+
+fn is_beside(y_m: f32) -> bool {
+    y_m.abs() <= 1e5
+}
+
+fn is_flown(altitude_m: f32) -> bool {
+    (0.1..=1e5).contains(&altitude_m)
 }

@@ -72,35 +72,46 @@ pub fn sealed(plain: &mut Vec<u8>) {
     plain.extend_from_slice(&crc.finish().to_le_bytes());
 }
 
-/// A body of any of the fourteen kinds, or of none.
+/// A body of any of the fifteen kinds, or of none.
 pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
-    let tag = input.below(15);
+    let tag = input.below(16);
     let mut body = Body {
         bytes: vec![tag],
         input,
         known,
     };
     match tag {
-        0 => body.sweep(false),
+        0 => body.sweep(Extra::Nothing),
         1 => body.verdict(),
         2 => body.number(),
         3 => {
             body.digest();
             body.small(0, 1);
         }
-        4 => body.sweep(true),
-        5 => body.wave(),
-        6 => body.trace(),
-        7 => body.token(),
-        8 => body.moved(),
-        9 => body.hail(),
-        10 => body.roster(),
-        11 => body.count(),
-        12 => body.fence(),
-        13 => body.offer(),
+        4 => body.sweep(Extra::Upsilon),
+        5 => body.sweep(Extra::Aside),
+        6 => body.course(),
+        7 => body.worth(),
+        8 => body.token(),
+        9 => body.moved(),
+        10 => body.hail(),
+        11 => body.roster(),
+        12 => body.count(),
+        13 => body.fence(),
+        14 => body.offer(),
         _ => body.bytes = body.input.piece().to_vec(),
     }
     body.bytes
+}
+
+/// What a sweep may have between the sender's profile and its reaches.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Extra {
+    Nothing,
+    /// What it measures.
+    Upsilon,
+    /// How far it is from the line.
+    Aside,
 }
 
 /// A body being written.
@@ -201,6 +212,12 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, distance_m));
     }
 
+    /// How far from the line: as far as relays may go, or hardly.
+    fn beside(&mut self) {
+        let most_m = if self.input.flag() { 1e5 } else { 100.0 };
+        self.float(|input| input.even(-most_m, most_m));
+    }
+
     /// A list of floats with its count: one number over and over, or each its own.
     fn list(&mut self, most: u8, low: f32, high: f32) {
         let count = self.small(0, most);
@@ -215,7 +232,7 @@ impl Body<'_, '_> {
         }
     }
 
-    fn sweep(&mut self, measured: bool) {
+    fn sweep(&mut self, extra: Extra) {
         self.pass();
         self.sir();
         let single = self.input.flag();
@@ -226,8 +243,12 @@ impl Body<'_, '_> {
         };
         self.bytes.extend_from_slice(&[gap, growth]);
         self.profile();
-        if measured {
-            self.float(|input| input.scaled(1e-9, 1e32));
+        match extra {
+            Extra::Nothing => {}
+            Extra::Upsilon => {
+                self.float(|input| input.scaled(1e-9, 1e32));
+            }
+            Extra::Aside => self.beside(),
         }
         let distance_m = self.known.distance_m;
         self.list(if single { 1 } else { 16 }, 0.0, distance_m);
@@ -235,6 +256,7 @@ impl Body<'_, '_> {
 
     fn verdict(&mut self) {
         self.pass();
+        self.small(0, 1);
         if self.small(0, 1) == 1 {
             self.small(0, 15);
         }
@@ -242,43 +264,34 @@ impl Body<'_, '_> {
         self.list(16, -distance_m, distance_m);
     }
 
-    fn wave(&mut self) {
+    /// Trials of places beside the line, each with its own target.
+    fn course(&mut self) {
         self.pass();
-        self.sir();
-        self.float(|input| input.scaled(1e-6, 1e6));
-        let targets = self.small(1, 16);
-        self.altitude();
-        self.float(|input| input.even(0.0, 1e3));
-        let levels = self.small(1, 64);
         self.power();
-        let pairs = u16::from(targets) * u16::from(levels);
-        let len = 3 * pairs.min(64);
-        let [low, high] = len.to_le_bytes();
-        if len < 128 {
-            self.bytes.push(low);
-        } else {
-            // A varint of two bytes.
-            self.bytes.push(low | 0x80);
-            self.bytes.push(high << 1 | low >> 7);
-        }
-        let place = [self.input.byte(), self.input.byte(), self.input.byte()];
-        let same = self.input.flag();
-        for at in 0..pairs.min(64) {
-            let place = if same || at == 0 {
-                place
-            } else {
-                [0, self.input.byte(), self.input.byte()]
-            };
-            self.bytes.extend_from_slice(&place);
+        for _ in 0..self.small(0, 4) {
+            self.sir();
+            self.place();
+            self.beside();
+            self.altitude();
         }
     }
 
-    fn trace(&mut self) {
+    /// Slopes, bends and gains, many of them nothing, as where there is no room to move, and a slack.
+    fn worth(&mut self) {
         self.pass();
         if self.small(0, 1) == 1 {
-            self.small(0, 15);
-            self.small(0, 63);
+            self.small(0, 3);
         }
+        let flat = self.input.flag();
+        for _ in 0..16 {
+            if flat {
+                self.bytes.extend_from_slice(&[0; 4]);
+            } else {
+                self.float(|input| input.even(-1e3, 1e3));
+            }
+        }
+        let distance_m = self.known.distance_m;
+        self.float(|input| input.even(-distance_m, distance_m));
     }
 
     fn token(&mut self) {

@@ -40,7 +40,7 @@ impl Body<'_, '_> {
         self.word(relays);
     }
 
-    /// The paper's mission with the interferer somewhere else, and any altitudes or one.
+    /// The paper's mission with the interferer somewhere else, any altitudes or one, and room to the side or none.
     fn paper(&mut self) {
         self.reals(&PAPER);
         self.float(|input| input.scaled(1.0, 1e4));
@@ -51,6 +51,8 @@ impl Body<'_, '_> {
         self.losses([los, nlos, los]);
         let most_m = if self.input.flag() { 300.0 } else { 20.0 };
         self.reals(&[20.0, most_m]);
+        let room_m = if self.input.flag() { 0.0 } else { 50.0 };
+        self.reals(&[-room_m, room_m]);
     }
 
     /// Every number from the whole of its range.
@@ -75,6 +77,8 @@ impl Body<'_, '_> {
         self.losses([los, nlos, eta]);
         self.float(|_| least_m);
         self.float(|_| most_m);
+        self.float(|input| input.even(-1e5, 0.0));
+        self.float(|input| input.even(0.0, 1e5));
     }
 
     /// Path-loss factors, rarely one of them any number at all.
