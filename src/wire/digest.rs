@@ -94,6 +94,15 @@ mod tests {
                 };
             })
         );
+        assert_ne!(
+            same,
+            of(|c| {
+                c.lateral = Band {
+                    least_m: -60.0,
+                    most_m: 40.0,
+                };
+            })
+        );
         assert_ne!(same, of(|c| c.tolerance = 2e-4));
     }
 }
