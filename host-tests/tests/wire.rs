@@ -20,6 +20,8 @@ use uav_relay::wire::crc::Crc32c;
 
 #[path = "wire/codec.rs"]
 mod codec;
+#[path = "wire/course.rs"]
+mod course;
 #[path = "wire/damage.rs"]
 mod damage;
 #[path = "wire/document.rs"]
@@ -60,8 +62,6 @@ mod stream;
 mod uploads;
 #[path = "wire/views.rs"]
 mod views;
-#[path = "wire/wave.rs"]
-mod wave;
 
 /// `cases` cases from the seed in `SEED`; a failure prints its shrunk input and leaves no file behind.
 fn config(cases: u32) -> Config {

@@ -11,7 +11,7 @@ use super::kinds::{Attacker, Kind, raised};
 use super::net::{Deed, Heard, NETWORK, Net, mission, newer};
 
 /// The first byte of the body of an offer.
-const OFFER: u8 = 13;
+const OFFER: u8 = 14;
 
 pub(crate) fn is_offer(frame: &Plain) -> bool {
     !frame.is_hello() && frame.0.get(HEADER) == Some(&OFFER)

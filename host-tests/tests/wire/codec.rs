@@ -5,17 +5,17 @@ use crc::{CRC_32_ISCSI, Crc};
 use serde::Deserialize;
 use uav_relay::guard::Fence;
 use uav_relay::placement::PerTarget;
+use uav_relay::placement::joint::Outlook;
 use uav_relay::placement::ladder::Ladder;
-use uav_relay::placement::levels::Levels;
 use uav_relay::placement::verdict::Verdict;
-use uav_relay::placement::wave::{Choice, Rungs};
+use uav_relay::sir::{CrossSection, Station};
 use uav_relay::wire::digest::Stamp;
 use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{
-    Answer, Before, Count, Hail, Message, MessageError, Moved, Roster, Sweep, Token, Trace, Turn,
-    Wave,
+    Answer, Before, Count, Course, Hail, Message, MessageError, Moved, Roster, Sweep, Token, Trial,
+    Turn, Worth,
 };
-use uav_relay::{Local, Placement, Profile};
+use uav_relay::{Local, Placement};
 
 use super::offer::Offer;
 
@@ -35,6 +35,7 @@ pub(crate) enum Said {
     Verdict {
         number: u16,
         mission: u16,
+        own: bool,
         commit: Option<u8>,
         slacks: Vec<f32>,
     },
@@ -56,23 +57,29 @@ pub(crate) enum Said {
         upsilon_per_w: f32,
         reaches: Vec<f32>,
     },
-    Wave {
+    Aside {
         number: u16,
         mission: u16,
-        base: f32,
-        rise: f32,
-        targets: u8,
-        centre_m: f32,
-        width_m: f32,
-        levels: u8,
+        anchor: f32,
+        gap: u8,
+        growth: u8,
+        altitude_m: f32,
         power_w: f32,
-        /// The bytes of the places.
-        reaches: Vec<u8>,
+        y_m: f32,
+        reaches: Vec<f32>,
     },
-    Trace {
+    Course {
         number: u16,
         mission: u16,
-        choice: Option<[u8; 2]>,
+        power_w: f32,
+        /// Target, x, y and altitude of each.
+        trials: Vec<[f32; 4]>,
+    },
+    Worth {
+        number: u16,
+        mission: u16,
+        trial: Option<u8>,
+        outlook: [f32; 17],
     },
     Token {
         number: u16,
@@ -157,28 +164,20 @@ impl Said {
                 power_w,
                 reaches,
             } => {
-                out.push(0);
-                out.extend(number.to_le_bytes());
-                out.extend(mission.to_le_bytes());
-                out.extend(anchor.to_le_bytes());
-                out.extend([*gap, *growth]);
-                out.extend(altitude_m.to_le_bytes());
-                out.extend(power_w.to_le_bytes());
+                out = ladder(0, [*number, *mission], (*anchor, *gap, *growth));
+                reals(&mut out, &[*altitude_m, *power_w]);
                 list(&mut out, reaches);
             }
             Self::Verdict {
                 number,
                 mission,
+                own,
                 commit,
                 slacks,
             } => {
-                out.push(1);
-                out.extend(number.to_le_bytes());
-                out.extend(mission.to_le_bytes());
-                match commit {
-                    None => out.push(0),
-                    Some(target) => out.extend([1, *target]),
-                }
+                out = pass(1, [*number, *mission]);
+                out.push(u8::from(*own));
+                option(&mut out, *commit);
                 list(&mut out, slacks);
             }
             Self::Busy { number } => {
@@ -201,52 +200,45 @@ impl Said {
                 upsilon_per_w,
                 reaches,
             } => {
-                out.push(4);
-                out.extend(number.to_le_bytes());
-                out.extend(mission.to_le_bytes());
-                out.extend(anchor.to_le_bytes());
-                out.extend([*gap, *growth]);
+                out = ladder(4, [*number, *mission], (*anchor, *gap, *growth));
                 reals(&mut out, &[*altitude_m, *power_w, *upsilon_per_w]);
                 list(&mut out, reaches);
             }
-            Self::Wave {
+            Self::Aside {
                 number,
                 mission,
-                base,
-                rise,
-                targets,
-                centre_m,
-                width_m,
-                levels,
+                anchor,
+                gap,
+                growth,
+                altitude_m,
                 power_w,
+                y_m,
                 reaches,
             } => {
-                out.push(5);
-                out.extend(number.to_le_bytes());
-                out.extend(mission.to_le_bytes());
-                reals(&mut out, &[*base, *rise]);
-                out.push(*targets);
-                reals(&mut out, &[*centre_m, *width_m]);
-                out.push(*levels);
-                reals(&mut out, &[*power_w]);
-                match u8::try_from(reaches.len()).unwrap() {
-                    count @ 0..128 => out.push(count),
-                    count => out.extend([count, 1]),
-                }
-                out.extend(reaches);
+                out = ladder(5, [*number, *mission], (*anchor, *gap, *growth));
+                reals(&mut out, &[*altitude_m, *power_w, *y_m]);
+                list(&mut out, reaches);
             }
-            Self::Trace {
+            Self::Course {
                 number,
                 mission,
-                choice,
+                power_w,
+                trials,
             } => {
-                out.push(6);
-                out.extend(number.to_le_bytes());
-                out.extend(mission.to_le_bytes());
-                match choice {
-                    None => out.push(0),
-                    Some([target, level]) => out.extend([1, *target, *level]),
-                }
+                out = pass(6, [*number, *mission]);
+                reals(&mut out, &[*power_w]);
+                out.push(u8::try_from(trials.len()).unwrap());
+                reals(&mut out, trials.as_flattened());
+            }
+            Self::Worth {
+                number,
+                mission,
+                trial,
+                outlook,
+            } => {
+                out = pass(7, [*number, *mission]);
+                option(&mut out, *trial);
+                reals(&mut out, outlook);
             }
             Self::Token {
                 number,
@@ -260,9 +252,7 @@ impl Said {
                 rows,
                 sir,
             } => {
-                out.push(7);
-                out.extend(number.to_le_bytes());
-                out.extend(mission.to_le_bytes());
+                out = pass(8, [*number, *mission]);
                 reals(&mut out, &[*x_m, *altitude_m, *power_w]);
                 out.push(*turn);
                 reals(&mut out, &[*explore_m]);
@@ -277,16 +267,14 @@ impl Said {
                 any,
                 worst,
             } => {
-                out.push(8);
-                out.extend(number.to_le_bytes());
-                out.extend(mission.to_le_bytes());
+                out = pass(9, [*number, *mission]);
                 reals(&mut out, &[*x_m, *altitude_m]);
                 out.push(u8::from(*any));
                 reals(&mut out, &[*worst]);
             }
-            Self::Hail(forming) => out = forming.body(9),
-            Self::Roster(forming) => out = forming.body(10),
-            Self::Count(forming) => out = forming.body(11),
+            Self::Hail(forming) => out = forming.body(10),
+            Self::Roster(forming) => out = forming.body(11),
+            Self::Count(forming) => out = forming.body(12),
             Self::Fence {
                 number,
                 mission,
@@ -295,7 +283,7 @@ impl Said {
                 x_m,
                 target_m,
             } => {
-                out.push(12);
+                out.push(13);
                 for word in [number, mission, echo, fence] {
                     out.extend(word.to_le_bytes());
                 }
@@ -324,10 +312,8 @@ impl Said {
                 number,
                 mission,
                 ladder: Ladder::from_parts(anchor, gap, growth).unwrap(),
-                profile: Profile {
-                    altitude_m,
-                    power_w,
-                },
+                relay: station(0.0, altitude_m, power_w),
+                chosen: false,
                 measured_per_w: None,
                 reaches: per_target(reaches),
             }),
@@ -345,16 +331,34 @@ impl Said {
                 number,
                 mission,
                 ladder: Ladder::from_parts(anchor, gap, growth).unwrap(),
-                profile: Profile {
-                    altitude_m,
-                    power_w,
-                },
+                relay: station(0.0, altitude_m, power_w),
+                chosen: false,
                 measured_per_w: Some(upsilon_per_w),
+                reaches: per_target(reaches),
+            }),
+            Self::Aside {
+                number,
+                mission,
+                anchor,
+                gap,
+                growth,
+                altitude_m,
+                power_w,
+                y_m,
+                ref reaches,
+            } => Message::Sweep(Sweep {
+                number,
+                mission,
+                ladder: Ladder::from_parts(anchor, gap, growth).unwrap(),
+                relay: station(y_m, altitude_m, power_w),
+                chosen: true,
+                measured_per_w: None,
                 reaches: per_target(reaches),
             }),
             Self::Verdict {
                 number,
                 mission,
+                own,
                 commit,
                 ref slacks,
             } => Message::Verdict(Answer {
@@ -364,36 +368,31 @@ impl Said {
                     commit,
                     slacks: per_target(slacks),
                 },
+                own,
             }),
             Self::Busy { number } => Message::Busy { sweep: number },
             Self::Heartbeat { mission, answer } => Message::Heartbeat { mission, answer },
-            Self::Wave {
+            Self::Course {
                 number,
                 mission,
-                base,
-                rise,
-                targets,
-                centre_m,
-                width_m,
-                levels,
                 power_w,
-                ref reaches,
-            } => Message::Wave(Wave {
+                ref trials,
+            } => Message::Course(Course {
                 number,
                 mission,
-                rungs: Rungs::from_parts(base, rise, targets).unwrap(),
-                levels: Levels::from_parts(centre_m, width_m, levels).unwrap(),
                 power_w,
-                reaches,
+                trials: trials.iter().copied().map(trial).collect(),
             }),
-            Self::Trace {
+            Self::Worth {
                 number,
                 mission,
-                choice,
-            } => Message::Trace(Trace {
+                trial,
+                outlook,
+            } => Message::Worth(Worth {
                 number,
                 mission,
-                choice: choice.map(|[target, level]| Choice { target, level }),
+                trial,
+                outlook: Outlook::from_parts(outlook).unwrap(),
             }),
             Self::Token {
                 number,
@@ -409,7 +408,7 @@ impl Said {
             } => Message::Token(Token {
                 number,
                 mission,
-                place: Placement { x_m, altitude_m },
+                place: Placement::on_line(x_m, altitude_m),
                 power_w,
                 turn: match (turn, columns) {
                     (0, _) => Turn::Look,
@@ -435,7 +434,7 @@ impl Said {
             } => Message::Moved(Moved {
                 number,
                 mission,
-                place: Placement { x_m, altitude_m },
+                place: Placement::on_line(x_m, altitude_m),
                 any,
                 worst,
             }),
@@ -537,30 +536,26 @@ impl Said {
                     && slacks.iter().all(|slack| (-2e9..=2e9).contains(slack))
             }
             Self::Busy { .. } | Self::Heartbeat { .. } => true,
-            Self::Wave {
-                base,
-                rise,
-                targets,
-                centre_m,
-                width_m,
-                levels,
+            Self::Aside {
+                anchor,
+                gap,
+                growth,
+                altitude_m,
                 power_w,
+                y_m,
                 reaches,
                 ..
             } => {
-                let pairs = usize::from(*targets) * usize::from(*levels);
-                (f32::MIN_POSITIVE..=1e30).contains(base)
-                    && (0.0..=1e6).contains(rise)
-                    && (1..=16).contains(targets)
-                    && is_altitude(*centre_m)
-                    && (0.0..=1e5).contains(width_m)
-                    && (1..=64).contains(levels)
+                is_sweep((*anchor, *gap, *growth), reaches)
+                    && is_altitude(*altitude_m)
                     && is_power(*power_w)
-                    && pairs <= 64
-                    && reaches.len() == 3 * pairs
+                    && is_beside(*y_m)
             }
-            Self::Trace { choice, .. } => {
-                choice.is_none_or(|[target, level]| target <= 63 && level <= 63)
+            Self::Course {
+                power_w, trials, ..
+            } => is_power(*power_w) && trials.iter().copied().all(is_trial),
+            Self::Worth { trial, outlook, .. } => {
+                trial.is_none_or(|trial| trial < 4) && outlook.iter().all(|part| part.is_finite())
             }
             Self::Token {
                 x_m,
@@ -624,6 +619,17 @@ fn is_place(x_m: f32) -> bool {
     (0.0..=1e6).contains(&x_m)
 }
 
+fn is_beside(y_m: f32) -> bool {
+    (-1e5..=1e5).contains(&y_m)
+}
+
+fn is_trial([target, x_m, y_m, altitude_m]: [f32; 4]) -> bool {
+    (f32::MIN_POSITIVE..=1e30).contains(&target)
+        && is_place(x_m)
+        && is_beside(y_m)
+        && is_altitude(altitude_m)
+}
+
 fn is_sir(sir: f32) -> bool {
     (0.0..f32::INFINITY).contains(&sir)
 }
@@ -636,6 +642,48 @@ fn is_sweep((anchor, gap, growth): (f32, u8, u8), reaches: &[f32]) -> bool {
         && targets[targets.len() - 1] < f32::INFINITY
         && reaches.len() <= targets.len()
         && reaches.iter().all(|reach| (0.0..=2e9).contains(reach))
+}
+
+fn station(y_m: f32, altitude_m: f32, power_w: f32) -> Station {
+    Station {
+        at: CrossSection { y_m, altitude_m },
+        power_w,
+    }
+}
+
+fn trial([target, x_m, y_m, altitude_m]: [f32; 4]) -> Trial {
+    Trial {
+        target,
+        place: Placement {
+            x_m,
+            y_m,
+            altitude_m,
+        },
+    }
+}
+
+/// What the message of a pass begins with: its tag, its number, the digest.
+fn pass(tag: u8, words: [u16; 2]) -> Vec<u8> {
+    let mut out = vec![tag];
+    for word in words {
+        out.extend(word.to_le_bytes());
+    }
+    out
+}
+
+/// What a sweep begins with.
+fn ladder(tag: u8, words: [u16; 2], (anchor, gap, growth): (f32, u8, u8)) -> Vec<u8> {
+    let mut out = pass(tag, words);
+    reals(&mut out, &[anchor]);
+    out.extend([gap, growth]);
+    out
+}
+
+fn option(out: &mut Vec<u8>, byte: Option<u8>) {
+    match byte {
+        None => out.push(0),
+        Some(byte) => out.extend([1, byte]),
+    }
 }
 
 fn reals(out: &mut Vec<u8>, numbers: &[f32]) {
@@ -676,6 +724,23 @@ impl Reader<'_> {
         (0..count).map(|_| self.real()).collect()
     }
 
+    fn trials(&mut self) -> Option<Vec<[f32; 4]>> {
+        let count = self.byte().filter(|&count| count <= 4)?;
+        let mut trials = Vec::new();
+        for _ in 0..count {
+            trials.push([self.real()?, self.real()?, self.real()?, self.real()?]);
+        }
+        Some(trials)
+    }
+
+    fn outlook(&mut self) -> Option<[f32; 17]> {
+        let mut parts = [0.0; 17];
+        for part in &mut parts {
+            *part = self.real()?;
+        }
+        Some(parts)
+    }
+
     fn bool(&mut self) -> Option<bool> {
         match self.byte()? {
             0 => Some(false),
@@ -684,20 +749,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The places of a wave, whose number has one byte up to 127 and two from there on.
-    fn places(&mut self) -> Option<Vec<u8>> {
-        let count = match self.byte()? {
-            low @ 128.. => match self.byte()? {
-                high @ 1..128 => usize::from(low - 128) + 128 * usize::from(high),
-                _ => return None,
-            },
-            count => usize::from(count),
-        };
-        let (taken, rest) = self.0.split_at_checked(count)?;
-        self.0 = rest;
-        Some(taken.to_vec())
-    }
-
+    #[expect(clippy::too_many_lines, reason = "an arm for each message")]
     fn said(&mut self) -> Option<Said> {
         Some(match self.byte()? {
             0 => Said::Sweep {
@@ -713,10 +765,11 @@ impl Reader<'_> {
             1 => Said::Verdict {
                 number: self.word()?,
                 mission: self.word()?,
-                commit: match self.byte()? {
-                    0 => None,
-                    1 => Some(self.byte()?),
-                    _ => return None,
+                own: self.bool()?,
+                commit: if self.bool()? {
+                    Some(self.byte()?)
+                } else {
+                    None
                 },
                 slacks: self.list()?,
             },
@@ -738,28 +791,34 @@ impl Reader<'_> {
                 upsilon_per_w: self.real()?,
                 reaches: self.list()?,
             },
-            5 => Said::Wave {
+            5 => Said::Aside {
                 number: self.word()?,
                 mission: self.word()?,
-                base: self.real()?,
-                rise: self.real()?,
-                targets: self.byte()?,
-                centre_m: self.real()?,
-                width_m: self.real()?,
-                levels: self.byte()?,
+                anchor: self.real()?,
+                gap: self.byte()?,
+                growth: self.byte()?,
+                altitude_m: self.real()?,
                 power_w: self.real()?,
-                reaches: self.places()?,
+                y_m: self.real()?,
+                reaches: self.list()?,
             },
-            6 => Said::Trace {
+            6 => Said::Course {
                 number: self.word()?,
                 mission: self.word()?,
-                choice: match self.byte()? {
-                    0 => None,
-                    1 => Some(self.take()?),
-                    _ => return None,
-                },
+                power_w: self.real()?,
+                trials: self.trials()?,
             },
-            7 => Said::Token {
+            7 => Said::Worth {
+                number: self.word()?,
+                mission: self.word()?,
+                trial: if self.bool()? {
+                    Some(self.byte()?)
+                } else {
+                    None
+                },
+                outlook: self.outlook()?,
+            },
+            8 => Said::Token {
                 number: self.word()?,
                 mission: self.word()?,
                 x_m: self.real()?,
@@ -771,7 +830,7 @@ impl Reader<'_> {
                 rows: self.byte()?,
                 sir: self.real()?,
             },
-            8 => Said::Moved {
+            9 => Said::Moved {
                 number: self.word()?,
                 mission: self.word()?,
                 x_m: self.real()?,
@@ -779,10 +838,10 @@ impl Reader<'_> {
                 any: self.bool()?,
                 worst: self.real()?,
             },
-            9 => Said::Hail(self.forming()?),
-            10 => Said::Roster(self.forming()?),
-            11 => Said::Count(self.forming()?),
-            12 => Said::Fence {
+            10 => Said::Hail(self.forming()?),
+            11 => Said::Roster(self.forming()?),
+            12 => Said::Count(self.forming()?),
+            13 => Said::Fence {
                 number: self.word()?,
                 mission: self.word()?,
                 echo: self.word()?,
@@ -790,7 +849,7 @@ impl Reader<'_> {
                 x_m: self.real()?,
                 target_m: self.real()?,
             },
-            13 => Said::Offer(self.offer()?),
+            14 => Said::Offer(self.offer()?),
             _ => return None,
         })
     }
@@ -842,65 +901,6 @@ pub(crate) fn wide(value: f32) -> f64 {
 #[expect(clippy::cast_possible_truncation, reason = "this is the rounding")]
 pub(crate) fn narrow(value: f64) -> f32 {
     value as f32
-}
-
-/// A wave's targets, each step rounded as those of [`targets`].
-pub(crate) fn rungs(base: f32, rise: f32, count: u8) -> Vec<f32> {
-    let risen = |k: u8| {
-        let part = narrow(wide(rise) / 2_f64.powi(i32::from(count - 1 - k)));
-        narrow(wide(base) + wide(narrow(wide(base) * wide(part))))
-    };
-    let above = (1..count).map(risen);
-    [base].into_iter().chain(above).collect()
-}
-
-/// A wave's levels within a band, each step rounded as those of [`targets`].
-pub(crate) fn altitudes(centre_m: f32, width_m: f32, count: u8, band: (f32, f32)) -> Vec<f32> {
-    const TUBE: [f64; 9] = [-1.0, -0.5, -0.25, -0.125, 0.0, 0.125, 0.25, 0.5, 1.0];
-    let last = f64::from(count.max(2) - 1);
-    let at = |level: u8| {
-        if width_m == 0.0 {
-            return centre_m;
-        }
-        let part = match count {
-            1 => 1.0,
-            9 => TUBE[usize::from(level)],
-            _ => wide(narrow(wide(narrow(2.0 * f64::from(level) / last)) - 1.0)),
-        };
-        let offset = narrow(wide(width_m) * part);
-        let altitude_m = narrow(wide(centre_m) + wide(offset));
-        altitude_m.max(band.0).min(band.1)
-    };
-    (0..count).map(at).collect()
-}
-
-/// What three bytes of a wave stand for on a link of `distance_m`.
-pub(crate) fn place([a, b, c]: [u8; 3], distance_m: f32) -> Option<f32> {
-    let code = u32::from(a) + 256 * u32::from(b) + 65536 * u32::from(c);
-    let step = narrow(wide(distance_m) / 16_777_214.0);
-    let place = narrow(f64::from(code) * wide(step)).min(distance_m);
-    (code < 0x00FF_FFFF).then_some(place)
-}
-
-/// The three bytes of a place in [0, `distance_m`].
-pub(crate) fn code(x_m: f32, distance_m: f32) -> [u8; 3] {
-    let step = narrow(wide(distance_m) / 16_777_214.0);
-    let steps = wide(narrow(wide(x_m) / wide(step))).min(16_777_214.0);
-    let bytes = |code: u32| {
-        let [a, b, c, _] = code.to_le_bytes();
-        [a, b, c]
-    };
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a whole number of 0 to 16 777 214"
-    )]
-    let code = steps.floor() as u32;
-    if place(bytes(code), distance_m).unwrap() > x_m {
-        bytes(code.saturating_sub(1))
-    } else {
-        bytes(code)
-    }
 }
 
 /// The ten bytes before the body.

@@ -1,13 +1,9 @@
 //! Golden vectors, both ways: `data/vectors.json`, made by a Python program of its own (bodies by the byte tables, those of
-//! the tags 0 to 3 again by the postcard implementation pohlednice 0.2.1, CRC bit by bit, COBS by its definition, ladders
-//! with each step rounded; targets, levels and places of waves in fractions, each step rounded once).
+//! the tags 0, 2 and 3 again by the postcard implementation pohlednice 0.2.1, CRC bit by bit, COBS by its definition, ladders
+//! with each step rounded).
 
 use serde::Deserialize;
-use uav_relay::Band;
-use uav_relay::placement::coded::Coded;
 use uav_relay::placement::ladder::Ladder;
-use uav_relay::placement::levels::Levels;
-use uav_relay::placement::wave::Rungs;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message};
@@ -19,9 +15,6 @@ use super::offer::Offer;
 pub(crate) struct Vectors {
     pub(crate) frames: Vec<Frame>,
     pub(crate) ladders: Vec<LadderVector>,
-    pub(crate) rungs: Vec<RungsVector>,
-    pub(crate) levels: Vec<LevelsVector>,
-    pub(crate) places: Vec<PlaceVector>,
 }
 
 #[derive(Deserialize)]
@@ -48,35 +41,6 @@ pub(crate) struct LadderVector {
     gap: u8,
     growth: u8,
     pub(crate) targets: Vec<String>,
-}
-
-/// Targets of a wave; numbers as the bits of their f32.
-#[derive(Deserialize)]
-pub(crate) struct RungsVector {
-    pub(crate) base: String,
-    pub(crate) rise: String,
-    pub(crate) count: u8,
-    pub(crate) targets: Vec<String>,
-}
-
-/// Levels of a wave in a band.
-#[derive(Deserialize)]
-pub(crate) struct LevelsVector {
-    pub(crate) centre: String,
-    pub(crate) width: String,
-    pub(crate) count: u8,
-    pub(crate) least: String,
-    pub(crate) most: String,
-    pub(crate) altitudes: Vec<String>,
-}
-
-/// What a place is sent as, and what that is read as.
-#[derive(Deserialize)]
-pub(crate) struct PlaceVector {
-    pub(crate) distance: String,
-    pub(crate) x: String,
-    pub(crate) code: String,
-    pub(crate) place: String,
 }
 
 impl Frame {
@@ -108,7 +72,6 @@ impl Frame {
 pub(crate) fn vectors() -> Vectors {
     let vectors: Vectors = serde_json::from_str(include_str!("../data/vectors.json")).unwrap();
     assert!(vectors.frames.len() >= 67 && vectors.ladders.len() >= 10);
-    assert!(vectors.rungs.len() >= 8 && vectors.levels.len() >= 10 && vectors.places.len() >= 15);
     vectors
 }
 
@@ -201,44 +164,27 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
     some(|said| matches!(said, Said::Measured { reaches, .. } if reaches.len() == 16));
     some(|said| matches!(said, Said::Measured { upsilon_per_w, .. } if *upsilon_per_w == 1e-9));
     some(|said| matches!(said, Said::Measured { upsilon_per_w, .. } if *upsilon_per_w == 1e32));
-    for (least, most) in [(3, 3), (126, 126), (129, 129), (192, 192)] {
-        assert!(frames.iter().any(|vector| matches!(
-            &vector.message,
-            Said::Wave { reaches, .. } if (least..=most).contains(&reaches.len())
-        )));
+    some(|said| matches!(said, Said::Aside { reaches, .. } if reaches.len() == 16));
+    some(
+        |said| matches!(said, Said::Aside { y_m, reaches, .. } if *y_m == -1e5 && reaches.is_empty()),
+    );
+    some(|said| matches!(said, Said::Aside { y_m, .. } if *y_m == 1e5));
+    for count in 0..=4 {
+        assert!(frames.iter().any(
+            |vector| matches!(&vector.message, Said::Course { trials, .. } if trials.len() == count)
+        ));
     }
-    some(|said| {
-        matches!(
-            said,
-            Said::Wave {
-                targets: 16,
-                levels: 4,
-                ..
-            }
-        )
-    });
-    some(|said| {
-        matches!(
-            said,
-            Said::Wave {
-                targets: 1,
-                levels: 64,
-                ..
-            }
-        )
-    });
-    some(|said| matches!(said, Said::Wave { reaches, .. } if reaches.iter().all(|&b| b == 0)));
-    some(|said| matches!(said, Said::Wave { reaches, .. } if reaches.iter().all(|&b| b == 255)));
-    some(|said| matches!(said, Said::Trace { choice: None, .. }));
-    some(|said| {
-        matches!(
-            said,
-            Said::Trace {
-                choice: Some([63, 63]),
-                ..
-            }
-        )
-    });
+    for trial in [[f32::MIN_POSITIVE, 0.0, -1e5, 0.1], [1e30, 1e6, 1e5, 1e5]] {
+        assert!(frames.iter().any(
+            |vector| matches!(&vector.message, Said::Course { trials, .. } if trials.contains(&trial))
+        ));
+    }
+    some(|said| matches!(said, Said::Worth { trial: None, .. }));
+    some(|said| matches!(said, Said::Worth { trial: Some(3), .. }));
+    some(|said| matches!(said, Said::Worth { outlook, .. } if outlook.contains(&f32::MAX)));
+    some(|said| matches!(said, Said::Worth { outlook, .. } if outlook.contains(&f32::MIN)));
+    some(|said| matches!(said, Said::Verdict { own: true, .. }));
+    some(|said| matches!(said, Said::Verdict { own: false, .. }));
     some(|said| matches!(said, Said::Token { turn: 0, .. }));
     some(|said| matches!(said, Said::Token { turn: 1, .. }));
     some(|said| {
@@ -271,7 +217,7 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
         known.map(|vector| vector.wire().len()).max()
     };
     assert_eq!(longest(true), Some(100));
-    assert_eq!(longest(false), Some(237));
+    assert_eq!(longest(false), Some(104));
 }
 
 #[test]
@@ -320,6 +266,9 @@ fn the_vectors_hold_offers_of_every_extreme() {
     some(|offer| offer.least_m == offer.most_m && offer.eta > offer.mu_los);
     some(|offer| offer.x_m < 0.0 && offer.interferer_w == 1e-6);
     some(|offer| offer.y_m < 0.0 && offer.interferer_w == 1e9);
+    some(|offer| offer.left_m == -1e5 && offer.right_m == 1e5);
+    some(|offer| offer.left_m == 0.0 && offer.right_m == 0.0);
+    some(|offer| offer.left_m < 0.0 && offer.right_m == 0.0);
 }
 
 #[test]
@@ -334,58 +283,5 @@ fn the_ladders_of_the_file_are_met_to_the_bit() {
         assert_eq!(hex(&ladder.targets()), vector.targets);
         let by_the_rules = codec::targets(anchor, vector.gap, vector.growth);
         assert_eq!(hex(&by_the_rules), vector.targets);
-    }
-}
-
-/// The f32 of these bits.
-fn real(bits: &str) -> f32 {
-    f32::from_bits(u32::from_str_radix(bits, 16).unwrap())
-}
-
-fn hex(numbers: &[f32]) -> Vec<String> {
-    let bits = numbers.iter().map(|number| number.to_bits());
-    bits.map(|bits| format!("{bits:08x}")).collect()
-}
-
-#[test]
-fn the_targets_of_waves_are_met_to_the_bit() {
-    for vector in vectors().rungs {
-        let (base, rise) = (real(&vector.base), real(&vector.rise));
-        let rungs = Rungs::from_parts(base, rise, vector.count).unwrap();
-        let targets: Vec<f32> = (0..vector.count).map(|at| rungs.target(at)).collect();
-        assert_eq!(hex(&targets), vector.targets);
-        assert_eq!(hex(&codec::rungs(base, rise, vector.count)), vector.targets);
-    }
-}
-
-#[test]
-fn the_levels_of_waves_are_met_to_the_bit() {
-    for vector in vectors().levels {
-        let (centre_m, width_m) = (real(&vector.centre), real(&vector.width));
-        let (least_m, most_m) = (real(&vector.least), real(&vector.most));
-        let levels = Levels::from_parts(centre_m, width_m, vector.count).unwrap();
-        let band = Band { least_m, most_m };
-        let altitudes: Vec<f32> = (0..vector.count)
-            .map(|level| levels.altitude(band, level))
-            .collect();
-        assert_eq!(hex(&altitudes), vector.altitudes);
-        let by_the_rules = codec::altitudes(centre_m, width_m, vector.count, (least_m, most_m));
-        assert_eq!(hex(&by_the_rules), vector.altitudes);
-    }
-}
-
-#[test]
-fn the_places_of_waves_are_met_to_the_bit() {
-    for vector in vectors().places {
-        let (distance_m, x_m) = (real(&vector.distance), real(&vector.x));
-        let mut coded = Coded::new();
-        coded.set(0, Some(x_m), distance_m);
-        assert_eq!(coded.bytes(1), bytes(&vector.code));
-        let place = coded.get(0, distance_m).unwrap();
-        assert_eq!(hex(&[place]), [&*vector.place]);
-        let code = codec::code(x_m, distance_m);
-        assert_eq!(code, *bytes(&vector.code));
-        let place = codec::place(code, distance_m).unwrap();
-        assert_eq!(hex(&[place]), [&*vector.place]);
     }
 }

@@ -28,10 +28,13 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         | Said::Verdict {
             number, mission, ..
         }
-        | Said::Wave {
+        | Said::Aside {
             number, mission, ..
         }
-        | Said::Trace {
+        | Said::Course {
+            number, mission, ..
+        }
+        | Said::Worth {
             number, mission, ..
         }
         | Said::Token {

@@ -28,6 +28,9 @@ pub(crate) struct Offer {
     pub(crate) eta: f64,
     pub(crate) least_m: f32,
     pub(crate) most_m: f32,
+    /// How far to the left, at most 0, and to the right, at least 0.
+    pub(crate) left_m: f32,
+    pub(crate) right_m: f32,
 }
 
 /// Where each number begins in the body.
@@ -46,14 +49,16 @@ pub(crate) const MU_NLOS: usize = 51;
 pub(crate) const ETA: usize = 59;
 pub(crate) const LEAST: usize = 67;
 pub(crate) const MOST: usize = 71;
+pub(crate) const LEFT: usize = 75;
+pub(crate) const RIGHT: usize = 79;
 
 /// Bytes of the body.
-pub(crate) const BYTES: usize = 75;
+pub(crate) const BYTES: usize = 83;
 
 impl Offer {
     /// The bytes of the body.
     pub(crate) fn body(&self) -> Vec<u8> {
-        let mut out = vec![13];
+        let mut out = vec![14];
         for word in [self.version, self.base, self.relays] {
             out.extend(word.to_le_bytes());
         }
@@ -73,7 +78,7 @@ impl Offer {
         for number in [self.mu_los, self.mu_nlos, self.eta] {
             out.extend(number.to_le_bytes());
         }
-        for number in [self.least_m, self.most_m] {
+        for number in [self.least_m, self.most_m, self.left_m, self.right_m] {
             out.extend(number.to_le_bytes());
         }
         out
@@ -103,6 +108,8 @@ impl Offer {
             eta: long(ETA),
             least_m: real(LEAST),
             most_m: real(MOST),
+            left_m: real(LEFT),
+            right_m: real(RIGHT),
         };
         Some((offer, rest))
     }
@@ -124,6 +131,8 @@ impl Offer {
             && (0.1..=1e5).contains(&self.least_m)
             && (self.least_m..=1e5).contains(&self.most_m)
             && (self.least_m..=self.most_m).contains(&self.altitude_m)
+            && (-1e5..=0.0).contains(&self.left_m)
+            && (0.0..=1e5).contains(&self.right_m)
     }
 
     /// Whether the relays have room between Tx and Rx.
@@ -133,11 +142,10 @@ impl Offer {
         narrow(f64::from(self.relays - 1) * wide(step)) <= self.distance_m
     }
 
-    /// The digest of the mission that it is of: CRC-32C of all but version and base, the band only if there is one.
+    /// The digest of the mission that it is of: CRC-32C of all but version and base.
     pub(crate) fn digest(&self) -> u16 {
         let body = self.body();
-        let band = self.least_m < self.most_m;
-        let bytes = &body[RELAYS..if band { BYTES } else { LEAST }];
+        let bytes = &body[RELAYS..];
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes);
         u16::try_from(crc & 0xFFFF).unwrap()
     }
@@ -160,6 +168,10 @@ impl Offer {
             least_m: self.least_m,
             most_m: self.most_m,
         };
+        let lateral = Band {
+            least_m: self.left_m,
+            most_m: self.right_m,
+        };
         assert_eq!((config.relays, config.common), (self.relays, common));
         assert_eq!(config.distance_m, self.distance_m);
         assert_eq!(config.min_separation_m, self.min_separation_m);
@@ -169,7 +181,7 @@ impl Offer {
         let channel = config.channel;
         let factors = [channel.mu_los(), channel.mu_nlos(), channel.eta()];
         assert_eq!(factors, [self.mu_los, self.mu_nlos, self.eta]);
-        assert_eq!(config.band, band);
+        assert_eq!((config.band, config.lateral), (band, lateral));
         let stamp = upload.stamp();
         assert_eq!((stamp.version, stamp.digest), (self.version, self.digest()));
         Message::Offer(upload)
@@ -196,5 +208,7 @@ pub(crate) fn offer() -> Offer {
         eta: 7000.25,
         least_m: 20.0,
         most_m: 300.0,
+        left_m: -60.0,
+        right_m: 40.5,
     }
 }

@@ -4,12 +4,12 @@ use proptest::prelude::*;
 
 use super::codec::Said;
 use super::offer::{
-    ALTITUDE, DISTANCE, ETA, INTERFERER, LEAST, MOST, MU_LOS, MU_NLOS, Offer, POWER, SEPARATION,
-    TOLERANCE, TX_POWER, X, Y,
+    ALTITUDE, DISTANCE, ETA, INTERFERER, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, Offer, POWER, RIGHT,
+    SEPARATION, TOLERANCE, TX_POWER, X, Y,
 };
 
 /// Where four bytes of an offer are an f32, or the upper half of an f64.
-pub(crate) const NUMBERS: [usize; 14] = [
+pub(crate) const NUMBERS: [usize; 16] = [
     DISTANCE,
     SEPARATION,
     TX_POWER,
@@ -24,6 +24,8 @@ pub(crate) const NUMBERS: [usize; 14] = [
     ETA + 4,
     LEAST,
     MOST,
+    LEFT,
+    RIGHT,
 ];
 
 /// From `least` to `most`, small and large alike, and both often.
@@ -79,6 +81,11 @@ fn bands() -> BoxedStrategy<[f32; 3]> {
         .boxed()
 }
 
+/// Room to one side: none, some, as much as may be.
+fn room() -> BoxedStrategy<f32> {
+    prop_oneof![2 => Just(0.0), 1 => Just(-0.0), 4 => scaled(0.1, 1e5)].boxed()
+}
+
 /// Along x or aside of it.
 fn beside() -> impl Strategy<Value = f32> {
     prop_oneof![
@@ -102,6 +109,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
         scaled(1e-6, 0.1),
         factors(),
         bands(),
+        (room(), room()),
     )
         .prop_map(
             |(
@@ -112,6 +120,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
                 tolerance,
                 [mu_los, mu_nlos, eta],
                 [least_m, most_m, altitude_m],
+                (left_m, right_m),
             )| {
                 Said::Offer(Offer {
                     version,
@@ -131,6 +140,8 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
                     eta,
                     least_m,
                     most_m,
+                    left_m: -left_m,
+                    right_m,
                 })
             },
         )

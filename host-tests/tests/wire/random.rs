@@ -9,7 +9,7 @@ use uav_relay::wire::message::{MAX_BODY, Message, MessageError};
 use super::codec::{self, Said, plain, sealed, wire};
 use super::config;
 use super::golden::only_frame;
-use super::strategies::{bodies, headers, measured, messages, sweeps, waves};
+use super::strategies::{asides, bodies, courses, headers, measured, messages, sweeps};
 
 /// Bodies are compared rather than messages: bytes tell -0 from 0.
 fn body_of(message: &Message) -> Vec<u8> {
@@ -41,17 +41,17 @@ proptest! {
         let len = frame::encode(head, &said.message(), &mut frame);
         let most = match &said {
             Said::Sweep { .. } => 100,
-            Said::Verdict { .. } => 88,
+            Said::Verdict { .. } => 89,
             Said::Busy { .. } => 19,
             Said::Heartbeat { .. } => 20,
-            Said::Measured { .. } => 104,
-            Said::Wave { .. } => 237,
-            Said::Trace { .. } => 24,
+            Said::Measured { .. } | Said::Aside { .. } => 104,
+            Said::Course { .. } => 90,
+            Said::Worth { .. } => 91,
             Said::Token { .. } => 44,
             Said::Moved { .. } => 34,
             Said::Hail(_) | Said::Roster(_) | Said::Count(_) => 30,
             Said::Fence { .. } => 33,
-            Said::Offer(_) => 91,
+            Said::Offer(_) => 99,
         };
         prop_assert!(len <= most && most <= MAX_FRAME);
         prop_assert_eq!(frame[..len].iter().position(|&byte| byte == 0), Some(len - 1));
@@ -59,21 +59,18 @@ proptest! {
         let expected = match said {
             Said::Sweep { reaches, .. } => 36 + 4 * reaches.len(),
             Said::Verdict { commit, slacks, .. } => {
-                23 + usize::from(commit.is_some()) + 4 * slacks.len()
+                24 + usize::from(commit.is_some()) + 4 * slacks.len()
             }
             Said::Busy { .. } => 19,
             Said::Heartbeat { .. } => 20,
-            Said::Measured { reaches, .. } => 40 + 4 * reaches.len(),
-            Said::Wave { targets, levels, .. } => {
-                let places = 3 * usize::from(targets) * usize::from(levels);
-                43 + if places < 128 { 1 } else { 2 } + places
-            }
-            Said::Trace { choice, .. } => if choice.is_some() { 24 } else { 22 },
+            Said::Measured { reaches, .. } | Said::Aside { reaches, .. } => 40 + 4 * reaches.len(),
+            Said::Course { trials, .. } => 26 + 16 * trials.len(),
+            Said::Worth { trial, .. } => 90 + usize::from(trial.is_some()),
             Said::Token { .. } => 44,
             Said::Moved { .. } => 34,
             Said::Hail(_) | Said::Roster(_) | Said::Count(_) => 30,
             Said::Fence { .. } => 33,
-            Said::Offer(_) => 91,
+            Said::Offer(_) => 99,
         };
         prop_assert_eq!(len, expected);
     }
@@ -85,16 +82,16 @@ proptest! {
     }
 
     #[test]
-    fn every_full_measured_sweep_takes_104_bytes_and_every_largest_wave_237(
-        sweep in measured(sweeps(16)),
-        wave in waves(prop_oneof![Just((1, 64)), Just((4, 16)), Just((8, 8)), Just((16, 4))]),
+    fn every_full_sweep_with_more_takes_104_bytes_and_every_full_course_90(
+        sweep in prop_oneof![measured(sweeps(16)), asides(sweeps(16))],
+        course in courses(4),
         head in headers(),
     ) {
         let mut frame = [0; MAX_FRAME];
+        prop_assert_eq!(frame::encode(head, &course.message(), &mut frame), 90);
         prop_assert_eq!(frame::encode(head, &sweep.message(), &mut frame), 104);
-        prop_assert_eq!(frame::encode(head, &wave.message(), &mut frame), 237);
-        prop_assert_eq!(MAX_FRAME, 237 + TAG);
-        prop_assert_eq!(only_frame(&frame[..237]).len(), 235);
+        prop_assert_eq!(MAX_FRAME, 104 + TAG);
+        prop_assert_eq!(only_frame(&frame[..104]).len(), 102);
     }
 
     #[test]
@@ -181,11 +178,11 @@ fn the_draws_reach_messages_and_both_refusals() {
     use proptest::test_runner::TestRunner;
 
     /// The first tag without a message, for it and all after it.
-    const NONE: usize = 14;
+    const NONE: usize = 15;
 
     let mut runner = TestRunner::new(config(1));
     // Of each tag: messages, wrongly encoded, out of range. Every busy and every heartbeat is in range.
-    let mut seen = [[0; 3]; 15];
+    let mut seen = [[0; 3]; 16];
     for _ in 0..16_000 {
         let body = bodies().new_tree(&mut runner).unwrap().current();
         let tag = body.first().map_or(NONE, |&tag| usize::from(tag).min(NONE));

@@ -6,8 +6,8 @@ use uav_relay::wire::message::{Message, MessageError};
 use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile, Upload};
 
 use super::offer::{
-    ALTITUDE, BYTES, DISTANCE, ETA, INTERFERER, LEAST, MOST, MU_LOS, MU_NLOS, Offer, POWER, RELAYS,
-    SEPARATION, TOLERANCE, TX_POWER, X, Y, offer,
+    ALTITUDE, BYTES, DISTANCE, ETA, INTERFERER, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, Offer, POWER,
+    RELAYS, RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y, offer,
 };
 use super::receive::paper;
 
@@ -64,6 +64,8 @@ fn every_f32_of_an_offer_is_taken_up_to_its_bounds_and_no_farther() {
         (offer(), TOLERANCE, 1e-6, 0.1, "tolerance"),
         (offer(), LEAST, 0.1, 20.0, "lowest altitude"),
         (offer(), MOST, 20.0, 1e5, "highest altitude"),
+        (offer(), LEFT, -1e5, 0.0, "room to the left"),
+        (offer(), RIGHT, 0.0, 1e5, "room to the right"),
     ] {
         for good in [least, most, f32::midpoint(least, most)] {
             let body = with(&offer, at, &f32::to_le_bytes(good));
@@ -83,7 +85,7 @@ fn every_f32_of_an_offer_is_taken_up_to_its_bounds_and_no_farther() {
             assert!(!taken(&body), "{what} {bad}");
         }
     }
-    for at in [SEPARATION, X, Y] {
+    for at in [SEPARATION, X, Y, LEFT, RIGHT] {
         assert!(taken(&with(&offer(), at, &(-0.0_f32).to_le_bytes())));
     }
 }
@@ -183,6 +185,10 @@ fn other(channel: Channel) -> MissionConfig {
             least_m: 25.0,
             most_m: 250.0,
         },
+        lateral: Band {
+            least_m: -35.0,
+            most_m: 45.0,
+        },
         interference: Interference::Source(Interferer {
             power_w: 60.0,
             x_m: 700.0,
@@ -231,6 +237,8 @@ fn an_upload_is_written_as_its_mission_has_it_and_read_back() {
             eta: channel.eta(),
             least_m: 25.0,
             most_m: 250.0,
+            left_m: -35.0,
+            right_m: 45.0,
         };
         let mut bytes = [0; BYTES];
         assert_eq!(upload.encode(&mut bytes), Some(BYTES));

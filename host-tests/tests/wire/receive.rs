@@ -52,6 +52,7 @@ pub(crate) fn paper(relays: u16) -> MissionConfig {
         },
         channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
         band: Band::at(20.0),
+        lateral: Band::NONE,
         interference: Interference::Source(Interferer {
             power_w: 80.0,
             x_m: 500.0,

@@ -2,11 +2,9 @@
 //! numbers out of range. `document.rs` has the same for the rows of the document.
 
 use uav_relay::placement::ladder::Ladder;
-use uav_relay::placement::levels::Levels;
-use uav_relay::placement::wave::Rungs;
 use uav_relay::placement::{PerTarget, verdict::Verdict};
 use uav_relay::wire::frame::{self, FrameError, Header, MAX_FRAME};
-use uav_relay::wire::message::{Answer, MAX_BODY, Message, MessageError, Wave};
+use uav_relay::wire::message::{Answer, MAX_BODY, Message, MessageError};
 
 use super::codec::{Forming, Said, plain, sealed};
 use super::golden::vectors;
@@ -45,6 +43,7 @@ fn verdict(commit: Option<u8>, slacks: &[f32]) -> Said {
     Said::Verdict {
         number: 1,
         mission: 2,
+        own: false,
         commit,
         slacks: slacks.to_vec(),
     }
@@ -61,29 +60,6 @@ fn measured() -> Said {
         power_w: 1.0,
         upsilon_per_w: 1e9,
         reaches: vec![100.0],
-    }
-}
-
-fn wave(targets: u8, levels: u8) -> Said {
-    Said::Wave {
-        number: 1,
-        mission: 2,
-        base: 1.5,
-        rise: 0.1,
-        targets,
-        centre_m: 100.0,
-        width_m: 40.0,
-        levels,
-        power_w: 1.0,
-        reaches: vec![7; 3 * usize::from(targets) * usize::from(levels)],
-    }
-}
-
-fn trace(choice: Option<[u8; 2]>) -> Said {
-    Said::Trace {
-        number: 1,
-        mission: 2,
-        choice,
     }
 }
 
@@ -155,15 +131,15 @@ fn bodies_that_are_no_message_are_refused() {
             let longer = [&body[..], &[extra]].concat();
             assert_eq!(verdict_on(&longer), Err(ENCODING), "{}", vector.name);
         }
-        for tag in 14..=u8::MAX {
+        for tag in 15..=u8::MAX {
             let mut other = body.clone();
             other[0] = tag;
             assert_eq!(verdict_on(&other), Err(ENCODING), "{}", vector.name);
         }
     }
     let heartbeat = [3, 0, 0];
-    let option = [1, 0, 0, 0, 0];
-    let choice = trace(None).body();
+    let verdict_head = [1, 0, 0, 0, 0];
+    let option = [1, 0, 0, 0, 0, 0];
     for byte in 2..=u8::MAX {
         let bool_byte = [&heartbeat[..], &[byte]].concat();
         assert_eq!(verdict_on(&bool_byte), Err(ENCODING), "bool {byte}");
@@ -171,17 +147,15 @@ fn bodies_that_are_no_message_are_refused() {
         assert_eq!(verdict_on(&option_byte), Err(ENCODING), "Option {byte}");
         let option_byte = [&option[..], &[byte, 0, 0]].concat();
         assert_eq!(verdict_on(&option_byte), Err(ENCODING), "Option {byte}");
-        for after in 0..3 {
-            let option_byte = [&choice[..5], &[byte], &vec![0; after]].concat();
-            assert_eq!(verdict_on(&option_byte), Err(ENCODING), "Option {byte}");
-        }
+        let bool_byte = [&verdict_head[..], &[byte, 0, 0]].concat();
+        assert_eq!(verdict_on(&bool_byte), Err(ENCODING), "bool {byte}");
         let mut bool_byte = moved().body();
         bool_byte[13] = byte;
         assert_eq!(verdict_on(&bool_byte), Err(ENCODING), "bool {byte}");
     }
     for count in 17..=127_u8 {
         let mut body = verdict(None, &[]).body();
-        body[6] = count;
+        body[7] = count;
         body.extend(vec![0; 4 * usize::from(count)]);
         assert_eq!(verdict_on(&body), Err(ENCODING), "{count} slacks");
         let mut body = sweep().body();
@@ -204,10 +178,6 @@ fn padded_varints_are_refused() {
         verdict(None, &[]).body(),
         verdict(Some(1), &[2.0, 1.0]).body(),
         measured().body(),
-        wave(1, 1).body(),
-        wave(6, 7).body(),
-        wave(1, 43).body(),
-        wave(16, 4).body(),
     ];
     for body in bodies {
         for tag in [true, false] {
@@ -222,7 +192,6 @@ fn padded_varints_are_refused() {
     for body in [
         Said::Busy { number: 9 }.body(),
         vec![3, 0, 0, 1],
-        trace(Some([1, 2])).body(),
         token(0, 0.0, 0, 0).body(),
         moved().body(),
         Said::Hail(FORMING).body(),
@@ -256,14 +225,14 @@ fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
         reaches: vec![100.0],
     };
     let slack = verdict(None, &[1.0]);
-    let (measured, wave, moved) = (measured(), wave(2, 3), moved());
+    let (measured, moved) = (measured(), moved());
     let token = token(2, 10.0, 5, 5);
     for (said, at, least, most, what) in [
         (&single, 5, f32::MIN_POSITIVE, f32::MAX, "anchor"),
         (&single, 11, 0.1, 1e5, "altitude"),
         (&single, 15, 1e-6, 1e6, "power"),
         (&single, 20, 0.0, 2e9, "reach"),
-        (&slack, 7, -2e9, 2e9, "slack"),
+        (&slack, 8, -2e9, 2e9, "slack"),
         (
             &measured,
             5,
@@ -275,11 +244,6 @@ fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
         (&measured, 15, 1e-6, 1e6, "power, measured"),
         (&measured, 19, 1e-9, 1e32, "Upsilon"),
         (&measured, 24, 0.0, 2e9, "reach, measured"),
-        (&wave, 5, f32::MIN_POSITIVE, 1e30, "base"),
-        (&wave, 9, 0.0, 1e6, "rise"),
-        (&wave, 14, 0.1, 1e5, "centre"),
-        (&wave, 18, 0.0, 1e5, "width"),
-        (&wave, 23, 1e-6, 1e6, "power of a wave"),
         (&token, 5, 0.0, 1e6, "x of a token"),
         (&token, 9, 0.1, 1e5, "altitude of a token"),
         (&token, 13, 1e-6, 1e6, "power of a token"),
@@ -309,10 +273,8 @@ fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
     for zero in [0.0, -0.0] {
         assert_eq!(verdict_on(&with(&single, 5, zero)), Err(VALUE));
         assert!(verdict_on(&with(&single, 20, zero)).is_ok());
-        assert!(verdict_on(&with(&slack, 7, zero)).is_ok());
+        assert!(verdict_on(&with(&slack, 8, zero)).is_ok());
         for (said, at) in [
-            (&wave, 9),
-            (&wave, 18),
             (&token, 5),
             (&token, 18),
             (&token, 24),
@@ -366,65 +328,6 @@ fn a_commit_names_one_of_sixteen_targets() {
     for target in 0..=u8::MAX {
         let read = verdict_on(&verdict(Some(target), &[]).body());
         assert_eq!(read.is_ok(), target < 16, "{target}");
-    }
-}
-
-/// A wave that says it has so many targets and levels, with `bytes` bytes of places.
-fn counted(targets: u8, levels: u8, bytes: usize) -> Vec<u8> {
-    let mut body = wave(1, 1).body();
-    (body[13], body[22]) = (targets, levels);
-    body.truncate(27);
-    match u8::try_from(bytes) {
-        Ok(count @ 0..128) => body.push(count),
-        Ok(count) => body.extend([count, 1]),
-        Err(_) => body.extend([
-            u8::try_from(bytes % 128).unwrap() | 0x80,
-            u8::try_from(bytes / 128).unwrap(),
-        ]),
-    }
-    body.extend(vec![0; bytes]);
-    body
-}
-
-#[test]
-fn a_wave_has_a_place_for_every_pair_and_at_most_64() {
-    for targets in 0..=u8::MAX {
-        for levels in 0..=u8::MAX {
-            let pairs = usize::from(targets) * usize::from(levels);
-            let fits = (1..=16).contains(&targets) && (1..=64).contains(&levels) && pairs <= 64;
-            // What does not fit a frame is refused for its length there, and for its numbers here.
-            let bytes = 3 * pairs.min(80);
-            let read = verdict_on(&counted(targets, levels, bytes));
-            let expected = if fits { Ok(()) } else { Err(VALUE) };
-            assert_eq!(read, expected, "{targets} targets, {levels} levels");
-            if fits || pairs == 0 {
-                for other in [
-                    0,
-                    1,
-                    2,
-                    bytes.abs_diff(1),
-                    bytes.abs_diff(3),
-                    bytes + 1,
-                    bytes + 3,
-                    192,
-                ] {
-                    if other != bytes || pairs == 0 {
-                        let read = verdict_on(&counted(targets, levels, other));
-                        assert_eq!(read, Err(VALUE), "{targets} by {levels}, {other} bytes");
-                    }
-                }
-            }
-        }
-    }
-}
-
-#[test]
-fn a_choice_names_one_of_64_targets_and_levels() {
-    for number in 0..=u8::MAX {
-        let expected = if number < 64 { Ok(()) } else { Err(VALUE) };
-        for choice in [[number, 0], [0, number], [number, number]] {
-            assert_eq!(verdict_on(&trace(Some(choice)).body()), expected);
-        }
     }
 }
 
@@ -531,6 +434,7 @@ fn what_the_crate_writes_out_of_range_it_refuses_to_read() {
                 commit: None,
                 slacks: PerTarget::from_slice(&[slack]).unwrap(),
             },
+            own: true,
         })
     };
     for (slack, fits) in [(1.0, true), (f32::NAN, false), (3e9, false)] {
@@ -539,27 +443,4 @@ fn what_the_crate_writes_out_of_range_it_refuses_to_read() {
         assert_eq!(Message::decode(&body[..len]).is_ok(), fits, "{slack}");
     }
     assert!(Ladder::from_parts(1.0, 255, 255).is_none());
-    for (targets, levels, places) in [(17, 1, 17), (1, 65, 64), (2, 2, 3)] {
-        let wave = Message::Wave(Wave {
-            number: 0,
-            mission: 0,
-            rungs: Rungs::new(1.0, 0.0, targets),
-            levels: Levels::held(20.0, levels),
-            power_w: 1.0,
-            reaches: &[0; 192][..3 * places],
-        });
-        let mut body = [0; MAX_BODY];
-        let len = wave.encode(&mut body).unwrap();
-        assert_eq!(Message::decode(&body[..len]), Err(MessageError::Value));
-    }
-    let longer = Message::Wave(Wave {
-        number: 0,
-        mission: 0,
-        rungs: Rungs::new(1.0, 0.0, 5),
-        levels: Levels::held(20.0, 13),
-        power_w: 1.0,
-        reaches: &[1; 195],
-    });
-    assert_eq!(longer.encode(&mut [0; MAX_BODY]), None);
-    assert_eq!(frame::encode(HEADER, &longer, &mut [0; MAX_FRAME]), 0);
 }

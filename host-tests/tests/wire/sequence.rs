@@ -43,13 +43,17 @@ const WEAK: Field = Field::new(&[FieldPoint {
 pub(crate) const FIRST: u16 = 64;
 pub(crate) const SECOND: u16 = 65;
 
-/// The paper's scenario with other interference, between 20 m and 300 m.
+/// The paper's scenario with other interference, between 20 m and 300 m, with room to both sides.
 fn mission(interference: Interference) -> MissionConfig {
     MissionConfig {
         interference,
         band: Band {
             least_m: 20.0,
             most_m: 300.0,
+        },
+        lateral: Band {
+            least_m: -60.0,
+            most_m: 40.0,
         },
         ..paper(8)
     }
@@ -118,6 +122,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         Said::Verdict {
             number,
             mission,
+            own: false,
             commit: Some(0),
             slacks: vec![1.0],
         },
@@ -137,22 +142,28 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             upsilon_per_w: 1e8,
             reaches: vec![x_m],
         },
-        Said::Wave {
+        Said::Aside {
             number,
             mission,
-            base: 1.0,
-            rise: 0.0,
-            targets: 1,
-            centre_m: altitude_m,
-            width_m: 0.0,
-            levels: 1,
+            anchor,
+            gap: 0,
+            growth: 0,
+            altitude_m,
             power_w,
-            reaches: vec![0, 0, 0x60],
+            y_m: -12.5,
+            reaches: vec![x_m],
         },
-        Said::Trace {
+        Said::Course {
             number,
             mission,
-            choice: Some([0, 0]),
+            power_w,
+            trials: vec![[1.0, x_m, -12.5, altitude_m]],
+        },
+        Said::Worth {
+            number,
+            mission,
+            trial: Some(0),
+            outlook: [0.5; 17],
         },
         Said::Token {
             number,
@@ -237,8 +248,8 @@ fn a_message_from_the_wrong_side_for_the_heading_is_misdirected_and_nothing_else
             }
             for said in one_of_each(SECOND, digest(relay.mission())) {
                 let wrong = match said.body()[0] {
-                    0 | 4 | 5 | 7 | 10 => to,
-                    1 | 2 | 6 | 8 | 11 => from,
+                    0 | 4..=6 | 8 | 11 => to,
+                    1 | 2 | 7 | 9 | 12 => from,
                     _ => continue,
                 };
                 let mut after = relay.clone();
@@ -315,40 +326,18 @@ fn a_sweep_goes_the_way_of_the_mission_and_its_verdict_back() {
 }
 
 #[test]
-fn a_wave_goes_onward_and_its_trace_back() {
-    let (mut relay, from, to) = relay_4(source());
-    let mut now = Instant::ZERO;
-    let kinds = one_of_each(FIRST, digest(relay.mission()));
-    relay.handle_bytes(now, from, &framed(4, from, &kinds[5]));
-    let out = settle(&mut relay, &mut now);
-    let Some((port, Said::Wave { number: FIRST, .. })) = out.first() else {
-        panic!("{out:?}");
-    };
-    assert_eq!(*port, to);
-    relay.handle_bytes(now, from, &framed(4, from, &kinds[5]));
-    assert_eq!(
-        sent(&mut relay, now),
-        [(from, Said::Busy { number: FIRST })]
-    );
-    relay.handle_bytes(now, to, &framed(4, to, &kinds[6]));
-    assert_eq!(sent(&mut relay, now), [(from, kinds[6].clone())]);
-    assert!(relay.setpoint().is_some_and(|place| place.x_m > 375.0));
-    assert_eq!(counted(relay.stats()), ["received", "repeated"]);
-}
-
-#[test]
 fn a_token_goes_onward_and_what_came_of_it_back() {
     let (mut relay, from, to) = relay_4(source());
     let mut now = Instant::ZERO;
     placed(&mut relay, (from, to), &mut now, FIRST);
     let kinds = one_of_each(SECOND, digest(relay.mission()));
-    relay.handle_bytes(now, from, &framed(4, from, &kinds[7]));
+    relay.handle_bytes(now, from, &framed(4, from, &kinds[8]));
     let out = settle(&mut relay, &mut now);
     assert!(
         matches!(out[0], (port, Said::Token { number: SECOND, .. }) if port == to),
         "{out:?}"
     );
-    relay.handle_bytes(now, to, &framed(4, to, &kinds[8]));
+    relay.handle_bytes(now, to, &framed(4, to, &kinds[9]));
     let out = sent(&mut relay, now);
     let [
         (
@@ -381,8 +370,8 @@ fn what_is_not_awaited_or_does_not_fit_is_stale() {
                 drain(&mut relay, now);
             }
             // An answer to another pass, or of another kind; a token for a relay without a place; a pass that is over.
-            let mut stale = vec![(from, one_of_each(SECOND, digest)[7].clone())];
-            for kind in [1, 6, 8] {
+            let mut stale = vec![(from, one_of_each(SECOND, digest)[8].clone())];
+            for kind in [1, 9] {
                 let number = if with_sweep && kind != 1 {
                     FIRST
                 } else {
@@ -391,7 +380,7 @@ fn what_is_not_awaited_or_does_not_fit_is_stale() {
                 stale.push((to, one_of_each(number, digest)[kind].clone()));
             }
             if with_sweep {
-                for kind in [0, 4, 5, 7] {
+                for kind in [0, 4, 8] {
                     stale.push((from, one_of_each(FIRST - 1, digest)[kind].clone()));
                 }
             }
@@ -419,12 +408,12 @@ fn what_comes_from_beyond_rx_is_of_no_use() {
         }
     }
     let mut after = relay.clone();
-    after.handle_bytes(now, from, &framed(4, from, &kinds[7]));
+    after.handle_bytes(now, from, &framed(4, from, &kinds[8]));
     assert_eq!(counted(after.stats()), ["received", "stale"]);
-    let token = one_of_each(SECOND, digest(relay.mission()))[7].clone();
+    let token = one_of_each(SECOND, digest(relay.mission()))[8].clone();
     relay.handle_bytes(now, from, &framed(4, from, &token));
     settle(&mut relay, &mut now);
-    relay.handle_bytes(now, to, &framed(4, to, &kinds[8]));
+    relay.handle_bytes(now, to, &framed(4, to, &kinds[9]));
     assert_eq!(counted(relay.stats()), ["received", "stale"]);
 
     let (mut relay, from, to) = relay_4(mission(Interference::Field(FIELD)));
@@ -440,20 +429,18 @@ fn what_comes_from_beyond_rx_is_of_no_use() {
     assert_eq!((*port, &reaches[..]), (to, &[][..]));
 }
 
-/// In a field there are neither altitudes to choose nor turns: such a pass changes nothing about the one under way.
+/// In a field there are no turns: such a pass changes nothing about the one under way.
 #[test]
-fn waves_and_tokens_are_stale_in_a_field() {
+fn tokens_are_stale_in_a_field() {
     let (mut relay, from, to) = relay_4(mission(Interference::Field(FIELD)));
     let mut now = Instant::ZERO;
     placed(&mut relay, (from, to), &mut now, FIRST);
-    for kind in [5, 7] {
-        let mut after = relay.clone();
-        let kinds = one_of_each(SECOND, digest(relay.mission()));
-        after.handle_bytes(now, from, &framed(4, from, &kinds[kind]));
-        assert_eq!(counted(after.stats()), ["received", "stale"]);
-        assert_eq!(settle(&mut after, &mut now.clone()), []);
-        assert_eq!(after.phase(), relay.phase());
-    }
+    let mut after = relay.clone();
+    let kinds = one_of_each(SECOND, digest(relay.mission()));
+    after.handle_bytes(now, from, &framed(4, from, &kinds[8]));
+    assert_eq!(counted(after.stats()), ["received", "stale"]);
+    assert_eq!(settle(&mut after, &mut now.clone()), []);
+    assert_eq!(after.phase(), relay.phase());
 }
 
 /// Makes a message one that may well be of this mission.
@@ -487,6 +474,7 @@ fn tamed(said: Said) -> Said {
         Said::Verdict {
             number,
             mission,
+            own,
             mut slacks,
             ..
         } => {
@@ -497,40 +485,54 @@ fn tamed(said: Said) -> Said {
             Said::Verdict {
                 number,
                 mission,
+                own,
                 commit: (!slacks.is_empty()).then_some(0),
                 slacks,
             }
         }
-        Said::Wave {
+        Said::Aside {
             number,
             mission,
-            rise,
-            targets,
-            width_m,
-            levels,
-            reaches,
+            altitude_m,
+            y_m,
+            mut reaches,
             ..
-        } => Said::Wave {
+        } => {
+            reaches.truncate(1);
+            for reach in &mut reaches {
+                *reach = into(*reach);
+            }
+            Said::Aside {
+                number,
+                mission,
+                anchor: 1.0,
+                gap: 0,
+                growth: 0,
+                altitude_m,
+                power_w: 1.0,
+                y_m: y_m % 100.0,
+                reaches,
+            }
+        }
+        Said::Course {
             number,
             mission,
-            base: 0.5,
-            rise: rise.min(1.0),
-            targets,
-            centre_m: 50.0,
-            width_m,
-            levels,
-            power_w: 1.0,
-            reaches,
-        },
-        Said::Trace {
-            number,
-            mission,
-            choice,
-        } => Said::Trace {
-            number,
-            mission,
-            choice: choice.map(|[_, level]| [0, level % 2]),
-        },
+            mut trials,
+            ..
+        } => {
+            for [target, x_m, y_m, altitude_m] in &mut trials {
+                *target = 0.5;
+                *x_m = into(*x_m);
+                *y_m %= 60.0;
+                *altitude_m = altitude_m.clamp(20.0, 300.0);
+            }
+            Said::Course {
+                number,
+                mission,
+                power_w: 1.0,
+                trials,
+            }
+        }
         Said::Roster(forming) => {
             let [_, relays, view, version] = forming.numbers;
             Said::Roster(Forming {
@@ -659,9 +661,9 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                     (view, begun) = (relay.view(), false);
                 }
                 let kind = step.said.body()[0];
-                let onward = [0, 4, 5, 7, 10].contains(&kind);
+                let onward = [0, 4, 5, 6, 8, 11].contains(&kind);
                 let port = if onward == step.right_side { from } else { to };
-                if onward && kind != 10 {
+                if onward && kind != 11 {
                     pass = if begun {
                         last + 1
                     } else {
@@ -672,8 +674,8 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                     }
                 }
                 let (number, mission) = match kind {
-                    9..=11 => (view.wrapping_add(1), digest),
-                    3 | 12 | 13 => (0, digest),
+                    10..=12 => (view.wrapping_add(1), digest),
+                    3 | 13 | 14 => (0, digest),
                     _ => (pass, digest.wrapping_add(view)),
                 };
                 let number = number.wrapping_add_signed(step.off);
@@ -681,10 +683,10 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                 let said = renamed(step.said, number, mission ^ wrong);
                 let said = if step.tame { tamed(said) } else { said };
                 let answer = match kind {
-                    0 | 4 => 1,
-                    5 => 6,
-                    10 => 11,
-                    _ => 8,
+                    0 | 4 | 5 => 1,
+                    6 => 7,
+                    11 => 12,
+                    _ => 9,
                 };
                 let answer = one_of_each(number, mission)[answer].clone();
                 let mut heard = vec![(port, said)];
@@ -702,14 +704,15 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                     prop_assert!((1..=relay.mission().relays()).contains(&relay.index()));
                     if let Some(at) = relay.setpoint() {
                         prop_assert!((0.0..=1000.0).contains(&at.x_m), "{at:?}");
+                        prop_assert!((-60.0..=40.0).contains(&at.y_m), "{at:?}");
                         prop_assert!((20.0..=300.0).contains(&at.altitude_m), "{at:?}");
                     }
                     if relay.setpoint() != place {
                         let cause = match (said.body()[0], pause) {
                             (1, 0) => "verdict",
-                            (6, 0) => "trace",
-                            (7, _) => "turn",
-                            (0 | 4, 0) => "sweep at the last",
+                            (7, 0) => "worth",
+                            (8, _) => "turn",
+                            (0 | 4 | 5, 0) => "sweep at the last",
                             _ => "work",
                         };
                         *counts.entry(cause).or_insert(0) += 1;
@@ -734,7 +737,7 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
 
 #[test]
 fn any_messages_leave_a_relay_in_bounds() {
-    led_by_anything(source(), 4, &["verdict", "trace", "turn", "view"]);
+    led_by_anything(source(), 4, &["verdict", "turn", "view"]);
     led_by_anything(source(), 1, &[]);
     led_by_anything(source(), 8, &["work", "view"]);
 }

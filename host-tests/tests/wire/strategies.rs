@@ -151,88 +151,79 @@ pub(crate) fn measured(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
         .boxed()
 }
 
-/// Numbers of targets and of levels that a wave may have.
-pub(crate) fn sizes() -> BoxedStrategy<(u8, u8)> {
-    let any_size = (1..=16_u8).prop_flat_map(|targets| (Just(targets), 1..=64 / targets));
-    prop_oneof![
-        4 => any_size,
-        1 => Just((7, 9)),
-        1 => Just((3, 21)),
-        1 => Just((1, 1)),
-        1 => Just((16, 4)),
-        1 => Just((1, 64)),
-    ]
-    .boxed()
+/// The sweeps of `plain` from beside the line.
+pub(crate) fn asides(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
+    (plain, beside())
+        .prop_map(|(said, y_m)| match said {
+            Said::Sweep {
+                number,
+                mission,
+                anchor,
+                gap,
+                growth,
+                altitude_m,
+                power_w,
+                reaches,
+            } => Said::Aside {
+                number,
+                mission,
+                anchor,
+                gap,
+                growth,
+                altitude_m,
+                power_w,
+                y_m,
+                reaches,
+            },
+            other => other,
+        })
+        .boxed()
 }
 
-/// A wave's base and rise.
-pub(crate) fn rises() -> BoxedStrategy<(f32, f32)> {
-    let bases = prop_oneof![
+/// How far from the line, on either side.
+fn beside() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        4 => -100.0..=100.0_f32,
+        1 => up_to(1e5),
+        1 => up_to(1e5).prop_map(|y_m| -y_m),
+    ]
+}
+
+/// A course in range, of `least` trials at least.
+pub(crate) fn courses(least: usize) -> BoxedStrategy<Said> {
+    let targets = prop_oneof![
         4 => (-10.0..5.0_f32).prop_map(f32::exp2),
         1 => (-126.0..99.0_f32).prop_map(f32::exp2),
         1 => Just(f32::MIN_POSITIVE),
         1 => Just(1e30),
     ];
-    (bases, up_to(1e6)).boxed()
-}
-
-/// The centre of a wave's levels and their width.
-pub(crate) fn widths() -> BoxedStrategy<(f32, f32)> {
-    (altitudes(), up_to(1e5)).boxed()
-}
-
-/// A wave in range, of one of these `sizes`.
-pub(crate) fn waves(sizes: impl Strategy<Value = (u8, u8)> + 'static) -> BoxedStrategy<Said> {
-    let places = || {
-        let code = prop_oneof![
-            8 => 0..=0x00FF_FFFF_u32,
-            2 => Just(0x00FF_FFFF),
-            1 => Just(0x00FF_FFFE),
-            1 => Just(0),
-        ];
-        vec(code, 64)
-    };
+    let trials = (targets, along(), beside(), altitudes())
+        .prop_map(|(target, x_m, y_m, altitude_m)| [target, x_m, y_m, altitude_m]);
     let numbers = (any::<u16>(), any::<u16>());
-    (numbers, sizes, rises(), widths(), powers(), places())
-        .prop_map(
-            |(
-                (number, mission),
-                (targets, levels),
-                (base, rise),
-                (centre_m, width_m),
-                power_w,
-                places,
-            )| {
-                let pairs = usize::from(targets) * usize::from(levels);
-                let bytes = places.iter().map(|code| code.to_le_bytes());
-                Said::Wave {
-                    number,
-                    mission,
-                    base,
-                    rise,
-                    targets,
-                    centre_m,
-                    width_m,
-                    levels,
-                    power_w,
-                    reaches: bytes
-                        .take(pairs)
-                        .flat_map(|[a, b, c, _]| [a, b, c])
-                        .collect(),
-                }
-            },
-        )
+    (numbers, powers(), vec(trials, least..=4))
+        .prop_map(|((number, mission), power_w, trials)| Said::Course {
+            number,
+            mission,
+            power_w,
+            trials,
+        })
         .boxed()
 }
 
-fn traces() -> BoxedStrategy<Said> {
-    let numbers = prop_oneof![3 => 0..8_u8, 1 => 0..64_u8];
-    let choice = proptest::option::of([numbers.clone(), numbers]);
-    (any::<u16>(), any::<u16>(), choice)
-        .prop_map(|(number, mission, choice)| Said::Trace {
+/// What came of a course, in range.
+pub(crate) fn worths() -> BoxedStrategy<Said> {
+    let parts = prop_oneof![
+        4 => -10.0..=10.0_f32,
+        1 => up_to(f32::MAX),
+        1 => up_to(f32::MAX).prop_map(|part| -part),
+    ];
+    let trials = proptest::option::of(0..4_u8);
+    (any::<u16>(), any::<u16>(), trials, vec(parts, 17))
+        .prop_map(|(number, mission, trial, outlook)| Said::Worth {
             number,
             mission,
-            choice,
+            trial,
+            outlook: outlook.try_into().unwrap(),
         })
         .boxed()
 }
@@ -364,12 +355,14 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
     let verdicts = (
         any::<u16>(),
         any::<u16>(),
+        any::<bool>(),
         proptest::option::of(0..16_u8),
         vec(metres(-2e9), 0..=16),
     )
-        .prop_map(|(number, mission, commit, slacks)| Said::Verdict {
+        .prop_map(|(number, mission, own, commit, slacks)| Said::Verdict {
             number,
             mission,
+            own,
             commit,
             slacks,
         });
@@ -380,8 +373,9 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         1 => (any::<u16>(), any::<bool>())
             .prop_map(|(mission, answer)| Said::Heartbeat { mission, answer }),
         2 => measured(sweeps(0)),
-        3 => waves(sizes()),
-        1 => traces(),
+        2 => asides(sweeps(0)),
+        2 => courses(0),
+        2 => worths(),
         2 => tokens(),
         2 => moves(),
         3 => formings(),
@@ -415,13 +409,14 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
             // Where numbers begin in the messages of each tag; in lists every four bytes from the last of them.
             let starts: &[usize] = match body[0] {
                 0 => &[5, 11, 15, 20, 24],
-                1 => &[7, 8],
-                4 => &[5, 11, 15, 19, 24, 28],
-                5 => &[5, 9, 14, 18, 23],
-                7 => &[5, 9, 13, 18, 24],
-                8 => &[5, 9, 14],
-                9..=11 => &[5, 7],
-                13 => &NUMBERS,
+                1 => &[8, 9],
+                4 | 5 => &[5, 11, 15, 19, 24, 28],
+                6 => &[5, 10, 14, 18, 22, 26, 30, 34, 38],
+                7 => &[6, 7, 10, 11, 70, 71],
+                8 => &[5, 9, 13, 18, 24],
+                9 => &[5, 9, 14],
+                10..=12 => &[5, 7],
+                14 => &NUMBERS,
                 _ => &[1],
             };
             let at = starts[at.index(starts.len())];
@@ -435,20 +430,20 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         body
     });
     let longer = (valid(), vec(any::<u8>(), 1..4)).prop_map(|(body, more)| [body, more].concat());
-    // Every byte that is neither part of a number nor of a place.
+    // Every byte that is no part of a number.
     let recounted = (valid(), any::<proptest::sample::Index>(), any::<u8>()).prop_map(
         |(mut body, at, byte)| {
             let bytes: &[usize] = match body[0] {
                 0 => &[9, 10, 19],
-                1 => &[5, 6],
+                1 => &[5, 6, 7],
                 3 => &[3],
-                4 => &[9, 10, 23],
-                5 => &[13, 22, 27, 28],
-                6 => &[5, 6, 7],
-                7 => &[17, 22, 23],
-                8 => &[13],
-                9..=11 => &[5, 6, 7, 8, 9, 10, 11, 12, 13],
-                13 => &[1, 2, 5, 6],
+                4 | 5 => &[9, 10, 23],
+                6 => &[9],
+                7 => &[5, 6],
+                8 => &[17, 22, 23],
+                9 => &[13],
+                10..=12 => &[5, 6, 7, 8, 9, 10, 11, 12, 13],
+                14 => &[1, 2, 5, 6],
                 _ => &[0],
             };
             let at = bytes[at.index(bytes.len())];
@@ -462,7 +457,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         pad(&mut body, tag, more);
         body
     });
-    let tagged = (0..16_u8, vec(any::<u8>(), 0..=220)).prop_map(|(tag, mut body)| {
+    let tagged = (0..16_u8, vec(any::<u8>(), 0..=96)).prop_map(|(tag, mut body)| {
         body.insert(0, tag);
         body
     });
@@ -475,19 +470,18 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         1 => longer.boxed(),
         1 => padded.boxed(),
         2 => tagged.boxed(),
-        1 => vec(any::<u8>(), 0..=221).boxed(),
+        1 => vec(any::<u8>(), 0..=96).boxed(),
     ]
     .boxed()
 }
 
 /// Writes the tag or the count of a body as a varint with one byte more, and another `more` on top.
 pub(crate) fn pad(body: &mut Vec<u8>, tag: bool, more: usize) {
-    let count = match (body[0], body.get(5)) {
-        (0, _) => 19,
-        (1, Some(commit)) => 6 + usize::from(*commit),
-        (4, _) => 23,
-        // The last byte of the count: its first may go on already.
-        (5, _) => 27 + usize::from(body[27] >= 0x80),
+    let count = match body[0] {
+        0 => 19,
+        1 => 7 + usize::from(body[6]),
+        4 | 5 => 23,
+        6 => 9,
         _ => 0,
     };
     let at = if tag { 0 } else { count };
@@ -505,7 +499,7 @@ pub(crate) fn pieces(heads: impl Strategy<Value = Header> + 'static) -> BoxedStr
         .prop_map(|(head, said)| wire(&plain(head, &said.body())))
         .boxed();
     let sealed_body = (heads, bodies()).prop_map(|(head, body)| wire(&plain(head, &body)));
-    let sealed_noise = vec(any::<u8>(), 0..=231).prop_map(|bytes| wire(&sealed(bytes)));
+    let sealed_noise = vec(any::<u8>(), 0..=98).prop_map(|bytes| wire(&sealed(bytes)));
     let damaged = (good.clone(), any::<proptest::sample::Index>(), 0..8_u8).prop_map(
         |(mut frame, at, bit)| {
             let at = at.index(frame.len());
@@ -526,7 +520,7 @@ pub(crate) fn pieces(heads: impl Strategy<Value = Header> + 'static) -> BoxedStr
             frame
         });
     let noise = vec(any::<u8>(), 0..300);
-    let oversized = vec(1..=u8::MAX, 220..700).prop_map(|mut bytes| {
+    let oversized = vec(1..=u8::MAX, 100..700).prop_map(|mut bytes| {
         bytes.push(0);
         bytes
     });

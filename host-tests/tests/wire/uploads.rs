@@ -6,7 +6,7 @@ use uav_relay::{Duration, Event, Instant, Interference, Mission, Port, Relay, Up
 
 use super::codec::{Forming, Said};
 use super::forming::{ASKS, FLIES, FORMS, FRESH, READY, events};
-use super::offer::{Offer, offer};
+use super::offer::{BYTES, Offer, offer};
 use super::receive::{FIELD, counted, paper, relay};
 use super::sequence::{FIRST, framed, one_of_each, sent};
 use super::signed::{Peer, said, set, with_key};
@@ -199,10 +199,10 @@ fn forming(tag: u8, view: u16, of: (u16, u16), place: u16) -> Said {
         number: view,
         mission: of.0,
         numbers: relays,
-        flags: 11 - tag,
+        flags: 12 - tag,
     };
     match tag {
-        10 => Said::Roster(forming),
+        11 => Said::Roster(forming),
         _ => Said::Count(forming),
     }
 }
@@ -220,7 +220,7 @@ fn a_roster_of_another_mission_than_the_one_held_leads_to_a_hail() {
         for roster in [newer, (base, 2), (base.wrapping_add(1), 0)] {
             let mut after = relay.clone();
             let mut peer = peers[0].clone();
-            peer.says(&mut after, NOW, &forming(10, 1, roster, 3));
+            peer.says(&mut after, NOW, &forming(11, 1, roster, 3));
             let (was, is) = (before, after.stats());
             let raised = (is.view - was.view, is.mission - was.mission);
             assert_eq!(raised, if known { (1, 0) } else { (0, 1) }, "{roster:?}");
@@ -228,8 +228,8 @@ fn a_roster_of_another_mission_than_the_one_held_leads_to_a_hail() {
             assert_eq!(said(&mut after, NOW), [(3, answer)]);
             assert_eq!(after.stats().received, before.received + 1);
         }
-        peers[0].says(&mut relay, NOW, &forming(10, 1, (base, 0), 3));
-        let on = (5, forming(10, 1, (base, 0), 4));
+        peers[0].says(&mut relay, NOW, &forming(11, 1, (base, 0), 3));
+        let on = (5, forming(11, 1, (base, 0), 4));
         assert_eq!(said(&mut relay, NOW), [on], "its own");
     }
 }
@@ -240,7 +240,7 @@ fn the_node_after_is_offered_the_mission_before_the_roster() {
     let newer = upload(2, base);
     peers[0].says(&mut relay, NOW, &Said::Offer(newer));
     both(&mut relay);
-    let roster = |place| forming(10, 1, stamp(&newer), place);
+    let roster = |place| forming(11, 1, stamp(&newer), place);
     peers[0].says(&mut relay, NOW, &roster(3));
     assert_eq!(said(&mut relay, NOW), [(5, Said::Offer(newer))]);
     // It is not repeated at once: a hail shows whether it has arrived.
@@ -255,16 +255,16 @@ fn adopted() -> (Relay, [Peer; 2], u16, Offer) {
     peers[0].says(&mut relay, NOW, &Said::Offer(newer));
     peers[1].says(&mut relay, NOW, &hail(base, 4, stamp(&newer), 0));
     both(&mut relay);
-    peers[0].says(&mut relay, NOW, &forming(10, 1, stamp(&newer), 3));
+    peers[0].says(&mut relay, NOW, &forming(11, 1, stamp(&newer), 3));
     assert_eq!(
         said(&mut relay, NOW),
-        [(5, forming(10, 1, stamp(&newer), 4))]
+        [(5, forming(11, 1, stamp(&newer), 4))]
     );
     assert_eq!((relay.version(), relay.view()), (0, 0));
-    peers[1].says(&mut relay, NOW, &forming(11, 1, stamp(&newer), 5));
+    peers[1].says(&mut relay, NOW, &forming(12, 1, stamp(&newer), 5));
     assert_eq!(
         said(&mut relay, NOW),
-        [(3, forming(11, 1, stamp(&newer), 4))]
+        [(3, forming(12, 1, stamp(&newer), 4))]
     );
     (relay, peers, base, newer)
 }
@@ -311,7 +311,7 @@ fn a_view_that_is_granted_flies_the_mission_of_its_roster() {
 fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_older_one_is_not() {
     let (mut relay, mut peers, base, flown) = adopted();
     events(&mut relay);
-    peers[0].says(&mut relay, NOW, &forming(10, 2, stamp(&flown), 3));
+    peers[0].says(&mut relay, NOW, &forming(11, 2, stamp(&flown), 3));
     said(&mut relay, NOW);
     let next = upload(3, base);
     peers[0].says(&mut relay, NOW, &Said::Offer(next));
@@ -320,7 +320,7 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
         let mut after = relay.clone();
         peers[1]
             .clone()
-            .says(&mut after, NOW, &forming(11, 2, of, 5));
+            .says(&mut after, NOW, &forming(12, 2, of, 5));
         assert_eq!((after.version(), after.view()), (2, view), "{of:?}");
         if view == 2 {
             // It still holds a newer one than it flies.
@@ -359,7 +359,7 @@ fn in_a_field_nothing_is_held() {
 #[test]
 fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
     let (relay, _, base, newer) = adopted();
-    let mut kept = [0; 75];
+    let mut kept = [0; BYTES];
     relay.upload().unwrap().encode(&mut kept).unwrap();
     assert_eq!(kept[..], newer.body());
     let upload = Upload::decode(&kept).unwrap();
