@@ -74,7 +74,7 @@ fn frame() -> Vec<Vec<u8>> {
 
 fn scenario() -> Vec<Vec<u8>> {
     let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples");
-    ["scenario", "several", "field", "altitudes", "side"]
+    ["scenario", "several", "field", "altitudes"]
         .iter()
         .map(|name| fs::read(format!("{examples}/{name}.toml")).unwrap())
         .collect()
@@ -84,9 +84,7 @@ fn scenario() -> Vec<Vec<u8>> {
 fn missions() -> Vec<Vec<u8>> {
     // Unsigned, and signed.
     let align = (0..6).flat_map(|mission| [0, 8].map(|how| vec![mission, 3, how]));
-    let joint = [1, 13]
-        .into_iter()
-        .flat_map(|mission| [1, 33, 65, 73].map(|how| vec![mission, 3, how]));
+    let joint = [1, 33, 65, 73].map(|how| vec![1, 3, how]);
     let adjust = [vec![1, 3, 2, 0, 2, 20, 0], vec![1, 3, 2, 65, 2, 20, 0, 5]];
     align.chain(joint).chain(adjust).collect()
 }
@@ -140,7 +138,7 @@ fn relay() -> Vec<Vec<u8>> {
         }
         // Wake-ups, a restart, samples, each kind of message from either side.
         let mut operations = vec![3, 63, 7, 3, 9, 8, 100, 1, 0, 0, 200];
-        for tag in 0..14 {
+        for tag in 0..15 {
             operations.extend([9, tag % 2, tag, 0, 0, 0, 128, 0, 1, 0, 64, 0, 128, 0, 0]);
         }
         seeds.push([&*mission, &[0, 1, 0, 0, 1, 0, 1, 0], &operations].concat());
@@ -154,19 +152,19 @@ fn relay() -> Vec<Vec<u8>> {
 
 /// The next version for as many relays, of the paper's mission with the interferer elsewhere, from one side or the other.
 fn offer(side: u8) -> Vec<u8> {
-    let head = [9, side, 13, 1, 0, 0, 1];
+    let head = [9, side, 14, 1, 0, 0, 1];
     let interferer = [0, 0, 128, 0, 0, 192, 0, 0, 64];
-    [&head[..], &interferer, &[255, 1, 0]].concat()
+    [&head[..], &interferer, &[255, 1, 1, 0]].concat()
 }
 
 /// The second of four relays with a key, on links or on one channel: it is offered a mission, its other neighbour comes to hold
 /// it, too, and they are counted in a view that flies it.
 fn uploaded(how: u8) -> Vec<u8> {
     let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
-    let hail = [9, 1, 9, 0, 0, 2, 0, 0, 0];
+    let hail = [9, 1, 10, 0, 0, 2, 0, 0, 0];
     // The next view, of the mission held: from the first place, after view 0 of four with its leader; back from the third.
-    let roster = [9, 0, 10, 1, 0, 1, 4, 0, 1, 0];
-    let count = [9, 1, 11, 1, 0, 3, 4, 0];
+    let roster = [9, 0, 11, 1, 0, 1, 4, 0, 1, 0];
+    let count = [9, 1, 12, 1, 0, 3, 4, 0];
     let wake = [3, 3];
     let parts = [&head[..], &offer(0), &wake, &hail, &roster, &count, &wake];
     parts.concat()
@@ -176,7 +174,7 @@ fn uploaded(how: u8) -> Vec<u8> {
 fn by_the_ground(index: u8) -> Vec<u8> {
     let head = [0, 3, 0, index, 8, 0, 0, 0, 0, 1, 0];
     let side = u8::from(index > 0);
-    let asks = [9, side, 9, 0, 0, 0, 0, 1, 0];
+    let asks = [9, side, 10, 0, 0, 0, 0, 1, 0];
     let offer = offer(side);
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
@@ -187,11 +185,11 @@ fn formed(wiring: u8) -> Vec<u8> {
     let head = [0, 3, 0, 3, wiring, 32, 0, 0, 0, 0, 0, 1, 0];
     let position = [15, 0, 0, 0, 100, 0, 0, 20];
     // The view after its own, a good digest, the third place of four in view 0, whose leader is there.
-    let roster = [9, 0, 10, 1, 0, 3, 4, 224, 0, 1];
-    let hail = [9, 0, 9, 1, 0, 3, 0, 5];
-    let fence = [9, 0, 12, 7, 0, 100, 0, 0, 0, 128, 0, 0, 128];
+    let roster = [9, 0, 11, 1, 0, 3, 4, 224, 0, 1];
+    let hail = [9, 0, 10, 1, 0, 3, 0, 5];
+    let fence = [9, 0, 13, 7, 0, 100, 0, 0, 0, 128, 0, 0, 128];
     let late = [9, 0, 0, 0, 241, 0, 0, 64, 0, 128, 0, 0, 0, 0, 0];
-    let far = [9, 46, 9, 1, 0, 4, 0, 9, 3, 8, 9, 46, 9, 1, 0, 4, 0, 9];
+    let far = [9, 46, 10, 1, 0, 4, 0, 9, 3, 8, 9, 46, 10, 1, 0, 4, 0, 9];
     let parts = [&head[..], &position, &roster, &hail, &roster, &fence];
     [&parts.concat()[..], &position, &late, &far, &[3, 60]].concat()
 }
