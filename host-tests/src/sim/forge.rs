@@ -76,7 +76,7 @@ fn lie(mission: &Mission, way: Way, heard: Option<Vec<u8>>, rng: &mut ChaCha8Rng
     twisted.unwrap_or_else(|| made_up(mission, way, rng))
 }
 
-/// A sweep or a verdict that was heard, from the same relay to the same, as if it were of one of the next passes and said
+/// A sweep, a course or an answer to one that was heard, from the same relay to the same, as if it were of one of the next passes and said
 /// something else.
 fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let whole = with_check(plain);
@@ -98,6 +98,19 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
             answer.number = later(answer.number, rng);
             answer.verdict.commit = Some(0);
             Message::Verdict(answer)
+        }
+        Message::Course(mut course) => {
+            course.number = later(course.number, rng);
+            let aside_m = rng.random_range(-100.0..100.0);
+            for trial in &mut course.trials {
+                trial.place.y_m += aside_m;
+            }
+            Message::Course(course)
+        }
+        Message::Worth(mut worth) => {
+            worth.number = later(worth.number, rng);
+            worth.trial = Some(0);
+            Message::Worth(worth)
         }
         _ => return None,
     };
