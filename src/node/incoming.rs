@@ -92,13 +92,7 @@ impl Node {
 
     /// Whether `message` from the neighbour `from` is of the mission and, if it is of one, of the view that this relay is in.
     /// What is not is counted, and answered by a hail if the two may have to come to one view.
-    fn is_of_this_view(
-        &mut self,
-        now: Instant,
-        side: Side,
-        from: u16,
-        message: &Message,
-    ) -> bool {
+    fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
         let Some(told) = message.mission() else {
             return true;
         };

@@ -49,7 +49,15 @@ pub fn extend(
     let pairs = targets.iter().zip(from);
     if let Some(interferer) = mission.interferer() {
         let end_m = mission.end_for(index, 0.0);
-        toward_rx(mission, interferer, behind, (index, own), end_m, pairs, reaches);
+        toward_rx(
+            mission,
+            interferer,
+            behind,
+            (index, own),
+            end_m,
+            pairs,
+            reaches,
+        );
     } else if let Some(field) = mission.field() {
         let altitude_m = behind.map(|behind| behind.relay.at.altitude_m);
         let measured = behind.and_then(|behind| behind.measured_per_w);
@@ -111,7 +119,15 @@ pub fn extend_chosen(
     reaches.clear();
     if let Some(interferer) = mission.interferer() {
         let pairs = targets.iter().zip(from);
-        toward_rx(mission, interferer, behind, (index, own), end_m, pairs, reaches);
+        toward_rx(
+            mission,
+            interferer,
+            behind,
+            (index, own),
+            end_m,
+            pairs,
+            reaches,
+        );
     }
 }
 
@@ -155,7 +171,8 @@ pub(super) fn slack(
     let at = own.at.at(place);
     let quiet = measured_per_w.map_or(sir::quiet(mission, at), |upsilon| upsilon / field.largest());
     // Cut at 1e9 m, as the last hop toward Rx: an infinite slack would not be sent.
-    let squared = (mission.tx_gain().value() * quiet / target).min(1e18) - square(own.at.altitude_m);
+    let squared =
+        (mission.tx_gain().value() * quiet / target).min(1e18) - square(own.at.altitude_m);
     // Where no place is near enough, by how much the square is negative: it stays continuous in the target.
     Some((sqrt(squared.abs()).copysign(squared) - place).max(-1e9))
 }

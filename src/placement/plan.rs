@@ -97,7 +97,13 @@ impl Planner {
                 self.index = next;
                 continue;
             }
-            let verdict = pass::close(mission, profile.on_line(), None, *self.search.ladder(), &self.reaches);
+            let verdict = pass::close(
+                mission,
+                profile.on_line(),
+                None,
+                *self.search.ladder(),
+                &self.reaches,
+            );
             if let Some(commit) = verdict.commit
                 && let Some(&target) = self.targets.get(usize::from(commit))
             {
@@ -147,7 +153,15 @@ pub fn place(
     loop {
         let profile = profile_of(at);
         let mut reaches = PerTarget::new();
-        pass::extend(mission, behind, at, profile.on_line(), &[target], &from, &mut reaches);
+        pass::extend(
+            mission,
+            behind,
+            at,
+            profile.on_line(),
+            &[target],
+            &from,
+            &mut reaches,
+        );
         if at == index {
             return reaches.first().map(|&x_m| profile.on_line().at.at(x_m));
         }

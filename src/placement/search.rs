@@ -89,8 +89,7 @@ impl Search {
         let MissionConfig {
             distance_m, common, ..
         } = *mission.config();
-        let above_receiver =
-            |profile: Profile| Placement::on_line(distance_m, profile.altitude_m);
+        let above_receiver = |profile: Profile| Placement::on_line(distance_m, profile.altitude_m);
         // What the hop at either end can have at most, and what a chain of equals meets that takes no step at all.
         let (ceiling, start, met) = match mission.heading() {
             Heading::TowardRx => {

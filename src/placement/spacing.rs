@@ -145,14 +145,21 @@ impl Hop {
         let discriminant = ratio * square(u) + e * h;
         if !(e > 0.0) {
             let room = self.end_m - from_m;
-            let all = square(u - room) + self.aside_squared >= ratio * (square(room) + self.across_squared);
-            if all || discriminant < 0.0 || !(u >= 0.0) { return Some(self.end_m.max(from_m)); }
+            let all = square(u - room) + self.aside_squared
+                >= ratio * (square(room) + self.across_squared);
+            if all || discriminant < 0.0 || !(u >= 0.0) {
+                return Some(self.end_m.max(from_m));
+            }
         }
         if discriminant < 0.0 {
             return None;
         }
         let r = sqrt(discriminant);
-        let d = if u >= 0.0 { (square(u) + h) / (u + r) } else { (r - u) / e };
+        let d = if u >= 0.0 {
+            (square(u) + h) / (u + r)
+        } else {
+            (r - u) / e
+        };
         Some((from_m + d).min(self.end_m.max(from_m)))
     }
 }
@@ -188,7 +195,14 @@ mod tests {
         let mission = Mission::try_new(config).unwrap();
         let sender = Sender::transmitter(&mission);
         let end_m = mission.end_for(1, 0.0);
-        Hop::new(&mission, &interferer, sender, 1, CrossSection::on_line(altitude_m), end_m)
+        Hop::new(
+            &mission,
+            &interferer,
+            sender,
+            1,
+            CrossSection::on_line(altitude_m),
+            end_m,
+        )
     }
 
     /// Behind the transmitter an interferer makes SIR_1 rise at first: at 10 m behind, from 1.04 above Tx to 1.22 at 45 m.

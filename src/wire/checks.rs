@@ -3,14 +3,13 @@
 //! The types of `body` hold any bytes; what [`Message::decode`] makes of them holds none that a relay would have to doubt.
 
 use super::body::{At, Body, Targets};
-use super::message::{
-    Answer, Course, Message, MessageError, Moved, Sweep, TRIALS, Token, Trial, Turn, Worth,
-};
+use super::message::{Answer, Course, Message, MessageError, Moved, Sweep, Token, Turn, Worth};
 use crate::field::is_upsilon;
 use crate::guard::Fence;
 use crate::mission::Profile;
 use crate::placement::PerTarget;
 use crate::placement::joint::Outlook;
+use crate::placement::joint::course::{Bar, TRIALS, Trial, Trials};
 use crate::placement::ladder::{Ladder, TARGETS};
 use crate::placement::local::Local;
 use crate::placement::verdict::Verdict;
@@ -66,19 +65,22 @@ fn checked(body: Body) -> Option<Message> {
             mission: u16::from_le_bytes(mission),
             answer,
         },
-        Body::Course(pass, power_w, trials) if cfg!(feature = "altitude") => {
+        Body::Course(pass, [power_w, trust, slope, estimate], trials)
+            if cfg!(feature = "altitude") =>
+        {
             let mut course = Course {
                 number: pass.number(),
                 mission: pass.mission(),
                 power_w: profile(1.0, power_w)?.power_w,
-                trials: heapless::Vec::new(),
+                bar: bar(trust, slope, estimate)?,
+                trials: Trials::new(),
             };
             for parts in trials {
                 course.trials.push(trial(parts)?).ok()?;
             }
             Message::Course(course)
         }
-        Body::Worth(pass, trial, outlook) if cfg!(feature = "altitude") => {
+        Body::Worth(pass, trial, slack_m, outlook) if cfg!(feature = "altitude") => {
             if trial.is_some_and(|trial| usize::from(trial) >= TRIALS) {
                 return None;
             }
@@ -86,6 +88,7 @@ fn checked(body: Body) -> Option<Message> {
                 number: pass.number(),
                 mission: pass.mission(),
                 trial,
+                slack_m: Some(slack_m).filter(|slack| slack.is_finite())?,
                 outlook: Outlook::from_parts(outlook)?,
             })
         }
@@ -205,14 +208,32 @@ fn is_beside(y_m: f32) -> bool {
 }
 
 /// A trial, if its numbers are in range.
-fn trial([target, x_m, y_m, altitude_m]: [f32; 4]) -> Option<Trial> {
+fn trial([target, penalty_m, x_m, y_m, altitude_m]: [f32; 5]) -> Option<Trial> {
     let place = Placement {
         x_m,
         y_m,
         altitude_m,
     };
-    let sound = (f32::MIN_POSITIVE..=1e30).contains(&target) && is_place(place);
-    sound.then_some(Trial { target, place })
+    let sound = (f32::MIN_POSITIVE..=1e30).contains(&target)
+        && (0.0..=f32::MAX).contains(&penalty_m)
+        && is_place(place);
+    sound.then_some(Trial {
+        target,
+        penalty_m,
+        place,
+    })
+}
+
+/// What trials are judged by, if its numbers are in range.
+fn bar(trust: f32, slope: f32, estimate: f32) -> Option<Bar> {
+    let sound = (0.0..=1.0).contains(&trust)
+        && (f32::MIN..0.0).contains(&slope)
+        && (-1e3..=1e3).contains(&estimate);
+    sound.then_some(Bar {
+        trust,
+        slope,
+        estimate,
+    })
 }
 
 /// The profile of these numbers, if they are in range.

@@ -4,7 +4,8 @@ use uav_relay::mission::MAX_RELAYS;
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};
-use uav_relay::wire::message::{Message, TRIALS, Trial};
+use uav_relay::placement::joint::course::{TRIALS, Trial};
+use uav_relay::wire::message::Message;
 use uav_relay::{Identity, Instant, Mission, Port, Relay, Stats};
 
 use super::cobs::stuffed;
@@ -230,13 +231,22 @@ fn look_at(message: &Message) {
         Message::Course(course) => {
             assert!((1e-6..=1e6).contains(&course.power_w));
             assert!(course.trials.len() <= TRIALS);
-            for Trial { target, place } in &course.trials {
+            let bar = course.bar;
+            assert!((0.0..=1.0).contains(&bar.trust) && bar.slope < 0.0 && bar.estimate.abs() <= 1e3);
+            for trial in &course.trials {
+                let Trial {
+                    target,
+                    penalty_m,
+                    place,
+                } = trial;
                 assert!(is_target(*target) && (0.0..=1e6).contains(&place.x_m));
+                assert!(*penalty_m >= 0.0);
                 assert!(is_beside(place.y_m) && is_flown(place.altitude_m));
             }
         }
         Message::Worth(worth) => {
             assert!(worth.trial.is_none_or(|trial| usize::from(trial) < TRIALS));
+            assert!(worth.slack_m.is_finite());
             let parts = worth.outlook.parts();
             assert!(parts.iter().all(|part| part.is_finite()), "{parts:?}");
         }

@@ -268,30 +268,35 @@ impl Body<'_, '_> {
     fn course(&mut self) {
         self.pass();
         self.power();
-        for _ in 0..self.small(0, 4) {
+        let distance_m = self.known.distance_m;
+        self.float(|input| input.even(0.0, 1.0));
+        self.float(|input| input.even(-2.0 * distance_m, -1e-3));
+        self.float(|input| input.even(-1e3, 10.0));
+        for _ in 0..self.small(0, 3) {
             self.sir();
+            self.float(|input| input.even(0.0, 1.0));
             self.place();
             self.beside();
             self.altitude();
         }
     }
 
-    /// Slopes, bends and gains, many of them nothing, as where there is no room to move, and a slack.
+    /// A slack, then slopes, bends and gains, many of them nothing, as where there is no room to move.
     fn worth(&mut self) {
         self.pass();
         if self.small(0, 1) == 1 {
-            self.small(0, 3);
+            self.small(0, 2);
         }
+        let distance_m = self.known.distance_m;
+        self.float(|input| input.even(-distance_m, distance_m));
         let flat = self.input.flag();
-        for _ in 0..16 {
+        for _ in 0..12 {
             if flat {
                 self.bytes.extend_from_slice(&[0; 4]);
             } else {
                 self.float(|input| input.even(-1e3, 1e3));
             }
         }
-        let distance_m = self.known.distance_m;
-        self.float(|input| input.even(-distance_m, distance_m));
     }
 
     fn token(&mut self) {

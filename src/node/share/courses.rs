@@ -138,8 +138,7 @@ impl Share {
 
     /// A course from the relay before.
     pub(crate) fn on_course(&mut self, own: Own<'_>, course: &Course) -> Next {
-        let same =
-            matches!(&self.pass, Pass::Course(coursing) if coursing.told == course.trials);
+        let same = matches!(&self.pass, Pass::Course(coursing) if coursing.told == course.trials);
         let arrival = self.exchange.arrival(course.number, same);
         if let Some(next) = arrival.refused(self.exchange) {
             return next;

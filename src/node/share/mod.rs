@@ -123,11 +123,7 @@ pub(crate) struct Share {
 
 impl Share {
     /// A relay that has just been switched on. The leader numbers its passes from `number` on, and has work to do.
-    pub(crate) const fn new(
-        leader: bool,
-        number: u16,
-        profile: Profile,
-    ) -> Self {
+    pub(crate) const fn new(leader: bool, number: u16, profile: Profile) -> Self {
         Self {
             exchange: Exchange::new(if leader { Phase::Planning } else { Phase::Idle }, number),
             pass: Pass::Sweep(Sweeping::new(Ladder::single(1.0))),

@@ -31,7 +31,13 @@ impl Share {
             return Next::Stale;
         }
         self.exchange.take(sweep.number);
-        self.sweep_on(own, sweep.ladder, sweep.chosen, Some(behind), &sweep.reaches)
+        self.sweep_on(
+            own,
+            sweep.ladder,
+            sweep.chosen,
+            Some(behind),
+            &sweep.reaches,
+        )
     }
 
     /// Works out this relay's share of a sweep.

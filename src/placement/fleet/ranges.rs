@@ -45,7 +45,12 @@ struct Step {
 impl Equals<'_> {
     /// l_N: the place nearest to Tx from which Rx still hears relay N.
     fn last(&self) -> Option<f32> {
-        let hop = Retreat::new(self.mission, self.profile.on_line(), self.mission.relays(), None);
+        let hop = Retreat::new(
+            self.mission,
+            self.profile.on_line(),
+            self.mission.relays(),
+            None,
+        );
         hop.reach(self.target, self.mission.config().distance_m, 1.0)
     }
 
@@ -58,7 +63,12 @@ impl Equals<'_> {
     /// The longest hop into `y` from relay `index`.
     fn step(&self, index: u16, y: f32) -> Option<Step> {
         let altitude_m = self.profile.altitude_m;
-        let hop = Retreat::new(self.mission, self.profile.on_line(), index, Some(altitude_m));
+        let hop = Retreat::new(
+            self.mission,
+            self.profile.on_line(),
+            index,
+            Some(altitude_m),
+        );
         let at = Placement::on_line(y, altitude_m);
         let from_m = hop.reach(self.target, y, sir::quiet(self.mission, at))?;
         Some(Step { to_m: y, from_m })

@@ -157,7 +157,11 @@ impl Ascent {
         if share >= 1.0 {
             self.trust = (2.0 * self.trust).min(1.0);
         }
-        if self.idle >= 2 { Turn::Over } else { Turn::Again }
+        if self.idle >= 2 {
+            Turn::Over
+        } else {
+            Turn::Again
+        }
     }
 
     /// The next course, as the head says it.

@@ -96,7 +96,13 @@ impl<'a> Courser<'a> {
             gain: self.gain_in,
         };
         let interferer = self.mission.interferer()?;
-        Some(Link::new(self.mission, interferer, sender, self.first, self.room))
+        Some(Link::new(
+            self.mission,
+            interferer,
+            sender,
+            self.first,
+            self.room,
+        ))
     }
 
     /// The slack at Rx of a trial of the tail, m, and its outlook.
@@ -119,7 +125,13 @@ impl Coursing {
     }
 
     /// Where this relay is in the trials of a new course, for as many as it can take part in; at first it is at `wanted`.
-    pub(crate) fn take(&mut self, relay: Courser<'_>, bar: Bar, told: &Trials, wanted: CrossSection) {
+    pub(crate) fn take(
+        &mut self,
+        relay: Courser<'_>,
+        bar: Bar,
+        told: &Trials,
+        wanted: CrossSection,
+    ) {
         self.bar = bar;
         self.told.clone_from(told);
         self.own.clear();

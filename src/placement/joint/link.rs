@@ -83,7 +83,11 @@ impl<'a> Link<'a> {
             sender,
             room,
             distance_m: config.distance_m,
-            apart_m: if first { 0.0 } else { MARGIN * config.min_separation_m },
+            apart_m: if first {
+                0.0
+            } else {
+                MARGIN * config.min_separation_m
+            },
             mission,
         }
     }
@@ -92,7 +96,14 @@ impl<'a> Link<'a> {
     /// hop meets it. Beyond Rx nobody goes.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let at = self.room.nearest(self.within_reach(target, from_m, wanted));
-        let hop = Hop::new(self.mission, self.interferer, self.sender, 1, at, self.distance_m);
+        let hop = Hop::new(
+            self.mission,
+            self.interferer,
+            self.sender,
+            1,
+            at,
+            self.distance_m,
+        );
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
@@ -149,7 +160,12 @@ impl<'a> Link<'a> {
             },
             Axis::Y => {
                 let b = self.room.band.nearest(b);
-                let y = self.along(policy, target, from, [a.max(from.x_m).min(self.distance_m), b]);
+                let y = self.along(
+                    policy,
+                    target,
+                    from,
+                    [a.max(from.x_m).min(self.distance_m), b],
+                );
                 CrossSection {
                     y_m: y.unwrap_or(nominal.y_m),
                     altitude_m: b,
@@ -157,7 +173,12 @@ impl<'a> Link<'a> {
             }
             Axis::H => {
                 let b = self.room.lateral.nearest(b);
-                let h = self.along(policy, target, from, [a.max(from.x_m).min(self.distance_m), b]);
+                let h = self.along(
+                    policy,
+                    target,
+                    from,
+                    [a.max(from.x_m).min(self.distance_m), b],
+                );
                 CrossSection {
                     y_m: b,
                     altitude_m: h.unwrap_or(nominal.altitude_m),

@@ -136,7 +136,8 @@ impl Outlook {
         let mut bend = [q0, q1, q2].map(|[x, y, h, _, _]| [x, y, h]);
         let (full_y, full_h) = (mix(ay, fy, yy, fh, yh), mix(ah, fy, yh, fh, hh));
         for ((((row, ay), ah), ky), kh) in bend.iter_mut().zip(ay).zip(ah).zip(fy).zip(fh) {
-            for ((((cell, my), mh), fy), fh) in row.iter_mut().zip(full_y).zip(full_h).zip(fy).zip(fh)
+            for ((((cell, my), mh), fy), fh) in
+                row.iter_mut().zip(full_y).zip(full_h).zip(fy).zip(fh)
             {
                 *cell += ky * my + kh * mh + ay * fy + ah * fh;
             }

@@ -65,9 +65,7 @@ impl Policy {
             }
         }
         // On the edges of the box.
-        let worth = |y: f32, h: f32| {
-            gy * y + gh * h + 0.5 * (yy * y * y + hh * h * h) + yh * y * h
-        };
+        let worth = |y: f32, h: f32| gy * y + gh * h + 0.5 * (yy * y * y + hh * h * h) + yh * y * h;
         let mut best = (f32::NEG_INFINITY, 0.0, 0.0);
         for (y, h) in [
             (ly, along_h(ly)),

@@ -365,7 +365,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 self.pass.end_m += self.least_step(chain.mission, chain.seat_of, index);
                 let sender = chain.sender(index, from);
                 let end_m = self.pass.end_m;
-                let hop = Hop::new(chain.mission, chain.interferer, sender, index, wanted, end_m);
+                let hop = Hop::new(
+                    chain.mission,
+                    chain.interferer,
+                    sender,
+                    index,
+                    wanted,
+                    end_m,
+                );
                 hop.reach(target, from.x_m).map(|x_m| wanted.at(x_m))
             } else {
                 let link = chain.link(index, from, room);
@@ -411,7 +418,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// The last place along x that leaves the relays after `index` of a solved chain their room, m.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let first = index.saturating_add(1);
-        let behind = (first..=mission.relays()).map(|after| self.least_step(mission, seat_of, after));
+        let behind =
+            (first..=mission.relays()).map(|after| self.least_step(mission, seat_of, after));
         mission.config().distance_m - behind.sum::<f32>()
     }
 
@@ -522,7 +530,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
         let first = u16::from(segment) * SEGMENT as u16 + 1;
         let last = relays.min(first + SEGMENT as u16 - 1);
-        (0..SEGMENT).zip(first..=last).collect::<heapless::Vec<_, SEGMENT>>().into_iter()
+        (0..SEGMENT)
+            .zip(first..=last)
+            .collect::<heapless::Vec<_, SEGMENT>>()
+            .into_iter()
     }
 
     /// Works out the policies of `segment`, whose relays come after one at `before`; what that one sees. Bounded by ten relays.
@@ -588,7 +599,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         if index == 0 {
             return Placement::default();
         }
-        let x_m = self.marks.get(usize::from(segment)).map_or(0.0, |mark| mark.x_m);
+        let x_m = self
+            .marks
+            .get(usize::from(segment))
+            .map_or(0.0, |mark| mark.x_m);
         self.at(index, (chain.seat_of)(index)).at(x_m)
     }
 

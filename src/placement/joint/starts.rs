@@ -56,7 +56,9 @@ impl Start {
         if number == 2 * count {
             return Some((relays > 1 && free).then_some(Self::Far));
         }
-        let &(aside, up) = ARCHES.get(number).or_else(|| ARCHES.get(number.checked_sub(count)?))?;
+        let &(aside, up) = ARCHES
+            .get(number)
+            .or_else(|| ARCHES.get(number.checked_sub(count)?))?;
         let fits = fits((aside, up));
         Some(if number < count {
             fits.then_some(Self::Arch { aside, up })
