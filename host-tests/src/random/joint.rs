@@ -22,16 +22,16 @@ use std::ops::RangeInclusive;
 use rand::{Rng, RngExt};
 
 use super::log_uniform;
-use crate::reference::joint::Band;
+use crate::reference::joint::Corridor;
 use crate::reference::{Link, Station};
 
-/// A link and the band of its relays, which stand at the band's lowest altitude in the link.
+/// A link and the corridor of its relays, which stand at its lowest altitude in the link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// The link.
     pub link: Link,
-    /// The band.
-    pub band: Band,
+    /// The corridor.
+    pub corridor: Corridor,
 }
 
 /// How far apart neighbours must stay in half of the scenarios, as a part of D / (N + 1): it hardly ever binds.
@@ -76,8 +76,8 @@ pub fn scenario(rng: &mut impl Rng, relays: &RangeInclusive<u32>, apart: (f64, f
         relays: (0..n).map(|_| relay).collect(),
     };
     let most_m = log_uniform(rng, 2.0 * least_m, 0.5 * d);
-    let band = Band { least_m, most_m };
-    Scenario { link, band }
+    let corridor = Corridor::plane(least_m, most_m);
+    Scenario { link, corridor }
 }
 
 /// How many relays.
