@@ -1,6 +1,12 @@
 //! The optimiser of the joint problem judged on its own, before it may judge anything: against known optima, against the exact
 //! reference at given altitudes, against brute force for one relay, and against itself from other seeds.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    missing_docs
+)]
 
 use std::iter::successors;
 
@@ -13,6 +19,8 @@ use host_tests::reference::{Link, Station};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+#[path = "joint/judged.rs"]
+mod judged;
 #[path = "joint/space.rs"]
 mod space;
 
@@ -27,9 +35,9 @@ fn close(got: f64, want: f64, rtol: f64, what: &str) {
 
 /// The optimum, and that it is one: flyable, and with the SIR of its places.
 fn checked(of: &Scenario, effort: Effort) -> JointOptimum {
-    let found = optimum(&of.link, of.corridor, &[], effort).unwrap();
+    let found = optimum(&of.link, of.corridor, &of.held, effort).unwrap();
     assert!(
-        keeps_rules(&of.link, of.corridor, &[], &found.places),
+        keeps_rules(&of.link, of.corridor, &of.held, &found.places),
         "{of:?}"
     );
     let again = sir(&of.link, &found.places).unwrap();
@@ -87,6 +95,7 @@ fn known_optima_are_found() {
                 ..Link::paper(n)
             },
             corridor: PAPER_BAND,
+            held: Vec::new(),
         };
         for seed in 0..3 {
             let found = checked(&paper, Effort { seed, rounds: 1 });
@@ -117,7 +126,14 @@ fn the_best_of_two_levels_is_beaten() {
     let best = best_of_levels(&link, &[20.0, 150.0]);
     close(best, 3.72189, 1e-5, "on two levels");
     let corridor = Corridor::plane(20.0, 150.0);
-    let found = checked(&Scenario { link, corridor }, Effort::usual(1));
+    let found = checked(
+        &Scenario {
+            link,
+            corridor,
+            held: Vec::new(),
+        },
+        Effort::usual(1),
+    );
     close(found.sir, 6.002_149_05, 1e-8, "in the band");
 }
 
@@ -223,7 +239,7 @@ fn no_move_is_better() {
                 }
             });
             let moved: Vec<Place> = moved.collect();
-            if keeps_rules(&of.link, of.corridor, &[], &moved) {
+            if keeps_rules(&of.link, of.corridor, &of.held, &moved) {
                 let sir = sir(&of.link, &moved).unwrap();
                 assert!(sir <= found.sir * (1.0 + 1e-8), "{sir}: {found:?}");
             }

@@ -118,9 +118,9 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// Five rounds: some milliseconds with few relays, about a second with 50 (release build).
+    /// Two rounds: some milliseconds with few relays, about half a second with 50 (release build).
     pub fn usual(seed: u64) -> Self {
-        Self { seed, rounds: 5 }
+        Self { seed, rounds: 2 }
     }
 }
 

@@ -26,7 +26,8 @@ impl Side {
             Self::Left => room.high.y = room.high.y.min(y_i),
             Self::Right => room.low.y = room.low.y.max(y_i),
         }
-        (room.low.y <= room.high.y).then_some(room)
+        let is_part = self == Self::Any || scene.corridor.free().y > 0.0;
+        (is_part && room.low.y <= room.high.y).then_some(room)
     }
 }
 

@@ -6,7 +6,7 @@
 //! interval, and either way the receiver's places solve a quadratic inequality. The target is bisected. Quadratics are solved
 //! here, unlike in the rest of the reference, for speed: what comes out is judged by its SIR alone.
 
-use super::scene::Scene;
+use super::scene::{Room, Scene};
 use super::space::{Across, Triple};
 
 type Interval = (f64, f64);
@@ -21,6 +21,32 @@ pub(super) struct Slot {
     pub(super) levels: Vec<Across>,
     /// Its places along Tx-Rx, both ends included.
     pub(super) window: Interval,
+}
+
+/// One level for each relay: the nearest in its room to that of `places`.
+pub(super) fn at_places(scene: &Scene, places: &[Across]) -> Vec<Slot> {
+    let places = places
+        .iter()
+        .chain(std::iter::repeat(&Across { y: 0.0, h: 0.0 }));
+    let rooms = scene.rooms.iter().zip(places);
+    rooms
+        .map(|(room, place)| Slot {
+            levels: vec![room.nearest(*place, 0.0)],
+            window: (0.0, 1.0),
+        })
+        .collect()
+}
+
+/// The nearest places to `levels` in a room, each once.
+pub(super) fn in_room(room: &Room, levels: &[Across]) -> Vec<Across> {
+    let mut inside: Vec<Across> = Vec::with_capacity(levels.len());
+    for level in levels {
+        let level = room.nearest(*level, 0.0);
+        if !inside.contains(&level) {
+            inside.push(level);
+        }
+    }
+    inside
 }
 
 /// The best chain, one slot per relay, to `tolerance` in ln SIR; `None` if no chain reaches `floor`, a ln SIR.

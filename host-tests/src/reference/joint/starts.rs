@@ -6,10 +6,11 @@ use rand_chacha::ChaCha8Rng;
 use super::Effort;
 use super::draws::{Side, bow, levels};
 use super::kicks::kicked;
-use super::levels::{Slot, best_chain, least_advance};
+use super::levels::{Slot, at_places, best_chain, in_room, least_advance};
 use super::polish::polish;
 use super::scene::{Room, Scene};
 use super::space::{Across, Triple};
+use crate::random::log_uniform;
 
 /// ln SIR below which no chain is looked for.
 const LEAST: f64 = -200.0;
@@ -22,6 +23,10 @@ const FINE: f64 = 1e-12;
 
 /// By how much, in ln SIR, a chain must be better than the best to be worth the last digits.
 const WORTH: f64 = 1e-8;
+
+/// How far below its SIR the polishing of a chain begins, in ln SIR: much to slide far from it, little to stay near.
+const FAR: f64 = 1.0;
+const NEAR: f64 = 0.03;
 
 /// Every place along Tx-Rx.
 const ANYWHERE: (f64, f64) = (0.0, 1.0);
@@ -37,7 +42,8 @@ const KICKS: u32 = 10;
 /// The best chain of all starts.
 pub(super) fn search(scene: &Scene, effort: Effort) -> Option<Vec<Triple>> {
     if scene.rooms.iter().all(Room::is_point) {
-        return best_chain(scene, &at_places(scene, &[]), LEAST, FINE);
+        let any = vec![Across::default(); scene.len()];
+        return best_chain(scene, &at_places(scene, &any), LEAST, FINE);
     }
     let mut search = Search {
         scene,
@@ -82,8 +88,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Chains at one common place in the cross-section, for a few places: the best on either side of the interferer and in
-    /// the plane of Tx and Rx are followed.
+    /// Chains at one common place in the cross-section: for a few offsets to the side, all over and on either side of the
+    /// interferer, the best of a few altitudes is followed.
     fn one_level(&mut self) {
         for side in [Side::Any, Side::Left, Side::Right] {
             let Some(room) = side.part(self.scene) else {
@@ -91,29 +97,27 @@ impl Search<'_> {
             };
             let columns = if room.free().y > 0.0 { 5 } else { 1 };
             for column in 0..columns {
-                let y = f64::from(column) / 4.0;
-                let slots = (0..8).map(|row| {
-                    let h = (room.high.h / room.low.h).powf(f64::from(row) / 7.0) * room.low.h;
-                    at_places(
-                        self.scene,
-                        &vec![
-                            room.nearest(Across::new(room.within(y, 0.0).y, h), 0.0);
-                            self.scene.len()
-                        ],
-                    )
-                });
-                let mut found: Option<(f64, Vec<Triple>)> = None;
-                for slots in slots {
-                    let floor = found.as_ref().map_or(LEAST, |(sir, _)| *sir);
-                    if let Some(chain) = best_chain(&self.roomy, &slots, floor, COARSE) {
-                        found = Some((self.scene.worst(&chain), chain));
-                    }
-                }
-                if let Some((_, chain)) = found {
-                    self.consider(&chain);
+                let foot = room.within(f64::from(column) / 4.0, 0.0);
+                if let Some(chain) = self.best_altitude(foot.y, &room) {
+                    self.consider(&chain, NEAR);
                 }
             }
         }
+    }
+
+    /// The best chain at one offset to the side and one altitude of a room.
+    fn best_altitude(&self, y: f64, room: &Room) -> Option<Vec<Triple>> {
+        let mut best: Option<(f64, Vec<Triple>)> = None;
+        for row in 0..8 {
+            let h = room.low.h * (room.high.h / room.low.h).powf(f64::from(row) / 7.0);
+            let level = room.nearest(Across::new(y, h), 0.0);
+            let slots = at_places(self.scene, &vec![level; self.scene.len()]);
+            let floor = best.as_ref().map_or(LEAST, |(sir, _)| *sir);
+            if let Some(chain) = best_chain(&self.roomy, &slots, floor, COARSE) {
+                best = Some((self.scene.worst(&chain), chain));
+            }
+        }
+        best.map(|(_, chain)| chain)
     }
 
     /// The best chain on some levels, with the relays' windows split at the interferer: the first `count` relays before it,
@@ -134,7 +138,7 @@ impl Search<'_> {
             .collect();
         let floor = self.sir() - below;
         if let Some(chain) = best_chain(&self.roomy, &slots, floor, COARSE) {
-            self.consider(&chain);
+            self.consider(&chain, NEAR);
         }
     }
 
@@ -178,7 +182,7 @@ impl Search<'_> {
                 })
                 .collect();
             if let Some(chain) = best_chain(&self.roomy, &slots, sir - 0.1, COARSE) {
-                self.consider(&chain);
+                self.consider(&chain, NEAR);
             }
         }
     }
@@ -189,7 +193,7 @@ impl Search<'_> {
             let bow = bow(&self.scene.corridor, rng, self.scene.len());
             let slots = at_places(self.scene, &bow);
             if let Some(chain) = best_chain(&self.roomy, &slots, self.sir() - 1.0, COARSE) {
-                self.consider(&chain);
+                self.consider(&chain, NEAR);
             }
         }
     }
@@ -202,19 +206,19 @@ impl Search<'_> {
             .into_iter()
             .map(|x| Triple::at(x, self.scene.corridor.within(rng.random(), rng.random())));
         let chain = chain.collect();
-        self.consider_apart(chain);
+        self.consider_apart(chain, FAR);
     }
 
     /// The best chain, kicked.
     fn kicked(&mut self, rng: &mut ChaCha8Rng) {
         if let Some((_, chain)) = &self.best {
             let chain = kicked(self.scene, chain, rng);
-            self.consider_apart(chain);
+            self.consider_apart(chain, log_uniform(rng, NEAR, FAR));
         }
     }
 
     /// Considers a chain after moving its relays into their rooms, and along until they are in order and apart.
-    fn consider_apart(&mut self, mut chain: Vec<Triple>) {
+    fn consider_apart(&mut self, mut chain: Vec<Triple>, slack: f64) {
         let mut before: Option<Triple> = None;
         for (place, room) in chain.iter_mut().zip(&self.scene.rooms) {
             let across = room.nearest(place.across(), 0.0);
@@ -234,19 +238,18 @@ impl Search<'_> {
             next = Some(*place);
         }
         if next.is_some_and(|first| first.x >= 0.0) {
-            self.consider(&chain);
+            self.consider(&chain, slack);
         }
     }
 
-    /// Keeps a chain, or the local optimum near it, if that is the best so far.
-    fn consider(&mut self, chain: &[Triple]) {
+    /// Keeps a chain, or the local optimum that is reached from it, if that is the best so far.
+    fn consider(&mut self, chain: &[Triple], slack: f64) {
         let hope = self.sir() + WORTH;
-        let fair = |start: &Vec<Triple>| polish(self.scene, start, 0.03, hope);
         let polished = [1e-3, 1e-5, 1e-2]
             .iter()
             .map(|&share| self.inward(chain, share))
             .find(|start| self.is_fair(start))
-            .and_then(|start| fair(&start));
+            .and_then(|start| polish(self.scene, &start, slack, hope));
         for chain in polished.into_iter().chain([chain.to_vec()]) {
             let sir = self.scene.worst(&chain);
             if sir > self.sir() {
@@ -279,30 +282,4 @@ impl Search<'_> {
     fn sir(&self) -> f64 {
         self.best.as_ref().map_or(LEAST, |(sir, _)| *sir)
     }
-}
-
-/// One level for each relay: the nearest in its room to that of `places`.
-fn at_places(scene: &Scene, places: &[Across]) -> Vec<Slot> {
-    let places = places
-        .iter()
-        .chain(std::iter::repeat(&Across { y: 0.0, h: 0.0 }));
-    let rooms = scene.rooms.iter().zip(places);
-    rooms
-        .map(|(room, place)| Slot {
-            levels: vec![room.nearest(*place, 0.0)],
-            window: ANYWHERE,
-        })
-        .collect()
-}
-
-/// The nearest places to `levels` in a room, each once.
-fn in_room(room: &Room, levels: &[Across]) -> Vec<Across> {
-    let mut inside: Vec<Across> = Vec::with_capacity(levels.len());
-    for level in levels {
-        let level = room.nearest(*level, 0.0);
-        if !inside.contains(&level) {
-            inside.push(level);
-        }
-    }
-    inside
 }
