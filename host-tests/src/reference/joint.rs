@@ -4,8 +4,8 @@
 //! cross-section), neighbouring relays at least the link's least separation apart. The problem is not concave: a chain may pass
 //! the interferer on either side or above, leave it between any two of its relays, climb early or late. So [`optimum`] collects
 //! fair chains by searches that are global on a coarse scale (`levels`: exact for given places in the cross-section), follows
-//! each to its local optimum (`polish`: to about 1e-9), kicks the best, and keeps the best of all. Nothing proves that it is the
-//! global optimum; the tests show how seldom two seeds disagree.
+//! each to its local optimum (`polish`: to about 1e-9), kicks the best (`kicks`), and keeps the best of all. Nothing proves that
+//! it is the global optimum; the tests show how seldom two seeds disagree.
 //!
 //! What is reported is the SIR of the places themselves, computed from received powers: never more than can be flown.
 
