@@ -27,7 +27,7 @@ fn row(chain: &[Triple], rng: &mut ChaCha8Rng) -> std::ops::RangeInclusive<usize
     one.min(other)..=one.max(other)
 }
 
-/// Some relays, one by one, taken out and put between two others: half of them across the interferer's place.
+/// One to three relays, each taken out of the chain and put between two others or at an end.
 fn reinserted(chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> {
     let mut chain = chain.to_vec();
     for _ in 0..rng.random_range(1..=3) {
