@@ -115,51 +115,44 @@ fn no_move_is_better() {
     });
 }
 
-/// One relay: every cell of a grid over its cross-section and along, then of a finer one around the best.
+/// The largest of `of` over [low, high], by grids that close in on the best place.
+fn closing_in(low: f64, high: f64, steps: i32, grids: u32, of: impl Fn(f64) -> f64) -> f64 {
+    let (mut from, mut to, mut best) = (low, high, (f64::NEG_INFINITY, low));
+    for _ in 0..grids {
+        let step = (to - from) / f64::from(steps);
+        let tried = (0..=steps).map(|i| (from + f64::from(i) * step).min(high));
+        best = tried
+            .map(|at| (of(at), at))
+            .fold(best, |best, next| if next.0 > best.0 { next } else { best });
+        (from, to) = (
+            (best.1 - 2.0 * step).max(low),
+            (best.1 + 2.0 * step).min(high),
+        );
+    }
+    best.0
+}
+
+/// One relay: the best place along for every offset to the side, for every altitude.
 #[test]
 fn one_relay_agrees_with_brute_force() {
-    for_scenarios(53, 40, 1, |mut of, _| {
+    for_scenarios(53, 30, 1, |mut of, _| {
         of.held.clear();
         let found = checked(&of, Effort { seed: 1, rounds: 1 }).sir;
-        let Corridor {
-            least_m,
-            most_m,
-            left_m,
-            right_m,
-        } = of.corridor;
-        let (low, high) = (
-            [0.0, left_m, least_m],
-            [of.link.distance_m, right_m, most_m],
-        );
-        let at = |[x_m, y_m, altitude_m]: [f64; 3]| {
-            let place = Place {
-                x_m,
-                y_m,
-                altitude_m,
-            };
-            sir(&of.link, &[place]).unwrap()
-        };
-        let mut best = (0.0, low);
-        let (mut from, mut to) = (low, high);
-        for _ in 0..14 {
-            let steps = [0, 1, 2].map(|i| (to[i] - from[i]) / 40.0);
-            let cell = |number: i32| {
-                let parts = [number % 41, number / 41 % 41, number / 1681].map(f64::from);
-                [0, 1, 2].map(|i| (from[i] + parts[i] * steps[i]).min(high[i]))
-            };
-            for place in (0..41 * 41 * 41).map(cell) {
-                best = if at(place) > best.0 {
-                    (at(place), place)
-                } else {
-                    best
-                };
-            }
-            from = [0, 1, 2].map(|i| (best.1[i] - 6.0 * steps[i]).max(low[i]));
-            to = [0, 1, 2].map(|i| (best.1[i] + 6.0 * steps[i]).min(high[i]));
-        }
-        assert!(found >= best.0 * (1.0 - 1e-9), "{found} {best:?} {of:?}");
-        // Where two hops are as bad, the grid closes in on a place beside the best.
-        close(found, best.0, 1e-2, &format!("{of:?}"));
+        let room = of.corridor;
+        let best = closing_in(room.least_m, room.most_m, 24, 5, |altitude_m| {
+            closing_in(room.left_m, room.right_m, 24, 5, |y_m| {
+                closing_in(0.0, of.link.distance_m, 60, 7, |x_m| {
+                    let place = Place {
+                        x_m,
+                        y_m,
+                        altitude_m,
+                    };
+                    sir(&of.link, &[place]).unwrap()
+                })
+            })
+        });
+        assert!(found >= best * (1.0 - 1e-9), "{found} {best} {of:?}");
+        close(found, best, 1e-5, &format!("{of:?}"));
     });
 }
 
