@@ -15,8 +15,8 @@
 //! - `Link::feasible` extends the chain greedily, as the on-board protocol does. It is exact when all altitudes are equal.
 //! - `Link::placement` keeps the whole set of places each node can reach. It is exact for any altitudes, which the greedy
 //!   chain is not: close to the interferer a climb may be impossible that was possible earlier.
-//! - [`joint::optimum`] chooses the altitudes too. It is a numerical search: no proof, and it does solve quadratics on the way,
-//!   but what it reports is the SIR of the places it found.
+//! - [`joint::optimum`] chooses altitudes and offsets to the side too. It is a numerical search: no proof, and it does solve
+//!   quadratics on the way, but what it reports is the SIR of the places it found.
 //!
 //! Cost: a reach takes about 60 SIR evaluations when the node may start from where the search starts, at most about 150 when
 //! a hilltop has to be found first. An optimum takes about 50 to 60 chains.

@@ -13,7 +13,7 @@ use host_tests::brief::{as_relays_know_it, of_link};
 use host_tests::random::joint::{CROWDED, ROOMY, scenario};
 use host_tests::random::{self, log_uniform};
 use host_tests::reference::Link;
-use host_tests::reference::joint::{self, Band, Effort, Place};
+use host_tests::reference::joint::{self, Corridor, Effort, Place};
 use host_tests::sim::chain::run;
 use host_tests::sim::faults::Faults;
 use host_tests::sim::outcome::{Ending, Outcome};
@@ -22,13 +22,13 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::{Adjust, Method, Mission, MissionConfig, Profile};
 
-/// The setup of a chain that chooses altitudes within `band`; `None` where a relay would refuse the numbers.
-fn setup(link: &Link, band: Band) -> Option<Setup> {
+/// The setup of a chain that chooses altitudes within `corridor`; `None` where a relay would refuse the numbers.
+fn setup(link: &Link, corridor: Corridor) -> Option<Setup> {
     let (mission, profiles) = of_link(link, 1e-4)?;
     let config = MissionConfig {
         band: uav_relay::Band {
-            least_m: band.least_m as f32,
-            most_m: band.most_m as f32,
+            least_m: corridor.least_m as f32,
+            most_m: corridor.most_m as f32,
         },
         ..*mission.config()
     };
@@ -43,9 +43,9 @@ fn places(outcome: &Outcome) -> Vec<Place> {
     outcome
         .relays
         .iter()
-        .map(|relay| Place {
-            x_m: f64::from(place(relay).x_m),
-            altitude_m: f64::from(place(relay).altitude_m),
+        .map(|relay| {
+            let at = place(relay);
+            Place::in_plane(f64::from(at.x_m), f64::from(at.altitude_m))
         })
         .collect()
 }
@@ -65,14 +65,14 @@ fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
     while results.len() < count {
         let drawn = scenario(&mut rng, &(1..=50), apart);
         let link = as_relays_know_it(&drawn.link);
-        let band = Band {
-            least_m: f64::from(drawn.band.least_m as f32),
-            most_m: f64::from(drawn.band.most_m as f32),
-        };
-        let Some(setup) = setup(&link, band) else {
+        let corridor = Corridor::plane(
+            f64::from(drawn.corridor.least_m as f32),
+            f64::from(drawn.corridor.most_m as f32),
+        );
+        let Some(setup) = setup(&link, corridor) else {
             continue;
         };
-        let Some(best) = joint::optimum(&link, band, Effort::usual(seed)) else {
+        let Some(best) = joint::optimum(&link, corridor, &[], Effort::usual(seed)) else {
             continue;
         };
         let outcome = run(setup).unwrap();
@@ -82,8 +82,8 @@ fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
             link.distance_m,
             link.x_i / link.distance_m,
             link.y_i / link.distance_m,
-            band.least_m / link.distance_m,
-            band.most_m / link.distance_m,
+            corridor.least_m / link.distance_m,
+            corridor.most_m / link.distance_m,
             link.min_separation_m / link.distance_m,
         );
         assert_eq!(outcome.ending, Ending::Settled, "{of}");
@@ -94,7 +94,7 @@ fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
             min_separation_m: (link.min_separation_m - 1e-6 * link.distance_m).max(0.0),
             ..link.clone()
         };
-        assert!(joint::keeps_rules(&rounded, band, &places), "{of}");
+        assert!(joint::keeps_rules(&rounded, corridor, &[], &places), "{of}");
         results.push(Result {
             ratio: joint::sir(&link, &places).unwrap() / best.sir,
             of,
@@ -106,17 +106,13 @@ fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
 }
 
 /// The scenario that the figures are for: X = 500, Y = 150, altitudes of 20 m to 300 m, 4 m apart.
-fn close_by(relays: usize) -> (Link, Band) {
+fn close_by(relays: usize) -> (Link, Corridor) {
     let link = Link {
         y_i: 150.0,
         min_separation_m: 4.0,
         ..Link::paper(relays)
     };
-    let band = Band {
-        least_m: 20.0,
-        most_m: 300.0,
-    };
-    (link, band)
+    (link, Corridor::plane(20.0, 300.0))
 }
 
 fn settle(setup: Setup) -> Outcome {
@@ -135,9 +131,9 @@ fn the_joint_optima_are_reached() {
         (8, 1.228_700, 1.235_66, 1.235_783_782_6),
         (50, 5.450_572, 6.497_73, 6.498_377_624_8),
     ] {
-        let (link, band) = close_by(relays);
+        let (link, corridor) = close_by(relays);
         for predict in [true, false] {
-            let mut setup = setup(&link, band).unwrap();
+            let mut setup = setup(&link, corridor).unwrap();
             setup.settings.predict = predict;
             let outcome = settle(setup);
             let places = places(&outcome);
@@ -149,11 +145,8 @@ fn the_joint_optima_are_reached() {
             assert!(sir >= least && sir <= best * (1.0 + 1e-6), "{sir}");
             assert!(!predict || outcome.sweeps <= 16, "{}", outcome.sweeps);
             assert!(outcome.sweeps <= 30, "{}", outcome.sweeps);
-            let band = Band {
-                least_m: band.least_m - 1e-9,
-                most_m: band.most_m + 1e-9,
-            };
-            assert!(joint::keeps_rules(&link, band, &places));
+            let corridor = Corridor::plane(corridor.least_m - 1e-9, corridor.most_m + 1e-9);
+            assert!(joint::keeps_rules(&link, corridor, &[], &places));
         }
     }
 }
@@ -214,8 +207,8 @@ fn crowded_chains_are_safe_and_seldom_far_from_the_joint_optimum() {
 #[test]
 fn faults_change_nothing() {
     for seed in 0..20 {
-        let (link, band) = close_by(2 + seed % 7);
-        let mut setup = setup(&link, band).unwrap();
+        let (link, corridor) = close_by(2 + seed % 7);
+        let mut setup = setup(&link, corridor).unwrap();
         setup.settings.predict = seed % 2 > 0;
         let clean = settle(setup.clone());
         setup.faults = Faults::BAD_DAY;
@@ -230,8 +223,8 @@ fn faults_change_nothing() {
 /// A relay that was given an altitude of its own, and is to hold it, does; the others choose around it.
 #[test]
 fn a_relay_may_hold_its_altitude() {
-    let (link, band) = close_by(6);
-    let mut setup = setup(&link, band).unwrap();
+    let (link, corridor) = close_by(6);
+    let mut setup = setup(&link, corridor).unwrap();
     let own = Profile {
         altitude_m: 77.7,
         power_w: 1.0,
@@ -254,8 +247,8 @@ fn a_relay_may_hold_its_altitude() {
 /// Where relays bring powers of their own the leader's prediction is wrong, and the chain finds its altitudes all the same.
 #[test]
 fn own_powers_are_found_out_about() {
-    let (link, band) = close_by(8);
-    let mut setup = setup(&link, band).unwrap();
+    let (link, corridor) = close_by(8);
+    let mut setup = setup(&link, corridor).unwrap();
     for (index, power_w) in [(2, 0.4), (5, 2.5), (7, 0.7)] {
         let own = Profile {
             altitude_m: 20.0,
@@ -268,7 +261,7 @@ fn own_powers_are_found_out_about() {
         real.relays[usize::from(*index) - 1].power_w = f64::from(own.power_w);
     }
     let outcome = settle(setup);
-    let best = joint::optimum(&real, band, Effort::usual(1)).unwrap();
+    let best = joint::optimum(&real, corridor, &[], Effort::usual(1)).unwrap();
     let ratio = joint::sir(&real, &places(&outcome)).unwrap() / best.sir;
     println!("{ratio:.6} of the optimum in {} passes", outcome.sweeps);
     assert!((0.99..=1.0 + 1e-6).contains(&ratio), "{ratio}");
@@ -278,13 +271,10 @@ fn own_powers_are_found_out_about() {
 #[test]
 fn a_band_of_one_altitude_is_algorithm_1() {
     let (link, _) = close_by(5);
-    let band = Band {
-        least_m: 20.0,
-        most_m: 20.0,
-    };
-    let outcome = settle(setup(&link, band).unwrap());
+    let corridor = Corridor::plane(20.0, 20.0);
+    let outcome = settle(setup(&link, corridor).unwrap());
     assert_eq!(outcome.sweeps, 1);
-    let mut align = setup(&link, band).unwrap();
+    let mut align = setup(&link, corridor).unwrap();
     align.settings.method = Method::Align;
     assert_eq!(outcome.bits(), settle(align).bits());
 }
@@ -297,7 +287,7 @@ fn faults_change_nothing_on_random_links() {
     for round in 0..120 {
         let drawn = scenario(&mut rng, &(1..=12), CROWDED);
         let link = as_relays_know_it(&drawn.link);
-        let Some(mut setup) = setup(&link, drawn.band) else {
+        let Some(mut setup) = setup(&link, drawn.corridor) else {
             continue;
         };
         let common = setup.mission.config().common;
@@ -316,7 +306,7 @@ fn faults_change_nothing_on_random_links() {
         if round % 3 == 0 {
             setup.settings.method = Method::Adjust(Adjust {
                 rounds: 5,
-                explore_m: 0.1 * drawn.band.most_m as f32,
+                explore_m: 0.1 * drawn.corridor.most_m as f32,
                 ..Adjust::default()
             });
         }

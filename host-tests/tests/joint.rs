@@ -1,20 +1,30 @@
 //! The optimiser of the joint problem judged on its own, before it may judge anything: against known optima, against the exact
 //! reference at given altitudes, against brute force for one relay, and against itself from other seeds.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    missing_docs
+)]
 
 use std::iter::successors;
 
 use host_tests::random::joint::{ROOMY, Scenario, scenario};
 use host_tests::random::{self, log_uniform};
-use host_tests::reference::joint::{Band, Effort, JointOptimum, Place, keeps_rules, optimum, sir};
+use host_tests::reference::joint::{
+    Corridor, Effort, JointOptimum, Place, keeps_rules, optimum, sir,
+};
 use host_tests::reference::{Link, Station};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-const PAPER_BAND: Band = Band {
-    least_m: 20.0,
-    most_m: 300.0,
-};
+#[path = "joint/judged.rs"]
+mod judged;
+#[path = "joint/space.rs"]
+mod space;
+
+const PAPER_BAND: Corridor = Corridor::plane(20.0, 300.0);
 
 fn close(got: f64, want: f64, rtol: f64, what: &str) {
     assert!(
@@ -25,8 +35,11 @@ fn close(got: f64, want: f64, rtol: f64, what: &str) {
 
 /// The optimum, and that it is one: flyable, and with the SIR of its places.
 fn checked(of: &Scenario, effort: Effort) -> JointOptimum {
-    let found = optimum(&of.link, of.band, effort).unwrap();
-    assert!(keeps_rules(&of.link, of.band, &found.places), "{of:?}");
+    let found = optimum(&of.link, of.corridor, &of.held, effort).unwrap();
+    assert!(
+        keeps_rules(&of.link, of.corridor, &of.held, &found.places),
+        "{of:?}"
+    );
     let again = sir(&of.link, &found.places).unwrap();
     assert!(again.total_cmp(&found.sir).is_eq(), "{of:?}");
     found
@@ -81,7 +94,8 @@ fn known_optima_are_found() {
                 min_separation_m: 4.0,
                 ..Link::paper(n)
             },
-            band: PAPER_BAND,
+            corridor: PAPER_BAND,
+            held: Vec::new(),
         };
         for seed in 0..3 {
             let found = checked(&paper, Effort { seed, rounds: 1 });
@@ -111,11 +125,15 @@ fn the_best_of_two_levels_is_beaten() {
     };
     let best = best_of_levels(&link, &[20.0, 150.0]);
     close(best, 3.72189, 1e-5, "on two levels");
-    let band = Band {
-        least_m: 20.0,
-        most_m: 150.0,
-    };
-    let found = checked(&Scenario { link, band }, Effort::usual(1));
+    let corridor = Corridor::plane(20.0, 150.0);
+    let found = checked(
+        &Scenario {
+            link,
+            corridor,
+            held: Vec::new(),
+        },
+        Effort::usual(1),
+    );
     close(found.sir, 6.002_149_05, 1e-8, "in the band");
 }
 
@@ -138,7 +156,9 @@ fn best_of_levels(link: &Link, levels: &[f64]) -> f64 {
 fn no_assignment_of_three_levels_is_better() {
     for_scenarios(31, 40, 4, |drawn, _| {
         let of = unseparated(drawn);
-        let Band { least_m, most_m } = of.band;
+        let Corridor {
+            least_m, most_m, ..
+        } = of.corridor;
         let levels = [least_m, (least_m * most_m).sqrt(), most_m];
         let found = checked(&of, Effort::usual(1)).sir;
         let best = best_of_levels(&of.link, &levels);
@@ -152,7 +172,9 @@ fn no_common_altitude_is_better() {
     for_scenarios(32, 40, 50, |drawn, _| {
         let of = unseparated(drawn);
         let found = checked(&of, Effort { seed: 1, rounds: 1 }).sir;
-        let Band { least_m, most_m } = of.band;
+        let Corridor {
+            least_m, most_m, ..
+        } = of.corridor;
         let best = (0..=60)
             .map(|i| least_m * (most_m / least_m).powf(f64::from(i) / 60.0))
             .filter_map(|h| flown(&of.link, &vec![h; of.link.len()]).optimum())
@@ -168,7 +190,9 @@ fn no_common_altitude_is_better() {
 fn one_relay_agrees_with_brute_force() {
     for_scenarios(33, 40, 1, |of, _| {
         let found = checked(&of, Effort { seed: 1, rounds: 1 }).sir;
-        let Band { least_m, most_m } = of.band;
+        let Corridor {
+            least_m, most_m, ..
+        } = of.corridor;
         let at = |h: f64| flown(&of.link, &[h]).optimum().unwrap_or(0.0);
         let (mut low, mut high, mut best) = (least_m, most_m, 0.0);
         for _ in 0..4 {
@@ -209,11 +233,13 @@ fn no_move_is_better() {
                 }
                 Place {
                     x_m: (place.x_m + by()).clamp(0.0, of.link.distance_m),
-                    altitude_m: (place.altitude_m + by()).clamp(of.band.least_m, of.band.most_m),
+                    y_m: (place.y_m + by()).clamp(of.corridor.left_m, of.corridor.right_m),
+                    altitude_m: (place.altitude_m + by())
+                        .clamp(of.corridor.least_m, of.corridor.most_m),
                 }
             });
             let moved: Vec<Place> = moved.collect();
-            if keeps_rules(&of.link, of.band, &moved) {
+            if keeps_rules(&of.link, of.corridor, &of.held, &moved) {
                 let sir = sir(&of.link, &moved).unwrap();
                 assert!(sir <= found.sir * (1.0 + 1e-8), "{sir}: {found:?}");
             }
@@ -225,7 +251,7 @@ fn no_move_is_better() {
 fn a_band_of_one_altitude_is_the_reference_at_that_altitude() {
     for_scenarios(36, 20, 50, |drawn, _| {
         let mut of = unseparated(drawn);
-        of.band.most_m = of.band.least_m;
+        of.corridor.most_m = of.corridor.least_m;
         let found = checked(&of, Effort::usual(1)).sir;
         close(found, of.link.optimum().unwrap(), 1e-9, &format!("{of:?}"));
     });
@@ -234,16 +260,13 @@ fn a_band_of_one_altitude_is_the_reference_at_that_altitude() {
 #[test]
 fn nothing_is_found_where_there_is_nothing() {
     let effort = Effort::usual(1);
-    assert_eq!(optimum(&Link::paper(0), PAPER_BAND, effort), None);
-    let upside_down = Band {
-        least_m: 300.0,
-        most_m: 20.0,
-    };
-    assert_eq!(optimum(&Link::paper(2), upside_down, effort), None);
+    assert_eq!(optimum(&Link::paper(0), PAPER_BAND, &[], effort), None);
+    let upside_down = Corridor::plane(300.0, 20.0);
+    assert_eq!(optimum(&Link::paper(2), upside_down, &[], effort), None);
     let mut on_rx = Link::paper(2);
     (on_rx.x_i, on_rx.y_i) = (on_rx.distance_m, 0.0);
-    assert_eq!(optimum(&on_rx, PAPER_BAND, effort), None);
+    assert_eq!(optimum(&on_rx, PAPER_BAND, &[], effort), None);
     let mut crowded = Link::paper(9);
     crowded.min_separation_m = 400.0;
-    assert_eq!(optimum(&crowded, PAPER_BAND, effort), None);
+    assert_eq!(optimum(&crowded, PAPER_BAND, &[], effort), None);
 }

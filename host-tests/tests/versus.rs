@@ -12,7 +12,7 @@ use std::process::{Command, Output};
 
 use host_tests::cases;
 use host_tests::reference::Link;
-use host_tests::reference::joint::{self, Band, Effort};
+use host_tests::reference::joint::{self, Corridor, Effort};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -180,16 +180,13 @@ fn the_sir_is_that_of_the_places() {
 
 #[test]
 fn the_altitudes_that_were_chosen_are_judged() {
-    let band = Band {
-        least_m: 20.0,
-        most_m: 300.0,
-    };
+    let corridor = Corridor::plane(20.0, 300.0);
     let link = Link {
         y_i: 150.0,
         min_separation_m: 4.0,
         ..Link::paper(8)
     };
-    let best = joint::optimum(&link, band, Effort::usual(1)).unwrap();
+    let best = joint::optimum(&link, corridor, &[], Effort::usual(1)).unwrap();
     let mut chain: Vec<[f64; 2]> = best
         .places
         .iter()

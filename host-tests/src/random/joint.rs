@@ -16,22 +16,67 @@
 //!
 //! Weighted toward scenarios in which altitudes of their own help: Tx is seldom so loud that hop 1 does not matter, and the
 //! interferer is often close to the axis. In about a third the best chain is more than 1 % better than the best common altitude.
+//!
+//! [`in_space`] draws what lies to the side as well:
+//!
+//! | quantity | distribution |
+//! | --- | --- |
+//! | Y | the above with either sign |
+//! | sides | a third: none; else left and right apart: 15 % none; else log-uniform 0.005 D to 0.4 D |
+//! | band | with sides, 15 %: the lowest altitude alone |
+//! | least separation | half as in [`ROOMY`], half as in [`CROWDED`] |
+//!
+//! [`with_own`] lets relays differ:
+//!
+//! | quantity | distribution |
+//! | --- | --- |
+//! | powers | in half of the scenarios, for each relay 15 %: log-uniform 0.3 to 3 times the common one |
+//! | held | in half of the scenarios, for each relay 10 %: any place in the cross-section, uniform |
+
+pub mod judged;
 
 use std::ops::RangeInclusive;
 
 use rand::{Rng, RngExt};
 
 use super::log_uniform;
-use crate::reference::joint::Band;
+use crate::brief::as_relays_know_it;
+use crate::command::narrow;
+use crate::reference::joint::{Corridor, Hold};
 use crate::reference::{Link, Station};
 
-/// A link and the band of its relays, which stand at the band's lowest altitude in the link.
+/// A link and the corridor of its relays, which stand at its lowest altitude in the link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// The link.
     pub link: Link,
-    /// The band.
-    pub band: Band,
+    /// The corridor.
+    pub corridor: Corridor,
+    /// The relays that hold their place in its cross-section.
+    pub held: Vec<Hold>,
+}
+
+impl Scenario {
+    /// The same with every number rounded to the f32 that a relay is given.
+    #[must_use]
+    pub fn as_relays_know_it(&self) -> Self {
+        let round = |value: f64| f64::from(narrow(value));
+        let held = self.held.iter().map(|hold| Hold {
+            y_m: round(hold.y_m),
+            altitude_m: round(hold.altitude_m),
+            ..*hold
+        });
+        Self {
+            link: as_relays_know_it(&self.link),
+            corridor: Corridor {
+                least_m: round(self.corridor.least_m),
+                most_m: round(self.corridor.most_m),
+                left_m: round(self.corridor.left_m),
+                right_m: round(self.corridor.right_m),
+            },
+            held: held.collect(),
+        }
+    }
 }
 
 /// How far apart neighbours must stay in half of the scenarios, as a part of D / (N + 1): it hardly ever binds.
@@ -76,8 +121,55 @@ pub fn scenario(rng: &mut impl Rng, relays: &RangeInclusive<u32>, apart: (f64, f
         relays: (0..n).map(|_| relay).collect(),
     };
     let most_m = log_uniform(rng, 2.0 * least_m, 0.5 * d);
-    let band = Band { least_m, most_m };
-    Scenario { link, band }
+    let corridor = Corridor::plane(least_m, most_m);
+    Scenario {
+        link,
+        corridor,
+        held: Vec::new(),
+    }
+}
+
+/// Draws one scenario with room to the side; the distribution is in the module's second table. `relays` within 1 to 1000.
+pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
+    let apart = if rng.random() { ROOMY } else { CROWDED };
+    let mut drawn = scenario(rng, relays, apart);
+    if rng.random() {
+        drawn.link.y_i = -drawn.link.y_i;
+    }
+    if rng.random_range(0..3) > 0 {
+        let mut side = || {
+            if rng.random_bool(0.15) {
+                0.0
+            } else {
+                drawn.link.distance_m * log_uniform(rng, 0.005, 0.4)
+            }
+        };
+        (drawn.corridor.left_m, drawn.corridor.right_m) = (-side(), side());
+        if rng.random_bool(0.15) {
+            drawn.corridor.most_m = drawn.corridor.least_m;
+        }
+    }
+    drawn
+}
+
+/// The scenario with powers and places that single relays have to themselves; the distribution is in the module's last table.
+#[must_use]
+pub fn with_own(rng: &mut impl Rng, mut of: Scenario) -> Scenario {
+    let (powers, holds): (bool, bool) = (rng.random(), rng.random());
+    let room = of.corridor;
+    for (relay, station) in of.link.relays.iter_mut().enumerate() {
+        if powers && rng.random_bool(0.15) {
+            station.power_w *= log_uniform(rng, 0.3, 3.0);
+        }
+        if holds && rng.random_bool(0.1) {
+            of.held.push(Hold {
+                relay,
+                y_m: rng.random_range(room.left_m..=room.right_m),
+                altitude_m: rng.random_range(room.least_m..=room.most_m),
+            });
+        }
+    }
+    of
 }
 
 /// How many relays.

@@ -1,30 +1,83 @@
-//! The joint problem: relays choose their altitudes as well as their places, to make the worst hop's SIR as large as can be.
+//! The joint problem: relays choose their places in a corridor along Tx-Rx, to make the worst hop's SIR as large as can be.
 //!
-//! 0 <= `x_1` <= ... <= `x_N` <= D, every altitude within one [`Band`], neighbouring relays at least the link's least separation
-//! apart. The problem is not concave: a chain may leave the interferer between any two of its relays, climb early or late. So
-//! [`optimum`] collects fair chains by searches that are global on a coarse scale (`levels`: exact for given levels), follows
-//! each to its local optimum (`polish`: to about 1e-9), and keeps the best. Nothing proves that it is the global optimum; the
-//! tests show how seldom two seeds disagree.
+//! 0 <= `x_1` <= ... <= `x_N` <= D, every relay within one [`Corridor`] (but for those that hold their place in its
+//! cross-section), neighbouring relays at least the link's least separation apart. The problem is not concave: a chain may pass
+//! the interferer on either side or above, leave it between any two of its relays, climb early or late. So [`optimum`] collects
+//! fair chains by searches that are global on a coarse scale (`levels`: exact for given places in the cross-section), follows
+//! each to its local optimum (`polish`: to about 1e-9), kicks the best (`kicks`), and keeps the best of all. Nothing proves that
+//! it is the global optimum; the tests show how seldom two seeds disagree.
 //!
-//! What is reported is the SIR of the places themselves, as [`Link::sir_hops`] computes it: never more than can be flown.
+//! What is reported is the SIR of the places themselves, computed from received powers: never more than can be flown.
 
+mod draws;
+mod kicks;
 mod levels;
-mod plane;
+mod limits;
 mod polish;
 mod scene;
+mod space;
 mod starts;
+mod system;
 
-use super::{Link, Station};
-use plane::Pair;
+use super::{Link, received_w};
 use scene::Scene;
+use space::Triple;
 
-/// The altitudes that relays may fly at.
+/// Where relays may fly, seen along Tx-Rx.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Band {
+pub struct Corridor {
     /// Lowest altitude above the ground of Tx, Rx and the interferer, metres, > 0.
     pub least_m: f64,
     /// Highest altitude, metres, >= `least_m`.
     pub most_m: f64,
+    /// Least y, metres; seldom > 0.
+    pub left_m: f64,
+    /// Largest y, metres, >= `left_m`.
+    pub right_m: f64,
+}
+
+impl Corridor {
+    /// The plane above Tx-Rx, within a band of altitudes.
+    pub const fn plane(least_m: f64, most_m: f64) -> Self {
+        Self {
+            least_m,
+            most_m,
+            left_m: 0.0,
+            right_m: 0.0,
+        }
+    }
+
+    /// Whether a place is within, `slack_m` forgiven.
+    pub fn contains(&self, place: &Place, slack_m: f64) -> bool {
+        let within =
+            |low: f64, value: f64, high: f64| (low - slack_m..=high + slack_m).contains(&value);
+        within(self.least_m, place.altitude_m, self.most_m)
+            && within(self.left_m, place.y_m, self.right_m)
+    }
+}
+
+/// A relay that holds its place in the cross-section, within the corridor or not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hold {
+    /// Its number in the link, from 0.
+    pub relay: usize,
+    /// Its offset from the Tx-Rx plane, metres.
+    pub y_m: f64,
+    /// Its altitude, metres, > 0.
+    pub altitude_m: f64,
+}
+
+impl Hold {
+    /// The corridor of one relay: of no width if it holds its place.
+    fn room(held: &[Self], relay: usize, corridor: Corridor) -> Corridor {
+        let own = held.iter().find(|hold| hold.relay == relay);
+        own.map_or(corridor, |hold| Corridor {
+            least_m: hold.altitude_m,
+            most_m: hold.altitude_m,
+            left_m: hold.y_m,
+            right_m: hold.y_m,
+        })
+    }
 }
 
 /// Where one relay flies.
@@ -32,8 +85,27 @@ pub struct Band {
 pub struct Place {
     /// Coordinate along Tx-Rx, metres, in [0, D].
     pub x_m: f64,
-    /// Altitude, metres, within the band.
+    /// Offset from the Tx-Rx plane, to the side on which the interferer's is positive, metres.
+    pub y_m: f64,
+    /// Altitude, metres.
     pub altitude_m: f64,
+}
+
+impl Place {
+    /// A place in the plane above Tx-Rx.
+    pub const fn in_plane(x_m: f64, altitude_m: f64) -> Self {
+        Self {
+            x_m,
+            y_m: 0.0,
+            altitude_m,
+        }
+    }
+
+    /// Distance from another place, metres.
+    pub fn distance_m(&self, other: &Self) -> f64 {
+        let aside = (self.y_m - other.y_m).hypot(self.altitude_m - other.altitude_m);
+        (self.x_m - other.x_m).hypot(aside)
+    }
 }
 
 /// How hard to search.
@@ -46,9 +118,9 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// Five rounds: some milliseconds with few relays, about a second with 50 (release build).
+    /// Two rounds: some milliseconds with few relays, about half a second with 50 (release build).
     pub fn usual(seed: u64) -> Self {
-        Self { seed, rounds: 5 }
+        Self { seed, rounds: 2 }
     }
 }
 
@@ -61,53 +133,77 @@ pub struct JointOptimum {
     pub places: Vec<Place>,
 }
 
-/// The best chain of a link whose relays may fly at any altitude of the band; the altitudes in `link` are not looked at.
+/// The best chain of a link in a corridor; the altitudes in `link` are not looked at.
 ///
-/// `None` without relays, with an empty band, where no chain has a positive SIR, or where no chain was found that keeps the
+/// `None` without relays, with an empty corridor, where no chain has a positive SIR, or where no chain was found that keeps the
 /// least separation. Deterministic.
-pub fn optimum(link: &Link, band: Band, effort: Effort) -> Option<JointOptimum> {
-    let scene = Scene::new(link, band)?;
+pub fn optimum(
+    link: &Link,
+    corridor: Corridor,
+    held: &[Hold],
+    effort: Effort,
+) -> Option<JointOptimum> {
+    let scene = Scene::new(link, corridor, held)?;
     let best = starts::search(&scene, effort)?;
-    let places = best.iter().map(|&place| in_metres(link, band, place));
+    let places = (0..).zip(&best).map(|(relay, &place)| {
+        let room = Hold::room(held, relay, corridor);
+        in_metres(link, room, place)
+    });
     let places: Vec<Place> = places.collect();
     let sir = sir(link, &places)?;
-    (sir > 0.0 && keeps_rules(link, band, &places)).then_some(JointOptimum { sir, places })
+    (sir > 0.0 && keeps_rules(link, corridor, held, &places))
+        .then_some(JointOptimum { sir, places })
 }
 
-/// The SIR (linear) of the worst hop of a chain; `None` unless there is one place per relay.
+/// The SIR (linear) of the worst hop of a chain; `None` without relays, or unless there is one place per relay.
 pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
-    let flown = Link {
-        relays: link
-            .relays
-            .iter()
-            .zip(places)
-            .map(|(relay, place)| Station {
-                altitude_m: place.altitude_m,
-                ..*relay
-            })
-            .collect(),
-        ..link.clone()
-    };
-    let x: Vec<f64> = places.iter().map(|place| place.x_m).collect();
-    flown.sir_hops(&x).into_iter().reduce(f64::min)
-}
-
-/// Whether a chain keeps order, band and least separation (but for 1e-9 of it, for rounding).
-pub fn keeps_rules(link: &Link, band: Band, places: &[Place]) -> bool {
-    let within = places.iter().all(|place| {
-        (0.0..=link.distance_m).contains(&place.x_m)
-            && (band.least_m..=band.most_m).contains(&place.altitude_m)
+    let (tail, last) = (places.last()?, link.relays.last()?);
+    if places.len() != link.len() {
+        return None;
+    }
+    let first = (link.tx_w, link.eta, Place::in_plane(0.0, 0.0));
+    let others = link.relays.iter().zip(places);
+    let senders =
+        std::iter::once(first).chain(others.map(|(relay, &at)| (relay.power_w, link.mu_los, at)));
+    let hops = senders.zip(places).map(|((power_w, factor, from), to)| {
+        let signal = received_w(
+            power_w,
+            factor,
+            to.x_m - from.x_m,
+            to.y_m - from.y_m,
+            to.altitude_m - from.altitude_m,
+        );
+        let (dx, dy) = (to.x_m - link.x_i, to.y_m - link.y_i);
+        signal / received_w(link.interferer_w, link.eta, dx, dy, to.altitude_m)
     });
-    let neighbours = places.iter().zip(places.iter().skip(1));
-    within
-        && neighbours
-            .map(|(a, b)| (b.x_m - a.x_m, b.altitude_m - a.altitude_m))
-            .all(|(dx, dh)| dx >= 0.0 && dx.hypot(dh) >= link.min_separation_m * (1.0 - 1e-9))
+    let signal = received_w(
+        last.power_w,
+        link.eta,
+        link.distance_m - tail.x_m,
+        tail.y_m,
+        tail.altitude_m,
+    );
+    let (dx, dy) = (link.distance_m - link.x_i, link.y_i);
+    let rx = signal / received_w(link.interferer_w, link.mu_nlos, dx, dy, 0.0);
+    Some(hops.fold(rx, f64::min))
 }
 
-fn in_metres(link: &Link, band: Band, place: Pair) -> Place {
+/// Whether a chain keeps order, corridor and least separation (but for 1e-9 of it, for rounding), and what is held.
+pub fn keeps_rules(link: &Link, corridor: Corridor, held: &[Hold], places: &[Place]) -> bool {
+    let mut each = (0..).zip(places);
+    let within = each.all(|(relay, place)| {
+        (0.0..=link.distance_m).contains(&place.x_m)
+            && Hold::room(held, relay, corridor).contains(place, 0.0)
+    });
+    let mut neighbours = places.iter().zip(places.iter().skip(1));
+    let least_m = link.min_separation_m * (1.0 - 1e-9);
+    within && neighbours.all(|(a, b)| b.x_m >= a.x_m && a.distance_m(b) >= least_m)
+}
+
+fn in_metres(link: &Link, room: Corridor, place: Triple) -> Place {
     Place {
         x_m: (place.x * link.distance_m).clamp(0.0, link.distance_m),
-        altitude_m: (place.h * link.distance_m).clamp(band.least_m, band.most_m),
+        y_m: (place.y * link.distance_m).clamp(room.left_m, room.right_m),
+        altitude_m: (place.h * link.distance_m).clamp(room.least_m, room.most_m),
     }
 }

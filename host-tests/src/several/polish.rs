@@ -6,7 +6,7 @@
 
 use super::altitude::golden;
 use super::scene::{Relay, Scene, Sender};
-use crate::reference::joint::Band;
+use crate::reference::joint::Corridor;
 
 /// Rounds after which it ends.
 const ROUNDS: u32 = 200;
@@ -54,7 +54,7 @@ struct Turn<'a> {
 /// only moves along x. At most 200 rounds, fewer when three in a row gain less than a millionth each: a round is 2 N moves, a
 /// move about 50 SIRs at one altitude and 2 400 in a band. `None` unless the start has one place per relay and at least one
 /// relay.
-pub fn polish(scene: &Scene, start: &[(f64, f64)], band: Band) -> Option<Polished> {
+pub fn polish(scene: &Scene, start: &[(f64, f64)], band: Corridor) -> Option<Polished> {
     if start.is_empty() || start.len() != scene.relays.len() {
         return None;
     }
@@ -83,7 +83,7 @@ pub fn polish(scene: &Scene, start: &[(f64, f64)], band: Band) -> Option<Polishe
 }
 
 /// Moves relay `at`, counted from 0, if a better place is found for it.
-fn step(scene: &Scene, places: &mut [(f64, f64)], at: usize, band: Band, window: f64) {
+fn step(scene: &Scene, places: &mut [(f64, f64)], at: usize, band: Corridor, window: f64) {
     let relays = &scene.relays;
     let (Some(&own), Some(relay)) = (places.get(at), relays.get(at)) else {
         return;
@@ -120,7 +120,7 @@ impl Turn<'_> {
     }
 
     /// The best place that is found from altitude `own_h` on, and the SIR there: 0 where there is no room.
-    fn best(&self, own_h: f64, band: Band, window: f64) -> ((f64, f64), f64) {
+    fn best(&self, own_h: f64, band: Corridor, window: f64) -> ((f64, f64), f64) {
         if self.relay.holds || !(band.least_m < band.most_m) {
             let h = if self.relay.holds {
                 own_h

@@ -3,7 +3,7 @@
 use uav_relay::channel::AirGround;
 use uav_relay::{Channel, Placement};
 
-use crate::reference::joint::Band;
+use crate::reference::joint::Corridor;
 use crate::scenario::{self, Interference, Scenario, Source};
 
 /// One relay of a [`Scene`].
@@ -35,7 +35,7 @@ pub struct Scene {
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
     /// The altitudes that relays without one of their own may be given.
-    pub band: Band,
+    pub band: Corridor,
     /// The relays from Tx to Rx; their number is N.
     pub relays: Vec<Relay>,
 }
@@ -91,10 +91,7 @@ impl Scene {
             mu_los: channel.mu_los(),
             mu_nlos: channel.mu_nlos(),
             eta: channel.eta(),
-            band: Band {
-                least_m: scenario.altitude_min_m,
-                most_m: scenario.altitude_max_m,
-            },
+            band: Corridor::plane(scenario.altitude_min_m, scenario.altitude_max_m),
             relays: (1..=relays).map(|index| relay(scenario, index)).collect(),
         })
     }

@@ -1,7 +1,7 @@
 //! Altitudes: a common one, Algorithm 2 round by round, and places and altitudes chosen jointly.
 
 use host_tests::figures::altitude::best_common;
-use host_tests::reference::joint::{self, Band, Place};
+use host_tests::reference::joint::{self, Corridor, Place};
 use host_tests::reference::{Link, Station};
 
 use super::{Table, off, within};
@@ -60,10 +60,7 @@ fn the_best_common_altitude_is_the_reference_programs() {
     within(sir, 5.450_572_0, 3e-6, 3e-6);
 }
 
-const BAND: Band = Band {
-    least_m: 20.0 - 1e-3,
-    most_m: 300.0 + 1e-3,
-};
+const CORRIDOR: Corridor = Corridor::plane(20.0 - 1e-3, 300.0 + 1e-3);
 
 #[test]
 fn shapes_have_the_sir_of_their_round_and_keep_the_rules() {
@@ -73,10 +70,7 @@ fn shapes_have_the_sir_of_their_round_and_keep_the_rules() {
         assert_eq!(rows.len(), 50);
         let places: Vec<Place> = rows
             .iter()
-            .map(|row| Place {
-                x_m: row.number("x_m"),
-                altitude_m: row.number("altitude_m"),
-            })
+            .map(|row| Place::in_plane(row.number("x_m"), row.number("altitude_m")))
             .collect();
         let link = link(50, 150.0, 220.0);
         let sir = joint::sir(&link, &places).unwrap();
@@ -86,7 +80,7 @@ fn shapes_have_the_sir_of_their_round_and_keep_the_rules() {
             min_separation_m: 3.999,
             ..link
         };
-        assert!(joint::keeps_rules(&rounded, BAND, &places));
+        assert!(joint::keeps_rules(&rounded, CORRIDOR, &[], &places));
     }
     // What the page says of them.
     let at = |round: f64, relay: f64| shapes.row(&[("round", round), ("relay", relay)]);

@@ -133,14 +133,9 @@ impl Chain {
             .relays
             .iter()
             .map(at)
-            .map(|at| Place {
-                x_m: f64::from(at.x_m),
-                altitude_m: f64::from(at.altitude_m),
-            })
+            .map(|at| Place::in_plane(f64::from(at.x_m), f64::from(at.altitude_m)))
             .collect();
-        let apart = |pair: &[Place]| {
-            (pair[1].x_m - pair[0].x_m).hypot(pair[1].altitude_m - pair[0].altitude_m)
-        };
+        let apart = |pair: &[Place]| pair[0].distance_m(&pair[1]);
         let nearest = places.windows(2).map(apart).fold(f64::INFINITY, f64::min);
         let targets = self.relays.iter().map(|relay| relay.target().unwrap());
         let most = f64::from(targets.fold(0.0, f32::max));

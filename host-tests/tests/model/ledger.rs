@@ -57,10 +57,7 @@ fn side(of: Side) -> usize {
 }
 
 fn as_told(place: Placement) -> Place {
-    Place {
-        x_m: f64::from(place.x_m),
-        altitude_m: f64::from(place.altitude_m),
-    }
+    Place::in_plane(f64::from(place.x_m), f64::from(place.altitude_m))
 }
 
 impl Ledger {

@@ -3,7 +3,7 @@
 use host_tests::brief::{as_relays_know_it, of_link, of_stochastic_link};
 use host_tests::random::joint::scenario as joint_scenario;
 use host_tests::random::{Chain, Style, link as random_link, log_uniform};
-use host_tests::reference::joint::{Band, Effort, optimum};
+use host_tests::reference::joint::{Corridor, Effort, optimum};
 use host_tests::reference::stochastic::StochasticLink;
 use host_tests::reference::{Link, Station};
 use rand::{RngExt, SeedableRng};
@@ -194,20 +194,17 @@ fn aligned(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
 fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     let drawn = joint_scenario(rng, &(2..=6), TIGHT);
     let narrow = uav_relay::Band {
-        least_m: drawn.band.least_m as f32,
-        most_m: drawn.band.most_m as f32,
+        least_m: drawn.corridor.least_m as f32,
+        most_m: drawn.corridor.most_m as f32,
     };
-    let band = Band {
-        least_m: f64::from(narrow.least_m),
-        most_m: f64::from(narrow.most_m),
-    };
+    let corridor = Corridor::plane(f64::from(narrow.least_m), f64::from(narrow.most_m));
     let mut link = drawn.link;
     // All at one altitude to begin with, but for single ones.
-    let common_m = log_uniform(rng, band.least_m, band.most_m);
+    let common_m = log_uniform(rng, corridor.least_m, corridor.most_m);
     for relay in &mut link.relays {
         let own = rng.random_bool(0.2);
         relay.altitude_m = if own {
-            log_uniform(rng, band.least_m, band.most_m)
+            log_uniform(rng, corridor.least_m, corridor.most_m)
         } else {
             common_m
         };
@@ -242,7 +239,7 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
         min_separation_m: 0.0,
         ..link.clone()
     };
-    let optimum = optimum(&unseparated, band, Effort::usual(1))?.sir;
+    let optimum = optimum(&unseparated, corridor, &[], Effort::usual(1))?.sir;
     Some((mission, settings, Judge::Source { link, optimum }))
 }
 

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use host_tests::random::{self, Chain, Style, seed};
 use host_tests::reference::Link;
-use host_tests::reference::joint::Band;
+use host_tests::reference::joint::Corridor;
 use host_tests::several::{self, Scene, best_common_altitude, optimum};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -173,7 +173,9 @@ fn no_altitude_of_a_dense_scan_is_better() {
         let mut scene = scene(&mut rng, 1..=6, 2..=5);
         scene.band.most_m = 0.5 * scene.distance_m;
         let found = checked(&scene, best_common_altitude(&scene).unwrap());
-        let Band { least_m, most_m } = scene.band;
+        let Corridor {
+            least_m, most_m, ..
+        } = scene.band;
         let h = found.places[0].1;
         inside += u32::from(h > least_m * 1.001 && h < most_m * 0.999);
         for i in 0..=120 {

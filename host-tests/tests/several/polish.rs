@@ -2,7 +2,7 @@
 
 use host_tests::random::joint::{CROWDED, scenario};
 use host_tests::random::seed;
-use host_tests::reference::joint::{self, Band, Effort};
+use host_tests::reference::joint::{self, Corridor, Effort};
 use host_tests::several::{Polished, Scene, best_common_altitude, optimum, polish};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -21,7 +21,7 @@ fn even(scene: &Scene, h: f64) -> Vec<(f64, f64)> {
 }
 
 /// The polished chain, and that it is no worse than its start, in order, within the band and apart.
-fn checked(scene: &Scene, start: &[(f64, f64)], band: Band) -> Polished {
+fn checked(scene: &Scene, start: &[(f64, f64)], band: Corridor) -> Polished {
     let found = polish(scene, start, band).unwrap();
     assert!(found.sir >= scene.chain_sir(start), "{scene:?}");
     assert_eq!(found.sir, scene.chain_sir(&found.places));
@@ -74,14 +74,14 @@ fn in_a_band_it_comes_near_the_joint_optimum() {
     while compared < 20 {
         let drawn = scenario(&mut rng, &(1..=12), CROWDED);
         let scene = Scene {
-            band: drawn.band,
+            band: drawn.corridor,
             ..of_link(&drawn.link)
         };
-        let joint = joint::optimum(&drawn.link, drawn.band, Effort::usual(1));
+        let joint = joint::optimum(&drawn.link, drawn.corridor, &[], Effort::usual(1));
         let (Some(start), Some(joint)) = (best_common_altitude(&scene), joint) else {
             continue;
         };
-        let found = checked(&scene, &start.places, drawn.band);
+        let found = checked(&scene, &start.places, drawn.corridor);
         assert!(above(found.sir, joint.sir) < 1e-6, "{drawn:?}");
         compared += 1;
         near += u32::from(found.sir > 0.999 * joint.sir);

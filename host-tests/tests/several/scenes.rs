@@ -21,7 +21,7 @@ use std::ops::RangeInclusive;
 
 use host_tests::random::log_uniform;
 use host_tests::reference::Link;
-use host_tests::reference::joint::Band;
+use host_tests::reference::joint::Corridor;
 use host_tests::scenario::{AirGround, ChannelSpec, Interference, RelayOverride, Scenario, Source};
 use host_tests::several::{Relay, Scene};
 use rand::RngExt;
@@ -119,10 +119,7 @@ pub(crate) fn of_link(link: &Link) -> Scene {
         mu_los: link.mu_los,
         mu_nlos: link.mu_nlos,
         eta: link.eta,
-        band: Band {
-            least_m: altitude_m,
-            most_m: altitude_m,
-        },
+        band: Corridor::plane(altitude_m, altitude_m),
         relays: link.relays.iter().map(relay).collect(),
     }
 }

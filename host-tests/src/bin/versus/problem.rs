@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use host_tests::reference::joint::Band;
+use host_tests::reference::joint::Corridor;
 use host_tests::reference::{Link, Station, path_loss_factor};
 use host_tests::scenario::{Interference, Scenario};
 use serde::{Deserialize, Serialize};
@@ -89,7 +89,7 @@ impl Problem {
     }
 
     /// The same for the judge and the other solvers, and the altitudes that relays may fly at.
-    pub(crate) fn link(self) -> Result<(Link, Band), String> {
+    pub(crate) fn link(self) -> Result<(Link, Corridor), String> {
         let scenario = self.scenario()?;
         let Interference::Sources(sources) = &scenario.interference else {
             return Err("a scenario without an interferer".to_owned());
@@ -121,6 +121,6 @@ impl Problem {
             Choice::Altitudes => (scenario.altitude_min_m, scenario.altitude_max_m),
         };
         let (least_m, most_m) = band;
-        Ok((link, Band { least_m, most_m }))
+        Ok((link, Corridor::plane(least_m, most_m)))
     }
 }

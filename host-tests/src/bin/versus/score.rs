@@ -3,7 +3,7 @@
 use std::fmt;
 
 use host_tests::reference::Link;
-use host_tests::reference::joint::{Band, Place, sir};
+use host_tests::reference::joint::{Corridor, Place, sir};
 
 use crate::results::Found;
 
@@ -49,7 +49,7 @@ impl fmt::Display for Refusal {
 }
 
 /// SIR (linear) of the worst hop of a chain of [x, h] in m.
-pub(crate) fn judge(link: &Link, band: Band, chain: &[[f64; 2]]) -> Result<f64, Refusal> {
+pub(crate) fn judge(link: &Link, band: Corridor, chain: &[[f64; 2]]) -> Result<f64, Refusal> {
     let count = Refusal::Count(chain.len());
     if chain.len() != link.len() {
         return Err(count);
@@ -74,7 +74,7 @@ pub(crate) fn judge(link: &Link, band: Band, chain: &[[f64; 2]]) -> Result<f64, 
             return Err(Refusal::Separation(relay, gap_m));
         }
     }
-    let place = |&[x_m, altitude_m]: &[f64; 2]| Place { x_m, altitude_m };
+    let place = |&[x_m, altitude_m]: &[f64; 2]| Place::in_plane(x_m, altitude_m);
     let places: Vec<Place> = chain.iter().map(place).collect();
     sir(link, &places).ok_or(count)
 }
@@ -90,7 +90,7 @@ pub(crate) struct Score {
 /// The score of what a solver found; its own word is taken for the time alone.
 pub(crate) fn score(
     link: &Link,
-    band: Band,
+    band: Corridor,
     optimum: f64,
     found: &Found,
 ) -> Result<Score, Refusal> {

@@ -1,25 +1,52 @@
-//! The best chain whose relays fly at given levels: exact for those levels, whatever the interferer.
+//! The best chain whose relays fly at given levels, each a place in the cross-section: exact for those levels, whatever the
+//! interferer.
 //!
 //! For a target, the places each relay can reach at each of its levels are a union of intervals (see `reference::sets`): a
 //! sender at another level matters only through its nearest place, which is the least advance away or at the end of an
 //! interval, and either way the receiver's places solve a quadratic inequality. The target is bisected. Quadratics are solved
 //! here, unlike in the rest of the reference, for speed: what comes out is judged by its SIR alone.
 
-use super::plane::Pair;
-use super::scene::Scene;
+use super::scene::{Room, Scene};
+use super::space::{Across, Triple};
 
 type Interval = (f64, f64);
 
 /// Reachable places of one relay: a level and its sorted, disjoint intervals, for every level.
-type Reach = Vec<(f64, Vec<Interval>)>;
+type Reach = Vec<(Across, Vec<Interval>)>;
 
 /// Where each relay may be.
 #[derive(Debug, Clone)]
 pub(super) struct Slot {
-    /// Its altitudes.
-    pub(super) levels: Vec<f64>,
+    /// Its places in the cross-section.
+    pub(super) levels: Vec<Across>,
     /// Its places along Tx-Rx, both ends included.
     pub(super) window: Interval,
+}
+
+/// One level for each relay: the nearest in its room to that of `places`.
+pub(super) fn at_places(scene: &Scene, places: &[Across]) -> Vec<Slot> {
+    let places = places
+        .iter()
+        .chain(std::iter::repeat(&Across { y: 0.0, h: 0.0 }));
+    let rooms = scene.rooms.iter().zip(places);
+    rooms
+        .map(|(room, place)| Slot {
+            levels: vec![room.nearest(*place, 0.0)],
+            window: (0.0, 1.0),
+        })
+        .collect()
+}
+
+/// The nearest places to `levels` in a room, each once.
+pub(super) fn in_room(room: &Room, levels: &[Across]) -> Vec<Across> {
+    let mut inside: Vec<Across> = Vec::with_capacity(levels.len());
+    for level in levels {
+        let level = room.nearest(*level, 0.0);
+        if !inside.contains(&level) {
+            inside.push(level);
+        }
+    }
+    inside
 }
 
 /// The best chain, one slot per relay, to `tolerance` in ln SIR; `None` if no chain reaches `floor`, a ln SIR.
@@ -28,7 +55,7 @@ pub(super) fn best_chain(
     slots: &[Slot],
     floor: f64,
     tolerance: f64,
-) -> Option<Vec<Pair>> {
+) -> Option<Vec<Triple>> {
     let mut best = chain(scene, slots, floor)?;
     let mut low = scene.worst(&best).max(floor);
     let mut high = scene.ceiling();
@@ -49,11 +76,11 @@ pub(super) fn best_chain(
 }
 
 /// A chain that meets a target, ln SIR.
-fn chain(scene: &Scene, slots: &[Slot], target: f64) -> Option<Vec<Pair>> {
+fn chain(scene: &Scene, slots: &[Slot], target: f64) -> Option<Vec<Triple>> {
     let mut reaches: Vec<Reach> = Vec::with_capacity(slots.len());
     for (slot, &constant) in slots.iter().zip(&scene.hops) {
         let ease = (constant - target).exp();
-        let reach = |&level: &f64| {
+        let reach = |&level: &Across| {
             let hop = Landing {
                 scene,
                 ease,
@@ -62,7 +89,7 @@ fn chain(scene: &Scene, slots: &[Slot], target: f64) -> Option<Vec<Pair>> {
             };
             let mut pieces = Vec::new();
             match reaches.last() {
-                None => hop.after_place(Pair::default(), 0.0, &mut pieces),
+                None => hop.after_place(Triple::default(), 0.0, &mut pieces),
                 Some(last) => {
                     for (from_level, set) in last {
                         hop.after_level(*from_level, set, &mut pieces);
@@ -81,8 +108,8 @@ fn chain(scene: &Scene, slots: &[Slot], target: f64) -> Option<Vec<Pair>> {
 }
 
 /// The last relay nearest to Rx, then each relay nearest to its successor.
-fn trace_back(scene: &Scene, reaches: &[Reach], target: f64) -> Option<Vec<Pair>> {
-    let mut next = Pair::new(1.0, 0.0);
+fn trace_back(scene: &Scene, reaches: &[Reach], target: f64) -> Option<Vec<Triple>> {
+    let mut next = Triple::new(1.0, 0.0, 0.0);
     let mut places = Vec::with_capacity(reaches.len());
     for reach in reaches.iter().rev() {
         let is_last = places.is_empty();
@@ -90,11 +117,11 @@ fn trace_back(scene: &Scene, reaches: &[Reach], target: f64) -> Option<Vec<Pair>
             let advance = if is_last {
                 0.0
             } else {
-                least_advance(scene, next.h - level)
+                least_advance(scene, next.across().apart_2(*level))
             };
-            last_at_or_before(set, next.x - advance).map(|x| Pair::new(x, *level))
+            last_at_or_before(set, next.x - advance).map(|x| Triple::at(x, *level))
         });
-        let distance = |place: &Pair| (next - *place).dot(next - *place);
+        let distance = |place: &Triple| (next - *place).dot(next - *place);
         let place = candidates.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         if is_last && scene.last - distance(&place).ln() < target {
             return None;
@@ -106,28 +133,30 @@ fn trace_back(scene: &Scene, reaches: &[Reach], target: f64) -> Option<Vec<Pair>
     Some(places)
 }
 
-/// How far past its sender a relay must be for the least separation, `rise` above or below it.
-pub(super) fn least_advance(scene: &Scene, rise: f64) -> f64 {
-    (scene.apart * scene.apart - rise * rise).max(0.0).sqrt()
+/// How far past its sender a relay must be for the least separation, `across_2` being the square of their distance in the
+/// cross-section.
+pub(super) fn least_advance(scene: &Scene, across_2: f64) -> f64 {
+    (scene.apart * scene.apart - across_2).max(0.0).sqrt()
 }
 
 /// A relay at one level that a hop is to reach: (sender to relay)^2 <= `ease` (relay to interferer)^2.
 struct Landing<'a> {
     scene: &'a Scene,
     ease: f64,
-    level: f64,
+    level: Across,
     window: Interval,
 }
 
 impl Landing<'_> {
     /// Places at least `advance` past one sender.
-    fn after_place(&self, from: Pair, advance: f64, pieces: &mut Vec<Interval>) {
-        let (ahead, rise) = (self.scene.interferer.x - from.x, self.level - from.h);
-        let rest = self.scene.aside_2 + self.level * self.level;
+    fn after_place(&self, from: Triple, advance: f64, pieces: &mut Vec<Interval>) {
+        let ahead = self.scene.interferer.x - from.x;
+        let across_2 = self.level.apart_2(from.across());
+        let rest = self.level.apart_2(self.scene.interferer.across());
         not_positive(
             1.0 - self.ease,
             self.ease * ahead,
-            rise * rise - self.ease * (ahead * ahead + rest),
+            across_2 - self.ease * (ahead * ahead + rest),
             (
                 (from.x + advance).max(self.window.0) - from.x,
                 self.window.1 - from.x,
@@ -137,24 +166,24 @@ impl Landing<'_> {
     }
 
     /// Places reached from a whole set of one level.
-    fn after_level(&self, level: f64, set: &[Interval], pieces: &mut Vec<Interval>) {
-        let rise = self.level - level;
-        let advance = least_advance(self.scene, rise);
-        let rest = self.scene.aside_2 + self.level * self.level;
+    fn after_level(&self, level: Across, set: &[Interval], pieces: &mut Vec<Interval>) {
+        let across_2 = self.level.apart_2(level);
+        let advance = least_advance(self.scene, across_2);
+        let rest = self.level.apart_2(self.scene.interferer.across());
         let x_i = self.scene.interferer.x;
         for &(start, end) in set {
             // The sender just the least advance behind.
             not_positive(
                 -self.ease,
                 0.0,
-                advance * advance + rise * rise - self.ease * rest,
+                advance * advance + across_2 - self.ease * rest,
                 (
                     (start + advance).max(self.window.0) - x_i,
                     (end + advance).min(self.window.1) - x_i,
                 ),
                 |(start, end)| pieces.push((x_i + start, x_i + end)),
             );
-            self.after_place(Pair::new(end, level), advance, pieces);
+            self.after_place(Triple::at(end, level), advance, pieces);
         }
     }
 }

@@ -3,8 +3,10 @@
 //! Places and target are the unknowns, the target is maximised, every [`Limit`] stays > 0. A Newton step costs O(N); where the
 //! Lagrangian is not convex, a multiple of the identity is added until it is.
 
-use super::plane::{Block, Pair, Square, solve};
-use super::scene::{Limit, Scene};
+use super::limits::{Limit, limits};
+use super::scene::Scene;
+use super::space::{Square, Triple};
+use super::system::{Block, solve};
 
 /// The last weight of the barrier: the target ends below the local optimum by this times the number of limits.
 const LAST_WEIGHT: f64 = 1e-12;
@@ -20,23 +22,30 @@ const NEARLY: f64 = 0.995;
 
 /// A chain with its target and the multipliers of its limits.
 struct Iterate {
-    places: Vec<Pair>,
+    places: Vec<Triple>,
     target: f64,
     limits: Vec<Limit>,
     duals: Vec<f64>,
 }
 
-/// The chain at the local optimum that is reached from `start`, which must be strictly within all limits; `None` if it is not.
+/// The chain at the local optimum that is reached from `start`, which must be strictly within all limits; `None` if it is not,
+/// or as soon as that optimum is known not to exceed `hope`, a ln SIR.
 ///
 /// `slack` > 0 is how far below the SIR of `start` the target begins, and how strong the barrier does: a larger slack forgets
 /// more of `start`.
-pub(super) fn polish(scene: &Scene, start: &[Pair], slack: f64) -> Option<Vec<Pair>> {
+pub(super) fn polish(
+    scene: &Scene,
+    start: &[Triple],
+    slack: f64,
+    hope: f64,
+) -> Option<Vec<Triple>> {
     let target = scene.worst(start) - slack;
-    let limits = scene.limits(start, target);
+    let limits = limits(scene, start, target);
     if limits.is_empty() || !limits.iter().all(|limit| limit.value > 0.0) {
         return None;
     }
-    let mut weight = slack / limits.len() as f64;
+    let count = limits.len() as f64;
+    let mut weight = slack / count;
     let duals = limits.iter().map(|limit| weight / limit.value).collect();
     let mut at = Iterate {
         places: start.to_vec(),
@@ -45,7 +54,12 @@ pub(super) fn polish(scene: &Scene, start: &[Pair], slack: f64) -> Option<Vec<Pa
         duals,
     };
     for _ in 0..STEPS {
-        if at.error(weight) < weight.max(LEAST_ERROR) {
+        let is_central = at.error(scene, weight) < weight.max(LEAST_ERROR);
+        if is_central {
+            // The optimum lies about the number of limits times the weight above the target.
+            if at.target + 2.0 * count * weight < hope {
+                return None;
+            }
             if weight <= LAST_WEIGHT {
                 break;
             }
@@ -64,13 +78,13 @@ pub(super) fn polish(scene: &Scene, start: &[Pair], slack: f64) -> Option<Vec<Pa
 
 /// A change of places and target.
 struct Direction {
-    steps: Vec<Pair>,
+    steps: Vec<Triple>,
     raise: f64,
 }
 
 impl Direction {
     /// The step of a relay and of the one before it.
-    fn of(&self, relay: usize) -> (Pair, Pair) {
+    fn of(&self, relay: usize) -> (Triple, Triple) {
         let step = |i: usize| self.steps.get(i).copied();
         let before = relay.checked_sub(1).and_then(step);
         (step(relay).unwrap_or_default(), before.unwrap_or_default())
@@ -79,8 +93,8 @@ impl Direction {
 
 impl Iterate {
     /// The largest violation of the optimality conditions at a barrier's weight.
-    fn error(&self, weight: f64) -> f64 {
-        let mut slopes = vec![Pair::default(); self.places.len()];
+    fn error(&self, scene: &Scene, weight: f64) -> f64 {
+        let mut slopes = vec![Triple::default(); self.places.len()];
         let (mut target, mut worst) = (1.0, 0.0_f64);
         for (limit, &dual) in self.limits.iter().zip(&self.duals) {
             add(&mut slopes, limit.relay, limit.own * dual);
@@ -90,7 +104,8 @@ impl Iterate {
             target += limit.target * dual;
             worst = worst.max((limit.value * dual - weight).abs());
         }
-        let slopes = slopes.iter().map(|slope| slope.x.abs().max(slope.h.abs()));
+        let slopes = slopes.iter().zip(&scene.rooms);
+        let slopes = slopes.map(|(slope, room)| slope.times(room.free()).size());
         slopes.fold(worst.max(target.abs()), f64::max)
     }
 
@@ -98,12 +113,12 @@ impl Iterate {
     ///
     /// It follows an arc: the limits bend, and a straight step along a narrow valley would soon run into its wall.
     fn step(&mut self, scene: &Scene, weight: f64) -> bool {
-        let Some((damping, line)) = self.direction(weight) else {
+        let Some((damping, line)) = self.direction(scene, weight) else {
             return false;
         };
         let changes = self.changes(&line);
         let bends = self.bends(&line);
-        let Some(arc) = self.damped_direction(weight, damping, Some(&bends)) else {
+        let Some(arc) = self.damped_direction(scene, weight, damping, Some(&bends)) else {
             return false;
         };
         let slopes = self.limits.iter().zip(&changes);
@@ -116,11 +131,11 @@ impl Iterate {
         while share > 1e-10 {
             let (straight, bent) = (share * (1.0 - share), share * share);
             let moves = self.places.iter().zip(line.steps.iter().zip(&arc.steps));
-            let places: Vec<Pair> = moves
+            let places: Vec<Triple> = moves
                 .map(|(&place, (&line, &arc))| place + line * straight + arc * bent)
                 .collect();
             let target = self.target + line.raise * straight + arc.raise * bent;
-            let limits = scene.limits(&places, target);
+            let limits = limits(scene, &places, target);
             let mut pairs = limits.iter().zip(&self.limits);
             if pairs.all(|(new, old)| new.value > (1.0 - NEARLY) * old.value) {
                 let next = Self {
@@ -146,7 +161,7 @@ impl Iterate {
             .iter()
             .map(|limit| {
                 let (own, before) = along.of(limit.relay);
-                limit.own.dot(own) + limit.before.dot(before) + limit.target * along.raise
+                limit.change(own, before, along.raise)
             })
             .collect()
     }
@@ -157,9 +172,7 @@ impl Iterate {
             .iter()
             .map(|limit| {
                 let (own, before) = along.of(limit.relay);
-                let across = limit.bend_across.apply(before);
-                0.5 * own.dot(limit.bend_own.apply(own)) + own.dot(across)
-                    - 0.5 * before.dot(across)
+                limit.bend(own, before)
             })
             .collect()
     }
@@ -171,22 +184,23 @@ impl Iterate {
     }
 
     /// The Newton direction, and the damping that it needed.
-    fn direction(&self, weight: f64) -> Option<(f64, Direction)> {
+    fn direction(&self, scene: &Scene, weight: f64) -> Option<(f64, Direction)> {
         let dampings = std::iter::once(0.0).chain((0..30).map(|i| 1e-6 * 8_f64.powi(i)));
         dampings
-            .map(|damping| (damping, self.damped_direction(weight, damping, None)))
+            .map(|damping| (damping, self.damped_direction(scene, weight, damping, None)))
             .find_map(|(damping, found)| Some((damping, found?)))
     }
 
     /// The Newton direction with `damping` on the diagonal, and with limits that lie higher by `bends`.
     fn damped_direction(
         &self,
+        scene: &Scene,
         weight: f64,
         damping: f64,
         bends: Option<&[f64]>,
     ) -> Option<Direction> {
         let fresh = Block {
-            own: Square::diagonal(damping),
+            own: Square::even(damping),
             ..Block::default()
         };
         let mut blocks = vec![fresh; self.places.len()];
@@ -198,24 +212,28 @@ impl Iterate {
         for ((limit, &dual), bend) in self.limits.iter().zip(&self.duals).zip(bends) {
             let stiff = dual / limit.value;
             let push = weight / limit.value - stiff * bend;
+            let leap = limit.leap.curvature() * dual;
             if let Some(block) = blocks.get_mut(limit.relay) {
-                block.own =
-                    block.own + Square::outer(limit.own, limit.own) * stiff - limit.bend_own * dual;
-                block.before = block.before + Square::outer(limit.own, limit.before) * stiff
-                    - limit.bend_across * dual;
+                block.own = block.own + Square::outer(limit.own, limit.own) * stiff
+                    - leap
+                    - limit.alone.curvature() * dual;
+                block.before = block.before + Square::outer(limit.own, limit.before) * stiff + leap;
                 block.common = block.common + limit.own * (limit.target * stiff);
                 block.right = block.right + limit.own * push;
             }
             let before = limit.relay.checked_sub(1);
             if let Some(block) = before.and_then(|i| blocks.get_mut(i)) {
-                block.own = block.own
-                    + Square::outer(limit.before, limit.before) * stiff
-                    + limit.bend_across * dual;
+                block.own = block.own + Square::outer(limit.before, limit.before) * stiff - leap;
                 block.common = block.common + limit.before * (limit.target * stiff);
                 block.right = block.right + limit.before * push;
             }
             corner += limit.target * limit.target * stiff;
             corner_right += limit.target * push;
+        }
+        let mut free_before = Triple::default();
+        for (block, room) in blocks.iter_mut().zip(&scene.rooms) {
+            *block = block.held(room.free(), free_before);
+            free_before = room.free();
         }
         let (steps, raise) = solve(&blocks, corner, corner_right)?;
         Some(Direction { steps, raise })
@@ -243,7 +261,7 @@ impl Iterate {
     }
 }
 
-fn add(slopes: &mut [Pair], relay: usize, slope: Pair) {
+fn add(slopes: &mut [Triple], relay: usize, slope: Triple) {
     if let Some(sum) = slopes.get_mut(relay) {
         *sum = *sum + slope;
     }

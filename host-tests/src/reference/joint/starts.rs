@@ -1,13 +1,15 @@
-//! Where to look: chains to polish, from searches over levels.
+//! Where to look: chains to polish, from searches over levels, bows, and kicks of the best.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::Effort;
-use super::levels::{Slot, best_chain, least_advance};
-use super::plane::Pair;
+use super::draws::{Side, bow, levels};
+use super::kicks::kicked;
+use super::levels::{Slot, at_places, best_chain, in_room, least_advance};
 use super::polish::polish;
-use super::scene::Scene;
+use super::scene::{Room, Scene};
+use super::space::{Across, Triple};
 use crate::random::log_uniform;
 
 /// ln SIR below which no chain is looked for.
@@ -16,17 +18,33 @@ const LEAST: f64 = -200.0;
 /// Accuracy of a search over levels, in ln SIR: its chain is polished afterwards.
 const COARSE: f64 = 2e-3;
 
-/// Accuracy of a search at one altitude.
+/// Accuracy of a search that nothing follows.
 const FINE: f64 = 1e-12;
+
+/// By how much, in ln SIR, a chain must be better than the best to be worth the last digits.
+const WORTH: f64 = 1e-8;
+
+/// How far below its SIR the polishing of a chain begins, in ln SIR: much to slide far from it, little to stay near.
+const FAR: f64 = 1.0;
+const NEAR: f64 = 0.03;
 
 /// Every place along Tx-Rx.
 const ANYWHERE: (f64, f64) = (0.0, 1.0);
 
-/// Random chains and random moves of the best chain that are tried in each round.
-const DRAWS: u32 = 4;
+/// Columns and rows of the levels of a round.
+const GRIDS: [(u32, u32); 4] = [(5, 4), (4, 6), (7, 4), (6, 5)];
+
+/// Bowed chains, random chains and kicks of the best chain that are tried in each round.
+const BOWS: u32 = 8;
+const SCATTERED: u32 = 2;
+const KICKS: u32 = 10;
 
 /// The best chain of all starts.
-pub(super) fn search(scene: &Scene, effort: Effort) -> Option<Vec<Pair>> {
+pub(super) fn search(scene: &Scene, effort: Effort) -> Option<Vec<Triple>> {
+    if scene.rooms.iter().all(Room::is_point) {
+        let any = vec![Across::default(); scene.len()];
+        return best_chain(scene, &at_places(scene, &any), LEAST, FINE);
+    }
     let mut search = Search {
         scene,
         roomy: Scene {
@@ -35,22 +53,27 @@ pub(super) fn search(scene: &Scene, effort: Effort) -> Option<Vec<Pair>> {
         },
         best: None,
     };
-    if scene.high <= scene.low * (1.0 + 1e-9) {
-        return common_altitude(scene, scene.low, FINE);
-    }
-    search.one_level();
     let mut rng = ChaCha8Rng::seed_from_u64(effort.seed);
-    for round in 0..effort.rounds {
-        let count = 8 + 3 * (round % 4);
-        let levels = draw_levels(scene, &mut rng, count);
-        search.on_levels(&levels, None, 1.0);
-        for _ in 0..DRAWS {
+    search.one_level();
+    for (round, (columns, rows)) in (0..effort.rounds).zip(GRIDS.into_iter().cycle()) {
+        let side = match round % 4 {
+            1 => Side::Left,
+            3 => Side::Right,
+            _ => Side::Any,
+        };
+        let part = side.part(scene).unwrap_or(scene.corridor);
+        let drawn = levels(&part, &mut rng, columns, rows);
+        search.on_levels(&drawn, None, 1.0);
+        search.bowed(&mut rng);
+        for _ in 0..SCATTERED {
             search.scattered(&mut rng);
+        }
+        for _ in 0..KICKS {
             search.kicked(&mut rng);
         }
     }
-    let levels = draw_levels(scene, &mut rng, 8);
-    search.other_splits(&levels);
+    let drawn = levels(&scene.corridor, &mut rng, 4, 3);
+    search.other_splits(&drawn);
     search.around();
     search.best.map(|(_, chain)| chain)
 }
@@ -61,48 +84,71 @@ struct Search<'a> {
     /// The same with a somewhat larger least separation, so that what is found can be moved a little.
     roomy: Scene,
     /// ln SIR and chain.
-    best: Option<(f64, Vec<Pair>)>,
+    best: Option<(f64, Vec<Triple>)>,
 }
 
 impl Search<'_> {
-    /// Chains at one common altitude, for a few altitudes.
+    /// Chains at one common place in the cross-section: for a few offsets to the side, all over and on either side of the
+    /// interferer, the best of a few altitudes is followed.
     fn one_level(&mut self) {
-        let altitudes = spread(self.scene.low, self.scene.high, 12);
-        for level in altitudes {
-            if let Some(chain) = common_altitude(&self.roomy, level, FINE) {
-                self.consider(chain);
+        for side in [Side::Any, Side::Left, Side::Right] {
+            let Some(room) = side.part(self.scene) else {
+                continue;
+            };
+            let columns = if room.free().y > 0.0 { 5 } else { 1 };
+            for column in 0..columns {
+                let foot = room.within(f64::from(column) / 4.0, 0.0);
+                if let Some(chain) = self.best_altitude(foot.y, &room) {
+                    self.consider(&chain, NEAR);
+                }
             }
         }
     }
 
+    /// The best chain at one offset to the side and one altitude of a room.
+    fn best_altitude(&self, y: f64, room: &Room) -> Option<Vec<Triple>> {
+        let mut best: Option<(f64, Vec<Triple>)> = None;
+        for row in 0..8 {
+            let h = room.low.h * (room.high.h / room.low.h).powf(f64::from(row) / 7.0);
+            let level = room.nearest(Across::new(y, h), 0.0);
+            let slots = at_places(self.scene, &vec![level; self.scene.len()]);
+            let floor = best.as_ref().map_or(LEAST, |(sir, _)| *sir);
+            if let Some(chain) = best_chain(&self.roomy, &slots, floor, COARSE) {
+                best = Some((self.scene.worst(&chain), chain));
+            }
+        }
+        best.map(|(_, chain)| chain)
+    }
+
     /// The best chain on some levels, with the relays' windows split at the interferer: the first `count` relays before it,
     /// or anywhere if `split` is `None`.
-    fn on_levels(&mut self, levels: &[f64], split: Option<usize>, below: f64) {
+    fn on_levels(&mut self, levels: &[Across], split: Option<usize>, below: f64) {
         let x_i = self.scene.interferer.x;
         let window = |k: usize| match split {
             Some(count) if k + 1 == count => (0.0, x_i),
             Some(count) if k == count => (x_i, 1.0),
             _ => ANYWHERE,
         };
-        let slots: Vec<Slot> = (0..self.scene.len())
-            .map(|k| Slot {
-                levels: levels.to_vec(),
+        let rooms = self.scene.rooms.iter().enumerate();
+        let slots: Vec<Slot> = rooms
+            .map(|(k, room)| Slot {
+                levels: in_room(room, levels),
                 window: window(k),
             })
             .collect();
         let floor = self.sir() - below;
         if let Some(chain) = best_chain(&self.roomy, &slots, floor, COARSE) {
-            self.consider(chain);
+            self.consider(&chain, NEAR);
         }
     }
 
     /// Chains that pass the interferer a few relays earlier or later than the best one.
-    fn other_splits(&mut self, levels: &[f64]) {
+    fn other_splits(&mut self, levels: &[Across]) {
         let x_i = self.scene.interferer.x;
         if !(0.0..=1.0).contains(&x_i) {
             return;
         }
-        let passed = |chain: &Vec<Pair>| chain.iter().filter(|place| place.x < x_i).count();
+        let passed = |chain: &Vec<Triple>| chain.iter().filter(|place| place.x < x_i).count();
         let Some(now) = self.best.as_ref().map(|(_, chain)| passed(chain)) else {
             return;
         };
@@ -113,25 +159,41 @@ impl Search<'_> {
         }
     }
 
-    /// Chains near the best one, at seven altitudes of each relay's own.
+    /// Chains near the best one, at some places around each relay's own.
     fn around(&mut self) {
         for share in [0.08, 0.02] {
             let Some((sir, chain)) = &self.best else {
                 return;
             };
-            let stride = share * (self.scene.high - self.scene.low);
-            let slots: Vec<Slot> = chain
-                .iter()
-                .map(|place| Slot {
-                    levels: (-3..=3)
-                        .map(|i| place.h + f64::from(i) * stride)
-                        .filter(|h| (self.scene.low..=self.scene.high).contains(h))
-                        .collect(),
+            let width = self.scene.corridor.width();
+            let near = |place: &Triple| -> Vec<Across> {
+                let steps = (-2..=2).flat_map(|i| (-2..=2).map(move |j| (i, j)));
+                steps
+                    .map(|(i, j)| {
+                        let (i, j) = (share * f64::from(i), share * f64::from(j));
+                        Across::new(place.y + i * width.y, place.h + j * width.h)
+                    })
+                    .collect()
+            };
+            let slots: Vec<Slot> = (chain.iter().zip(&self.scene.rooms))
+                .map(|(place, room)| Slot {
+                    levels: in_room(room, &near(place)),
                     window: ANYWHERE,
                 })
                 .collect();
             if let Some(chain) = best_chain(&self.roomy, &slots, sir - 0.1, COARSE) {
-                self.consider(chain);
+                self.consider(&chain, NEAR);
+            }
+        }
+    }
+
+    /// Chains with a bend, at the best places along.
+    fn bowed(&mut self, rng: &mut ChaCha8Rng) {
+        for _ in 0..BOWS {
+            let bow = bow(&self.scene.corridor, rng, self.scene.len());
+            let slots = at_places(self.scene, &bow);
+            if let Some(chain) = best_chain(&self.roomy, &slots, self.sir() - 1.0, COARSE) {
+                self.consider(&chain, NEAR);
             }
         }
     }
@@ -142,62 +204,53 @@ impl Search<'_> {
         along.sort_unstable_by(f64::total_cmp);
         let chain = along
             .into_iter()
-            .map(|x| Pair::new(x, rng.random_range(self.scene.low..=self.scene.high)));
+            .map(|x| Triple::at(x, self.scene.corridor.within(rng.random(), rng.random())));
         let chain = chain.collect();
-        self.consider_apart(chain);
+        self.consider_apart(chain, FAR);
     }
 
-    /// The best chain with some of its relays, all in a row, moved at random.
+    /// The best chain, kicked.
     fn kicked(&mut self, rng: &mut ChaCha8Rng) {
-        let Some((_, chain)) = &self.best else {
-            return;
-        };
-        let mut chain = chain.clone();
-        let (first, last) = (
-            rng.random_range(0..chain.len()),
-            rng.random_range(0..chain.len()),
-        );
-        let (low, high) = (self.scene.low, self.scene.high);
-        let size = log_uniform(rng, 0.01, 1.0);
-        let gap = 1.0 / (chain.len() as f64 + 1.0);
-        let row = chain.iter_mut().enumerate();
-        for (_, place) in row.filter(|(k, _)| (first.min(last)..=first.max(last)).contains(k)) {
-            let x = place.x + size * gap * rng.random_range(-1.0..=1.0);
-            let h = place.h + size * (high - low) * rng.random_range(-1.0..=1.0);
-            *place = Pair::new(x.clamp(0.0, 1.0), h.clamp(low, high));
+        if let Some((_, chain)) = &self.best {
+            let chain = kicked(self.scene, chain, rng);
+            self.consider_apart(chain, log_uniform(rng, NEAR, FAR));
         }
-        self.consider_apart(chain);
     }
 
-    /// Considers a chain after moving its relays along until they are in order and apart.
-    fn consider_apart(&mut self, mut chain: Vec<Pair>) {
-        let mut before: Option<Pair> = None;
-        for place in &mut chain {
+    /// Considers a chain after moving its relays into their rooms, and along until they are in order and apart.
+    fn consider_apart(&mut self, mut chain: Vec<Triple>, slack: f64) {
+        let mut before: Option<Triple> = None;
+        for (place, room) in chain.iter_mut().zip(&self.scene.rooms) {
+            let across = room.nearest(place.across(), 0.0);
+            *place = Triple::at(place.x.clamp(0.0, 1.0), across);
             if let Some(before) = before {
-                let advance = least_advance(&self.roomy, place.h - before.h);
+                let advance = least_advance(&self.roomy, across.apart_2(before.across()));
                 place.x = place.x.max(before.x + advance);
             }
             before = Some(*place);
         }
-        let mut next: Option<Pair> = None;
+        let mut next: Option<Triple> = None;
         for place in chain.iter_mut().rev() {
             let limit = next.map_or(1.0, |next| {
-                next.x - least_advance(&self.roomy, place.h - next.h)
+                next.x - least_advance(&self.roomy, place.across().apart_2(next.across()))
             });
             place.x = place.x.min(limit);
             next = Some(*place);
         }
         if next.is_some_and(|first| first.x >= 0.0) {
-            self.consider(chain);
+            self.consider(&chain, slack);
         }
     }
 
-    /// Keeps a chain, or the local optimum near it, if that is the best so far.
-    fn consider(&mut self, chain: Vec<Pair>) {
+    /// Keeps a chain, or the local optimum that is reached from it, if that is the best so far.
+    fn consider(&mut self, chain: &[Triple], slack: f64) {
+        let hope = self.sir() + WORTH;
         let polished = [1e-3, 1e-5, 1e-2]
             .iter()
-            .find_map(|&share| polish(self.scene, &self.inward(&chain, share), 0.03));
-        for chain in polished.into_iter().chain([chain]) {
+            .map(|&share| self.inward(chain, share))
+            .find(|start| self.is_fair(start))
+            .and_then(|start| polish(self.scene, &start, slack, hope));
+        for chain in polished.into_iter().chain([chain.to_vec()]) {
             let sir = self.scene.worst(&chain);
             if sir > self.sir() {
                 self.best = Some((sir, chain));
@@ -205,57 +258,28 @@ impl Search<'_> {
         }
     }
 
-    /// The chain moved by `share` toward evenly spread places within the band, off every limit it touches.
-    fn inward(&self, chain: &[Pair], share: f64) -> Vec<Pair> {
-        let (low, high) = (self.scene.low, self.scene.high);
-        let room = share * (high - low);
-        let gaps = self.scene.len() as f64 + 1.0;
-        let moved = (1..).zip(chain).map(|(k, place)| {
-            let even = f64::from(k) / gaps;
-            Pair::new(
-                (1.0 - share) * place.x + share * even,
-                place.h.clamp(low + room, high - room),
-            )
+    /// The chain moved by `share` toward evenly spread places within the rooms, off every limit it touches.
+    fn inward(&self, chain: &[Triple], share: f64) -> Vec<Triple> {
+        let gap = 1.0 / (self.scene.len() as f64 + 1.0);
+        let mut even = 0.0;
+        let moved = chain.iter().zip(&self.scene.rooms).map(|(place, room)| {
+            even += gap;
+            let x = (1.0 - share) * place.x + share * even;
+            Triple::at(x, room.nearest(place.across(), share))
         });
         moved.collect()
+    }
+
+    /// Whether neighbours are farther apart than they must be.
+    fn is_fair(&self, chain: &[Triple]) -> bool {
+        let apart_2 = self.scene.apart * self.scene.apart;
+        let neighbours = chain.iter().zip(chain.iter().skip(1));
+        let mut steps = neighbours.map(|(a, b)| *b - *a);
+        steps.all(|step| step.x > 0.0 && step.dot(step) > apart_2)
     }
 
     /// ln SIR of the best chain so far.
     fn sir(&self) -> f64 {
         self.best.as_ref().map_or(LEAST, |(sir, _)| *sir)
     }
-}
-
-/// The best chain at one altitude, to `tolerance` in ln SIR.
-fn common_altitude(scene: &Scene, level: f64, tolerance: f64) -> Option<Vec<Pair>> {
-    let slot = Slot {
-        levels: vec![level],
-        window: ANYWHERE,
-    };
-    let slots = vec![slot; scene.len()];
-    best_chain(scene, &slots, LEAST, tolerance)
-}
-
-/// `count` levels over the band with some jitter, its ends included: evenly or closer at the bottom.
-fn draw_levels(scene: &Scene, rng: &mut ChaCha8Rng, count: u32) -> Vec<f64> {
-    let power = rng.random_range(1.0..=2.0);
-    let shares = (0..count).map(|i| {
-        let jitter = if i == 0 || i + 1 == count {
-            0.0
-        } else {
-            rng.random_range(-0.3..=0.3)
-        };
-        ((f64::from(i) + jitter) / f64::from(count - 1)).powf(power)
-    });
-    shares
-        .map(|share| scene.low + share * (scene.high - scene.low))
-        .collect()
-}
-
-/// `count` numbers from `low` to `high`, ends included, evenly spaced in their logarithms.
-fn spread(low: f64, high: f64, count: u32) -> Vec<f64> {
-    (0..count)
-        .map(|i| low * (high / low).powf(f64::from(i) / f64::from(count - 1)))
-        .map(|level| level.clamp(low, high))
-        .collect()
 }

@@ -1,0 +1,151 @@
+//! What limits a chain, with slopes and curvatures.
+//!
+//! A hop's SIR is a constant times (receiver to interferer)^2 / (sender to receiver)^2, at Rx a constant over (sender to
+//! Rx)^2. So its logarithm is a sum of logarithms of squared distances, whose derivatives are those of ln(q), q = d^2: slope
+//! 2 d / q, curvature 2 I / q - 4 d d^T / q^2.
+
+use super::scene::Scene;
+use super::space::{Square, Triple};
+
+/// A multiple of ln(d^2) with its slope and curvature by d.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Log {
+    value: f64,
+    slope: Triple,
+    /// The curvature is `even` times the identity less `sharp` times the square of the slope.
+    even: f64,
+    sharp: f64,
+}
+
+impl Log {
+    fn of(d: Triple, factor: f64) -> Self {
+        let q = d.dot(d);
+        Self {
+            value: factor * q.ln(),
+            slope: d * (2.0 * factor / q),
+            even: 2.0 * factor / q,
+            sharp: factor.recip(),
+        }
+    }
+
+    pub(super) fn curvature(&self) -> Square {
+        Square::even(self.even) - Square::outer(self.slope, self.slope) * self.sharp
+    }
+
+    /// Half the curvature along a step: what the second order adds to a change.
+    fn bend(&self, step: Triple) -> f64 {
+        0.5 * (self.even * step.dot(step) - self.sharp * self.slope.dot(step).powi(2))
+    }
+}
+
+/// Something that must stay >= 0 (a hop's ln SIR over the target, a margin of order, corridor or separation), of one relay and
+/// the one before it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limit {
+    /// Number of the relay, from 0.
+    pub(super) relay: usize,
+    pub(super) value: f64,
+    /// Slope by the relay's own place.
+    pub(super) own: Triple,
+    /// Slope by the place of the relay before.
+    pub(super) before: Triple,
+    /// Slope by the target: -1 for hops, 0 for margins.
+    pub(super) target: f64,
+    /// The part that depends on the step from the relay before to this one.
+    pub(super) leap: Log,
+    /// The curved part that depends on the relay's own place alone.
+    pub(super) alone: Log,
+}
+
+impl Limit {
+    /// A linear margin.
+    fn margin(relay: usize, value: f64, own: Triple, before: Triple) -> Self {
+        Self {
+            relay,
+            value,
+            own,
+            before,
+            target: 0.0,
+            leap: Log::default(),
+            alone: Log::default(),
+        }
+    }
+
+    /// What both logarithms add to `value`; with `target`, so much less.
+    fn curved(relay: usize, value: f64, leap: Log, alone: Log, target: Option<f64>) -> Self {
+        Self {
+            relay,
+            value: value + leap.value + alone.value - target.unwrap_or(0.0),
+            own: leap.slope + alone.slope,
+            before: -leap.slope,
+            target: if target.is_some() { -1.0 } else { 0.0 },
+            leap,
+            alone,
+        }
+    }
+
+    /// The first-order change by a step of the relay, of the one before and of the target.
+    pub(super) fn change(&self, own: Triple, before: Triple, raise: f64) -> f64 {
+        self.own.dot(own) + self.before.dot(before) + self.target * raise
+    }
+
+    /// What the second order adds to that.
+    pub(super) fn bend(&self, own: Triple, before: Triple) -> f64 {
+        self.leap.bend(own - before) + self.alone.bend(own)
+    }
+}
+
+/// Everything that limits a chain when its ln SIR is to exceed `target`.
+pub(super) fn limits(scene: &Scene, places: &[Triple], target: f64) -> Vec<Limit> {
+    let mut limits = Vec::with_capacity(7 * places.len() + 2);
+    let mut from = Triple::default();
+    let none = Triple::default();
+    let (ahead, aside, up) = (
+        Triple::new(1.0, 0.0, 0.0),
+        Triple::new(0.0, 1.0, 0.0),
+        Triple::new(0.0, 0.0, 1.0),
+    );
+    let relays = scene.hops.iter().zip(&scene.rooms).zip(places).enumerate();
+    for (relay, ((&constant, room), &place)) in relays {
+        let leap = place - from;
+        limits.push(Limit::curved(
+            relay,
+            constant,
+            Log::of(leap, -1.0),
+            Log::of(place - scene.interferer, 1.0),
+            Some(target),
+        ));
+        limits.push(Limit::margin(relay, leap.x, ahead, -ahead));
+        let free = room.free();
+        if free.y > 0.0 {
+            limits.push(Limit::margin(relay, place.y - room.low.y, aside, none));
+            limits.push(Limit::margin(relay, room.high.y - place.y, -aside, none));
+        }
+        if free.h > 0.0 {
+            limits.push(Limit::margin(relay, place.h - room.low.h, up, none));
+            limits.push(Limit::margin(relay, room.high.h - place.h, -up, none));
+        }
+        if relay > 0 && scene.apart > 0.0 {
+            // As a logarithm: the margin then has the size of those of the hops.
+            limits.push(Limit::curved(
+                relay,
+                -2.0 * scene.apart.ln(),
+                Log::of(leap, 1.0),
+                Log::default(),
+                None,
+            ));
+        }
+        if relay + 1 == scene.len() {
+            limits.push(Limit::margin(relay, 1.0 - place.x, -ahead, none));
+            limits.push(Limit::curved(
+                relay,
+                scene.last,
+                Log::default(),
+                Log::of(place - ahead, -1.0),
+                Some(target),
+            ));
+        }
+        from = place;
+    }
+    limits
+}
