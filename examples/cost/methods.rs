@@ -95,7 +95,7 @@ pub(crate) fn methods() {
     let mut climb = Flight::new(
         HIGH,
         Settings {
-            method: Method::Altitude,
+            method: Method::Joint,
             ..settings
         },
     );
@@ -105,7 +105,7 @@ pub(crate) fn methods() {
     let mut survey = Flight::new(
         HIGH,
         Settings {
-            method: Method::Altitude,
+            method: Method::Joint,
             ..Settings::default()
         },
     );

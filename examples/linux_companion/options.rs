@@ -146,7 +146,7 @@ fn plan(options: &Options) -> Result<Plan, String> {
     let settings = Settings {
         method: match options.method {
             Method::Align => uav_relay::Method::Align,
-            Method::Altitude => uav_relay::Method::Altitude,
+            Method::Altitude => uav_relay::Method::Joint,
             Method::Adjust => uav_relay::Method::Adjust(Adjust::default()),
         },
         wiring: match ttys {

@@ -247,6 +247,7 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
         tx_power_w,
         common,
         band,
+        lateral: Band::NONE,
         channel,
         interference,
         tolerance,
@@ -307,7 +308,7 @@ pub fn write(config: &Config, numbers: &ChannelNumbers, secret: Option<Secret>) 
     };
     let (method, rounds, explore_m) = match config.method {
         Method::Align => (0, 0, 0.0),
-        Method::Altitude => (1, 0, 0.0),
+        Method::Joint => (1, 0, 0.0),
         Method::Adjust(adjust) => (2, adjust.rounds, adjust.explore_m),
     };
     let (i_max_w, samples) = config
@@ -422,7 +423,7 @@ impl Reader<'_> {
         let unused = explore_m.to_bits() == 0 && rounds == 0;
         match number {
             0 if unused => Ok(Method::Align),
-            1 if unused => Ok(Method::Altitude),
+            1 if unused => Ok(Method::Joint),
             2 if rounds > 0 && (0.0..=1e5).contains(&explore_m) => Ok(Method::Adjust(Adjust {
                 rounds,
                 explore_m,

@@ -80,6 +80,7 @@ pub fn mission(
             least_m: narrow(scenario.altitude_min_m),
             most_m: narrow(scenario.altitude_max_m),
         },
+        lateral: Band::NONE,
         channel: channel(scenario).map_err(Refusal::Channel)?,
         interference,
         tolerance: narrow(tolerance),
@@ -233,6 +234,7 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
         tx_power_w: narrow(link.tx_w),
         common,
         band: Band::at(common.altitude_m),
+        lateral: Band::NONE,
         channel,
         interference: uav_relay::Interference::Source(Interferer {
             power_w: narrow(link.interferer_w),
@@ -272,6 +274,7 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
         tx_power_w: narrow(link.tx_w),
         common,
         band: Band::at(common.altitude_m),
+        lateral: Band::NONE,
         channel: Channel::new(
             UNIT_CARRIER_HZ,
             link.mu_los,

@@ -54,7 +54,7 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
         sirs.push(f64::from(
             sender.sir_at(mission, from_m, *place).min(f32::MAX),
         ));
-        sender = Sender::relay(mission, *profile);
+        sender = Sender::relay(mission, profile.on_line());
         from_m = place.x_m;
     }
     if let Some((place, profile)) = places.last() {

@@ -78,13 +78,7 @@ fn hop_sirs_agree_with_the_reference() {
             .zip(&x)
             .map(|(index, &x_m)| {
                 let profile = profile_of(&mission, &own, index);
-                (
-                    Placement {
-                        x_m,
-                        altitude_m: profile.altitude_m,
-                    },
-                    profile,
-                )
+                (Placement::on_line(x_m, profile.altitude_m), profile)
             })
             .collect();
         let reference = link.sir_hops(&x.iter().map(|&x| f64::from(x)).collect::<Vec<_>>());
@@ -120,7 +114,7 @@ fn reaches_agree_with_the_reference() {
         let profile = profile_of(&mission, &own, index);
         let sender = match index {
             1 => Sender::transmitter(&mission),
-            _ => Sender::relay(&mission, profile_of(&mission, &own, index - 1)),
+            _ => Sender::relay(&mission, profile_of(&mission, &own, index - 1).on_line()),
         };
         let from = if index == 1 {
             0.0
@@ -143,7 +137,7 @@ fn reaches_agree_with_the_reference() {
             mission.interferer().unwrap(),
             sender,
             index,
-            profile.altitude_m,
+            profile.on_line().at,
             0.0,
         );
         let ours = hop.reach(target, from);
@@ -207,7 +201,7 @@ fn the_reach_of_the_last_hop_agrees_with_the_reference() {
         let above = link.sir_rx(link.distance_m).unwrap();
         for part in [1.000_01, 0.999_99, 0.5, 1e-3] {
             let target = (above * part) as f32;
-            let ours = receiver_reach(&mission, mission.config().common, target);
+            let ours = receiver_reach(&mission, mission.config().common.on_line(), target);
             let band = [1.0 - 1e-6, 1.0 + 1e-6].map(|f| link.rx_reach(f64::from(target) * f));
             match (ours, band) {
                 (None, [_, tighter]) => assert_eq!(tighter, None, "link {at}"),
@@ -410,7 +404,7 @@ fn reference_cases_of_one_hop_hold() {
             mission.interferer().unwrap(),
             Sender::transmitter(&mission),
             1,
-            mission.config().common.altitude_m,
+            mission.config().common.on_line().at,
             0.0,
         );
         let ours = hop.reach(case.arg("gamma").unwrap() as f32, 0.0);
@@ -426,9 +420,9 @@ fn reference_cases_of_one_hop_hold() {
         let hop = Hop::new(
             &mission,
             mission.interferer().unwrap(),
-            Sender::relay(&mission, common),
+            Sender::relay(&mission, common.on_line()),
             2,
-            common.altitude_m,
+            common.on_line().at,
             0.0,
         );
         let from = case.arg("s").unwrap();
@@ -449,7 +443,7 @@ fn reference_cases_of_one_hop_hold() {
         let (mission, _) = of_link(&case.link(1), 1e-4).unwrap();
         let ours = receiver_reach(
             &mission,
-            mission.config().common,
+            mission.config().common.on_line(),
             case.arg("gamma").unwrap() as f32,
         )
         .unwrap();

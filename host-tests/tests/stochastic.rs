@@ -90,7 +90,8 @@ fn retreats_agree_with_the_reference() {
             panic!("a field");
         };
         let quiet = field.upsilon(from) / field.largest();
-        let ours = Retreat::new(&mission, own, 1, Some(own.altitude_m)).reach(target, from, quiet);
+        let ours = Retreat::new(&mission, own.on_line(), 1, Some(own.altitude_m))
+            .reach(target, from, quiet);
         let exact = (f64::from(own.power_w) * link.upsilon_at(f64::from(from))
             / (link.mu_los * f64::from(target)))
         .sqrt();

@@ -102,7 +102,7 @@ fn run(options: &Options) -> Result<String, String> {
         .map_or("default scenario".into(), |file| file.to_string_lossy());
     let method = match options.method {
         Method::Align => uav_relay::Method::Align,
-        Method::Altitude => uav_relay::Method::Altitude,
+        Method::Altitude => uav_relay::Method::Joint,
         Method::Adjust => uav_relay::Method::Adjust(Adjust {
             rounds: options.rounds,
             explore_m: options.explore_m,

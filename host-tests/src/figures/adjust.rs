@@ -209,7 +209,7 @@ pub fn rounds_sheet() -> Result<Sheet, Trouble> {
     let rows = rounds(most)?;
     let joint = fly(
         &mission(RELAYS, START_M)?,
-        Method::Altitude,
+        Method::Joint,
         Schedule::Bracketed,
         true,
     )?;

@@ -61,7 +61,7 @@ fn row(relays: u16, rounds: u16) -> Result<Row, Trouble> {
     let (altitude_m, common) = best_common(relays, OFFSET_M)?;
     let adjusted = adjusted(relays, altitude_m, rounds, Local::Fine)?;
     let mission = paper::flown(&paper::altitudes(OFFSET_M, altitude_m), relays)?;
-    let joint = fly(&mission, Method::Altitude, Schedule::Bracketed, true)?;
+    let joint = fly(&mission, Method::Joint, Schedule::Bracketed, true)?;
     Ok(Row {
         relays,
         common_altitude_m: altitude_m,

@@ -39,17 +39,14 @@ pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
             mission,
             behind,
             index,
-            profile,
+            profile.on_line(),
             &[target],
             &from,
             &mut reaches,
         );
-        places.push(Placement {
-            x_m: *reaches.first()?,
-            altitude_m: profile.altitude_m,
-        });
+        places.push(Placement::on_line(*reaches.first()?, profile.altitude_m));
         behind = Some(Behind {
-            profile,
+            relay: profile.on_line(),
             measured_per_w: None,
         });
         from = reaches;
@@ -91,7 +88,7 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, Trouble> {
             Heading::TowardTx => chain.places.first(),
         });
         let reached: Vec<f32> = last.map(|place| place.x_m).into_iter().collect();
-        let verdict = pass::close(mission, own, None, ladder, &reached);
+        let verdict = pass::close(mission, own.on_line(), None, ladder, &reached);
         sweeps.push(Sweep {
             number,
             target,

@@ -268,10 +268,7 @@ impl Chain {
     /// A relay finds out where it is.
     fn position(&mut self, at: usize, input: &mut Input<'_>) {
         let distance_m = self.mission.config().distance_m;
-        let place = Placement {
-            x_m: input.even(0.0, distance_m),
-            altitude_m: input.scaled(0.1, 1e5),
-        };
+        let place = Placement::on_line(input.even(0.0, distance_m), input.scaled(0.1, 1e5));
         if let Some(member) = self.members.get_mut(at) {
             member.watched.position(self.now, self.now, place);
         }

@@ -222,13 +222,10 @@ fn look_at(message: &Message) {
                 "{targets:?}"
             );
             assert!(sweep.reaches.len() <= targets.len());
-            assert!(sweep.profile.is_valid());
+            assert!(sweep.relay.power_w > 0.0);
         }
-        Message::Wave(wave) => {
-            let rungs = 0..wave.rungs.count();
-            assert!(rungs.map(|at| wave.rungs.target(at)).all(is_target));
-            let pairs = usize::from(wave.rungs.count()) * usize::from(wave.levels.count());
-            assert_eq!(wave.reaches.len(), 3 * pairs);
+        Message::Course(course) => {
+            assert!(course.trials.iter().all(|trial| is_target(trial.target)));
         }
         Message::Token(token) => {
             assert!(token.place.x_m.is_finite() && token.place.altitude_m > 0.0);
@@ -257,7 +254,7 @@ fn look_at(message: &Message) {
             let same = Mission::try_new(*upload.config()).is_ok();
             assert!(same && upload.version() > 0, "{upload:?}");
         }
-        Message::Busy { .. } | Message::Heartbeat { .. } | Message::Trace(_) => {}
+        Message::Busy { .. } | Message::Heartbeat { .. } | Message::Worth(_) => {}
     }
 }
 

@@ -232,10 +232,10 @@ impl Bench {
         let ago = Duration::from_millis(u64::from(how % 16) * 20);
         let at = self.now.as_micros().saturating_sub(ago.as_micros());
         let distance_m = self.mission.config().distance_m;
-        let place = Placement {
-            x_m: input.mostly(|input| input.even(0.0, distance_m)),
-            altitude_m: input.mostly(|input| input.scaled(0.1, 1e5)),
-        };
+        let place = Placement::on_line(
+            input.mostly(|input| input.even(0.0, distance_m)),
+            input.mostly(|input| input.scaled(0.1, 1e5)),
+        );
         let at = Instant::from_micros(at);
         self.watched.position(self.now, at, place);
     }

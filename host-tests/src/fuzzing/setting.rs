@@ -51,6 +51,7 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
         },
         channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).ok()?,
         band: Band::at(20.0),
+        lateral: Band::NONE,
         interference: Interference::Source(Interferer {
             power_w: 80.0,
             x_m: 500.0,
@@ -116,6 +117,7 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
         },
         channel: channel(input)?,
         band: Band { least_m, most_m },
+        lateral: Band::NONE,
         interference,
         tolerance: input.scaled(1e-6, 0.1),
     })
@@ -179,7 +181,7 @@ pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Se
 pub fn of_chain(input: &mut Input<'_>, mission: &Mission) -> Settings {
     let how = input.byte();
     let method = match how % 4 {
-        1 if mission.interferer().is_some() => Method::Altitude,
+        1 if mission.interferer().is_some() => Method::Joint,
         2 if mission.interferer().is_some() => Method::Adjust(adjust(input)),
         _ => Method::Align,
     };

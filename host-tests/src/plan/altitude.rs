@@ -13,7 +13,7 @@ use crate::sim::setup::Setup;
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, relays, tolerance)?;
     let mut setup = Setup::new(briefed.mission);
-    setup.settings.method = Method::Altitude;
+    setup.settings.method = Method::Joint;
     setup.profiles.clone_from(&briefed.own);
     setup.held.clone_from(&briefed.held);
     let mut chain = Chain::new(setup).map_err(|error| NoPlan::Wrong(error.to_string()))?;

@@ -225,10 +225,7 @@ impl Best {
     fn new(scene: &Scene, places: &[(f64, f64)], proven: bool) -> Self {
         let places: Vec<Placement> = places
             .iter()
-            .map(|&(x, h)| Placement {
-                x_m: narrow(x),
-                altitude_m: narrow(h),
-            })
+            .map(|&(x, h)| Placement::on_line(narrow(x), narrow(h)))
             .collect();
         Self {
             sir: scene.chain_sir(&wide(&places)),

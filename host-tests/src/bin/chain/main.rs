@@ -132,7 +132,7 @@ fn setup(options: &Options, mission: Mission) -> Result<Setup, Failure> {
         _ => Schedule::Bracketed,
     };
     setup.settings.method = match options.method {
-        Method::Altitude => uav_relay::Method::Altitude,
+        Method::Altitude => uav_relay::Method::Joint,
         Method::Adjust => uav_relay::Method::Adjust(uav_relay::Adjust {
             rounds: options.rounds,
             explore_m: options.explore_m,

@@ -38,7 +38,7 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     }
     let mut setup = Setup::new(mission);
     if problem.choice == Choice::Altitudes {
-        setup.settings.method = Method::Altitude;
+        setup.settings.method = Method::Joint;
     }
     let (time_s, places) = timed(|| flown(setup.clone()))?;
     runs.push(run(

@@ -8,8 +8,8 @@ pub(super) const fn number_of(message: &Message) -> Option<u16> {
         Message::Sweep(sweep) => sweep.number,
         Message::Verdict(answer) => answer.number,
         Message::Busy { sweep } => *sweep,
-        Message::Wave(wave) => wave.number,
-        Message::Trace(trace) => trace.number,
+        Message::Course(course) => course.number,
+        Message::Worth(worth) => worth.number,
         Message::Token(token) => token.number,
         Message::Moved(moved) => moved.number,
         Message::Heartbeat { .. }

@@ -127,8 +127,5 @@ impl Chain {
 
 #[expect(clippy::cast_possible_truncation, reason = "a place in metres")]
 fn placement((x_m, altitude_m): (f64, f64)) -> Placement {
-    Placement {
-        x_m: x_m as f32,
-        altitude_m: altitude_m as f32,
-    }
+    Placement::on_line(x_m as f32, altitude_m as f32)
 }
