@@ -55,6 +55,8 @@ impl Answerer {
                     commit: None,
                     slacks: sweep.ladder.targets(),
                 },
+                stand: None,
+                own: false,
             }));
         }
     }

@@ -5,9 +5,9 @@
 
 use super::PerTarget;
 use super::ladder::Ladder;
-use super::pass::{self, Behind, origins};
+use super::pass::{self, Behind, Link, Stand, origins};
 use super::search::{Infeasible, Schedule, Search};
-use crate::mission::{Mission, Profile};
+use crate::mission::{Heading, Mission, Profile};
 use crate::sir::Placement;
 
 /// A target the whole chain meets, as the ladder and the place in it that the tail would commit.
@@ -20,6 +20,8 @@ pub struct Agreed {
     pub commit: u8,
     /// That target, linear SIR.
     pub target: f32,
+    /// What no chain at these altitudes has, linear SIR; `None` with the paper's fixed step, which leaves chains out.
+    pub most: Option<f32>,
     /// Sweeps it took to find.
     pub sweeps: u32,
 }
@@ -79,25 +81,22 @@ impl Planner {
         for _ in 0..hops {
             let profile = profile_of(self.index);
             let mut reaches = PerTarget::new();
-            pass::extend(
+            let link = Link {
                 mission,
-                self.behind,
-                self.index,
-                profile.on_line(),
-                &self.targets,
-                &self.reaches,
-                &mut reaches,
-            );
+                behind: self.behind,
+                index: self.index,
+                own: profile.on_line(),
+                measured_per_w: None,
+                plain: self.search.ladder().is_plain(),
+            };
+            link.extend(&self.targets, &self.reaches, &mut reaches);
             self.reaches = reaches;
             if let Some(next) = mission.after(self.index) {
-                self.behind = Some(Behind {
-                    relay: profile.on_line(),
-                    measured_per_w: None,
-                });
+                self.behind = Some(Behind::of(profile));
                 self.index = next;
                 continue;
             }
-            let verdict = pass::close(mission, profile.on_line(), None, *self.search.ladder(), &self.reaches);
+            let verdict = pass::close(&link, *self.search.ladder(), &self.reaches);
             if let Some(commit) = verdict.commit
                 && let Some(&target) = self.targets.get(usize::from(commit))
             {
@@ -105,6 +104,7 @@ impl Planner {
                     ladder: *self.search.ladder(),
                     commit,
                     target,
+                    most: self.search.most(&verdict.slacks),
                     sweeps: self.sweeps,
                 }));
             }
@@ -117,6 +117,8 @@ impl Planner {
 
 /// Solves the chain in one go: at most about fifty sweeps over N hops with the bracketed schedule.
 ///
+/// Where relays hold back, they are followed once more, as [`place`] does.
+///
 /// # Errors
 /// [`Infeasible`] when no target can be met.
 pub fn solve(
@@ -124,40 +126,183 @@ pub fn solve(
     schedule: Schedule,
     profile_of: impl Fn(u16) -> Profile,
 ) -> Result<Agreed, Infeasible> {
-    let mut planner = Planner::new(mission, profile_of(mission.leader()), schedule)?;
+    let leader = profile_of(mission.leader());
+    let mut planner = Planner::new(mission, leader, schedule)?;
     loop {
-        if let Some(agreed) = planner.step(mission, &profile_of, u16::MAX)? {
-            return Ok(agreed);
+        let Some(agreed) = planner.step(mission, &profile_of, u16::MAX)? else {
+            continue;
+        };
+        let chain = Walk {
+            mission,
+            target: agreed.target,
+            plain: agreed.ladder.is_plain(),
+            profile_of: &profile_of,
+        };
+        let next = if chain.place(0).is_some() {
+            if planner.search.accept(agreed.target) {
+                return Ok(agreed);
+            }
+            Ok(())
+        } else {
+            planner.search.refuse(mission, leader, agreed.target, agreed.most)
+        };
+        next?;
+        planner.start_sweep(mission);
+    }
+}
+
+/// A chain that takes one target.
+pub(super) struct Walk<'a, F> {
+    pub(super) mission: &'a Mission,
+    pub(super) target: f32,
+    pub(super) plain: bool,
+    pub(super) profile_of: &'a F,
+}
+
+impl<F: Fn(u16) -> Profile> Walk<'_, F> {
+    pub(super) fn link(&self, index: u16) -> Link<'_> {
+        let before = before(self.mission, index);
+        Link {
+            mission: self.mission,
+            behind: before.map(|index| Behind::of((self.profile_of)(index))),
+            index,
+            own: (self.profile_of)(index).on_line(),
+            measured_per_w: None,
+            plain: self.plain,
+        }
+    }
+
+    /// Goes through the reaches of all; the slack that they end with, and where the last one stands.
+    pub(super) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
+        let mut from_m = pass::origin(self.mission);
+        let mut at = self.mission.leader();
+        loop {
+            let link = self.link(at);
+            from_m = link.reach(self.target, from_m)?;
+            visit(at, from_m);
+            let Some(next) = self.mission.after(at) else {
+                return link.ending(self.target, from_m);
+            };
+            at = next;
+        }
+    }
+
+    /// Whether the chain closes, on a plain pass or with everybody able to stand where the others need it.
+    pub(super) fn is_met(&self) -> bool {
+        let closes = |chain: &Self| chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0);
+        closes(self) && (closes(&Self { plain: true, ..*self }) || self.place(0).is_some())
+    }
+
+    /// Where relay `index` stands where nobody has to hold back; 0 for any.
+    fn at_reach(&self, index: u16) -> Option<f32> {
+        let plain = Self { plain: true, ..*self };
+        let (mut from_m, mut at) = (pass::origin(self.mission), self.mission.leader());
+        let mut place = None;
+        loop {
+            let reach = self.link(at).reach(self.target, from_m)?;
+            let same = plain.link(at).reach(self.target, from_m)?.to_bits() == reach.to_bits();
+            if !same {
+                return None;
+            }
+            from_m = reach;
+            if at == index || index == 0 {
+                place = Some(reach);
+            }
+            let Some(next) = self.mission.after(at) else {
+                let (_, end) = self.link(at).ending(self.target, reach)?;
+                return place.filter(|_| end.to_bits() == reach.to_bits());
+            };
+            at = next;
+        }
+    }
+
+    /// The reach of relay `index`; of the place that the pass begins at, without one.
+    fn reach(&self, index: Option<u16>) -> Option<f32> {
+        let mut from_m = pass::origin(self.mission);
+        let Some(index) = index else {
+            return Some(from_m);
+        };
+        let mut at = self.mission.leader();
+        loop {
+            from_m = self.link(at).reach(self.target, from_m)?;
+            if at == index {
+                return Some(from_m);
+            }
+            at = self.mission.after(at)?;
+        }
+    }
+
+    /// Where relay `index` stands, m along x; `None` where somebody cannot stand where the others need it. For an `index` that
+    /// is none's, anything if everybody can.
+    pub(super) fn place(&self, index: u16) -> Option<f32> {
+        if self.plain && index > 0 {
+            return self.reach(Some(index));
+        }
+        if let Some(place) = self.at_reach(index) {
+            return Some(place);
+        }
+        let mut at = match self.mission.heading() {
+            Heading::TowardRx => self.mission.relays(),
+            Heading::TowardTx => 1,
+        };
+        let mut place = self.link(at).ending(self.target, self.reach(Some(at))?)?.1;
+        loop {
+            if at == index {
+                return Some(place);
+            }
+            let link = self.link(at);
+            let before = before(self.mission, at);
+            let from_m = self.reach(before)?;
+            place = match link.stand(self.target, from_m, place)? {
+                Stand::AtReach => from_m,
+                Stand::At(x_m) => x_m,
+            };
+            let Some(before) = before else {
+                return Some(place);
+            };
+            at = before;
         }
     }
 }
 
-/// Where relay `index` stands when the chain takes `target`: as far on the way as every hop up to there lets it.
+/// The relay that a pass comes from to relay `index`.
+pub(super) fn before(mission: &Mission, index: u16) -> Option<u16> {
+    match mission.heading() {
+        Heading::TowardRx => index.checked_sub(1).filter(|before| *before > 0),
+        Heading::TowardTx => (index < mission.relays()).then(|| index.saturating_add(1)),
+    }
+}
+
+/// Where relay `index` stands when the chain takes `target`, on a `plain` pass or not.
+fn placed(
+    mission: &Mission,
+    target: f32,
+    plain: bool,
+    index: u16,
+    profile_of: impl Fn(u16) -> Profile,
+) -> Option<Placement> {
+    let chain = Walk {
+        mission,
+        target,
+        plain,
+        profile_of: &profile_of,
+    };
+    // Everybody must be able to, not only those on the way back to this one.
+    chain.place(0)?;
+    chain.place(index).map(|x_m| profile_of(index).on_line().at.at(x_m))
+}
+
+/// Where relay `index` stands when the chain takes `target`, held back where that lets the others meet it.
 ///
-/// `None` when a hop cannot meet the target. At most N reaches' worth of work.
+/// `None` when the target cannot be met. At most N^2 reaches' worth of work.
 pub fn place(
     mission: &Mission,
     target: f32,
     index: u16,
     profile_of: impl Fn(u16) -> Profile,
 ) -> Option<Placement> {
-    let mut at = mission.leader();
-    let mut behind = None;
-    let mut from = origins(mission);
-    loop {
-        let profile = profile_of(at);
-        let mut reaches = PerTarget::new();
-        pass::extend(mission, behind, at, profile.on_line(), &[target], &from, &mut reaches);
-        if at == index {
-            return reaches.first().map(|&x_m| profile.on_line().at.at(x_m));
-        }
-        behind = Some(Behind {
-            relay: profile.on_line(),
-            measured_per_w: None,
-        });
-        from = reaches;
-        at = mission.after(at)?;
-    }
+    placed(mission, target, false, index, &profile_of)
+        .or_else(|| placed(mission, target, true, index, &profile_of))
 }
 
 /// The place relay `index` finds for itself without a message, where every relay holds what the mission has in common.
@@ -170,5 +315,6 @@ pub fn place(
 pub fn silent_place(mission: &Mission, index: u16) -> Result<Placement, Infeasible> {
     let common = |_| mission.config().common;
     let agreed = solve(mission, Schedule::Bracketed, common)?;
-    place(mission, agreed.target, index, common).ok_or(Infeasible)
+    let plain = agreed.ladder.is_plain();
+    placed(mission, agreed.target, plain, index, common).ok_or(Infeasible)
 }

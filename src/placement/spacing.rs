@@ -22,12 +22,24 @@
 //! small targets. e is formed from a gain of twice f32's width, so targets next to A lose nothing. The printed
 //! case distinction picks wrong roots once the chain has passed the interferer.
 //!
+//! Where every sender in [0, x0] counts, only the nearest to a place matters: the interference there does not depend on it, and
+//! none is louder. Up to x0 and the least step s beyond, that is one just s before, and a node at x is heard there if
+//!
+//! ```text
+//! (X - x)^2 + (Y - y)^2 + h^2 >= (gamma / A) (s^2 + (y - y0)^2 + (h - h0)^2):
+//! ```
+//!
+//! everywhere but within w of the interferer. So where nothing is heard from x0, the sender may *hold back*, for a node at X - w:
+//! to climb before it comes near, or to leave the least step room. `bounds_cover_every_gap` in
+//! `host-tests/tests/exact.rs` holds it against all places at once.
+//!
 //! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement.rs` asserts it against a bisection of the
 //! SIR itself in f64.
 
 use crate::mission::{Interferer, Mission};
 use crate::root::sqrt;
 use crate::sir::{CrossSection, Sender, Station, square};
+use super::pass::Stand;
 
 /// No hop is short enough for a target this far above its gain, and every term of f stays finite below it.
 const MOST_RATIO: f32 = 1e18;
@@ -48,6 +60,8 @@ pub struct Hop {
     across_squared: f32,
     /// The least step to the node, m.
     least_step: f32,
+    /// Whether the sender is Tx, which cannot hold back.
+    from_tx: bool,
     /// The last place the node may take, m.
     end_m: f32,
 }
@@ -73,6 +87,7 @@ impl Hop {
             base: (aside - from.y_m) * (aside + from.y_m - 2.0 * at.y_m)
                 + from.altitude_m * (at.altitude_m + climb),
             across_squared,
+            from_tx: index <= 1,
             // The transmitter stands on the ground: its altitude alone keeps the head clear of it.
             least_step: if index <= 1 {
                 0.0
@@ -80,6 +95,14 @@ impl Hop {
                 mission.least_step(across_squared)
             },
             end_m: mission.end_for(index, spread_squared),
+        }
+    }
+
+    /// The same hop, to relay `index`, when those after it hold back to leave themselves room rather than this one.
+    pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
+        Self {
+            end_m: mission.end_freely(index),
+            ..self
         }
     }
 
@@ -130,7 +153,66 @@ impl Hop {
         // A hop too short for an f32 is none: two relays never share a place.
         (place > from_m).then_some(place)
     }
+
+    /// The farthest place at which the node meets `target` with its sender anywhere in [0, `from_m`]; `None` if there is none.
+    ///
+    /// Beyond `from_m` by the least step or more that is [`Hop::reach`]; short of it the sender stands just the least step
+    /// before, which is as near as it may be. Constant work.
+    pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
+        self.reach(target, from_m).or_else(|| self.held_back(target, from_m))
+    }
+
+    fn held_back(&self, target: f32, from_m: f32) -> Option<f32> {
+        let ratio = self.sender.gain.ratio(target);
+        if self.from_tx || !(ratio <= MOST_RATIO) {
+            return None;
+        }
+        let near = (from_m + self.least_step).min(self.end_m);
+        // Nobody hears even the nearest sender within this of the interferer.
+        let zone = sqrt(ratio * (square(self.least_step) + self.across_squared) - self.aside_squared);
+        let place = if (near - self.interferer_x_m).abs() < zone {
+            (self.interferer_x_m - zone).next_down()
+        } else {
+            near
+        };
+        (self.before(place) >= 0.0).then_some(place)
+    }
+
+    /// The nearest that a sender may be before `place`, m.
+    fn before(&self, place: f32) -> f32 {
+        let from = place - self.least_step;
+        if place - from < self.least_step || from >= place {
+            from.next_down()
+        } else {
+            from
+        }
+    }
+
+    /// Where the sender, whose reach for `target` is `from_m`, is to stand when the node is at `place`; `None` if nowhere.
+    ///
+    /// The nearest that it may be, which is the loudest.
+    pub fn stand(&self, target: f32, from_m: f32, place: f32) -> Option<Stand> {
+        if self.reach(target, from_m).is_some_and(|reach| place >= reach) {
+            return Some(Stand::AtReach);
+        }
+        let from = if self.from_tx {
+            from_m
+        } else {
+            from_m.min(self.before(place))
+        };
+        let heard = square(self.interferer_x_m - place) + self.aside_squared;
+        let needed = self.sender.gain.ratio(target) * (square(place - from) + self.across_squared);
+        let met = from >= 0.0 && heard >= needed * (1.0 - ROUNDING);
+        met.then_some(if from < from_m {
+            Stand::At(from)
+        } else {
+            Stand::AtReach
+        })
+    }
 }
+
+/// What rounding may take from a hop's SIR at the edge of where it meets its target, relative.
+const ROUNDING: f32 = 4e-6;
 
 /// The farthest a relay may be from the receiver, m along x, for the receiver to meet `target`: the paper's `d_max`.
 ///

@@ -74,6 +74,26 @@ pub fn optimum(link: &Link, band: Band, effort: Effort) -> Option<JointOptimum> 
     (sir > 0.0 && keeps_rules(link, band, &places)).then_some(JointOptimum { sir, places })
 }
 
+/// The best SIR (linear) of a link whose relays hold the altitudes they have, with its least separation; to 1e-6 relative.
+///
+/// `None` as for [`optimum`].
+pub fn at_their_altitudes(link: &Link) -> Option<f64> {
+    let heights = || link.relays.iter().map(|relay| relay.altitude_m);
+    let band = Band {
+        least_m: heights().reduce(f64::min)?,
+        most_m: heights().reduce(f64::max)?,
+    };
+    let scene = Scene::new(link, band)?;
+    let slots: Vec<levels::Slot> = heights()
+        .map(|height| levels::Slot {
+            levels: vec![height / link.distance_m],
+            window: (0.0, 1.0),
+        })
+        .collect();
+    let best = levels::best_chain(&scene, &slots, -200.0, 1e-6)?;
+    Some(scene.worst(&best).exp())
+}
+
 /// The SIR (linear) of the worst hop of a chain; `None` unless there is one place per relay.
 pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     let flown = Link {

@@ -56,11 +56,6 @@ impl Share {
     #[inline(never)] // a planner is built here once; its stack is not for every call of `work`
     fn begin_lead(&mut self, own: Own<'_>) -> Result<(), Infeasible> {
         self.lead = Lead::begin(own.mission, self.profile, own.settings)?;
-        if let Lead::Searching { search, .. } = &mut self.lead
-            && own.measured_per_w.is_some()
-        {
-            search.take_as_even();
-        }
         Ok(())
     }
 
@@ -73,9 +68,6 @@ impl Share {
         last: bool,
     ) -> Result<(), Infeasible> {
         let mut search = Search::new(own.mission, self.profile, Schedule::Bracketed)?;
-        if own.measured_per_w.is_some() {
-            search.take_as_even();
-        }
         if let Some(ladder) = ladder {
             search.begin_with(ladder);
         }

@@ -17,6 +17,7 @@ use super::lead::Lead;
 use super::settings::Settings;
 use crate::mission::{Band, Mission, Profile};
 use crate::placement::ladder::Ladder;
+use crate::placement::pass::Link;
 use crate::placement::search::Infeasible;
 use crate::sir::{CrossSection, Placement, Station};
 use crate::wire::digest::Stamp;
@@ -58,6 +59,18 @@ impl Own<'_> {
     /// Whether it can fly the mission of that stamp.
     fn has(self, stamp: Stamp) -> bool {
         stamp == self.held || stamp == self.flown
+    }
+
+    /// The relay on a pass, when it holds `profile`.
+    fn link(&self, profile: Profile) -> Link<'_> {
+        Link {
+            mission: self.mission,
+            behind: None,
+            index: self.index,
+            own: profile.on_line(),
+            measured_per_w: self.measured_per_w,
+            plain: false,
+        }
     }
 
     fn is_last(&self) -> bool {
@@ -102,6 +115,8 @@ pub(crate) struct Share {
     after: Option<Placement>,
     setpoint: Option<Placement>,
     target: Option<f32>,
+    /// At the leader, what no chain can have.
+    bound: Option<f32>,
 }
 
 impl Share {
@@ -121,6 +136,7 @@ impl Share {
             after: None,
             setpoint: None,
             target: None,
+            bound: None,
         }
     }
 
@@ -156,6 +172,7 @@ impl Share {
     pub(crate) fn work(&mut self, own: Own<'_>) -> Next {
         if self.exchange.phase == Phase::Waiting {
             return match &self.pass {
+                Pass::Sweep(sweeping) if !sweeping.is_done() => self.go_on_with_sweep(own),
                 Pass::Turn(_) if ADJUST => self.go_on_with_turn(own),
                 _ => Next::Stale,
             };
@@ -174,6 +191,7 @@ impl Share {
         }
         let (number, mission) = (self.exchange.number, own.digest());
         match &self.pass {
+            Pass::Sweep(sweeping) if !sweeping.is_done() => None,
             Pass::Sweep(sweeping) => Some(Message::Sweep(Sweep {
                 number,
                 mission,
@@ -224,6 +242,7 @@ impl Share {
                 number,
                 mission,
                 verdict: sweeping.verdict.clone(),
+                stand: sweeping.stand(),
                 own: false,
             })),
             Pass::Turn(turning) if ADJUST => self.setpoint.map(|place| {
@@ -272,6 +291,10 @@ impl Share {
 
     pub(crate) const fn target(&self) -> Option<f32> {
         self.target
+    }
+
+    pub(crate) const fn bound(&self) -> Option<f32> {
+        self.bound
     }
 
     /// What this relay holds.

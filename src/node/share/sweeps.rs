@@ -43,16 +43,20 @@ impl Share {
             return Next::Stale;
         };
         sweeping.ladder = ladder;
-        let known = sweeping.reach(
-            own.mission,
-            behind,
-            own.index,
-            self.profile.on_line(),
-            own.measured_per_w,
-            from,
-        );
+        sweeping.begin(behind, from);
         self.exchange.phase = Phase::Waiting;
-        if known {
+        self.go_on_with_sweep(own)
+    }
+
+    /// Goes on with this relay's share of a sweep, as far as one call may.
+    pub(super) fn go_on_with_sweep(&mut self, own: Own<'_>) -> Next {
+        let Pass::Sweep(sweeping) = &mut self.pass else {
+            return Next::Stale;
+        };
+        if !sweeping.go_on(own.link(self.profile)) {
+            return Next::Work { moved: false };
+        }
+        if own.is_last() {
             self.conclude_sweep(own)
         } else {
             Next::Forward { moved: false }
@@ -63,7 +67,7 @@ impl Share {
     pub(crate) fn on_verdict(&mut self, own: Own<'_>, answer: &Answer) -> Next {
         if let Pass::Sweep(sweeping) = &mut self.pass
             && self.exchange.awaits(answer.number)
-            && sweeping.take(&answer.verdict)
+            && sweeping.take(own.link(self.profile), answer)
         {
             return self.conclude_sweep(own);
         }
@@ -79,6 +83,13 @@ impl Share {
             self.at = self.profile.on_line().at;
             self.setpoint = Some(self.at.at(x_m));
             self.target = Some(target);
+            if let Lead::Searching { search, .. } = &mut self.lead {
+                self.bound = search.most(&sweeping.verdict.slacks);
+                if !search.accept(target) {
+                    self.exchange.phase = Phase::Answered;
+                    return Next::Work { moved: true };
+                }
+            }
             return self.agree(own);
         }
         self.exchange.phase = Phase::Answered;
@@ -88,7 +99,15 @@ impl Share {
                 agreed: false,
             };
         };
-        if search.advance(&sweeping.verdict.slacks).is_err() {
+        let verdict = &sweeping.verdict;
+        let next = match search.refused(own.mission, verdict) {
+            Some(target) => {
+                let most = search.most(&verdict.slacks);
+                search.refuse(own.mission, self.profile, target, most)
+            }
+            None => search.advance(&verdict.slacks),
+        };
+        if next.is_err() {
             return self.give_up();
         }
         Next::Work { moved: false }
