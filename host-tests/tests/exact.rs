@@ -13,6 +13,10 @@ use host_tests::brief::{as_relays_know_it, of_link, of_stochastic_link};
 use host_tests::random::{self, Chain, Style, log_uniform};
 use host_tests::reference::stochastic::StochasticLink;
 use host_tests::reference::{Link, Station, joint};
+use host_tests::sim::chain::run;
+use host_tests::sim::faults::Faults;
+use host_tests::sim::outcome::Ending;
+use host_tests::sim::setup::Setup;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::PerTarget;
@@ -98,7 +102,8 @@ impl Tally {
     ) {
         let of = |index| profile_of(mission, own, index);
         self.scenes += 1;
-        self.before += usize::from((1..10).any(|k| plainly(mission, own, best * (1.0 - 1e-4 * f64::from(k)))));
+        self.before +=
+            usize::from((1..10).any(|k| plainly(mission, own, best * (1.0 - 1e-4 * f64::from(k)))));
         let Ok(agreed) = plan::solve(mission, Schedule::Bracketed, of) else {
             self.worst = 1.0;
             println!("nothing of {best}: {told}");
@@ -106,16 +111,24 @@ impl Tally {
         };
         let target = f64::from(agreed.target);
         let mut places = vec![Placement::default(); usize::from(mission.relays())];
-        assert!(fleet::places(mission, agreed.target, of, &mut places), "{told}");
+        assert!(
+            fleet::places(mission, agreed.target, of, &mut places),
+            "{told}"
+        );
         let reached = sir(&places);
-        assert!(reached >= target * (1.0 - 3e-5), "{reached} of {target} {places:?}: {told}");
-        assert!(reached <= best * (1.0 + 2e-5), "{reached} above {best}: {told}");
+        assert!(
+            reached >= target * (1.0 - 3e-5),
+            "{reached} of {target} {places:?}: {told}"
+        );
+        assert!(
+            reached <= best * (1.0 + 2e-5),
+            "{reached} above {best}: {told}"
+        );
         let bound = f64::from(agreed.most.unwrap());
-        assert!(bound >= best * (1.0 - 2e-4), "{bound} does not cover {best}: {told}");
-        if std::env::var("PROBE").is_ok() {
-            let k = (0..400).find(|k| { let mut p = places.clone(); fleet::places(mission, (best * (1.0 - 1e-3 * f64::from(*k))) as f32, of, &mut p) });
-            println!("PROBE {k:?} {:.4} {:.4} plain {} {}", reached / best, bound / best, agreed.ladder.is_plain(), if own.is_empty() {"equal"} else {"mixed"});
-        }
+        assert!(
+            bound >= best * (1.0 - 2e-4),
+            "{bound} does not cover {best}: {told}"
+        );
         let short = 1.0 - reached / best;
         self.near += usize::from(short <= NEAR);
         self.plain += usize::from(agreed.ladder.is_plain());
@@ -165,7 +178,7 @@ fn at_mixed_altitudes() {
         tally.judge(&mission, &own, best, sir, &format!("{link:?}"));
     }
     tally.tell("mixed altitudes");
-    assert!(tally.near * 100 >= tally.scenes * 97);
+    assert!(tally.near == tally.scenes);
 }
 
 #[test]
@@ -176,7 +189,11 @@ fn with_a_separation_that_binds() {
     while tally.scenes < count() {
         let style = Style {
             relays: 2..=50,
-            chain: if tally.scenes % 2 == 0 { Chain::Alike } else { Chain::Own },
+            chain: if tally.scenes % 2 == 0 {
+                Chain::Alike
+            } else {
+                Chain::Own
+            },
         };
         let free = random::link(&mut rng, &style);
         let even = free.distance_m / free.len() as f64;
@@ -196,7 +213,10 @@ fn with_a_separation_that_binds() {
             for pair in places.windows(2) {
                 let apart = f64::from(pair[1].x_m - pair[0].x_m)
                     .hypot(f64::from(pair[1].altitude_m - pair[0].altitude_m));
-                assert!(apart >= link.min_separation_m * (1.0 - 1e-5), "{apart} {places:?} {told}");
+                assert!(
+                    apart >= link.min_separation_m * (1.0 - 1e-5),
+                    "{apart} {places:?} {told}"
+                );
                 assert!(pair[0].x_m <= pair[1].x_m && pair[0].x_m >= 0.0);
             }
             link.chain_sir(&on_line(places))
@@ -205,7 +225,7 @@ fn with_a_separation_that_binds() {
     }
     tally.tell("binding separation");
     println!("it binds in {binding}");
-    assert!(binding * 4 >= tally.scenes && tally.near * 100 >= tally.scenes * 75);
+    assert!(binding * 4 >= tally.scenes && tally.near * 100 >= tally.scenes * 88);
 }
 
 /// The best of equals in a field by ranges in f64, with nothing solved: each stretch is convex, and searched by thirds.
@@ -245,8 +265,16 @@ fn best_in_a_field(link: &StochasticLink) -> f64 {
     };
     let (mut low, mut high) = (0.0, link.ceiling());
     for k in 0..60 {
-        let middle: f64 = if k < 30 && low <= 0.0 { high / 10.0 } else { 0.5 * (low + high) };
-        if met(middle) { low = middle } else { high = middle }
+        let middle: f64 = if k < 30 && low <= 0.0 {
+            high / 10.0
+        } else {
+            0.5 * (low + high)
+        };
+        if met(middle) {
+            low = middle
+        } else {
+            high = middle
+        }
         if high - low < 1e-6 * low {
             break;
         }
@@ -294,4 +322,54 @@ fn in_uneven_fields() {
     }
     tally.tell("uneven fields");
     assert_eq!(tally.near, tally.scenes);
+}
+
+/// The same by messages, with the leader's prediction and without, and with frames that are lost: one chain, and it keeps its word.
+#[test]
+fn by_messages() {
+    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(904));
+    let (mut settled, mut near, mut most) = (0, 0, 0);
+    while settled < 60.min(count()) {
+        let style = Style {
+            relays: 2..=16,
+            chain: Chain::Own,
+        };
+        let free = random::link(&mut rng, &style);
+        let even = free.distance_m / free.len() as f64;
+        let link = as_relays_know_it(&Link {
+            min_separation_m: even * rng.random_range(0.0..0.9),
+            ..free
+        });
+        let Some((mission, own)) = of_link(&link, 1e-4) else {
+            continue;
+        };
+        let Some(best) = joint::at_their_altitudes(&link) else {
+            continue;
+        };
+        let mut setup = Setup::new(mission);
+        setup.profiles.clone_from(&own);
+        setup.settings.predict = settled % 2 == 0;
+        if settled % 3 == 0 {
+            setup.faults = Faults::BAD_DAY;
+        }
+        let outcome = run(setup).unwrap();
+        assert_eq!(outcome.ending, Ending::Settled, "{link:?}");
+        let places: Vec<Placement> = outcome
+            .relays
+            .iter()
+            .map(|relay| relay.setpoint.unwrap())
+            .collect();
+        let target = f64::from(outcome.relays[0].target.unwrap());
+        let sir = link.chain_sir(&on_line(&places));
+        assert!(sir >= target * (1.0 - 3e-5), "{sir} of {target}: {link:?}");
+        let bound = f64::from(outcome.relays[0].bound.unwrap());
+        assert!(
+            bound >= best * (1.0 - 2e-4),
+            "{bound} does not cover {best}: {link:?}"
+        );
+        near += usize::from(sir >= best * (1.0 - NEAR));
+        most = most.max(outcome.sweeps);
+        settled += 1;
+    }
+    println!("{near} of {settled} within 0.1 %, {most} sweeps at most");
 }

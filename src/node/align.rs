@@ -1,17 +1,13 @@
 //! Algorithms 1 and 4 on board: a relay's share of a sweep of targets, and of its verdict.
 
 use super::MEMBERSHIP;
-use crate::field::MAX_POINTS;
 use crate::mission::Heading;
 use crate::placement::PerTarget;
-use crate::placement::ladder::{Ladder, TARGETS};
+use crate::placement::ladder::Ladder;
 use crate::placement::pass::{Behind, Link, Stand, close};
 use crate::placement::verdict::Verdict;
 use crate::sir::Station;
 use crate::wire::message::Answer;
-
-/// Points of a field that are looked at in one call: for as many targets as that makes, and one at least.
-const POINTS_AT_ONCE: usize = 128;
 
 /// A sweep, as one relay sees it.
 #[derive(Clone, Debug)]
@@ -68,16 +64,12 @@ impl Sweeping {
     pub(crate) fn go_on(&mut self, link: Link<'_>) -> bool {
         let link = self.link(link);
         let targets = self.ladder.targets();
-        let points = link.mission.field().map_or(1, |field| field.points().len());
-        let most = (POINTS_AT_ONCE / points.clamp(1, MAX_POINTS)).clamp(1, TARGETS);
-        let had = self.reaches.len();
-        let next = targets.get(..had + most).unwrap_or(&targets);
-        link.extend(next, &self.from, &mut self.reaches);
-        let all = targets.len().min(self.from.len());
-        self.done = self.reaches.len() < (had + most).min(all) || self.reaches.len() == all;
+        self.done = link.go_on(&targets, &self.from, &mut self.reaches);
         if self.done && link.mission.after(link.index).is_none() {
             self.verdict = close(&link, self.ladder, &self.reaches);
-            let place = self.committed().and_then(|(target, reach)| Some(link.ending(target, reach)?.1));
+            let place = self
+                .committed()
+                .and_then(|(target, reach)| Some(link.ending(target, reach)?.1));
             self.settle(&link, place);
         }
         self.done
@@ -99,9 +91,9 @@ impl Sweeping {
         let stand = |(_, reach): (f32, f32)| match (answer.stand, link.mission.heading()) {
             (None, _) => Some(reach),
             (Some(x_m), Heading::TowardRx) => (x_m <= reach).then_some(x_m),
-            (Some(x_m), Heading::TowardTx) => {
-                (reach..=link.mission.config().distance_m).contains(&x_m).then_some(x_m)
-            }
+            (Some(x_m), Heading::TowardTx) => (reach..=link.mission.config().distance_m)
+                .contains(&x_m)
+                .then_some(x_m),
         };
         self.verdict = verdict.clone();
         let place = self.committed().and_then(stand);
@@ -111,7 +103,9 @@ impl Sweeping {
 
     /// Goes to `place` by the verdict, if from there the relay before can be told where to be; else nothing is committed.
     fn settle(&mut self, link: &Link<'_>, place: Option<f32>) {
-        let Some(commit) = self.verdict.commit else { return };
+        let Some(commit) = self.verdict.commit else {
+            return;
+        };
         let before = self.from.get(usize::from(commit)).copied();
         let stand = match (self.committed(), before, place) {
             (Some((target, _)), Some(from_m), Some(place)) => link.stand(target, from_m, place),
@@ -132,7 +126,10 @@ impl Sweeping {
     /// The target that is committed, and this relay's reach for it.
     fn committed(&self) -> Option<(f32, f32)> {
         let commit = usize::from(self.verdict.commit?);
-        Some((*self.ladder.targets().get(commit)?, *self.reaches.get(commit)?))
+        Some((
+            *self.ladder.targets().get(commit)?,
+            *self.reaches.get(commit)?,
+        ))
     }
 
     /// The place that this relay takes by the verdict, m along x, and the target it is for.

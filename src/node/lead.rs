@@ -7,6 +7,10 @@ use crate::placement::search::{Infeasible, Schedule, Search};
 use crate::wire::message::Turn;
 
 /// What the leader is at.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one of it, and nothing allocates"
+)]
 #[derive(Clone, Debug)]
 pub(crate) enum Lead {
     /// Not the leader, or nothing begun yet, or all done.

@@ -22,6 +22,7 @@ pub mod search;
 pub mod single;
 pub mod spacing;
 pub mod verdict;
+mod walk;
 
 /// Up to one number a target: reaches, slacks or the targets themselves.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

@@ -18,6 +18,9 @@ use crate::mission::{Heading, Mission, Profile};
 use crate::root::sqrt;
 use crate::sir::{Sender, Station, square};
 
+/// Points of a field that are looked at in one call: for as many targets as that makes, and one at least.
+const POINTS_AT_ONCE: usize = 128;
+
 /// The relay that a pass comes from, as its message tells.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -109,6 +112,17 @@ impl Link<'_> {
         }
     }
 
+    /// The same for as many more targets as one call of a relay may; whether these are all.
+    ///
+    /// Bounded by 16 reaches; in a field by 128 of its points, or by one target.
+    pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
+        let points = self.mission.field().map_or(1, |field| field.points().len());
+        let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
+        self.extend(targets.get(..due).unwrap_or(targets), from, reaches);
+        let all = targets.len().min(from.len());
+        reaches.len() < due.min(all) || reaches.len() == all
+    }
+
     /// The reach for one target.
     pub(super) fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
         let mut reaches = PerTarget::new();
@@ -131,7 +145,9 @@ impl Link<'_> {
         }
         mission.field()?;
         let altitude_m = self.behind.map(|behind| behind.relay.at.altitude_m);
-        Some(Onward::Tx(Retreat::new(mission, self.own, self.index, altitude_m)))
+        Some(Onward::Tx(Retreat::new(
+            mission, self.own, self.index, altitude_m,
+        )))
     }
 
     /// The hop that begins nearest to Tx of all that end from `low` on.
@@ -175,9 +191,16 @@ impl Link<'_> {
         };
         let heard = Heard::new(mission, self.measured_per_w);
         let here = value(reach, heard.quiet(reach))?;
-        let high = if self.plain { reach } else { mission.latest(self.index) };
+        let high = if self.plain {
+            reach
+        } else {
+            mission.latest(self.index)
+        };
         let step = if here <= 0.0 || high < reach {
-            Step { to_m: reach, from_m: here }
+            Step {
+                to_m: reach,
+                from_m: here,
+            }
         } else {
             least(heard, c, [beyond, beyond], reach, high, value)?
         };
@@ -198,7 +221,9 @@ impl Link<'_> {
                 let Some(behind) = self.behind else {
                     return Some(Stand::AtReach);
                 };
-                let apart = self.mission.least_step(self.own.at.apart_squared(behind.relay.at));
+                let apart = self
+                    .mission
+                    .least_step(self.own.at.apart_squared(behind.relay.at));
                 let low = from_m.max(place + apart).max(place.next_up());
                 let step = self.longest(&hop, target, low)?;
                 let met = step.from_m <= place;

@@ -5,9 +5,10 @@
 
 use super::PerTarget;
 use super::ladder::Ladder;
-use super::pass::{self, Behind, Link, Stand, origins};
+use super::pass::{self, Behind, Link, origins};
 use super::search::{Infeasible, Schedule, Search};
-use crate::mission::{Heading, Mission, Profile};
+use super::walk::Walk;
+use crate::mission::{Mission, Profile};
 use crate::sir::Placement;
 
 /// A target the whole chain meets, as the ladder and the place in it that the tail would commit.
@@ -32,6 +33,8 @@ pub struct Planner {
     search: Search,
     targets: PerTarget,
     reaches: PerTarget,
+    /// The next reaches, as far as they are known.
+    next: PerTarget,
     /// The relay whose reaches come next, 1 to N.
     index: u16,
     behind: Option<Behind>,
@@ -49,6 +52,7 @@ impl Planner {
             search,
             targets: PerTarget::new(),
             reaches: PerTarget::new(),
+            next: PerTarget::new(),
             index: mission.leader(),
             behind: None,
             sweeps: 0,
@@ -65,7 +69,7 @@ impl Planner {
         self.sweeps = self.sweeps.saturating_add(1);
     }
 
-    /// Works through at most `hops` hops (at most 16 reaches each); `Ok(Some(..))` when the chain is solved.
+    /// Works through at most `hops` hops (at most 16 reaches each, in a field 128 of its points); `Ok(Some(..))` when the chain is solved.
     ///
     /// `profile_of` gives what relay 1..=N holds; it must answer the same every time.
     ///
@@ -80,7 +84,6 @@ impl Planner {
     ) -> Result<Option<Agreed>, Infeasible> {
         for _ in 0..hops {
             let profile = profile_of(self.index);
-            let mut reaches = PerTarget::new();
             let link = Link {
                 mission,
                 behind: self.behind,
@@ -89,8 +92,10 @@ impl Planner {
                 measured_per_w: None,
                 plain: self.search.ladder().is_plain(),
             };
-            link.extend(&self.targets, &self.reaches, &mut reaches);
-            self.reaches = reaches;
+            if !link.go_on(&self.targets, &self.reaches, &mut self.next) {
+                continue;
+            }
+            self.reaches = core::mem::take(&mut self.next);
             if let Some(next) = mission.after(self.index) {
                 self.behind = Some(Behind::of(profile));
                 self.index = next;
@@ -144,132 +149,12 @@ pub fn solve(
             }
             Ok(())
         } else {
-            planner.search.refuse(mission, leader, agreed.target, agreed.most)
+            planner
+                .search
+                .refuse(mission, leader, agreed.target, agreed.most)
         };
         next?;
         planner.start_sweep(mission);
-    }
-}
-
-/// A chain that takes one target.
-pub(super) struct Walk<'a, F> {
-    pub(super) mission: &'a Mission,
-    pub(super) target: f32,
-    pub(super) plain: bool,
-    pub(super) profile_of: &'a F,
-}
-
-impl<F: Fn(u16) -> Profile> Walk<'_, F> {
-    pub(super) fn link(&self, index: u16) -> Link<'_> {
-        let before = before(self.mission, index);
-        Link {
-            mission: self.mission,
-            behind: before.map(|index| Behind::of((self.profile_of)(index))),
-            index,
-            own: (self.profile_of)(index).on_line(),
-            measured_per_w: None,
-            plain: self.plain,
-        }
-    }
-
-    /// Goes through the reaches of all; the slack that they end with, and where the last one stands.
-    pub(super) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
-        let mut from_m = pass::origin(self.mission);
-        let mut at = self.mission.leader();
-        loop {
-            let link = self.link(at);
-            from_m = link.reach(self.target, from_m)?;
-            visit(at, from_m);
-            let Some(next) = self.mission.after(at) else {
-                return link.ending(self.target, from_m);
-            };
-            at = next;
-        }
-    }
-
-    /// Whether the chain closes, on a plain pass or with everybody able to stand where the others need it.
-    pub(super) fn is_met(&self) -> bool {
-        let closes = |chain: &Self| chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0);
-        closes(self) && (closes(&Self { plain: true, ..*self }) || self.place(0).is_some())
-    }
-
-    /// Where relay `index` stands where nobody has to hold back; 0 for any.
-    fn at_reach(&self, index: u16) -> Option<f32> {
-        let plain = Self { plain: true, ..*self };
-        let (mut from_m, mut at) = (pass::origin(self.mission), self.mission.leader());
-        let mut place = None;
-        loop {
-            let reach = self.link(at).reach(self.target, from_m)?;
-            let same = plain.link(at).reach(self.target, from_m)?.to_bits() == reach.to_bits();
-            if !same {
-                return None;
-            }
-            from_m = reach;
-            if at == index || index == 0 {
-                place = Some(reach);
-            }
-            let Some(next) = self.mission.after(at) else {
-                let (_, end) = self.link(at).ending(self.target, reach)?;
-                return place.filter(|_| end.to_bits() == reach.to_bits());
-            };
-            at = next;
-        }
-    }
-
-    /// The reach of relay `index`; of the place that the pass begins at, without one.
-    fn reach(&self, index: Option<u16>) -> Option<f32> {
-        let mut from_m = pass::origin(self.mission);
-        let Some(index) = index else {
-            return Some(from_m);
-        };
-        let mut at = self.mission.leader();
-        loop {
-            from_m = self.link(at).reach(self.target, from_m)?;
-            if at == index {
-                return Some(from_m);
-            }
-            at = self.mission.after(at)?;
-        }
-    }
-
-    /// Where relay `index` stands, m along x; `None` where somebody cannot stand where the others need it. For an `index` that
-    /// is none's, anything if everybody can.
-    pub(super) fn place(&self, index: u16) -> Option<f32> {
-        if self.plain && index > 0 {
-            return self.reach(Some(index));
-        }
-        if let Some(place) = self.at_reach(index) {
-            return Some(place);
-        }
-        let mut at = match self.mission.heading() {
-            Heading::TowardRx => self.mission.relays(),
-            Heading::TowardTx => 1,
-        };
-        let mut place = self.link(at).ending(self.target, self.reach(Some(at))?)?.1;
-        loop {
-            if at == index {
-                return Some(place);
-            }
-            let link = self.link(at);
-            let before = before(self.mission, at);
-            let from_m = self.reach(before)?;
-            place = match link.stand(self.target, from_m, place)? {
-                Stand::AtReach => from_m,
-                Stand::At(x_m) => x_m,
-            };
-            let Some(before) = before else {
-                return Some(place);
-            };
-            at = before;
-        }
-    }
-}
-
-/// The relay that a pass comes from to relay `index`.
-pub(super) fn before(mission: &Mission, index: u16) -> Option<u16> {
-    match mission.heading() {
-        Heading::TowardRx => index.checked_sub(1).filter(|before| *before > 0),
-        Heading::TowardTx => (index < mission.relays()).then(|| index.saturating_add(1)),
     }
 }
 
@@ -289,7 +174,9 @@ fn placed(
     };
     // Everybody must be able to, not only those on the way back to this one.
     chain.place(0)?;
-    chain.place(index).map(|x_m| profile_of(index).on_line().at.at(x_m))
+    chain
+        .place(index)
+        .map(|x_m| profile_of(index).on_line().at.at(x_m))
 }
 
 /// Where relay `index` stands when the chain takes `target`, held back where that lets the others meet it.

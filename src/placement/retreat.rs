@@ -176,12 +176,19 @@ pub(super) fn least(
     let [apart, least_apart] = squares;
     let points = field.points();
     let first = points.partition_point(|point| point.x_m <= low);
-    for pair in points.get(first.saturating_sub(1)..).unwrap_or_default().windows(2) {
+    for pair in points
+        .get(first.saturating_sub(1)..)
+        .unwrap_or_default()
+        .windows(2)
+    {
         let [left, right] = pair else { continue };
         if left.x_m >= high {
             break;
         }
-        let (start, end) = (left.upsilon_per_w / field.largest(), right.upsilon_per_w / field.largest());
+        let (start, end) = (
+            left.upsilon_per_w / field.largest(),
+            right.upsilon_per_w / field.largest(),
+        );
         let best = if left.x_m > low {
             weigh(left.x_m, start)
         } else {
@@ -205,7 +212,10 @@ pub(super) fn least(
             }
         }
     }
-    if let Some(last) = points.last().filter(|last| last.x_m > low && last.x_m < high) {
+    if let Some(last) = points
+        .last()
+        .filter(|last| last.x_m > low && last.x_m < high)
+    {
         weigh(last.x_m, last.upsilon_per_w / field.largest());
     }
     best

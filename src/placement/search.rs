@@ -8,13 +8,15 @@
 //! On a plain pass, which holds nobody back, a target may be met while lower ones are not: what is met is met. All other passes
 //! leave no chain out, so the lowest target that has been missed is a bound of what any chain can have.
 
+mod trials;
+
 use core::ops::Range;
 
 use super::ladder::Ladder;
-use super::verdict::{Verdict, met};
+use super::verdict::met;
 use crate::mission::{Heading, Mission, MissionConfig, Profile};
-use crate::root::sqrt;
 use crate::sir::{self, Placement, Sender};
+use trials::Trials;
 
 /// Which targets the head tries.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -58,17 +60,6 @@ const PROGRESS: f32 = 0.25;
 /// Sweeps after which the search settles for the best target it has met.
 const MOST_SWEEPS: u32 = 48;
 
-/// Targets that are agreed on to see whether everybody can stand where the others need it.
-#[derive(Clone, Copy, Debug)]
-struct Trials {
-    /// The lowest that was refused.
-    high: f32,
-    /// The highest that was not, and its pass.
-    best: Option<(f32, Ladder)>,
-    /// Whether that is agreed on for good.
-    over: bool,
-}
-
 /// The state of a search: the bracket so far and the ladder to try next.
 #[derive(Clone, Debug)]
 pub struct Search {
@@ -104,8 +95,7 @@ impl Search {
         let MissionConfig {
             distance_m, common, ..
         } = *mission.config();
-        let above_receiver =
-            |profile: Profile| Placement::on_line(distance_m, profile.altitude_m);
+        let above_receiver = |profile: Profile| Placement::on_line(distance_m, profile.altitude_m);
         // What the hop at either end can have at most, and what a chain of equals meets that takes no step at all.
         let (ceiling, start, met) = match mission.heading() {
             Heading::TowardRx => {
@@ -170,79 +160,6 @@ impl Search {
         Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
-    /// Whether `verdict`, which commits nothing, is on a pass that was to be agreed on: somebody cannot stand where another needs
-    /// it. Then the target that was.
-    pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
-        let targets = self.ladder.targets();
-        let due = Verdict::new(mission, self.ladder, &targets, verdict.slacks.clone());
-        let due = due.commit.filter(|_| !self.plain && verdict.commit.is_none())?;
-        targets.get(usize::from(due)).copied()
-    }
-
-    /// A target was agreed on; whether that is all.
-    pub fn accept(&mut self, target: f32) -> bool {
-        let own = Ladder::single(target).plainly(self.plain);
-        let Some(trials) = &mut self.trials else {
-            return true;
-        };
-        let last = trials.over;
-        trials.best = Some((target, own));
-        // The best is what is held: once no other is left to try, it is that.
-        last || self.try_next().is_err() || self.trials.is_some_and(|trials| trials.over)
-    }
-
-    /// `target` was to be agreed on, and `refused`. First a plain pass tells what can be had for certain; between that and what was
-    /// refused the targets are then halved.
-    ///
-    /// # Errors
-    /// [`Infeasible`] when none is left.
-    pub fn refuse(
-        &mut self,
-        mission: &Mission,
-        leader: Profile,
-        target: f32,
-        most: Option<f32>,
-    ) -> Result<(), Infeasible> {
-        if let Some(trials) = &mut self.trials {
-            trials.high = target;
-            return self.try_next();
-        }
-        let fresh = Self::new(mission, leader, self.schedule)?;
-        *self = Self {
-            plain: true,
-            most,
-            trials: Some(Trials {
-                high: target,
-                best: None,
-                over: false,
-            }),
-            ladder: fresh.ladder.plainly(true),
-            ..fresh
-        };
-        Ok(())
-    }
-
-    /// The next target that may be agreed on with somebody held back; at the end the best once more, if it is not held.
-    fn try_next(&mut self) -> Result<(), Infeasible> {
-        let trials = self.trials.as_mut().ok_or(Infeasible)?;
-        if trials.over {
-            return Err(Infeasible);
-        }
-        let (low, high) = (trials.best.map_or(trials.high / 4.0, |best| best.0), trials.high);
-        let near = high <= low * (1.0 + self.tolerance) || low.next_up() >= high;
-        self.ladder = match trials.best {
-            Some((_, best)) if near => {
-                trials.over = true;
-                best
-            }
-            None if low <= self.start * DEPTH => return Err(Infeasible),
-            Some(_) => Ladder::single(sqrt(low) * sqrt(high)),
-            None => Ladder::single(low),
-        };
-        self.plain = self.ladder.is_plain();
-        Ok(())
-    }
-
     /// Takes the slacks of [`Search::ladder`], in metres for as many targets as every hop could meet, and moves on.
     ///
     /// Constant work: at most some 200 floating-point operations and three logarithms.
@@ -255,7 +172,9 @@ impl Search {
             && !self.plain
         {
             // A relay has changed.
-            trials.high = trials.high.min(self.ladder.targets().first().copied().unwrap_or(0.0));
+            trials.high = trials
+                .high
+                .min(self.ladder.targets().first().copied().unwrap_or(0.0));
             return self.try_next();
         }
         let next = match self.schedule {

@@ -30,16 +30,16 @@
 //! ```
 //!
 //! everywhere but within w of the interferer. So where nothing is heard from x0, the sender may *hold back*, for a node at X - w:
-//! to climb before it comes near, or to leave the least step room. `bounds_cover_every_gap` in
+//! to climb before it comes near, or to leave the least step room. `at_mixed_altitudes` and `with_a_separation_that_binds` in
 //! `host-tests/tests/exact.rs` holds it against all places at once.
 //!
 //! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement.rs` asserts it against a bisection of the
 //! SIR itself in f64.
 
+use super::pass::Stand;
 use crate::mission::{Interferer, Mission};
 use crate::root::sqrt;
 use crate::sir::{CrossSection, Sender, Station, square};
-use super::pass::Stand;
 
 /// No hop is short enough for a target this far above its gain, and every term of f stays finite below it.
 const MOST_RATIO: f32 = 1e18;
@@ -64,6 +64,8 @@ pub struct Hop {
     from_tx: bool,
     /// The last place the node may take, m.
     end_m: f32,
+    /// The last places that the node and its sender take where all gather at the end, m.
+    gathered_m: [f32; 2],
 }
 
 impl Hop {
@@ -95,6 +97,8 @@ impl Hop {
                 mission.least_step(across_squared)
             },
             end_m: mission.end_for(index, spread_squared),
+            gathered_m: [index, index.saturating_sub(1)]
+                .map(|index| mission.end_for(index, spread_squared)),
         }
     }
 
@@ -159,7 +163,8 @@ impl Hop {
     /// Beyond `from_m` by the least step or more that is [`Hop::reach`]; short of it the sender stands just the least step
     /// before, which is as near as it may be. Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
-        self.reach(target, from_m).or_else(|| self.held_back(target, from_m))
+        self.reach(target, from_m)
+            .or_else(|| self.held_back(target, from_m))
     }
 
     fn held_back(&self, target: f32, from_m: f32) -> Option<f32> {
@@ -169,7 +174,8 @@ impl Hop {
         }
         let near = (from_m + self.least_step).min(self.end_m);
         // Nobody hears even the nearest sender within this of the interferer.
-        let zone = sqrt(ratio * (square(self.least_step) + self.across_squared) - self.aside_squared);
+        let zone =
+            sqrt(ratio * (square(self.least_step) + self.across_squared) - self.aside_squared);
         let place = if (near - self.interferer_x_m).abs() < zone {
             (self.interferer_x_m - zone).next_down()
         } else {
@@ -192,22 +198,31 @@ impl Hop {
     ///
     /// The nearest that it may be, which is the loudest.
     pub fn stand(&self, target: f32, from_m: f32, place: f32) -> Option<Stand> {
-        if self.reach(target, from_m).is_some_and(|reach| place >= reach) {
+        if self
+            .reach(target, from_m)
+            .is_some_and(|reach| place >= reach)
+        {
             return Some(Stand::AtReach);
         }
-        let from = if self.from_tx {
-            from_m
-        } else {
-            from_m.min(self.before(place))
-        };
         let heard = square(self.interferer_x_m - place) + self.aside_squared;
-        let needed = self.sender.gain.ratio(target) * (square(place - from) + self.across_squared);
-        let met = from >= 0.0 && heard >= needed * (1.0 - ROUNDING);
-        met.then_some(if from < from_m {
-            Stand::At(from)
-        } else {
-            Stand::AtReach
-        })
+        let ratio = self.sender.gain.ratio(target);
+        let at = |from: f32| {
+            let needed = ratio * (square(place - from) + self.across_squared);
+            let met = from >= 0.0 && heard >= needed * (1.0 - ROUNDING);
+            met.then_some(if from < from_m {
+                Stand::At(from)
+            } else {
+                Stand::AtReach
+            })
+        };
+        if self.from_tx {
+            return at(from_m);
+        }
+        let near = from_m.min(self.before(place));
+        // Where all gather at the end, as evenly as a pass that leaves them room from the start.
+        let [own, sender] = self.gathered_m;
+        let gathered = (place >= own && !(self.across_squared > 0.0)).then(|| at(near.min(sender)));
+        gathered.flatten().or_else(|| at(near))
     }
 }
 
@@ -244,7 +259,14 @@ mod tests {
         };
         let mission = Mission::try_new(config).unwrap();
         let sender = Sender::transmitter(&mission);
-        Hop::new(&mission, &interferer, sender, 1, CrossSection::on_line(altitude_m), 0.0)
+        Hop::new(
+            &mission,
+            &interferer,
+            sender,
+            1,
+            CrossSection::on_line(altitude_m),
+            0.0,
+        )
     }
 
     /// Behind the transmitter an interferer makes SIR_1 rise at first: at 10 m behind, from 1.04 above Tx to 1.22 at 45 m.

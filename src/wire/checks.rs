@@ -3,7 +3,9 @@
 //! The types of `body` hold any bytes; what [`Message::decode`] makes of them holds none that a relay would have to doubt.
 
 use super::body::{At, Body, Targets};
-use super::message::{Answer, Course, Message, MessageError, Moved, Sweep, TRIALS, Token, Trial, Turn, Worth};
+use super::message::{
+    Answer, Course, Message, MessageError, Moved, Sweep, TRIALS, Token, Trial, Turn, Worth,
+};
 use crate::field::is_upsilon;
 use crate::guard::Fence;
 use crate::mission::Profile;

@@ -11,10 +11,10 @@ use crate::placement::pass::origins;
 use crate::placement::search::{Infeasible, Schedule, Search};
 use crate::sir::Placement;
 
-/// Hops of the prediction in one call of `work`: 16 reaches each.
+/// Hops of the prediction in one call of `work`: 16 reaches each. In an uneven field a part of one.
 const HOPS_AT_ONCE: u16 = 16;
 
-/// The same in a field, where a reach takes twice the work.
+/// The same in an even field, where a reach takes twice the work.
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
 impl Share {
@@ -37,7 +37,8 @@ impl Share {
                 };
                 let hops = match mission.field() {
                     None => HOPS_AT_ONCE,
-                    Some(_) => FIELD_HOPS_AT_ONCE,
+                    Some(field) if field.is_constant() => FIELD_HOPS_AT_ONCE,
+                    Some(_) => 1,
                 };
                 let ladder = match planner.step(mission, profile_of, hops) {
                     Ok(None) => return Ok(false),

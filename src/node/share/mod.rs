@@ -168,7 +168,7 @@ impl Share {
 
     /// Goes on with a computation: the relay's own share of the current pass, or the leader's next pass.
     ///
-    /// Bounded by 16 hops of 16 reaches, half as many in a field, 96 hops of a wave, or 624 places of Algorithm 2.
+    /// Bounded by 16 hops of 16 reaches, 128 points of an uneven field (or all of them for one target), or 624 places of Algorithm 2.
     pub(crate) fn work(&mut self, own: Own<'_>) -> Next {
         if self.exchange.phase == Phase::Waiting {
             return match &self.pass {

@@ -6,7 +6,7 @@
 use super::Fewest;
 use crate::mission::{Heading, MAX_RELAYS, Mission, Profile};
 use crate::placement::pass::Stand;
-use crate::placement::plan::{Walk, before};
+use crate::placement::walk::{Walk, before};
 use crate::sir::Placement;
 
 /// The fewest relays whose chain meets `target`; see [`super::fewest`].
@@ -41,7 +41,10 @@ fn toward_rx(
         let last = chain(&mission, target, profile_of);
         let link = last.link(index);
         from_m = link.reach(target, from_m)?;
-        if !link.ending(target, from_m).is_some_and(|(slack, _)| slack >= 0.0) {
+        if !link
+            .ending(target, from_m)
+            .is_some_and(|(slack, _)| slack >= 0.0)
+        {
             continue;
         }
         // With room to be left for those behind it, a chain may end sooner than one that grows without knowing its length.

@@ -5,7 +5,7 @@
 
 use super::Fewest;
 use crate::mission::{MAX_RELAYS, Mission, Profile};
-use crate::placement::plan::Walk;
+use crate::placement::walk::Walk;
 use crate::root::sqrt;
 use crate::sir::square;
 
