@@ -270,6 +270,12 @@ impl Relay {
         self.node.target()
     }
 
+    /// At the leader, after Algorithm 1 or 4: at the altitudes held no chain has an SIR of this or more, linear. `None` elsewhere, and
+    /// with the paper's fixed step, which leaves chains out.
+    pub fn bound(&self) -> Option<f32> {
+        self.node.bound()
+    }
+
     /// Where the relay is in the protocol.
     pub fn phase(&self) -> Phase {
         self.node.phase()

@@ -56,6 +56,7 @@ impl Answerer {
                     slacks: sweep.ladder.targets(),
                 },
                 own: sweep.chosen,
+                stand: None,
             }));
         }
     }

@@ -20,7 +20,6 @@ use host_tests::sim::setup::Setup;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::plan::{self, silent_place};
-use uav_relay::placement::promise::is_most;
 use uav_relay::placement::retreat::Retreat;
 use uav_relay::{Interference, Measure, Mission, Profile, Schedule};
 
@@ -161,81 +160,6 @@ fn the_fixed_step_is_the_papers() {
     }
     println!("{steps} steps");
     assert!(steps > 1000);
-}
-
-/// In an uneven field: never below the fixed step of 0.01 by more than that, and what is promised holds.
-#[test]
-fn in_an_uneven_field_the_brackets_end_no_lower_than_the_step() {
-    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(64));
-    let (mut promised, mut higher, mut worst, mut sweeps) = (0, 0, 0.0_f64, 0);
-    let mut judged = 0;
-    let (mut islands, mut missed, mut short) = (0_usize, 0_usize, 0_usize);
-    let rounds = std::env::var("COUNT").map_or(300, |text| text.parse().unwrap());
-    for round in 0..rounds {
-        // Few relays and wild fields are where the curve of slacks has hills.
-        let (relays, spread) = [
-            (1 + round % 50, 2.0),
-            (1 + round % 50, 10.0),
-            (1 + round % 5, 300.0),
-        ][round % 3];
-        let link = link(&mut rng, relays, 2 + round % 9, spread);
-        if link.ceiling() > 1_000.0 {
-            // The fixed step would take more than a hundred thousand of them.
-            continue;
-        }
-        let mission = mission(&link, 0.0);
-        judged += 1;
-        let common = mission.config().common;
-        let agreed = plan::solve(&mission, Schedule::Bracketed, |_| common).unwrap();
-        let x: Vec<f64> = (1..=mission.relays())
-            .map(|index| {
-                let place = plan::place(&mission, agreed.target, index, |_| common).unwrap();
-                f64::from(place.x_m)
-            })
-            .collect();
-        let sir = link.chain_sir(&x);
-        assert!(
-            sir >= f64::from(agreed.target) * (1.0 - 1e-5),
-            "{sir} {}",
-            agreed.target
-        );
-        sweeps = sweeps.max(agreed.sweeps);
-        let stepped = link.algorithm4(0.01).map_or(0.0, |found| found.gamma);
-        worst = worst.max((stepped - sir) / stepped);
-        // Above an SIR of 100 the relative tolerance is the wider of the two.
-        assert!(
-            sir >= stepped - 0.01_f64.max(1e-4 * stepped),
-            "{sir} against {stepped}: {link:?}"
-        );
-        higher += u32::from(sir > stepped * (1.0 + 1e-3));
-        let met = |target: f64| link.backward_sir(target) >= target;
-        // A target that is met above one that is not: what a bracket from below would not find.
-        islands += usize::from((1..200).any(|step| !met(sir * (1.0 - 0.004 * f64::from(step)))));
-        // A target that is met above the one that was found.
-        let mut above = link.ceiling();
-        while above > sir * (1.0 + 2e-4) && !met(above) {
-            above *= 1.0 - 5e-4;
-        }
-        missed += usize::from(above > sir * (1.0 + 2e-4));
-        // A chain whose first hop falls short of its target, and is still better than one that meets a lower one.
-        short += usize::from(link.backward_best(2_000) > sir * (1.0 + 2e-3));
-        if is_most(&mission, agreed.target, x[0] as f32) {
-            promised += 1;
-            let most = link.backward_best(2_000);
-            assert!(
-                most <= sir * (1.0 + 2e-4),
-                "promised {sir}, but there is {most}: {link:?}"
-            );
-        }
-    }
-    println!(
-        "{promised} of {judged} promised, {higher} higher than by the step, at most {worst:.1e} (relative) lower; {sweeps} sweeps at most"
-    );
-    println!(
-        "{islands} with an island on top, {missed} missed; in {short} a chain that falls short of its target has 0.2 % more"
-    );
-    assert!(promised > judged / 10 && promised < judged);
-    assert!(islands > 0 && missed * 200 <= judged, "{islands} {missed}");
 }
 
 /// Relays that bring an altitude or a power of their own make the leader's prediction wrong: their answers decide.
@@ -381,25 +305,4 @@ fn what_is_measured_takes_the_place_of_what_was_agreed() {
             "{reached:?}"
         );
     }
-}
-
-/// A promise takes that every hop from farther on ends farther on: not so where Upsilon rises faster than a hop is long.
-#[test]
-fn nothing_is_promised_where_stepping_back_less_may_reach_farther() {
-    let promise = |upsilon: Vec<(f64, f64)>| {
-        let link = StochasticLink {
-            tx_w: 1.0,
-            upsilon,
-            ..even(6)
-        };
-        let mission = mission(&link, 0.0);
-        let common = mission.config().common;
-        let agreed = plan::solve(&mission, Schedule::Bracketed, |_| common).unwrap();
-        let first = plan::place(&mission, agreed.target, 1, |_| common).unwrap();
-        is_most(&mission, agreed.target, first.x_m)
-    };
-    assert!(!promise(vec![(600.0, 1e6), (605.0, 3e6)]));
-    assert!(promise(vec![(400.0, 1e6), (1000.0, 3e6)]));
-    // Falling is no harm.
-    assert!(promise(vec![(600.0, 3e6), (605.0, 1e6)]));
 }

@@ -369,13 +369,7 @@ impl Mission {
 
     /// The same with room for rounding.
     pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
-        let distance_m = self.config.distance_m;
-        let least = self.least_step(across_squared);
-        if least > 0.0 {
-            least + distance_m * ROUNDING
-        } else {
-            distance_m * FINEST_STEP
-        }
+        self.step_of(self.least_step(across_squared))
     }
 
     /// The last place on its way that leaves the relays after `index` room to stand `min_separation_m` apart, m.
@@ -387,8 +381,33 @@ impl Mission {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
             Heading::TowardTx => index.saturating_sub(1),
         });
+        let least = self.least_step(across_squared);
+        self.end_after(behind, least)
+    }
+
+    /// The same where whoever comes after may stand as close as they like.
+    pub(crate) fn end_freely(&self, index: u16) -> f32 {
+        self.end_after(f32::from(self.config.relays.saturating_sub(index)), 0.0)
+    }
+
+    /// The last place of relay `index` toward Rx that leaves those after it their separation, m.
+    pub(crate) fn latest(&self, index: u16) -> f32 {
+        let after = f32::from(self.config.relays.saturating_sub(index));
+        self.config.distance_m - after * self.step_of(self.config.min_separation_m)
+    }
+
+    /// What a step between two that must be `least` apart takes with its rounding, m.
+    fn step_of(&self, least: f32) -> f32 {
         let distance_m = self.config.distance_m;
-        let step = self.step_with_room(across_squared);
+        if least > 0.0 {
+            least + distance_m * ROUNDING
+        } else {
+            distance_m * FINEST_STEP
+        }
+    }
+
+    fn end_after(&self, behind: f32, least: f32) -> f32 {
+        let (distance_m, step) = (self.config.distance_m, self.step_of(least));
         match self.heading() {
             Heading::TowardRx => (distance_m - behind * step).max(0.0),
             Heading::TowardTx => (behind * step).min(distance_m),

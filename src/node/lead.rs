@@ -15,6 +15,10 @@ pub(crate) const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else
 pub(crate) type Chain = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
 /// What the leader is at.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one of it, and nothing allocates"
+)]
 #[derive(Clone, Debug)]
 pub(crate) enum Lead {
     /// Not the leader, or nothing begun yet, or all done.

@@ -358,6 +358,10 @@ impl Node {
         self.share.setpoint()
     }
 
+    pub(crate) fn bound(&self) -> Option<f32> {
+        self.share.bound()
+    }
+
     pub(crate) fn target(&self) -> Option<f32> {
         self.share.target()
     }

@@ -24,6 +24,8 @@ pub struct Ladder {
     gap: u8,
     /// What each gap is to its inner neighbour: 1 + `growth` / 16.
     growth: u8,
+    /// Whether the pass is a plain one: nobody holds back.
+    plain: bool,
 }
 
 impl Ladder {
@@ -33,7 +35,18 @@ impl Ladder {
             anchor: target,
             gap: 0,
             growth: 0,
+            plain: false,
         }
+    }
+
+    /// The same targets, on a pass that is plain or not.
+    pub const fn plainly(self, plain: bool) -> Self {
+        Self { plain, ..self }
+    }
+
+    /// Whether nobody holds back on the pass.
+    pub const fn is_plain(&self) -> bool {
+        self.plain
     }
 
     /// Targets with equal ratios, the lowest just below `low` and the highest just above `high`; 0 < `low` < `high`.
@@ -80,6 +93,7 @@ impl Ladder {
             anchor: centre / sqrt(1.0 + gap_value(gap)),
             gap,
             growth,
+            plain: false,
         }
     }
 
@@ -89,6 +103,7 @@ impl Ladder {
             anchor,
             gap,
             growth,
+            plain: false,
         };
         let targets = ladder.targets();
         // Subnormal targets would make a hop depend on how the processor treats subnormals.

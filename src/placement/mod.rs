@@ -3,7 +3,7 @@
 //! | for | files |
 //! | --- | --- |
 //! | how far one hop reaches for a target SIR | [`spacing`] toward Rx, [`retreat`] toward Tx in a field |
-//! | a pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass), [`verdict`]; [`search`] and [`scan`] say which come next; [`plan`] runs all of it for a whole chain without a message; [`promise`] whether it is the most |
+//! | a pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass), [`verdict`]; [`search`] says which come next; [`plan`] runs all of it for a whole chain without a message |
 //! | places, sides and altitudes together | [`joint`] |
 //! | one relay between its neighbours | [`local`]: Algorithm 2 |
 //! | how many relays | [`fleet`]: the fewest for a target, and the most any number can have |
@@ -17,13 +17,12 @@ pub mod ladder;
 pub mod local;
 pub mod pass;
 pub mod plan;
-pub mod promise;
 pub mod retreat;
-pub mod scan;
 pub mod search;
 pub mod single;
 pub mod spacing;
 pub mod verdict;
+mod walk;
 
 /// Up to one number a target: reaches, slacks or the targets themselves.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

@@ -5,8 +5,9 @@
 
 use super::PerTarget;
 use super::ladder::Ladder;
-use super::pass::{self, Behind, origins};
+use super::pass::{self, Behind, Link, origins};
 use super::search::{Infeasible, Schedule, Search};
+use super::walk::Walk;
 use crate::mission::{Mission, Profile};
 use crate::sir::Placement;
 
@@ -20,6 +21,8 @@ pub struct Agreed {
     pub commit: u8,
     /// That target, linear SIR.
     pub target: f32,
+    /// What no chain at these altitudes has, linear SIR; `None` with the paper's fixed step, which leaves chains out.
+    pub most: Option<f32>,
     /// Sweeps it took to find.
     pub sweeps: u32,
 }
@@ -30,6 +33,8 @@ pub struct Planner {
     search: Search,
     targets: PerTarget,
     reaches: PerTarget,
+    /// The next reaches, as far as they are known.
+    next: PerTarget,
     /// The relay whose reaches come next, 1 to N.
     index: u16,
     behind: Option<Behind>,
@@ -47,6 +52,7 @@ impl Planner {
             search,
             targets: PerTarget::new(),
             reaches: PerTarget::new(),
+            next: PerTarget::new(),
             index: mission.leader(),
             behind: None,
             sweeps: 0,
@@ -63,7 +69,7 @@ impl Planner {
         self.sweeps = self.sweeps.saturating_add(1);
     }
 
-    /// Works through at most `hops` hops (at most 16 reaches each); `Ok(Some(..))` when the chain is solved.
+    /// Works through at most `hops` hops (at most 16 reaches each, in a field 128 of its points); `Ok(Some(..))` when the chain is solved.
     ///
     /// `profile_of` gives what relay 1..=N holds; it must answer the same every time.
     ///
@@ -78,32 +84,25 @@ impl Planner {
     ) -> Result<Option<Agreed>, Infeasible> {
         for _ in 0..hops {
             let profile = profile_of(self.index);
-            let mut reaches = PerTarget::new();
-            pass::extend(
+            let link = Link {
                 mission,
-                self.behind,
-                self.index,
-                profile.on_line(),
-                &self.targets,
-                &self.reaches,
-                &mut reaches,
-            );
-            self.reaches = reaches;
+                behind: self.behind,
+                index: self.index,
+                own: profile.on_line(),
+                measured_per_w: None,
+                plain: self.search.ladder().is_plain(),
+                end_m: None,
+            };
+            if !link.go_on(&self.targets, &self.reaches, &mut self.next) {
+                continue;
+            }
+            self.reaches = core::mem::take(&mut self.next);
             if let Some(next) = mission.after(self.index) {
-                self.behind = Some(Behind {
-                    relay: profile.on_line(),
-                    measured_per_w: None,
-                });
+                self.behind = Some(Behind::of(profile));
                 self.index = next;
                 continue;
             }
-            let verdict = pass::close(
-                mission,
-                profile.on_line(),
-                None,
-                *self.search.ladder(),
-                &self.reaches,
-            );
+            let verdict = pass::close(&link, *self.search.ladder(), &self.reaches);
             if let Some(commit) = verdict.commit
                 && let Some(&target) = self.targets.get(usize::from(commit))
             {
@@ -111,6 +110,7 @@ impl Planner {
                     ladder: *self.search.ladder(),
                     commit,
                     target,
+                    most: self.search.most(&verdict.slacks),
                     sweeps: self.sweeps,
                 }));
             }
@@ -123,6 +123,8 @@ impl Planner {
 
 /// Solves the chain in one go: at most about fifty sweeps over N hops with the bracketed schedule.
 ///
+/// Where relays hold back, they are followed once more, as [`place`] does.
+///
 /// # Errors
 /// [`Infeasible`] when no target can be met.
 pub fn solve(
@@ -130,48 +132,65 @@ pub fn solve(
     schedule: Schedule,
     profile_of: impl Fn(u16) -> Profile,
 ) -> Result<Agreed, Infeasible> {
-    let mut planner = Planner::new(mission, profile_of(mission.leader()), schedule)?;
+    let leader = profile_of(mission.leader());
+    let mut planner = Planner::new(mission, leader, schedule)?;
     loop {
-        if let Some(agreed) = planner.step(mission, &profile_of, u16::MAX)? {
-            return Ok(agreed);
-        }
+        let Some(agreed) = planner.step(mission, &profile_of, u16::MAX)? else {
+            continue;
+        };
+        let chain = Walk {
+            mission,
+            target: agreed.target,
+            plain: agreed.ladder.is_plain(),
+            profile_of: &profile_of,
+        };
+        let next = if chain.place(0).is_some() {
+            if planner.search.accept(agreed.target) {
+                return Ok(agreed);
+            }
+            Ok(())
+        } else {
+            planner
+                .search
+                .refuse(mission, leader, agreed.target, agreed.most)
+        };
+        next?;
+        planner.start_sweep(mission);
     }
 }
 
-/// Where relay `index` stands when the chain takes `target`: as far on the way as every hop up to there lets it.
+/// Where relay `index` stands when the chain takes `target`, on a `plain` pass or not.
+fn placed(
+    mission: &Mission,
+    target: f32,
+    plain: bool,
+    index: u16,
+    profile_of: impl Fn(u16) -> Profile,
+) -> Option<Placement> {
+    let chain = Walk {
+        mission,
+        target,
+        plain,
+        profile_of: &profile_of,
+    };
+    // Everybody must be able to, not only those on the way back to this one.
+    chain.place(0)?;
+    chain
+        .place(index)
+        .map(|x_m| profile_of(index).on_line().at.at(x_m))
+}
+
+/// Where relay `index` stands when the chain takes `target`, held back where that lets the others meet it.
 ///
-/// `None` when a hop cannot meet the target. At most N reaches' worth of work.
+/// `None` when the target cannot be met. At most N^2 reaches' worth of work.
 pub fn place(
     mission: &Mission,
     target: f32,
     index: u16,
     profile_of: impl Fn(u16) -> Profile,
 ) -> Option<Placement> {
-    let mut at = mission.leader();
-    let mut behind = None;
-    let mut from = origins(mission);
-    loop {
-        let profile = profile_of(at);
-        let mut reaches = PerTarget::new();
-        pass::extend(
-            mission,
-            behind,
-            at,
-            profile.on_line(),
-            &[target],
-            &from,
-            &mut reaches,
-        );
-        if at == index {
-            return reaches.first().map(|&x_m| profile.on_line().at.at(x_m));
-        }
-        behind = Some(Behind {
-            relay: profile.on_line(),
-            measured_per_w: None,
-        });
-        from = reaches;
-        at = mission.after(at)?;
-    }
+    placed(mission, target, false, index, &profile_of)
+        .or_else(|| placed(mission, target, true, index, &profile_of))
 }
 
 /// The place relay `index` finds for itself without a message, where every relay holds what the mission has in common.
@@ -184,5 +203,6 @@ pub fn place(
 pub fn silent_place(mission: &Mission, index: u16) -> Result<Placement, Infeasible> {
     let common = |_| mission.config().common;
     let agreed = solve(mission, Schedule::Bracketed, common)?;
-    place(mission, agreed.target, index, common).ok_or(Infeasible)
+    let plain = agreed.ladder.is_plain();
+    placed(mission, agreed.target, plain, index, common).ok_or(Infeasible)
 }

@@ -5,16 +5,18 @@
 //! that was met and the lowest that was not, and the slacks, smooth in log gamma, tell where: inverse interpolation puts
 //! the next ladder's dense middle there while its ends still span the bracket.
 //!
-//! In a field that is not the same everywhere a target may be met while lower ones are not. There the bracket is looked for
-//! from the top downward, in steps of [`scan::STEP`](super::scan::STEP).
+//! On a plain pass, which holds nobody back, a target may be met while lower ones are not: what is met is met. All other passes
+//! leave no chain out, so the lowest target that has been missed is a bound of what any chain can have.
+
+mod trials;
 
 use core::ops::Range;
 
 use super::ladder::Ladder;
-use super::scan::{Found, Scan};
 use super::verdict::met;
 use crate::mission::{Heading, Mission, MissionConfig, Profile};
 use crate::sir::{self, Placement, Sender};
+use trials::Trials;
 
 /// Which targets the head tries.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -76,8 +78,12 @@ pub struct Search {
     ladder: Ladder,
     /// Sweeps whose verdict has come in.
     tried: u32,
-    /// The way down to the bracket, where a target may be met that is above others that are not.
-    scan: Option<Scan>,
+    /// Whether nobody holds back: as in the paper, and where a chain that did has turned out not to be one.
+    plain: bool,
+    /// The lowest target that no chain can meet, as far as known.
+    most: Option<f32>,
+    /// What is tried once somebody was held back to where it could not be.
+    trials: Option<Trials>,
 }
 
 impl Search {
@@ -111,17 +117,12 @@ impl Search {
         }
         // In a quiet field they may be above any f32, and no ladder ends there.
         let (ceiling, start) = (ceiling.min(HIGHEST), start.min(HIGHEST));
-        let uneven = mission.field().is_some_and(|field| !field.is_constant());
-        let scan = (uneven && schedule == Schedule::Bracketed).then(|| Scan::new(start));
-        let ladder = match schedule {
-            Schedule::FixedStep { .. } => Ladder::single(start),
-            Schedule::Bracketed => {
-                scan.map_or_else(
-                    // Half of what is met leaves room for rounding.
-                    || Ladder::spanning(met.min(start).max(start * DEPTH) / 2.0, start * 1.01),
-                    Scan::ladder,
-                )
-            }
+        let plain = schedule != Schedule::Bracketed;
+        let ladder = if plain {
+            Ladder::single(start)
+        } else {
+            // Half of what is met leaves room for rounding.
+            Ladder::spanning(met.min(start).max(start * DEPTH) / 2.0, start * 1.01)
         };
         Ok(Self {
             schedule,
@@ -131,9 +132,11 @@ impl Search {
             feasible: None,
             infeasible: None,
             width: f32::INFINITY,
-            ladder,
+            ladder: ladder.plainly(plain),
             tried: 0,
-            scan,
+            plain,
+            most: None,
+            trials: None,
         })
     }
 
@@ -142,24 +145,19 @@ impl Search {
         &self.ladder
     }
 
-    /// The way down, in a field; without the feature for it there is none, and none of its code.
-    fn scan(&mut self) -> Option<&mut Scan> {
-        self.scan.as_mut().filter(|_| cfg!(feature = "field"))
-    }
-
     /// Tries `ladder` next instead: the one by which the head, having solved the chain beforehand, expects a commit.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.ladder = ladder;
-        if let Some(scan) = self.scan() {
-            scan.put_off();
-        }
     }
 
-    /// Takes it that the lower a target the easier it is met, whatever the field: as where every relay uses what it measures.
-    pub(crate) fn take_as_even(&mut self) {
-        if cfg!(feature = "field") && self.scan.take().is_some() {
-            self.ladder = Ladder::spanning(self.start * 1e-4, self.start * 1.01);
+    /// The lowest target that no chain can meet, once the last pass gave these `slacks`; `None` of plain passes alone.
+    pub fn most(&self, slacks: &[f32]) -> Option<f32> {
+        if self.plain || self.trials.is_some() {
+            return self.most;
         }
+        let missed = self.ladder.targets().get(met(slacks)).copied();
+        let known = self.infeasible.unwrap_or(self.ceiling * 1.000_001);
+        Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
     /// Takes the slacks of [`Search::ladder`], in metres for as many targets as every hop could meet, and moves on.
@@ -170,26 +168,24 @@ impl Search {
     /// [`Infeasible`] when no target is left to try.
     pub fn advance(&mut self, slacks: &[f32]) -> Result<(), Infeasible> {
         self.tried = self.tried.saturating_add(1);
-        self.ladder = match self.schedule {
-            Schedule::FixedStep { step } => self.step_down(step)?,
-            Schedule::Bracketed => {
-                let targets = self.ladder.targets();
-                match self.scan().map(|scan| scan.advance(&targets, slacks)) {
-                    Some(Found::Nothing(next))
-                        if next.targets().first() > Some(&(self.start * DEPTH)) =>
-                    {
-                        next
-                    }
-                    Some(Found::Nothing(_)) => return Err(Infeasible),
-                    Some(Found::Bracket) => {
-                        self.scan = None;
-                        self.tried = 0;
-                        self.narrow(slacks)?
-                    }
-                    None => self.narrow(slacks)?,
-                }
-            }
+        if let Some(trials) = &mut self.trials
+            && !self.plain
+        {
+            // A relay has changed.
+            trials.high = trials
+                .high
+                .min(self.ladder.targets().first().copied().unwrap_or(0.0));
+            return self.try_next();
+        }
+        let next = match self.schedule {
+            Schedule::FixedStep { step } => self.step_down(step),
+            Schedule::Bracketed => self.narrow(slacks),
         };
+        match next {
+            Ok(next) => self.ladder = next.plainly(self.plain),
+            // No plain chain at all: others may do.
+            Err(Infeasible) => self.try_next()?,
+        }
         Ok(())
     }
 

@@ -22,9 +22,21 @@
 //! small targets. e is formed from a gain of twice f32's width, so targets next to A lose nothing. The printed
 //! case distinction picks wrong roots once the chain has passed the interferer.
 //!
+//! Where every sender in [0, x0] counts, only the nearest to a place matters: the interference there does not depend on it, and
+//! none is louder. Up to x0 and the least step s beyond, that is one just s before, and a node at x is heard there if
+//!
+//! ```text
+//! (X - x)^2 + (Y - y)^2 + h^2 >= (gamma / A) (s^2 + (y - y0)^2 + (h - h0)^2):
+//! ```
+//!
+//! everywhere but within w of the interferer. So where nothing is heard from x0, the sender may *hold back*, for a node at X - w:
+//! to climb before it comes near, or to leave the least step room. `at_mixed_altitudes` and `with_a_separation_that_binds` in
+//! `host-tests/tests/exact.rs` holds it against all places at once.
+//!
 //! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement.rs` asserts it against a bisection of the
 //! SIR itself in f64.
 
+use super::pass::Stand;
 use crate::mission::{Interferer, Mission};
 use crate::root::sqrt;
 use crate::sir::{CrossSection, Sender, Station, square};
@@ -48,19 +60,24 @@ pub struct Hop {
     across_squared: f32,
     /// The least step to the node, m.
     least_step: f32,
+    /// Whether the sender is Tx, which cannot hold back.
+    from_tx: bool,
     /// The last place the node may take, m.
     end_m: f32,
+    /// The last places that the node and its sender take where all gather at the end, m.
+    gathered_m: [f32; 2],
 }
 
 impl Hop {
-    /// The hop from `sender` to relay `index`, which flies at `at` and goes no farther than `end_m`.
+    /// The hop from `sender` to relay `index`, which flies at `at`; neighbours among the relays after it may be `spread_squared`
+    /// m^2 apart across the line.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
         sender: Sender,
         index: u16,
         at: CrossSection,
-        end_m: f32,
+        spread_squared: f32,
     ) -> Self {
         let (from, aside) = (sender.at, interferer.y_m);
         let climb = at.altitude_m - from.altitude_m;
@@ -72,14 +89,30 @@ impl Hop {
             base: (aside - from.y_m) * (aside + from.y_m - 2.0 * at.y_m)
                 + from.altitude_m * (at.altitude_m + climb),
             across_squared,
+            from_tx: index <= 1,
             // The transmitter stands on the ground: its altitude alone keeps the head clear of it.
             least_step: if index <= 1 {
                 0.0
             } else {
                 mission.least_step(across_squared)
             },
-            end_m,
+            end_m: mission.end_for(index, spread_squared),
+            gathered_m: [index, index.saturating_sub(1)]
+                .map(|index| mission.end_for(index, spread_squared)),
         }
+    }
+
+    /// The same hop, to relay `index`, when those after it hold back to leave themselves room rather than this one.
+    pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
+        Self {
+            end_m: mission.end_freely(index),
+            ..self
+        }
+    }
+
+    /// The same hop, to a node that goes no farther than `end_m`.
+    pub(crate) fn ending(self, end_m: f32) -> Self {
+        Self { end_m, ..self }
     }
 
     /// The farthest place in [`from_m`, end] at which the node still meets `target`, m along x; `None` if there is none.
@@ -129,7 +162,77 @@ impl Hop {
         // A hop too short for an f32 is none: two relays never share a place.
         (place > from_m).then_some(place)
     }
+
+    /// The farthest place at which the node meets `target` with its sender anywhere in [0, `from_m`]; `None` if there is none.
+    ///
+    /// Beyond `from_m` by the least step or more that is [`Hop::reach`]; short of it the sender stands just the least step
+    /// before, which is as near as it may be. Constant work.
+    pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
+        self.reach(target, from_m)
+            .or_else(|| self.held_back(target, from_m))
+    }
+
+    fn held_back(&self, target: f32, from_m: f32) -> Option<f32> {
+        let ratio = self.sender.gain.ratio(target);
+        if self.from_tx || !(ratio <= MOST_RATIO) {
+            return None;
+        }
+        let near = (from_m + self.least_step).min(self.end_m);
+        // Nobody hears even the nearest sender within this of the interferer.
+        let zone =
+            sqrt(ratio * (square(self.least_step) + self.across_squared) - self.aside_squared);
+        let place = if (near - self.interferer_x_m).abs() < zone {
+            (self.interferer_x_m - zone).next_down()
+        } else {
+            near
+        };
+        (self.before(place) >= 0.0).then_some(place)
+    }
+
+    /// The nearest that a sender may be before `place`, m.
+    fn before(&self, place: f32) -> f32 {
+        let from = place - self.least_step;
+        if place - from < self.least_step || from >= place {
+            from.next_down()
+        } else {
+            from
+        }
+    }
+
+    /// Where the sender, whose reach for `target` is `from_m`, is to stand when the node is at `place`; `None` if nowhere.
+    ///
+    /// The nearest that it may be, which is the loudest.
+    pub fn stand(&self, target: f32, from_m: f32, place: f32) -> Option<Stand> {
+        if self
+            .reach(target, from_m)
+            .is_some_and(|reach| place >= reach)
+        {
+            return Some(Stand::AtReach);
+        }
+        let heard = square(self.interferer_x_m - place) + self.aside_squared;
+        let ratio = self.sender.gain.ratio(target);
+        let at = |from: f32| {
+            let needed = ratio * (square(place - from) + self.across_squared);
+            let met = from >= 0.0 && heard >= needed * (1.0 - ROUNDING);
+            met.then_some(if from < from_m {
+                Stand::At(from)
+            } else {
+                Stand::AtReach
+            })
+        };
+        if self.from_tx {
+            return at(from_m);
+        }
+        let near = from_m.min(self.before(place));
+        // Where all gather at the end, as evenly as a pass that leaves them room from the start.
+        let [own, sender] = self.gathered_m;
+        let gathered = (place >= own && !(self.across_squared > 0.0)).then(|| at(near.min(sender)));
+        gathered.flatten().or_else(|| at(near))
+    }
 }
+
+/// What rounding may take from a hop's SIR at the edge of where it meets its target, relative.
+const ROUNDING: f32 = 4e-6;
 
 impl Hop {
     /// The reach as a smooth function of everything: without a least step, and behind `from_m` where the hop across takes more than
@@ -194,14 +297,13 @@ mod tests {
         };
         let mission = Mission::try_new(config).unwrap();
         let sender = Sender::transmitter(&mission);
-        let end_m = mission.end_for(1, 0.0);
         Hop::new(
             &mission,
             &interferer,
             sender,
             1,
             CrossSection::on_line(altitude_m),
-            end_m,
+            0.0,
         )
     }
 

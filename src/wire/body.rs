@@ -43,6 +43,7 @@ impl Pass {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Targets {
     pub(super) pass: Pass,
+    /// Below zero for a plain pass.
     pub(super) anchor: f32,
     pub(super) gap: u8,
     pub(super) growth: u8,
@@ -61,7 +62,7 @@ pub(super) struct At {
 #[derive(Serialize, Deserialize)]
 pub(super) enum Body {
     Sweep(Targets, PerTarget),
-    Verdict(Pass, bool, Option<u8>, PerTarget),
+    Verdict(Pass, bool, Option<u8>, PerTarget, Option<f32>),
     Busy([u8; 2]),
     Heartbeat([u8; 2], bool),
     Measured(Targets, f32, PerTarget),
@@ -95,8 +96,9 @@ impl Body {
     pub(super) fn shortest(&self) -> usize {
         match self {
             Self::Sweep(_, reaches) => 20 + 4 * reaches.len(),
-            Self::Verdict(_, _, commit, slacks) => {
-                8 + usize::from(commit.is_some()) + 4 * slacks.len()
+            Self::Verdict(_, _, commit, slacks, stand) => {
+                let stand = if stand.is_some() { 4 } else { 0 };
+                9 + usize::from(commit.is_some()) + 4 * slacks.len() + stand
             }
             Self::Busy(_) => 3,
             Self::Heartbeat(..) => 4,
@@ -123,7 +125,11 @@ impl Message {
                 let (anchor, gap, growth) = sweep.ladder.parts();
                 let targets = Targets {
                     pass: Pass::new(sweep.number, sweep.mission),
-                    anchor,
+                    anchor: if sweep.ladder.is_plain() {
+                        -anchor
+                    } else {
+                        anchor
+                    },
                     gap,
                     growth,
                     altitude_m: sweep.relay.at.altitude_m,
@@ -141,6 +147,7 @@ impl Message {
                 answer.own,
                 answer.verdict.commit,
                 answer.verdict.slacks.clone(),
+                answer.stand,
             ),
             Self::Busy { sweep } => Body::Busy(sweep.to_le_bytes()),
             Self::Heartbeat { mission, answer } => Body::Heartbeat(mission.to_le_bytes(), *answer),

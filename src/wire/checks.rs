@@ -46,9 +46,10 @@ fn checked(body: Body) -> Option<Message> {
         Body::Aside(targets, y_m, reaches) if cfg!(feature = "altitude") => {
             Message::Sweep(sweep(targets, Some(y_m), None, reaches)?)
         }
-        Body::Verdict(pass, own, commit, slacks) => {
+        Body::Verdict(pass, own, commit, slacks, stand) => {
             let known = commit.is_none_or(|target| usize::from(target) < TARGETS);
-            if !(in_range(&slacks, -FARTHEST_M) && known) {
+            let placed = stand.is_none_or(|x_m| (0.0..=1e6).contains(&x_m));
+            if !(in_range(&slacks, -FARTHEST_M) && known && placed) {
                 return None;
             }
             Message::Verdict(Answer {
@@ -56,6 +57,7 @@ fn checked(body: Body) -> Option<Message> {
                 mission: pass.mission(),
                 verdict: Verdict { commit, slacks },
                 own,
+                stand,
             })
         }
         Body::Busy(number) => Message::Busy {
@@ -139,7 +141,8 @@ fn sweep(
     measured_per_w: Option<f32>,
     reaches: PerTarget,
 ) -> Option<Sweep> {
-    let ladder = Ladder::from_parts(targets.anchor, targets.gap, targets.growth)?;
+    let ladder = Ladder::from_parts(targets.anchor.abs(), targets.gap, targets.growth)?
+        .plainly(targets.anchor < 0.0);
     let fits = reaches.len() <= ladder.len() && in_range(&reaches, 0.0);
     let measured = measured_per_w.is_none_or(is_upsilon);
     let beside = y_m.is_none_or(is_beside);

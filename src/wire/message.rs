@@ -135,6 +135,8 @@ pub struct Answer {
     pub mission: u16,
     /// What became of the targets.
     pub verdict: Verdict,
+    /// Where the receiver is to stand when a target is committed, m along x; `None` for its own reach.
+    pub stand: Option<f32>,
     /// Whether the sender or a relay after it differs from what the mission says of all.
     pub own: bool,
 }

@@ -2,7 +2,7 @@
 
 use uav_relay::placement::PerTarget;
 use uav_relay::placement::ladder::TARGETS;
-use uav_relay::placement::pass::{self, Behind};
+use uav_relay::placement::pass::{Behind, Link, close};
 use uav_relay::placement::plan;
 use uav_relay::placement::search::Search;
 use uav_relay::{Heading, Mission, Placement, Profile, Schedule};
@@ -35,15 +35,16 @@ pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     let mut next = Some(mission.leader());
     while let Some(index) = next {
         let mut reaches = PerTarget::new();
-        pass::extend(
+        let link = Link {
             mission,
             behind,
             index,
-            profile.on_line(),
-            &[target],
-            &from,
-            &mut reaches,
-        );
+            own: profile.on_line(),
+            measured_per_w: None,
+            plain: true,
+            end_m: None,
+        };
+        link.extend(&[target], &from, &mut reaches);
         places.push(Placement::on_line(*reaches.first()?, profile.altitude_m));
         behind = Some(Behind {
             relay: profile.on_line(),
@@ -88,7 +89,19 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, Trouble> {
             Heading::TowardTx => chain.places.first(),
         });
         let reached: Vec<f32> = last.map(|place| place.x_m).into_iter().collect();
-        let verdict = pass::close(mission, own.on_line(), None, ladder, &reached);
+        let verdict = close(
+            &Link {
+                mission,
+                behind: None,
+                index: mission.relays(),
+                own: own.on_line(),
+                measured_per_w: None,
+                plain: true,
+                end_m: None,
+            },
+            ladder,
+            &reached,
+        );
         sweeps.push(Sweep {
             number,
             target,

@@ -155,6 +155,27 @@ pub fn optimum(
         .then_some(JointOptimum { sir, places })
 }
 
+/// The best SIR (linear) of a link whose relays hold the altitudes they have above the line, with its least separation; to 1e-6
+/// relative.
+///
+/// `None` as for [`optimum`].
+pub fn at_their_altitudes(link: &Link) -> Option<f64> {
+    let heights = || link.relays.iter().map(|relay| relay.altitude_m);
+    let corridor = Corridor::plane(heights().reduce(f64::min)?, heights().reduce(f64::max)?);
+    let scene = Scene::new(link, corridor, &[])?;
+    let slots: Vec<levels::Slot> = heights()
+        .map(|height| levels::Slot {
+            levels: vec![space::Across {
+                y: 0.0,
+                h: height / link.distance_m,
+            }],
+            window: (0.0, 1.0),
+        })
+        .collect();
+    let best = levels::best_chain(&scene, &slots, -200.0, 1e-6)?;
+    Some(scene.worst(&best).exp())
+}
+
 /// The SIR (linear) of the worst hop of a chain; `None` without relays, or unless there is one place per relay.
 pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     let (tail, last) = (places.last()?, link.relays.last()?);

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use uav_relay::placement::promise::is_most;
 use uav_relay::{Interference, Mission};
 
 use super::attack::AttackReport;
@@ -141,12 +140,11 @@ impl ChainReport {
         let rx_sir = sirs.last().copied();
         let injected = outcome.injected;
         let target = chain.first().and_then(|(_, head)| head.target);
-        let promised = match (mission.interference(), target, places.first()) {
-            (Interference::Field(_), Some(target), Some((head, _))) => {
-                let common = mission.config().common;
-                let equals = places.iter().all(|(_, profile)| *profile == common);
-                let flown = mission.with_relays(flown).unwrap_or(*mission);
-                Some(equals && is_most(&flown, target, head.x_m))
+        // Whether no chain can have more, as far as the tolerance goes.
+        let bound = outcome.relays.iter().find_map(|relay| relay.bound);
+        let promised = match (mission.interference(), target, bound) {
+            (Interference::Field(_), Some(target), Some(bound)) => {
+                Some(bound <= target * (1.0 + 2.0 * mission.config().tolerance))
             }
             _ => None,
         };

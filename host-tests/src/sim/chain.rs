@@ -243,6 +243,7 @@ impl Chain {
             .map(|member| RelayEnd {
                 setpoint: member.relay.setpoint(),
                 target: member.relay.target(),
+                bound: member.relay.bound(),
                 profile: member.relay.profile(),
                 stats: *member.relay.stats(),
                 killed: member.killed,

@@ -86,6 +86,8 @@ pub struct RelayEnd {
     pub setpoint: Option<Placement>,
     /// The target it holds that place for.
     pub target: Option<f32>,
+    /// What no chain has, as the leader found.
+    pub bound: Option<f32>,
     /// What it brought along.
     pub profile: Profile,
     /// Its counters.

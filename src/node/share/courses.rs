@@ -11,6 +11,7 @@ use crate::placement::joint::ascent::{Ascent, Turn};
 use crate::placement::joint::course::{Bar, Courser, Coursing, Trials};
 use crate::placement::joint::{Outlook, Seat};
 use crate::placement::ladder::Ladder;
+use crate::placement::pass::Link;
 use crate::placement::search::Infeasible;
 use crate::wire::message::{Course, Worth};
 
@@ -42,19 +43,17 @@ impl Share {
         Next::Nothing
     }
 
-    /// Goes on with a sweep that came before this relay knew where it is to be.
-    pub(super) fn go_on_with_sweep(&mut self, own: Own<'_>) -> Next {
-        if self.chosen.is_none() && self.solve(own).is_none() {
-            return Next::Work { moved: false };
+    /// What this relay is on a sweep.
+    pub(super) fn link<'a>(&self, own: Own<'a>, chosen: bool) -> Link<'a> {
+        Link {
+            mission: own.mission,
+            behind: None,
+            index: own.index,
+            own: self.station_for(chosen),
+            measured_per_w: own.measured_per_w,
+            plain: false,
+            end_m: self.chosen.filter(|_| chosen).map(|chosen| chosen.end_m),
         }
-        let Pass::Sweep(sweeping) = &mut self.pass else {
-            return Next::Stale;
-        };
-        let Some(behind) = sweeping.put_off.take() else {
-            return Next::Stale;
-        };
-        let (ladder, from) = (sweeping.ladder, sweeping.reaches.clone());
-        self.sweep_on(own, ladder, true, behind, &from)
     }
 
     /// Solves some more of the chain as if all relays were alike; the target, linear SIR, once this relay knows where it is to be.

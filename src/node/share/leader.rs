@@ -11,10 +11,10 @@ use crate::placement::pass::origins;
 use crate::placement::search::{Infeasible, Schedule, Search};
 use crate::sir::Placement;
 
-/// Hops of the prediction in one call of `work`: 16 reaches each.
+/// Hops of the prediction in one call of `work`: 16 reaches each. In an uneven field a part of one.
 const HOPS_AT_ONCE: u16 = 16;
 
-/// The same in a field, where a reach takes twice the work.
+/// The same in an even field, where a reach takes twice the work.
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
 impl Share {
@@ -44,7 +44,8 @@ impl Share {
                 };
                 let hops = match mission.field() {
                     None => HOPS_AT_ONCE,
-                    Some(_) => FIELD_HOPS_AT_ONCE,
+                    Some(field) if field.is_constant() => FIELD_HOPS_AT_ONCE,
+                    Some(_) => 1,
                 };
                 let ladder = match planner.step(mission, profile_of, hops) {
                     Ok(None) => return Ok(false),
@@ -63,11 +64,6 @@ impl Share {
     #[inline(never)] // a planner is built here once; its stack is not for every call of `work`
     fn begin_lead(&mut self, own: Own<'_>) -> Result<(), Infeasible> {
         self.lead = Lead::begin(own.mission, self.profile, own.settings)?;
-        if let Lead::Searching { search, .. } = &mut self.lead
-            && own.measured_per_w.is_some()
-        {
-            search.take_as_even();
-        }
         Ok(())
     }
 
@@ -80,9 +76,6 @@ impl Share {
         last: bool,
     ) -> Result<(), Infeasible> {
         let mut search = Search::new(own.mission, self.profile, Schedule::Bracketed)?;
-        if own.measured_per_w.is_some() {
-            search.take_as_even();
-        }
         if let Some(ladder) = ladder {
             search.begin_with(ladder);
         }

@@ -119,6 +119,8 @@ pub(crate) struct Share {
     after: Option<Placement>,
     setpoint: Option<Placement>,
     target: Option<f32>,
+    /// At the leader, what no chain can have.
+    bound: Option<f32>,
 }
 
 impl Share {
@@ -136,6 +138,7 @@ impl Share {
             after: None,
             setpoint: None,
             target: None,
+            bound: None,
         }
     }
 
@@ -168,14 +171,13 @@ impl Share {
 
     /// Goes on with a computation: the relay's own share of the current pass, or the leader's next pass.
     ///
-    /// Bounded by 16 hops of 16 reaches, half as many in a field, ten relays of the joint method, or 624 places of Algorithm 2.
+    /// Bounded by 16 hops of 16 reaches, 128 points of an uneven field (or all of them for one target), ten relays of the joint method,
+    /// or 624 places of Algorithm 2.
     pub(crate) fn work(&mut self, own: Own<'_>) -> Next {
         if self.exchange.phase == Phase::Waiting {
             match &self.pass {
+                Pass::Sweep(sweeping) if !sweeping.is_done() => return self.go_on_with_sweep(own),
                 Pass::Turn(_) if ADJUST => return self.go_on_with_turn(own),
-                Pass::Sweep(sweeping) if ALTITUDE && sweeping.put_off.is_some() => {
-                    return self.go_on_with_sweep(own);
-                }
                 _ => {}
             }
         }
@@ -196,6 +198,7 @@ impl Share {
         }
         let (number, mission) = (self.exchange.number, own.digest());
         match &self.pass {
+            Pass::Sweep(sweeping) if !sweeping.is_done() => None,
             Pass::Sweep(sweeping) => Some(Message::Sweep(Sweep {
                 number,
                 mission,
@@ -257,6 +260,7 @@ impl Share {
                 number,
                 mission,
                 verdict: sweeping.verdict.clone(),
+                stand: sweeping.stand(),
                 own: sweeping.own || self.differs(own),
             })),
             Pass::Course(_) if ALTITUDE => self.worth.map(|(trial, slack_m, outlook)| {
@@ -314,6 +318,10 @@ impl Share {
 
     pub(crate) const fn target(&self) -> Option<f32> {
         self.target
+    }
+
+    pub(crate) const fn bound(&self) -> Option<f32> {
+        self.bound
     }
 
     /// What this relay holds.

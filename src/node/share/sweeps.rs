@@ -4,11 +4,10 @@ use super::super::align::{Sweeping, told};
 use super::super::exchange::{Next, Phase};
 use super::super::lead::{Lead, Rounds};
 use super::super::settings::Method;
-use super::{ADJUST, ALTITUDE, Chosen, Own, Pass, Share};
+use super::{ADJUST, ALTITUDE, Own, Pass, Share};
 use crate::placement::PerTarget;
 use crate::placement::ladder::Ladder;
 use crate::placement::pass::Behind;
-use crate::sir::Station;
 use crate::wire::message::{Answer, Sweep};
 
 impl Share {
@@ -57,32 +56,26 @@ impl Share {
         };
         sweeping.ladder = ladder;
         sweeping.chosen = chosen;
+        sweeping.begin(behind, from);
         self.exchange.phase = Phase::Waiting;
-        if ALTITUDE && chosen && self.chosen.is_none() {
+        self.go_on_with_sweep(own)
+    }
+
+    /// Goes on with this relay's share of a sweep, as far as one call may.
+    pub(super) fn go_on_with_sweep(&mut self, own: Own<'_>) -> Next {
+        let is_chosen = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.chosen);
+        if ALTITUDE && is_chosen && self.chosen.is_none() && self.solve(own).is_none() {
             // First it has to find out where it is to be.
-            sweeping.told = told(behind, from);
-            sweeping.reaches.clone_from(from);
-            sweeping.put_off = Some(behind);
             return Next::Work { moved: false };
         }
-        sweeping.put_off = None;
-        sweeping.own = false;
-        let end_m = self.chosen.filter(|_| chosen).map(|chosen| chosen.end_m);
-        let given = self.profile.on_line();
-        let station = match self.chosen {
-            Some(Chosen { at, .. }) if chosen => Station { at, ..given },
-            _ => given,
+        let link = self.link(own, is_chosen);
+        let Pass::Sweep(sweeping) = &mut self.pass else {
+            return Next::Stale;
         };
-        let known = sweeping.reach(
-            own.mission,
-            behind,
-            own.index,
-            station,
-            end_m,
-            own.measured_per_w,
-            from,
-        );
-        if known {
+        if !sweeping.go_on(link) {
+            return Next::Work { moved: false };
+        }
+        if own.is_last() {
             self.conclude_sweep(own)
         } else {
             Next::Forward { moved: false }
@@ -91,12 +84,12 @@ impl Share {
 
     /// A verdict from the relay after.
     pub(crate) fn on_verdict(&mut self, own: Own<'_>, answer: &Answer) -> Next {
+        let is_chosen = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.chosen);
+        let link = self.link(own, is_chosen);
         if let Pass::Sweep(sweeping) = &mut self.pass
             && self.exchange.awaits(answer.number)
-            && sweeping.put_off.is_none()
-            && sweeping.take(&answer.verdict)
+            && sweeping.take(link, answer)
         {
-            sweeping.own = answer.own;
             return self.conclude_sweep(own);
         }
         Next::Stale
@@ -109,9 +102,20 @@ impl Share {
         };
         if let Some((x_m, target)) = sweeping.agreed() {
             let chosen = sweeping.chosen;
+            if let Lead::Searching { search, .. } = &self.lead {
+                // Of places that may be chosen otherwise it says nothing.
+                let most = search.most(&sweeping.verdict.slacks);
+                self.bound = most.filter(|_| !chosen);
+            }
             self.at = self.station_for(chosen).at;
             self.setpoint = Some(self.at.at(x_m));
             self.target = Some(target);
+            if let Lead::Searching { search, .. } = &mut self.lead {
+                if !search.accept(target) {
+                    self.exchange.phase = Phase::Answered;
+                    return Next::Work { moved: true };
+                }
+            }
             return self.agree(own);
         }
         self.exchange.phase = Phase::Answered;
@@ -121,7 +125,15 @@ impl Share {
                 agreed: false,
             };
         };
-        if search.advance(&sweeping.verdict.slacks).is_err() {
+        let verdict = &sweeping.verdict;
+        let next = match search.refused(own.mission, verdict) {
+            Some(target) => {
+                let most = search.most(&verdict.slacks);
+                search.refuse(own.mission, self.profile, target, most)
+            }
+            None => search.advance(&verdict.slacks),
+        };
+        if next.is_err() {
             return self.give_up();
         }
         Next::Work { moved: false }

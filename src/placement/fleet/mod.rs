@@ -2,9 +2,9 @@
 //!
 //! | interference | relays | file | how good |
 //! | --- | --- | --- | --- |
-//! | one interferer | one altitude | [`farthest`] | exact: no chain with one relay fewer meets the target |
+//! | one interferer | any | [`farthest`] | exact where it says so: no chain with one relay fewer meets the target |
 //! | a field | all alike | [`ranges`] | exact, in an uneven field too, which the paper leaves to an exhaustive search |
-//! | either | other | [`farthest`] | what Algorithms 1 and 4 find; not proven |
+//! | a field | other | [`farthest`] | what Algorithm 4 finds; not proven |
 //!
 //! A least separation can only raise the number: a number that is the same without it is proven, any other is not.
 //! Nothing here is meant for a relay's main loop; nothing allocates either.
@@ -88,11 +88,7 @@ pub fn places(
     let Some(places) = places.get_mut(..usize::from(mission.relays())) else {
         return false;
     };
-    if mission.field().is_some() && alike(mission.relays(), &profile_of) {
-        ranges::places(mission, target, profile_of(1), places)
-    } else {
-        farthest::places(mission, target, &profile_of, places)
-    }
+    farthest::places(mission, target, &profile_of, places)
 }
 
 /// The highest target that any number of relays meets; `None` where none does down to 1e-20 of what the first hop can have.

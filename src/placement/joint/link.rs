@@ -96,14 +96,8 @@ impl<'a> Link<'a> {
     /// hop meets it. Beyond Rx nobody goes.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let at = self.room.nearest(self.within_reach(target, from_m, wanted));
-        let hop = Hop::new(
-            self.mission,
-            self.interferer,
-            self.sender,
-            1,
-            at,
-            self.distance_m,
-        );
+        let hop = Hop::new(self.mission, self.interferer, self.sender, 1, at, 0.0)
+            .ending(self.distance_m);
         Some(at.at(hop.stretched(target, from_m)?))
     }
 

@@ -365,14 +365,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 self.pass.end_m += self.least_step(chain.mission, chain.seat_of, index);
                 let sender = chain.sender(index, from);
                 let end_m = self.pass.end_m;
-                let hop = Hop::new(
-                    chain.mission,
-                    chain.interferer,
-                    sender,
-                    index,
-                    wanted,
-                    end_m,
-                );
+                let hop = Hop::new(chain.mission, chain.interferer, sender, index, wanted, 0.0)
+                    .ending(end_m);
                 hop.reach(target, from.x_m).map(|x_m| wanted.at(x_m))
             } else {
                 let link = chain.link(index, from, room);
