@@ -55,6 +55,7 @@ fn plainly(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
             own: relay,
             measured_per_w: None,
             plain: true,
+            end_m: None,
         };
         let mut reaches = PerTarget::new();
         link.extend(&[target as f32], &from, &mut reaches);

@@ -19,7 +19,7 @@ use host_tests::sim::outcome::{Ending, Outcome};
 use host_tests::sim::setup::Setup;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::placement::plan::{self, silent_place};
+use uav_relay::placement::plan::silent_place;
 use uav_relay::placement::retreat::Retreat;
 use uav_relay::{Interference, Measure, Mission, Profile, Schedule};
 

@@ -5,8 +5,7 @@ use core::task::Poll;
 
 use super::super::exchange::{Next, Phase};
 use super::super::lead::{Chain, Lead, MOST_SOLVED};
-use super::super::settings::Method;
-use super::{ALTITUDE, Chosen, Own, Pass, Share};
+use super::{Chosen, Own, Pass, Share};
 use crate::placement::joint::ascent::{Ascent, Turn};
 use crate::placement::joint::course::{Bar, Courser, Coursing, Trials};
 use crate::placement::joint::{Outlook, Seat};
@@ -35,8 +34,7 @@ impl Share {
 
     /// Goes on with the chain's solution while there is nothing else to do.
     pub(super) fn think(&mut self, own: Own<'_>) -> Next {
-        let wanted = ALTITUDE && own.settings.method == Method::Joint && self.chosen.is_none();
-        if wanted && own.mission.interferer().is_some() {
+        if own.joins() && self.chosen.is_none() {
             _ = self.solve(own);
             return Next::Think;
         }
@@ -102,7 +100,7 @@ impl Share {
 
     /// The leader goes over to sweeps at the places chosen, about `target` if that is known.
     pub(super) fn search_chosen(&mut self, own: Own<'_>, target: f32) -> Result<(), Infeasible> {
-        let ladder = (target > 0.0).then(|| {
+        let ladder = (target > 0.0 && own.settings.predict).then(|| {
             let gap = own.mission.config().tolerance / 4.0;
             Ladder::around(target * 1.000_001, gap, target * 0.5, target * 2.0)
         });

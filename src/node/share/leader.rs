@@ -20,7 +20,7 @@ const FIELD_HOPS_AT_ONCE: u16 = 8;
 impl Share {
     /// Goes on with the leader's computation; whether the next pass can begin.
     pub(super) fn plan(&mut self, own: Own<'_>) -> Result<bool, Infeasible> {
-        if ALTITUDE && own.settings.method == Method::Joint && self.chosen.is_none() {
+        if own.joins() && self.chosen.is_none() {
             if let Some(target) = self.solve(own) {
                 self.search_chosen(own, target)?;
                 return Ok(true);
@@ -89,7 +89,7 @@ impl Share {
         match &self.lead {
             Lead::Searching { search, .. } => {
                 let ladder = *search.ladder();
-                let chosen = own.settings.method == Method::Joint && self.chosen.is_some();
+                let chosen = own.joins() && self.chosen.is_some();
                 self.begin();
                 self.sweep_on(own, ladder, chosen, None, &origins(mission))
             }

@@ -15,7 +15,7 @@ use super::adjust::Turning;
 use super::align::Sweeping;
 use super::exchange::{Exchange, Next, Phase};
 use super::lead::Lead;
-use super::settings::Settings;
+use super::settings::{Method, Settings};
 use crate::mission::{Band, Mission, Profile};
 use crate::placement::joint::Outlook;
 use crate::placement::joint::course::Coursing;
@@ -61,6 +61,13 @@ impl Own<'_> {
     /// Whether it can fly the mission of that stamp.
     fn has(self, stamp: Stamp) -> bool {
         stamp == self.held || stamp == self.flown
+    }
+
+    /// Whether the joint method is asked for, and has something to choose.
+    fn joins(&self) -> bool {
+        let config = self.mission.config();
+        let free = !(config.band.is_single() && config.lateral.is_single());
+        ALTITUDE && self.settings.method == Method::Joint && free
     }
 
     fn is_last(&self) -> bool {

@@ -151,7 +151,7 @@ impl Share {
                     self.exchange.phase = Phase::Answered;
                     return Next::Work { moved: true };
                 }
-                Method::Joint if ALTITUDE && self.is_mixed(own) => {
+                Method::Joint if own.joins() && self.is_mixed(own) => {
                     self.begin_ascent(own, target);
                     self.exchange.phase = Phase::Answered;
                     return Next::Work { moved: true };
