@@ -451,6 +451,29 @@ fn a_course_goes_onward_and_what_came_of_it_back() {
     assert_eq!(counted(relay.stats()), ["received", "repeated"]);
 }
 
+/// From far aside, the room of relay 4 is to be had for some targets by a hop alone that ends before Tx.
+#[test]
+fn a_trial_that_would_lead_back_before_tx_is_not_handed_on() {
+    let mut now = Instant::ZERO;
+    let (relay, course, _) = on_course(&mut now);
+    let mut kept = Vec::new();
+    for step in 1..=200_u16 {
+        let mut relay = relay.clone();
+        let mut course = course.clone();
+        if let Said::Course { trials, .. } = &mut course {
+            trials[1] = [0.001 * f32::from(step), 2.5, 0.0, -400.0, 20.0];
+        }
+        hear(&mut relay, now, Port::Upstream, &course);
+        let out = sent(&mut relay, now);
+        let [(Port::Downstream, Said::Course { trials, .. })] = &out[..] else {
+            panic!("{out:?}");
+        };
+        kept.push(trials.len());
+    }
+    println!("{kept:?}");
+    assert!(kept.contains(&2) && kept.contains(&1) && kept.is_sorted_by(|a, b| a >= b));
+}
+
 /// The number alone does not make it the same course.
 #[test]
 fn a_course_with_other_trials_does_not_repeat_and_asks_for_a_new_view() {
