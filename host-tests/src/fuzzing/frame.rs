@@ -1,10 +1,10 @@
 //! Any bytes behind a good check sequence: what can be read can be written, and is then the same.
 
 use uav_relay::mission::MAX_RELAYS;
+use uav_relay::placement::joint::course::{TRIALS, Trial};
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};
-use uav_relay::placement::joint::course::{TRIALS, Trial};
 use uav_relay::wire::message::Message;
 use uav_relay::{Identity, Instant, Mission, Port, Relay, Stats};
 
@@ -232,7 +232,9 @@ fn look_at(message: &Message) {
             assert!((1e-6..=1e6).contains(&course.power_w));
             assert!(course.trials.len() <= TRIALS);
             let bar = course.bar;
-            assert!((0.0..=1.0).contains(&bar.trust) && bar.slope < 0.0 && bar.estimate.abs() <= 1e3);
+            assert!(
+                (0.0..=1.0).contains(&bar.trust) && bar.slope < 0.0 && bar.estimate.abs() <= 1e3
+            );
             for trial in &course.trials {
                 let Trial {
                     target,
