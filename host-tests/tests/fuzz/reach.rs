@@ -79,6 +79,21 @@ fn chains_of_the_corpus_agree_by_every_method_over_bad_links() {
         *agreed.entry((method(&relays[0]), shared)).or_insert(0) += u32::from(all);
     }
     println!("{agreed:?}");
+    for shared in [false, true] {
+        let mixed = chains.iter().filter(|relays| {
+            let settings = relays[0].settings();
+            settings.method == Method::Joint
+                && (settings.wiring == Wiring::Shared) == shared
+                && relays.iter().any(|one| one.settings().hold_altitude)
+                && relays
+                    .iter()
+                    .all(|one| one.relay().phase() == Phase::Holding)
+        });
+        assert!(
+            mixed.count() > 0,
+            "no chain agrees by courses, shared: {shared}"
+        );
+    }
     let signed = chains.iter().filter(|relays| {
         let signs = relays[0].settings().auth.is_some();
         signs

@@ -21,6 +21,9 @@ use super::folder;
 /// Frames of a flight that are kept: a few passes of every kind.
 const FRAMES: usize = 24;
 
+/// Wake-ups in one operation, at most.
+const MOST_WAKES: u8 = 64;
+
 #[derive(Deserialize)]
 struct Vectors {
     frames: Vec<Frame>,
@@ -126,6 +129,12 @@ fn chain() -> Vec<Vec<u8>> {
     ]
     .concat();
     seeds.extend([8, 72].map(|how| with(&[0, 3, how], &uploads)));
+    // Relay 2 holds its altitude: places come of courses.
+    let mixed = |how| {
+        let rounds = [0, 13, 127].repeat(8);
+        [&[1, 3, how, 1, 0][..], &[0, 4, 0, 0], &[3], &rounds].concat()
+    };
+    seeds.extend([1, 65].map(mixed));
     seeds
 }
 
@@ -227,7 +236,7 @@ fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
     let own = u8::try_from(index).unwrap() - 1;
     let head = [prefix.get(..2).unwrap(), &[0, own]].concat();
     let mut seed = [&*head, &prefix[2..], &[0, 0, 0, 0, 1, 0]].concat();
-    let mut frames = 0;
+    let (mut frames, mut wakes) = (0, 0_u8);
     while frames < FRAMES {
         let Some(now) = relays.iter().filter_map(Relay::poll_timeout).min() else {
             break;
@@ -235,11 +244,18 @@ fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
         if now > Instant::from_millis(4_000) {
             break;
         }
-        seed.extend([3, 0]);
+        wakes += u8::from(relays[usize::from(own)].poll_timeout() == Some(now));
         for relay in &mut relays {
             relay.handle_timeout(now);
         }
-        frames += exchange(&mut relays, now, usize::from(own), &mut seed);
+        let mut heard = Vec::new();
+        frames += exchange(&mut relays, now, usize::from(own), &mut heard);
+        // As many wake-ups in one operation as there may be.
+        if wakes > 0 && (wakes == MOST_WAKES || !heard.is_empty()) {
+            seed.extend([3, wakes - 1]);
+            wakes = 0;
+        }
+        seed.extend(heard);
     }
     seed
 }

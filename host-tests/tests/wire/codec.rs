@@ -6,14 +6,15 @@ use serde::Deserialize;
 use uav_relay::guard::Fence;
 use uav_relay::placement::PerTarget;
 use uav_relay::placement::joint::Outlook;
+use uav_relay::placement::joint::course::{Bar, Trial};
 use uav_relay::placement::ladder::Ladder;
 use uav_relay::placement::verdict::Verdict;
 use uav_relay::sir::{CrossSection, Station};
 use uav_relay::wire::digest::Stamp;
 use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{
-    Answer, Before, Count, Course, Hail, Message, MessageError, Moved, Roster, Sweep, Token, Trial,
-    Turn, Worth,
+    Answer, Before, Count, Course, Hail, Message, MessageError, Moved, Roster, Sweep, Token, Turn,
+    Worth,
 };
 use uav_relay::{Local, Placement};
 
@@ -72,14 +73,17 @@ pub(crate) enum Said {
         number: u16,
         mission: u16,
         power_w: f32,
-        /// Target, x, y and altitude of each.
-        trials: Vec<[f32; 4]>,
+        /// Trust, slope and estimate.
+        bar: [f32; 3],
+        /// Target, penalty, x, y and altitude of each.
+        trials: Vec<[f32; 5]>,
     },
     Worth {
         number: u16,
         mission: u16,
         trial: Option<u8>,
-        outlook: [f32; 17],
+        slack_m: f32,
+        outlook: [f32; 12],
     },
     Token {
         number: u16,
@@ -223,10 +227,12 @@ impl Said {
                 number,
                 mission,
                 power_w,
+                bar,
                 trials,
             } => {
                 out = pass(6, [*number, *mission]);
                 reals(&mut out, &[*power_w]);
+                reals(&mut out, bar);
                 out.push(u8::try_from(trials.len()).unwrap());
                 reals(&mut out, trials.as_flattened());
             }
@@ -234,10 +240,12 @@ impl Said {
                 number,
                 mission,
                 trial,
+                slack_m,
                 outlook,
             } => {
                 out = pass(7, [*number, *mission]);
                 option(&mut out, *trial);
+                reals(&mut out, &[*slack_m]);
                 reals(&mut out, outlook);
             }
             Self::Token {
@@ -376,22 +384,30 @@ impl Said {
                 number,
                 mission,
                 power_w,
+                bar: [trust, slope, estimate],
                 ref trials,
             } => Message::Course(Course {
                 number,
                 mission,
                 power_w,
+                bar: Bar {
+                    trust,
+                    slope,
+                    estimate,
+                },
                 trials: trials.iter().copied().map(trial).collect(),
             }),
             Self::Worth {
                 number,
                 mission,
                 trial,
+                slack_m,
                 outlook,
             } => Message::Worth(Worth {
                 number,
                 mission,
                 trial,
+                slack_m,
                 outlook: Outlook::from_parts(outlook).unwrap(),
             }),
             Self::Token {
@@ -552,10 +568,20 @@ impl Said {
                     && is_beside(*y_m)
             }
             Self::Course {
-                power_w, trials, ..
-            } => is_power(*power_w) && trials.iter().copied().all(is_trial),
-            Self::Worth { trial, outlook, .. } => {
-                trial.is_none_or(|trial| trial < 4) && outlook.iter().all(|part| part.is_finite())
+                power_w,
+                bar,
+                trials,
+                ..
+            } => is_power(*power_w) && is_bar(*bar) && trials.iter().copied().all(is_trial),
+            Self::Worth {
+                trial,
+                slack_m,
+                outlook,
+                ..
+            } => {
+                trial.is_none_or(|trial| trial < 3)
+                    && slack_m.is_finite()
+                    && outlook.iter().all(|part| part.is_finite())
             }
             Self::Token {
                 x_m,
@@ -623,8 +649,16 @@ fn is_beside(y_m: f32) -> bool {
     (-1e5..=1e5).contains(&y_m)
 }
 
-fn is_trial([target, x_m, y_m, altitude_m]: [f32; 4]) -> bool {
+fn is_bar([trust, slope, estimate]: [f32; 3]) -> bool {
+    (0.0..=1.0).contains(&trust)
+        && slope < 0.0
+        && slope.is_finite()
+        && (-1e3..=1e3).contains(&estimate)
+}
+
+fn is_trial([target, penalty_m, x_m, y_m, altitude_m]: [f32; 5]) -> bool {
     (f32::MIN_POSITIVE..=1e30).contains(&target)
+        && (0.0..f32::INFINITY).contains(&penalty_m)
         && is_place(x_m)
         && is_beside(y_m)
         && is_altitude(altitude_m)
@@ -651,9 +685,10 @@ fn station(y_m: f32, altitude_m: f32, power_w: f32) -> Station {
     }
 }
 
-fn trial([target, x_m, y_m, altitude_m]: [f32; 4]) -> Trial {
+fn trial([target, penalty_m, x_m, y_m, altitude_m]: [f32; 5]) -> Trial {
     Trial {
         target,
+        penalty_m,
         place: Placement {
             x_m,
             y_m,
@@ -724,21 +759,17 @@ impl Reader<'_> {
         (0..count).map(|_| self.real()).collect()
     }
 
-    fn trials(&mut self) -> Option<Vec<[f32; 4]>> {
-        let count = self.byte().filter(|&count| count <= 4)?;
-        let mut trials = Vec::new();
-        for _ in 0..count {
-            trials.push([self.real()?, self.real()?, self.real()?, self.real()?]);
-        }
-        Some(trials)
+    fn trials(&mut self) -> Option<Vec<[f32; 5]>> {
+        let count = self.byte().filter(|&count| count <= 3)?;
+        (0..count).map(|_| self.reals()).collect()
     }
 
-    fn outlook(&mut self) -> Option<[f32; 17]> {
-        let mut parts = [0.0; 17];
-        for part in &mut parts {
-            *part = self.real()?;
+    fn reals<const N: usize>(&mut self) -> Option<[f32; N]> {
+        let mut numbers = [0.0; N];
+        for number in &mut numbers {
+            *number = self.real()?;
         }
-        Some(parts)
+        Some(numbers)
     }
 
     fn bool(&mut self) -> Option<bool> {
@@ -806,6 +837,7 @@ impl Reader<'_> {
                 number: self.word()?,
                 mission: self.word()?,
                 power_w: self.real()?,
+                bar: self.reals()?,
                 trials: self.trials()?,
             },
             7 => Said::Worth {
@@ -816,7 +848,8 @@ impl Reader<'_> {
                 } else {
                     None
                 },
-                outlook: self.outlook()?,
+                slack_m: self.real()?,
+                outlook: self.reals()?,
             },
             8 => Said::Token {
                 number: self.word()?,

@@ -45,8 +45,8 @@ proptest! {
             Said::Busy { .. } => 19,
             Said::Heartbeat { .. } => 20,
             Said::Measured { .. } | Said::Aside { .. } => 104,
-            Said::Course { .. } => 90,
-            Said::Worth { .. } => 91,
+            Said::Course { .. } => 98,
+            Said::Worth { .. } => 75,
             Said::Token { .. } => 44,
             Said::Moved { .. } => 34,
             Said::Hail(_) | Said::Roster(_) | Said::Count(_) => 30,
@@ -64,8 +64,8 @@ proptest! {
             Said::Busy { .. } => 19,
             Said::Heartbeat { .. } => 20,
             Said::Measured { reaches, .. } | Said::Aside { reaches, .. } => 40 + 4 * reaches.len(),
-            Said::Course { trials, .. } => 26 + 16 * trials.len(),
-            Said::Worth { trial, .. } => 90 + usize::from(trial.is_some()),
+            Said::Course { trials, .. } => 38 + 20 * trials.len(),
+            Said::Worth { trial, .. } => 74 + usize::from(trial.is_some()),
             Said::Token { .. } => 44,
             Said::Moved { .. } => 34,
             Said::Hail(_) | Said::Roster(_) | Said::Count(_) => 30,
@@ -82,13 +82,13 @@ proptest! {
     }
 
     #[test]
-    fn every_full_sweep_with_more_takes_104_bytes_and_every_full_course_90(
+    fn every_full_sweep_with_more_takes_104_bytes_and_every_full_course_98(
         sweep in prop_oneof![measured(sweeps(16)), asides(sweeps(16))],
-        course in courses(4),
+        course in courses(3),
         head in headers(),
     ) {
         let mut frame = [0; MAX_FRAME];
-        prop_assert_eq!(frame::encode(head, &course.message(), &mut frame), 90);
+        prop_assert_eq!(frame::encode(head, &course.message(), &mut frame), 98);
         prop_assert_eq!(frame::encode(head, &sweep.message(), &mut frame), 104);
         prop_assert_eq!(MAX_FRAME, 104 + TAG);
         prop_assert_eq!(only_frame(&frame[..104]).len(), 102);

@@ -157,13 +157,15 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             number,
             mission,
             power_w,
-            trials: vec![[1.0, x_m, -12.5, altitude_m]],
+            bar: [0.5, -1.0, -1e3],
+            trials: vec![[1.0, 0.0, x_m, -12.5, altitude_m]],
         },
         Said::Worth {
             number,
             mission,
             trial: Some(0),
-            outlook: [0.5; 17],
+            slack_m: 1.0,
+            outlook: [0.5; 12],
         },
         Said::Token {
             number,
@@ -517,11 +519,13 @@ fn tamed(said: Said) -> Said {
         Said::Course {
             number,
             mission,
+            bar,
             mut trials,
             ..
         } => {
-            for [target, x_m, y_m, altitude_m] in &mut trials {
+            for [target, penalty_m, x_m, y_m, altitude_m] in &mut trials {
                 *target = 0.5;
+                *penalty_m = penalty_m.min(1.0);
                 *x_m = into(*x_m);
                 *y_m %= 60.0;
                 *altitude_m = altitude_m.clamp(20.0, 300.0);
@@ -530,6 +534,7 @@ fn tamed(said: Said) -> Said {
                 number,
                 mission,
                 power_w: 1.0,
+                bar,
                 trials,
             }
         }
@@ -607,7 +612,7 @@ struct Step {
 
 fn steps() -> impl Strategy<Value = Vec<Step>> {
     let mostly = || prop_oneof![9 => Just(true), 1 => Just(false)];
-    let waits = prop_oneof![3 => Just(0), 4 => 1..8_u64, 1 => 0..100_u64];
+    let waits = prop_oneof![3 => Just(0), 4 => 1..8_u64, 2 => 0..100_u64];
     let drawn = (
         messages(),
         mostly(),

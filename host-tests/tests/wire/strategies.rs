@@ -197,32 +197,50 @@ pub(crate) fn courses(least: usize) -> BoxedStrategy<Said> {
         1 => Just(f32::MIN_POSITIVE),
         1 => Just(1e30),
     ];
-    let trials = (targets, along(), beside(), altitudes())
-        .prop_map(|(target, x_m, y_m, altitude_m)| [target, x_m, y_m, altitude_m]);
+    let penalties = prop_oneof![2 => Just(0.0), 2 => 0.0..=10.0_f32, 1 => up_to(f32::MAX)];
+    let trials = (targets, penalties, along(), beside(), altitudes())
+        .prop_map(|(target, penalty, x, y, altitude)| [target, penalty, x, y, altitude]);
     let numbers = (any::<u16>(), any::<u16>());
-    (numbers, powers(), vec(trials, least..=4))
-        .prop_map(|((number, mission), power_w, trials)| Said::Course {
+    (numbers, powers(), bars(), vec(trials, least..=3))
+        .prop_map(|((number, mission), power_w, bar, trials)| Said::Course {
             number,
             mission,
             power_w,
+            bar,
             trials,
         })
         .boxed()
 }
 
+/// By what trials are judged: in the first course, and later.
+fn bars() -> impl Strategy<Value = [f32; 3]> {
+    let trusts = prop_oneof![2 => 0.0..=1.0_f32, 1 => Just(0.5)];
+    let slopes = prop_oneof![
+        4 => -1000.0..=-1e-3_f32,
+        1 => Just(f32::MIN),
+        1 => Just(-f32::from_bits(1)),
+    ];
+    let estimates = prop_oneof![2 => Just(-1e3), 3 => -5.0..=5.0_f32, 1 => -1e3..=1e3_f32];
+    (trusts, slopes, estimates).prop_map(|(trust, slope, estimate)| [trust, slope, estimate])
+}
+
 /// What came of a course, in range.
 pub(crate) fn worths() -> BoxedStrategy<Said> {
-    let parts = prop_oneof![
-        4 => -10.0..=10.0_f32,
-        1 => up_to(f32::MAX),
-        1 => up_to(f32::MAX).prop_map(|part| -part),
-    ];
-    let trials = proptest::option::of(0..4_u8);
-    (any::<u16>(), any::<u16>(), trials, vec(parts, 17))
-        .prop_map(|(number, mission, trial, outlook)| Said::Worth {
+    let parts = || {
+        prop_oneof![
+            4 => -10.0..=10.0_f32,
+            1 => up_to(f32::MAX),
+            1 => up_to(f32::MAX).prop_map(|part| -part),
+        ]
+    };
+    let trials = proptest::option::of(0..3_u8);
+    let numbers = (any::<u16>(), any::<u16>());
+    (numbers, trials, parts(), vec(parts(), 12))
+        .prop_map(|((number, mission), trial, slack_m, outlook)| Said::Worth {
             number,
             mission,
             trial,
+            slack_m,
             outlook: outlook.try_into().unwrap(),
         })
         .boxed()

@@ -160,9 +160,12 @@ impl Coursing {
             }
         };
         let place = link.at(told.target, from.x_m, wanted)?;
-        Some(Trial {
+        let penalty_m = told.penalty_m + link.penalty(told.target, place);
+        // Where there is no room nearer to the line, a hop may end before Tx.
+        let sound = place.x_m >= 0.0 && penalty_m <= f32::MAX;
+        sound.then_some(Trial {
             place,
-            penalty_m: told.penalty_m + link.penalty(told.target, place),
+            penalty_m,
             ..told
         })
     }
