@@ -121,37 +121,34 @@ impl<'a> Link<'a> {
     /// What a hop reaches for c > 1 is a ball: its middle is (p - m) / (c - 1) beyond the sender's place p, its radius sqrt(c) |p - m| /
     /// (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
-        let Sender { at: from, gain } = self.sender;
-        let e = gain.excess(target);
-        let m = self.interferer;
         let wanted = self.room.nearest(wanted);
-        if !(e > 0.0) {
+        let Some((middle, rim)) = self.disk(target, from_m, from_m) else {
             return Some(wanted);
-        }
-        let (ahead, aside, above) = (m.x_m - from_m, from.y_m - m.y_m, from.altitude_m);
-        let squared = square(ahead) + square(aside) + square(above);
-        let rim = (RIM * gain.ratio(target) * squared - square(ahead.max(0.0))) / square(e);
-        let middle = CrossSection {
-            y_m: from.y_m + aside / e,
-            altitude_m: from.altitude_m + above / e,
         };
         if wanted.apart_squared(middle) <= rim {
             return Some(wanted);
         }
-        // |best + share w - middle|^2 = rim
         let best = self.room.nearest(middle);
-        let left = rim - best.apart_squared(middle);
-        let (wy, wh) = (wanted.y_m - best.y_m, wanted.altitude_m - best.altitude_m);
-        let (cy, ch) = (best.y_m - middle.y_m, best.altitude_m - middle.altitude_m);
-        let (a, b) = (square(wy) + square(wh), wy * cy + wh * ch);
-        if !(left >= 0.0 && a > 0.0) {
+        toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
+    }
+
+    /// The middle and the squared radius of what a hop reaches for c > 1 at `x_m` or beyond.
+    fn disk(&self, target: f32, from_m: f32, x_m: f32) -> Option<(CrossSection, f32)> {
+        let Sender { at: from, gain } = self.sender;
+        let e = gain.excess(target);
+        if !(e > 0.0) {
             return None;
         }
-        let share = left / (b + sqrt(square(b) + a * left));
-        Some(self.room.nearest(CrossSection {
-            y_m: best.y_m + share * wy,
-            altitude_m: best.altitude_m + share * wh,
-        }))
+        let m = self.interferer;
+        let (ahead, aside, above) = (m.x_m - from_m, from.y_m - m.y_m, from.altitude_m);
+        let squared = square(ahead) + square(aside) + square(above);
+        let beyond = (e * (x_m - from_m) + ahead).max(0.0);
+        let rim = (RIM * gain.ratio(target) * squared - square(beyond)) / square(e);
+        let middle = CrossSection {
+            y_m: from.y_m + aside / e,
+            altitude_m: from.altitude_m + above / e,
+        };
+        Some((middle, rim))
     }
 
     /// Where the relay goes across the line for `share` of its `policy`, when the sender is at `from` instead of `change` before that.
@@ -169,10 +166,21 @@ impl<'a> Link<'a> {
         let [_, a, b] = policy.axis.first(triple(nominal));
         let (a, b) = (a + by[0], b + by[1]);
         match policy.axis {
-            Axis::X => CrossSection {
-                y_m: a,
-                altitude_m: b,
-            },
+            Axis::X => {
+                let wanted = self.room.nearest(CrossSection {
+                    y_m: a,
+                    altitude_m: b,
+                });
+                // What was right above Rx stays there.
+                let there = nominal.x_m >= self.distance_m;
+                let disk = self.disk(target, from.x_m, self.distance_m);
+                match disk.filter(|_| there) {
+                    Some((middle, rim)) if wanted.apart_squared(middle) > rim => {
+                        toward(nominal.cross_section(), wanted, middle, rim).unwrap_or(wanted)
+                    }
+                    _ => wanted,
+                }
+            }
             Axis::Y => {
                 let b = self.room.band.nearest(b);
                 let y = self.along(
@@ -274,8 +282,17 @@ impl<'a> Link<'a> {
         let low = [from.x_m, lateral.least_m, band.least_m];
         let high = [self.distance_m, lateral.most_m, band.most_m];
         let (low, high) = (minus(low, place), minus(high, place));
-        let (axis, normal) = self.axis(c, from, to, low, high);
-        let hop = if to.x_m >= self.distance_m {
+        let at_end = to.x_m >= self.distance_m - EDGE * self.distance_m;
+        let [hx, hy, hh] = minus(place, triple(from));
+        let reached = c * (square(hx) + square(hy) + square(hh));
+        let spare = square(dx) + square(dy) + square(dh) - reached;
+        let loose = at_end && spare > TIGHT * reached;
+        let (axis, normal) = if loose {
+            (Axis::X, 0.0)
+        } else {
+            self.axis(c, from, to, low, high)
+        };
+        let hop = if at_end && axis == Axis::X {
             Reach::FIXED
         } else {
             let [source, from, place] = [source, triple(from), place].map(|p| axis.first(p));
@@ -306,14 +323,18 @@ impl<'a> Link<'a> {
         low: Triple,
         high: Triple,
     ) -> (Axis, f32) {
-        let rounding = 1e-6 * self.distance_m;
+        let rounding = EDGE * self.distance_m;
         let [dx, dy, dh] = minus(triple(to), self.source());
         let [hx, hy, hh] = minus(triple(to), triple(from));
         let [nx, ny, nh] = [dx - c * hx, dy - c * hy, dh - c * hh];
-        let ([lx, ly, lh], [_, uy, uh]) = (low, high);
+        let ([lx, ly, lh], [ux, uy, uh]) = (low, high);
         let mut best = (Axis::X, nx);
         // Rather x, by which the chain gets on.
-        let mut steepest = if lx >= -rounding { 0.0 } else { 1.5 * nx.abs() };
+        let mut steepest = if lx >= -rounding || ux <= rounding {
+            0.0
+        } else {
+            1.5 * nx.abs()
+        };
         for (axis, normal, low, high) in [(Axis::Y, ny, ly, uy), (Axis::H, nh, lh, uh)] {
             let free = low < -rounding && high > rounding;
             if c > 1.0 && free && normal.abs() > steepest {
@@ -374,6 +395,34 @@ pub(super) fn tail(
 }
 
 const LITTLE: f32 = 0.999_97;
+
+/// What lies on the way from `best` to `wanted` within a circle; `None` if nothing does.
+fn toward(
+    best: CrossSection,
+    wanted: CrossSection,
+    middle: CrossSection,
+    rim: f32,
+) -> Option<CrossSection> {
+    // |best + share w - middle|^2 = rim
+    let left = rim - best.apart_squared(middle);
+    let (wy, wh) = (wanted.y_m - best.y_m, wanted.altitude_m - best.altitude_m);
+    let (cy, ch) = (best.y_m - middle.y_m, best.altitude_m - middle.altitude_m);
+    let (a, b) = (square(wy) + square(wh), wy * cy + wh * ch);
+    if !(left >= 0.0 && a > 0.0) {
+        return None;
+    }
+    let share = left / (b + sqrt(square(b) + a * left));
+    Some(CrossSection {
+        y_m: best.y_m + share * wy,
+        altitude_m: best.altitude_m + share * wh,
+    })
+}
+
+/// How near an end of its room a relay is at it, in parts of D.
+const EDGE: f32 = 2e-6;
+
+/// How much of its length a hop may leave and still be as long as it may be.
+const TIGHT: f32 = 1e-3;
 
 /// The coordinates of a place.
 pub(super) const fn triple(place: Placement) -> Triple {
