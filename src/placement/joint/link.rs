@@ -142,8 +142,11 @@ impl<'a> Link<'a> {
         let m = self.interferer;
         let (ahead, aside, above) = (m.x_m - from_m, from.y_m - m.y_m, from.altitude_m);
         let squared = square(ahead) + square(aside) + square(above);
-        let beyond = (e * (x_m - from_m) + ahead).max(0.0);
-        let rim = (RIM * gain.ratio(target) * squared - square(beyond)) / square(e);
+        // By how much the middle is before that, or beyond Rx.
+        let before = e * (x_m - from_m) + ahead;
+        let beyond = -(e * (self.distance_m - from_m) + ahead);
+        let off = before.max(beyond).max(0.0);
+        let rim = (RIM * gain.ratio(target) * squared - square(off)) / square(e);
         let middle = CrossSection {
             y_m: from.y_m + aside / e,
             altitude_m: from.altitude_m + above / e,
@@ -213,6 +216,11 @@ impl<'a> Link<'a> {
     /// The coordinate that follows from the other two, `at`, by the hop `from` the sender.
     fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
         let gain = self.sender.gain;
+        let target = if gain.excess(target) > 0.0 {
+            target
+        } else {
+            target * (2.0 - RIM)
+        };
         let (e, c) = (gain.excess(target), gain.ratio(target));
         let [m, m1, m2] = policy.axis.first(self.source());
         let [p, p1, p2] = policy.axis.first(triple(from));
@@ -220,11 +228,13 @@ impl<'a> Link<'a> {
         let u = if policy.rising { m - p } else { p - m };
         let rest = square(m1 - a) + square(m2 - b) - c * (square(a - p1) + square(b - p2));
         let root = c * square(u) + e * rest;
-        if !(e > 0.0 && root >= 0.0) {
+        if !(root >= 0.0) {
             return None;
         }
         let r = sqrt(root);
-        let d = if u >= 0.0 {
+        let d = if !(e > 0.0) {
+            (u + r) / -e.min(-1e-6)
+        } else if u >= 0.0 {
             (square(u) + rest) / (u + r)
         } else {
             (r - u) / e
@@ -307,7 +317,7 @@ impl<'a> Link<'a> {
         let [_, h1, h2] = axis.first(high.map(|high| high.min(far).max(0.0)));
         let (before, policy) = after.before(axis, &hop, [l1, l2], [h1, h2]);
         let policy = Policy {
-            rising: normal < 0.0,
+            rising: (normal < 0.0) == (c > 1.0),
             ..policy
         };
         (before, policy)
@@ -337,7 +347,7 @@ impl<'a> Link<'a> {
         };
         for (axis, normal, low, high) in [(Axis::Y, ny, ly, uy), (Axis::H, nh, lh, uh)] {
             let free = low < -rounding && high > rounding;
-            if c > 1.0 && free && normal.abs() > steepest {
+            if (c > 1.0 || ux <= rounding) && free && normal.abs() > steepest {
                 steepest = normal.abs();
                 best = (axis, normal);
             }
