@@ -47,6 +47,9 @@ pub(crate) struct Ascent {
     pub(crate) slack: f32,
     /// The least target that may be tried.
     floor: f32,
+    /// The most that is tried before the chain is probed, in ln gamma, and by how much that is raised next.
+    limit: f32,
+    excess: f32,
     distance_m: f32,
     /// The slack's slope by ln gamma, m.
     pub(crate) slope: f32,
@@ -66,6 +69,8 @@ impl Ascent {
             sigma,
             slack,
             floor,
+            limit: f32::INFINITY,
+            excess: 0.0,
             distance_m,
             slope: -1.0,
             linear: 0.0,
@@ -75,6 +80,33 @@ impl Ascent {
             iterations: 0,
             idle: 0,
         }
+    }
+
+    /// The same, to be probed at `limit` first.
+    pub(crate) const fn probed_at(self, limit: f32) -> Self {
+        Self {
+            limit,
+            excess: 0.03,
+            ..self
+        }
+    }
+
+    /// The highest target for now.
+    pub(crate) const fn limit(&self) -> f32 {
+        self.limit
+    }
+
+    /// Whether there is no higher one for now.
+    pub(crate) fn at_limit(&self) -> bool {
+        self.slack >= 0.0 && self.sigma >= self.limit
+    }
+
+    /// The probe came to nothing: the chain has to have more to spare.
+    pub(crate) fn probed(&mut self) -> Turn {
+        self.limit += self.excess;
+        self.excess *= 4.0;
+        self.trust = TRUST;
+        Turn::Again
     }
 
     /// The target at which the nominal chain's slack would be zero.
@@ -102,6 +134,9 @@ impl Ascent {
         if self.iterations > ITERATIONS || !(self.linear + self.square).is_finite() {
             return Turn::Over;
         }
+        if self.at_limit() {
+            return Turn::Raise;
+        }
         // More than enough, and no use for it but a higher target.
         if self.slack > 1e-4 * self.distance_m && self.linear + self.square < 0.1 * self.slack {
             return Turn::Raise;
@@ -113,7 +148,9 @@ impl Ascent {
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
-        (self.sigma + by.clamp(-self.trust, self.trust)).max(self.floor)
+        (self.sigma + by.clamp(-self.trust, self.trust))
+            .min(self.limit)
+            .max(self.floor)
     }
 
     fn attempt(&self) -> Turn {
@@ -128,6 +165,9 @@ impl Ascent {
 
     /// Whether a trial that has `slack` for `sigma` is better than the nominal chain.
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
+        if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
+            return true;
+        }
         let by = sigma - slack / self.slope - self.estimate();
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }

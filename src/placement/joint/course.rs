@@ -4,11 +4,10 @@
 //! it is in each of them. The tail says which one is gone by, and on the way back every relay works out its next step.
 
 use super::ascent::{SHARES, TRUST};
-use super::link::{Link, Room, minus, triple};
+use super::link::{Link, Room, minus, tail, triple};
 use super::outlook::Outlook;
 use super::policy::Policy;
 use crate::mission::Mission;
-use crate::root::sqrt;
 use crate::sir::{CrossSection, Placement, Sender};
 
 /// The most trials of one course.
@@ -107,8 +106,7 @@ impl<'a> Courser<'a> {
 
     /// The slack at Rx of a trial of the tail, m, and its outlook.
     fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
-        let reach_m = sqrt(self.mission.receiver_gain(self.power_w) / target);
-        Outlook::tail(reach_m, self.mission.config().distance_m, at)
+        tail(self.mission, self.power_w, self.room, target, at)
     }
 }
 

@@ -9,7 +9,7 @@ use core::task::Poll;
 use super::ascent::{Ascent, Turn};
 use super::axis::Triple;
 use super::cells::Cell;
-use super::link::{Link, Room, minus, triple};
+use super::link::{self, Link, Room, minus, triple};
 use super::outlook::Outlook;
 use super::policy::Brief;
 use super::seek::Seek;
@@ -118,6 +118,8 @@ enum Work {
     Seek(Seek, Purpose),
     /// The chain as it is for one target, to be kept.
     Settle(f32, Purpose),
+    /// Whether the chain has all that can be had, by the rules of the sweep.
+    Probe,
     /// A pass back, at this segment.
     Back(u8),
     /// A pass forward with a part of the step and a target; to be kept if `true`.
@@ -188,18 +190,17 @@ impl<'a, F: Fn(u16) -> Seat> Chain<'a, F> {
 
     /// The slack of the tail at `at`, and its outlook.
     fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
-        let power_w = (self.seat_of)(self.mission.relays()).power_w;
-        let reach_m = sqrt(self.mission.receiver_gain(power_w) / target);
-        Outlook::tail(reach_m, self.distance_m(), at)
+        let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
+        link::tail(self.mission, power_w, room, target, at)
     }
 
     /// No chain meets more than the first hop or the last one can have.
     fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         let first = (self.seat_of)(1).room;
-        let first = sir::first_hop_ceiling(self.mission, first.band.least_m);
-        let last = self.mission.receiver_gain(power_w) / square(room.band.least_m);
-        libm::logf(first.min(last).clamp(1e-30, 1e30)) + 0.01
+        let first = link::first_most(self.mission, self.interferer, first);
+        let last = link::last_most(self.mission, power_w, room);
+        libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
     /// The largest gain of any hop, in ln gamma: above it nobody leaps to the far side of the interferer.
@@ -262,6 +263,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             Work::Begin => self.begin(&chain),
             Work::Seek(seek, purpose) => self.seek(&chain, seek, purpose),
             Work::Settle(sigma, purpose) => self.settle(&chain, sigma, purpose),
+            Work::Probe => {
+                self.probe(&chain);
+                Poll::Pending
+            }
             Work::Back(segment) => {
                 self.back(&chain, segment);
                 Poll::Pending
@@ -301,7 +306,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.restart();
         self.work = match start {
             Start::Near { .. } => Work::Settle(floor + 0.04, Purpose::Start),
-            Start::Arch { .. } | Start::Far => {
+            Start::Arch { .. } | Start::Around { .. } | Start::Far => {
                 Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, 0.02), Purpose::Start)
             }
         };
@@ -319,6 +324,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         chain: &Chain<'_, impl Fn(u16) -> Seat>,
         index: u16,
         room: Room,
+        target: f32,
         purpose: Purpose,
     ) -> CrossSection {
         if purpose != Purpose::Start {
@@ -333,6 +339,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                     y_m: top.y_m * (1.0 - down),
                     altitude_m: top.altitude_m + down * (room.band.least_m - top.altitude_m),
                 }
+            }
+            start @ Start::Around { .. } => {
+                let c = chain.sender(index, self.pass.from).gain.ratio(target);
+                start.around(
+                    chain.distance_m(),
+                    chain.interferer,
+                    self.pass.from,
+                    c,
+                    room,
+                )
             }
             start => start.across(chain.distance_m(), self.pass.from.x_m, room),
         };
@@ -355,11 +371,21 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         for _ in 0..PLAIN {
             let index = self.pass.done + 1;
             if index > relays {
+                if purpose == Purpose::Last {
+                    let power_w = (chain.seat_of)(relays).power_w;
+                    let reach_m = sqrt(chain.mission.receiver_gain(power_w) / target);
+                    let (slack, _) = Outlook::tail(reach_m, chain.distance_m(), self.pass.from);
+                    return Poll::Ready(Some(slack));
+                }
                 let (slack, _) = chain.tail(target, self.pass.from);
-                return Poll::Ready(Some(slack - self.pass.penalty));
+                let penalty = self.pass.penalty;
+                if purpose == Purpose::Judge && penalty > 5e-5 * chain.distance_m() {
+                    return Poll::Ready(Some(-penalty));
+                }
+                return Poll::Ready(Some(slack - penalty));
             }
             let room = (chain.seat_of)(index).room;
-            let wanted = self.shaped(chain, index, room, purpose);
+            let wanted = self.shaped(chain, index, room, target, purpose);
             let from = self.pass.from;
             let place = if purpose == Purpose::Last {
                 self.pass.end_m += self.least_step(chain.mission, chain.seat_of, index);
@@ -434,12 +460,30 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 Some(sigma) if purpose == Purpose::Last => {
                     return Poll::Ready(Ok(libm::expf(sigma)));
                 }
+                Some(sigma) if purpose == Purpose::Raise => {
+                    Work::Settle(sigma.min(self.ascent.limit()), purpose)
+                }
                 Some(sigma) => Work::Settle(sigma, purpose),
                 None if purpose == Purpose::Last => return Poll::Ready(Err(Infeasible)),
                 None => self.given_up(),
             }
         };
         Poll::Pending
+    }
+
+    fn probe(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>) {
+        let ceiling = chain.ceiling();
+        let Poll::Ready(slack) = self.plain(chain, ceiling - 5e-5, Purpose::Last, false) else {
+            return;
+        };
+        self.restart();
+        self.work = if slack.is_some_and(|slack| slack >= 0.0) {
+            self.best = Some((ceiling, self.number));
+            Work::Seek(Seek::down(ceiling + 7e-5, 1e-5, 2.0, 1e-6), Purpose::Last)
+        } else {
+            let turn = self.ascent.probed();
+            self.next(turn, chain.mission)
+        };
     }
 
     /// Nothing came of the start.
@@ -469,21 +513,23 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                     Start::Near { .. } => chain.floor(),
                     _ => f32::NEG_INFINITY,
                 };
-                self.ascent = Ascent::new(chain.distance_m(), sigma, slack, floor);
+                self.ascent = Ascent::new(chain.distance_m(), sigma, slack, floor)
+                    .probed_at(chain.ceiling() + 3e-4);
                 self.look_back(chain.mission)
             }
             Purpose::Raise => {
                 let turn = self.ascent.raised(sigma, slack);
                 self.next(turn, chain.mission)
             }
-            Purpose::Judge | Purpose::Last => self.judged(sigma),
+            Purpose::Judge | Purpose::Last => self.judged(sigma, chain.ceiling()),
         };
         Poll::Pending
     }
 
     /// An ascent has come to `sigma`.
-    fn judged(&mut self, sigma: f32) -> Work {
+    fn judged(&mut self, sigma: f32, ceiling: f32) -> Work {
         if self.again {
+            let sigma = sigma.min(ceiling + 5e-5);
             return Work::Seek(Seek::down(sigma + 2e-5, 1e-5, 2.0, 1e-6), Purpose::Last);
         }
         if self.best.is_none_or(|(best, _)| sigma > best) {
@@ -503,6 +549,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.restart();
         match turn {
             Turn::Try { share, sigma } => Work::Forward(share, sigma, false),
+            Turn::Raise if self.ascent.at_limit() => Work::Probe,
             Turn::Raise => {
                 let Ascent { sigma, slack, .. } = self.ascent;
                 Work::Seek(Seek::up(sigma, slack, 0.02, 1e-5), Purpose::Raise)
@@ -510,12 +557,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             Turn::Again => self.look_back(mission),
             Turn::Over => {
                 let Ascent { sigma, slack, .. } = self.ascent;
-                let seek = if slack >= 0.0 {
-                    Seek::up(sigma, slack, JUDGED, JUDGED)
-                } else {
-                    Seek::down(sigma, 2e-5, 3.0, JUDGED)
-                };
-                Work::Seek(seek, Purpose::Judge)
+                let _ = slack;
+                Work::Seek(
+                    Seek::down(sigma + JUDGED, JUDGED, 3.0, JUDGED),
+                    Purpose::Judge,
+                )
             }
         }
     }
@@ -572,7 +618,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     fn back(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>, segment: u8) {
         let before = self.nominal_before(chain, segment);
         let Some(outlook) = self.recall(chain, segment, before) else {
-            self.work = self.given_up();
+            self.work = self.next(Turn::Over, chain.mission);
             return;
         };
         self.ascent.add(&outlook);
@@ -629,7 +675,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let segment = u8::try_from(usize::from(self.pass.done) / SEGMENT).unwrap_or(u8::MAX);
         if self.held != Some(segment) {
             if self.recall(chain, segment, self.pass.old).is_none() {
-                self.work = self.given_up();
+                self.work = self.next(Turn::Over, chain.mission);
             }
             return;
         }
