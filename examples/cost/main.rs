@@ -56,6 +56,7 @@ mod image {
         shares::shares();
         methods::methods();
         planning::planning();
+        planning::joint();
         stack::stack();
         #[cfg(feature = "auth")]
         super::auth::auth();

@@ -3,6 +3,7 @@
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use uav_relay::placement::fleet;
+use uav_relay::placement::joint::{Seat, Solver};
 use uav_relay::placement::single::{free, given_altitude, given_x};
 
 use super::counter::instructions;
@@ -25,4 +26,40 @@ pub(crate) fn planning() {
     });
     hprintln!("fewest {}", count);
     hprintln!("fewest_relays {}", relays);
+}
+
+/// A chain of so many by the joint method in the scenario with a band of altitudes: instructions in all, of the costliest portion, and
+/// how many portions.
+fn solved(relays: u16) -> (u32, u32, u32) {
+    let Ok(mission) = HIGH.with_relays(relays) else {
+        return (0, 0, 0);
+    };
+    let Some(mut solver) = Solver::<100, 10>::new(&mission) else {
+        return (0, 0, 0);
+    };
+    let seat = Seat::common(&mission);
+    let (mut all, mut most, mut portions) = (0_u32, 0, 0);
+    loop {
+        let mut over = false;
+        let cost = instructions(|| over = solver.step(&mission, |_| seat).is_ready());
+        all = all.saturating_add(cost);
+        most = most.max(cost);
+        portions += 1;
+        if over {
+            return (all, most, portions);
+        }
+    }
+}
+
+/// The joint method without a message.
+pub(crate) fn joint() {
+    let (all, most, portions) = solved(8);
+    hprintln!("solved_8 {}", all);
+    hprintln!("portion_8 {}", most);
+    hprintln!("portions_8 {}", portions);
+    let (all, most, portions) = solved(50);
+    hprintln!("solved_50 {}", all);
+    hprintln!("portion_50 {}", most);
+    hprintln!("portions_50 {}", portions);
+    hprintln!("size_of_solver {}", size_of::<Solver<100, 10>>());
 }

@@ -18,7 +18,7 @@ use crate::mission::{Interferer, Mission, Profile};
 use crate::placement::search::Infeasible;
 use crate::placement::spacing::Hop;
 use crate::root::sqrt;
-use crate::sir::{self, CrossSection, Placement, Sender, Station, square};
+use crate::sir::{CrossSection, Placement, Sender, Station};
 
 /// Relays in a segment.
 const SEGMENT: usize = 10;

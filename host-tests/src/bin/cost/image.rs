@@ -34,17 +34,17 @@ const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",
         &["--no-default-features"],
-        [32 * 1024, 4 * 1024, 2 * 1024],
+        [40 * 1024, 4 * 1024, 2 * 1024],
     ),
     (
         "flash of that with `auth`",
         &["--no-default-features", "--features", "auth"],
-        [40 * 1024, 6 * 1024, 2 * 1024],
+        [48 * 1024, 6 * 1024, 3 * 1024],
     ),
     (
         "flash of that with `auth` and `membership`",
         &["--no-default-features", "--features", "auth,membership"],
-        [44 * 1024, 6 * 1024, 2 * 1024],
+        [56 * 1024, 6 * 1024, 3 * 1024],
     ),
     (
         "flash of that with `auth`, `membership` and `guard`",
@@ -53,27 +53,27 @@ const IMAGES: &[Image] = &[
             "--features",
             "auth,membership,guard",
         ],
-        [48 * 1024, 6 * 1024, 2_304],
+        [60 * 1024, 6 * 1024, 3 * 1024],
     ),
     (
         "flash of that with `auth`, `membership` and `upload`",
         &["--no-default-features", "--features", "upload"],
-        [51 * 1024, 6 * 1024, 2_176],
+        [64 * 1024, 6 * 1024, 3 * 1024],
     ),
     (
         "flash of the relay image, everything and `auth`",
         &["--features", "auth"],
-        [62 * 1024, 6 * 1024, 3_328],
+        [112 * 1024, 10 * 1024, 4 * 1024],
     ),
     (
         "flash of the relay image, everything and `upload`",
         &["--features", "upload"],
-        [68 * 1024, 6 * 1024, 3_456],
+        [112 * 1024, 10 * 1024, 4 * 1024],
     ),
     (
         "flash of the relay image, everything but `auth`",
         &[],
-        [57 * 1024, 6 * 1024, 3 * 1024],
+        [112 * 1024, 10 * 1024, 4 * 1024],
     ),
 ];
 
