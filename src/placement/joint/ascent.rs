@@ -50,6 +50,10 @@ pub(crate) struct Ascent {
     /// The most that is tried before the chain is probed, in ln gamma, and by how much that is raised next.
     limit: f32,
     excess: f32,
+    /// How much of the slack counts, in parts of D: less and less where it would outweigh a penalty.
+    spare: f32,
+    /// The nominal chain's penalty, m.
+    pub(crate) penalty: f32,
     distance_m: f32,
     /// The slack's slope by ln gamma, m.
     pub(crate) slope: f32,
@@ -71,6 +75,8 @@ impl Ascent {
             floor,
             limit: f32::INFINITY,
             excess: 0.0,
+            spare: f32::INFINITY,
+            penalty: 0.0,
             distance_m,
             slope: -1.0,
             linear: 0.0,
@@ -94,6 +100,28 @@ impl Ascent {
     /// The highest target for now.
     pub(crate) const fn limit(&self) -> f32 {
         self.limit
+    }
+
+    /// How much of the slack counts, m.
+    pub(crate) fn spare_m(&self) -> f32 {
+        self.spare * self.distance_m
+    }
+
+    /// Whether less of the slack is to count from now on: where there is a penalty.
+    pub(crate) fn tighten(&mut self) -> bool {
+        if self.spare < 1e-4 || self.penalty <= 4e-5 * self.distance_m {
+            return false;
+        }
+        self.spare = (0.1 * self.spare).min(3e-3);
+        true
+    }
+
+    /// The nominal chain's slack is that.
+    pub(crate) const fn tightened(&mut self, slack: f32) -> Turn {
+        self.slack = slack;
+        self.trust = TRUST;
+        (self.idle, self.iterations) = (0, 0);
+        Turn::Again
     }
 
     /// Whether there is no higher one for now.
