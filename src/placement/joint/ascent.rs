@@ -20,6 +20,9 @@ const LEAST_TRUST: f32 = 1e-4;
 /// Hops as long as D in all lose half of it for each e-fold of the target: less than that is a chain that does not feel it yet.
 const LEAST_SLOPE: f32 = 0.3;
 
+/// What slack that is missing is worth against such that is left over.
+const SHORT: f32 = 2.0;
+
 /// How close to the optimum is close enough, in ln gamma.
 const CLOSE: f32 = 3e-6;
 
@@ -191,12 +194,17 @@ impl Ascent {
         }
     }
 
+    /// What a chain is worth that has `slack` for `sigma`: slack that is missing costs more than that which is left over gains.
+    fn merit(&self, sigma: f32, slack: f32) -> f32 {
+        sigma - slack.min(SHORT * slack) / self.slope
+    }
+
     /// Whether a trial that has `slack` for `sigma` is better than the nominal chain.
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
         }
-        let by = sigma - slack / self.slope - self.estimate();
+        let by = self.merit(sigma, slack) - self.merit(self.sigma, self.slack);
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
@@ -215,9 +223,9 @@ impl Ascent {
 
     /// The trial with `share` is the nominal chain from now on.
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> Turn {
-        let before = self.estimate();
+        let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
-        self.idle = if self.estimate() - before < CLOSE {
+        self.idle = if self.merit(sigma, slack) - before < CLOSE {
             self.idle + 1
         } else {
             0
