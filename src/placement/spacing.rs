@@ -250,8 +250,11 @@ impl Hop {
             let room = self.end_m - from_m;
             let all = square(u - room) + self.aside_squared
                 >= ratio * (square(room) + self.across_squared);
-            if all || discriminant < 0.0 || !(u >= 0.0) {
+            if all || (discriminant < 0.0 && u >= 0.0) {
                 return Some(self.end_m.max(from_m));
+            }
+            if !(u >= 0.0 && square(u) + h >= 0.0) {
+                return None;
             }
         }
         if discriminant < 0.0 {

@@ -20,6 +20,9 @@ const LEAST_TRUST: f32 = 1e-4;
 /// Hops as long as D in all lose half of it for each e-fold of the target: less than that is a chain that does not feel it yet.
 const LEAST_SLOPE: f32 = 0.3;
 
+/// What slack that is missing is worth against such that is left over.
+const SHORT: f32 = 2.0;
+
 /// How close to the optimum is close enough, in ln gamma.
 const CLOSE: f32 = 3e-6;
 
@@ -50,6 +53,10 @@ pub(crate) struct Ascent {
     /// The most that is tried before the chain is probed, in ln gamma, and by how much that is raised next.
     limit: f32,
     excess: f32,
+    /// How much of the slack counts, in parts of D: less and less where it would outweigh a penalty.
+    spare: f32,
+    /// The nominal chain's penalty, m.
+    pub(crate) penalty: f32,
     distance_m: f32,
     /// The slack's slope by ln gamma, m.
     pub(crate) slope: f32,
@@ -71,6 +78,8 @@ impl Ascent {
             floor,
             limit: f32::INFINITY,
             excess: 0.0,
+            spare: f32::INFINITY,
+            penalty: 0.0,
             distance_m,
             slope: -1.0,
             linear: 0.0,
@@ -94,6 +103,28 @@ impl Ascent {
     /// The highest target for now.
     pub(crate) const fn limit(&self) -> f32 {
         self.limit
+    }
+
+    /// How much of the slack counts, m.
+    pub(crate) fn spare_m(&self) -> f32 {
+        self.spare * self.distance_m
+    }
+
+    /// Whether less of the slack is to count from now on: where there is a penalty.
+    pub(crate) fn tighten(&mut self) -> bool {
+        if self.spare < 1e-4 || self.penalty <= 4e-5 * self.distance_m {
+            return false;
+        }
+        self.spare = (0.1 * self.spare).min(3e-3);
+        true
+    }
+
+    /// The nominal chain's slack is that.
+    pub(crate) const fn tightened(&mut self, slack: f32) -> Turn {
+        self.slack = slack;
+        self.trust = TRUST;
+        (self.idle, self.iterations) = (0, 0);
+        Turn::Again
     }
 
     /// Whether there is no higher one for now.
@@ -163,12 +194,17 @@ impl Ascent {
         }
     }
 
+    /// What a chain is worth that has `slack` for `sigma`: slack that is missing costs more than that which is left over gains.
+    fn merit(&self, sigma: f32, slack: f32) -> f32 {
+        sigma - slack.min(SHORT * slack) / self.slope
+    }
+
     /// Whether a trial that has `slack` for `sigma` is better than the nominal chain.
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
         }
-        let by = sigma - slack / self.slope - self.estimate();
+        let by = self.merit(sigma, slack) - self.merit(self.sigma, self.slack);
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
@@ -187,9 +223,9 @@ impl Ascent {
 
     /// The trial with `share` is the nominal chain from now on.
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> Turn {
-        let before = self.estimate();
+        let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
-        self.idle = if self.estimate() - before < CLOSE {
+        self.idle = if self.merit(sigma, slack) - before < CLOSE {
             self.idle + 1
         } else {
             0

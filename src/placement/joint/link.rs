@@ -340,8 +340,10 @@ impl<'a> Link<'a> {
             1.5 * nx.abs()
         };
         for (axis, normal, low, high) in [(Axis::Y, ny, ly, uy), (Axis::H, nh, lh, uh)] {
-            let free = low < -rounding && high > rounding;
-            if (c > 1.0 || ux <= rounding) && free && normal.abs() > steepest {
+            // What a leap does not reach is within a ball, and a relay at its foot may rise from there.
+            let rises = c <= 1.0 && ux <= rounding;
+            let free = (low < -rounding || rises) && high > rounding;
+            if (c > 1.0 || rises) && free && normal.abs() > steepest {
                 steepest = normal.abs();
                 best = (axis, normal);
             }

@@ -132,6 +132,8 @@ enum Purpose {
     Start,
     /// A higher target during an ascent.
     Raise,
+    /// The slack where less of it counts.
+    Tighten,
     /// What an ascent has come to.
     Judge,
     /// What the best of them comes to by the rules of the sweep.
@@ -303,6 +305,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             return Poll::Pending;
         }
         self.start = start;
+        self.ascent = Ascent::new(chain.distance_m(), 0.0, 0.0, 0.0);
         self.restart();
         self.work = match start {
             Start::Near { .. } => Work::Settle(floor + 0.04, Purpose::Start),
@@ -382,7 +385,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 if purpose == Purpose::Judge && penalty > 5e-5 * chain.distance_m() {
                     return Poll::Ready(Some(-penalty));
                 }
-                return Poll::Ready(Some(slack - penalty));
+                return Poll::Ready(Some(slack.min(self.ascent.spare_m()) - penalty));
             }
             let room = (chain.seat_of)(index).room;
             let wanted = self.shaped(chain, index, room, target, purpose);
@@ -501,6 +504,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let Poll::Ready(slack) = self.plain(chain, sigma, purpose, true) else {
             return Poll::Pending;
         };
+        self.ascent.penalty = self.pass.penalty;
         self.restart();
         self.held = None;
         let Some(slack) = slack else {
@@ -513,12 +517,18 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                     Start::Near { .. } => chain.floor(),
                     _ => f32::NEG_INFINITY,
                 };
+                let penalty = self.ascent.penalty;
                 self.ascent = Ascent::new(chain.distance_m(), sigma, slack, floor)
                     .probed_at(chain.ceiling() + 3e-4);
+                self.ascent.penalty = penalty;
                 self.look_back(chain.mission)
             }
             Purpose::Raise => {
                 let turn = self.ascent.raised(sigma, slack);
+                self.next(turn, chain.mission)
+            }
+            Purpose::Tighten => {
+                let turn = self.ascent.tightened(slack);
                 self.next(turn, chain.mission)
             }
             Purpose::Judge | Purpose::Last => self.judged(sigma, chain.ceiling()),
@@ -539,6 +549,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
+    /// Whether the start may still be the best.
+    fn is_promising(&self) -> bool {
+        self.again || self.best.is_none_or(|(best, _)| self.ascent.sigma > best)
+    }
+
     fn look_back(&mut self, mission: &Mission) -> Work {
         self.ascent.look_back();
         let last = (usize::from(mission.relays()) - 1) / SEGMENT;
@@ -555,6 +570,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 Work::Seek(Seek::up(sigma, slack, 0.02, 1e-5), Purpose::Raise)
             }
             Turn::Again => self.look_back(mission),
+            Turn::Over if self.is_promising() && self.ascent.tighten() => {
+                Work::Settle(self.ascent.sigma, Purpose::Tighten)
+            }
             Turn::Over => {
                 let Ascent { sigma, slack, .. } = self.ascent;
                 let _ = slack;
@@ -597,7 +615,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
         let is_last = (usize::from(segment) + 1) * SEGMENT >= usize::from(relays);
         let mut outlook = if is_last {
-            chain.tail(target, from).1
+            let (slack, outlook) = chain.tail(target, from);
+            if slack > self.ascent.spare_m() {
+                Outlook::default()
+            } else {
+                outlook
+            }
         } else {
             self.marks.get(usize::from(segment))?.outlook()
         };
@@ -658,8 +681,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let target = libm::expf(sigma);
         if self.pass.done >= relays {
             let (slack, _) = chain.tail(target, self.pass.from);
-            let slack = slack - self.pass.penalty;
+            let slack = slack.min(self.ascent.spare_m()) - self.pass.penalty;
             let turn = if kept {
+                self.ascent.penalty = self.pass.penalty;
                 self.held = None;
                 self.ascent.taken(share, sigma, slack)
             } else if self.ascent.is_gain(sigma, slack) {

@@ -132,7 +132,7 @@ impl Start {
         let count = ARCHES.len();
         let number = usize::from(number);
         if number == 2 * count {
-            return Some((relays > 1 && free).then_some(Self::Far));
+            return Some(free.then_some(Self::Far));
         }
         if number > 2 * count {
             let &(aside, up, far) = SPIRALS.get(number - 2 * count - 1)?;
