@@ -152,14 +152,15 @@ impl Message {
             Self::Busy { sweep } => Body::Busy(sweep.to_le_bytes()),
             Self::Heartbeat { mission, answer } => Body::Heartbeat(mission.to_le_bytes(), *answer),
             Self::Course(course) => {
-                let trials = course.trials.iter().map(|trial| {
+                let mut trials = heapless::Vec::new();
+                for trial in &course.trials {
                     let Trial {
                         target,
                         penalty_m,
                         place,
                     } = *trial;
-                    [target, penalty_m, place.x_m, place.y_m, place.altitude_m]
-                });
+                    _ = trials.push([target, penalty_m, place.x_m, place.y_m, place.altitude_m]);
+                }
                 Body::Course(
                     Pass::new(course.number, course.mission),
                     [
@@ -168,7 +169,7 @@ impl Message {
                         course.bar.slope,
                         course.bar.estimate,
                     ],
-                    trials.collect(),
+                    trials,
                 )
             }
             Self::Worth(worth) => Body::Worth(

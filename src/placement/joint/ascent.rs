@@ -179,7 +179,7 @@ impl Ascent {
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
-        (self.sigma + by.clamp(-self.trust, self.trust))
+        (self.sigma + by.max(-self.trust).min(self.trust))
             .min(self.limit)
             .max(self.floor)
     }
@@ -248,7 +248,9 @@ impl Ascent {
             place: Placement::default(),
         };
         if self.iterations == 0 {
-            return (Bar::FIRST, [self.sigma].map(trial).into_iter().collect());
+            let mut trials = Trials::new();
+            _ = trials.push(trial(self.sigma));
+            return (Bar::FIRST, trials);
         }
         let bar = Bar {
             trust: self.trust,
@@ -256,7 +258,7 @@ impl Ascent {
             estimate: self.estimate(),
         };
         let trials = SHARES.map(|share| trial(self.sigma_for(share)));
-        (bar, trials.into_iter().collect())
+        (bar, Trials::from(trials))
     }
 
     /// What came of it.

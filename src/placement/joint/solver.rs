@@ -586,12 +586,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// The numbers of the relays in `segment`.
     fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
-        let first = u16::from(segment) * SEGMENT as u16 + 1;
-        let last = relays.min(first + SEGMENT as u16 - 1);
+        let first = u16::from(segment) * SEGMENT as u16;
         (0..SEGMENT)
-            .zip(first..=last)
-            .collect::<heapless::Vec<_, SEGMENT>>()
-            .into_iter()
+            .zip(1..=SEGMENT as u16)
+            .map(move |(k, number)| (k, first + number))
+            .filter(move |(_, index)| *index <= relays)
     }
 
     /// Works out the policies of `segment`, whose relays come after one at `before`; what that one sees. Bounded by ten relays.
