@@ -587,9 +587,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// The numbers of the relays in `segment`.
     fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
         let first = u16::from(segment) * SEGMENT as u16;
-        (0..SEGMENT)
-            .zip(1..=SEGMENT as u16)
-            .map(move |(k, number)| (k, first + number))
+        // Counted in u16, which both are: to zip two ranges backward may panic.
+        (0..SEGMENT as u16)
+            .map(move |k| (usize::from(k), first + 1 + k))
             .filter(move |(_, index)| *index <= relays)
     }
 
