@@ -282,9 +282,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// The next start, or the end.
     fn begin(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>) -> Poll<Result<f32, Infeasible>> {
-        let mission = chain.mission;
         let room = (chain.seat_of)(1).room;
-        let Some(start) = Start::number(self.number, room, mission.relays()) else {
+        let Some(start) = Start::number(self.number, room) else {
             // All have been tried.
             let Some((_, number)) = self.best else {
                 return Poll::Ready(Err(Infeasible));

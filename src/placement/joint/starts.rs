@@ -116,7 +116,7 @@ impl Start {
     }
 
     /// Start `number` for relays with that `room`, of which there are `relays`; `None` after the last, `Some(None)` where it is no use.
-    pub(super) fn number(number: u8, room: Room, relays: u16) -> Option<Option<Self>> {
+    pub(super) fn number(number: u8, room: Room) -> Option<Option<Self>> {
         let Room { lateral, band } = room;
         let fits = |(aside, up): (f32, f32)| {
             let sideways = if aside < 0.0 {

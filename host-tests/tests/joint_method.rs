@@ -1,4 +1,4 @@
-//! Joint altitude and distance: how near the true optimum the chain comes, in how many passes, whatever happens to frames.
+//! Places, sides and altitudes together: how near the true optimum the chain comes, in how many messages, whatever happens to frames.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -122,32 +122,62 @@ fn settle(setup: Setup) -> Outcome {
     outcome
 }
 
-/// What is asked of the method, and the true optima, from an independent program.
+/// The scenario that the figures are for with room to either side, `lateral_m`, and altitudes of 20 m to `most_m`.
+fn roomy(relays: usize, x_m: f64, y_m: f64, lateral_m: f64, most_m: f64) -> (Link, Corridor) {
+    let link = Link {
+        x_i: x_m,
+        y_i: y_m,
+        min_separation_m: 4.0,
+        ..Link::paper(relays)
+    };
+    let corridor = Corridor {
+        least_m: 20.0,
+        most_m,
+        left_m: -lateral_m,
+        right_m: lateral_m,
+    };
+    (link, corridor)
+}
+
+/// What is asked of the method, the optima from an independent program, and one round trip for each.
 #[test]
-fn the_joint_optima_are_reached() {
-    for (relays, common, least, best) in [
-        (2, 0.881_533, 0.881_45, 0.881_533_886_7),
-        (5, 1.047_409, 1.047_36, 1.047_463_457_8),
-        (8, 1.228_700, 1.235_66, 1.235_783_782_6),
-        (50, 5.450_572, 6.497_73, 6.498_377_624_8),
+fn the_joint_optima_are_reached_in_one_round_trip() {
+    for (relays, x_m, y_m, lateral_m, most_m, best) in [
+        (2, 500.0, 150.0, 0.0, 300.0, 0.881_533_886_7),
+        (5, 500.0, 150.0, 0.0, 300.0, 1.047_463_457_8),
+        (8, 500.0, 150.0, 0.0, 300.0, 1.235_783_782_6),
+        (50, 500.0, 150.0, 0.0, 300.0, 6.498_377_624_4),
+        (3, 500.0, 150.0, 0.0, 300.0, 0.937_863_772),
+        (3, 300.0, 50.0, 0.0, 300.0, 1.122_591_008),
+        (8, 500.0, 400.0, 0.0, 300.0, 2.465_561_744),
+        (3, 500.0, 150.0, 280.0, 300.0, 1.073_203_411),
+        (8, 500.0, 150.0, 280.0, 300.0, 1.543_032_046),
+        (8, 500.0, 400.0, 280.0, 300.0, 2.983_117_645),
+        (3, 300.0, 50.0, 280.0, 300.0, 1.176_055_555),
+        (8, 500.0, 150.0, 30.0, 120.0, 1.268_920_082),
+        (8, 500.0, 150.0, 100.0, 120.0, 1.379_038_560),
+        (50, 500.0, 150.0, 280.0, 300.0, 9.002_614_360),
     ] {
-        let (link, corridor) = close_by(relays);
-        for predict in [true, false] {
-            let mut setup = setup(&link, corridor).unwrap();
-            setup.settings.predict = predict;
-            let outcome = settle(setup);
-            let places = places(&outcome);
-            let sir = joint::sir(&link, &places).unwrap();
-            println!(
-                "N = {relays}: {sir:.7} of {best}, best common altitude {common}; {} passes, {} messages, {} bytes",
-                outcome.sweeps, outcome.messages, outcome.bytes
-            );
-            assert!(sir >= least && sir <= best * (1.0 + 1e-6), "{sir}");
-            assert!(!predict || outcome.sweeps <= 16, "{}", outcome.sweeps);
-            assert!(outcome.sweeps <= 30, "{}", outcome.sweeps);
-            let corridor = Corridor::plane(corridor.least_m - 1e-9, corridor.most_m + 1e-9);
-            assert!(joint::keeps_rules(&link, corridor, &[], &places));
-        }
+        let (link, corridor) = roomy(relays, x_m, y_m, lateral_m, most_m);
+        let outcome = settle(setup(&link, corridor).unwrap());
+        let places = places(&outcome);
+        let sir = joint::sir(&link, &places).unwrap();
+        println!(
+            "N = {relays}, X = {x_m}, Y = {y_m}, to the side {lateral_m}: {sir:.7} of {best}; {} passes, {} messages, {} bytes, {:.3} s",
+            outcome.sweeps,
+            outcome.messages,
+            outcome.bytes,
+            outcome.virtual_s()
+        );
+        assert!(sir >= best * (1.0 - 1e-4) && sir <= best * (1.0 + 1e-6), "{sir}");
+        assert_eq!(outcome.sweeps, 1);
+        assert_eq!(outcome.messages, 2 * (relays as u64 - 1));
+        let corridor = Corridor {
+            least_m: corridor.least_m - 1e-9,
+            most_m: corridor.most_m + 1e-9,
+            ..corridor
+        };
+        assert!(joint::keeps_rules(&link, corridor, &[], &places));
     }
 }
 
@@ -206,6 +236,7 @@ fn crowded_chains_are_safe_and_seldom_far_from_the_joint_optimum() {
 
 #[test]
 fn faults_change_nothing() {
+    let mut hurt = 0;
     for seed in 0..20 {
         let (link, corridor) = close_by(2 + seed % 7);
         let mut setup = setup(&link, corridor).unwrap();
@@ -215,9 +246,10 @@ fn faults_change_nothing() {
         setup.seed = seed as u64;
         let faulty = settle(setup);
         let injected = faulty.injected;
-        assert!(injected.lost > 0 && injected.corrupted > 0 && injected.reordered > 0);
+        hurt += injected.lost + injected.corrupted + injected.reordered;
         assert_eq!(clean.bits(), faulty.bits(), "seed {seed}");
     }
+    assert!(hurt > 100, "{hurt}");
 }
 
 /// A relay that was given an altitude of its own, and is to hold it, does; the others choose around it.
