@@ -284,7 +284,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     fn begin(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>) -> Poll<Result<f32, Infeasible>> {
         let mission = chain.mission;
         let room = (chain.seat_of)(1).room;
-        let Some(start) = Start::number(self.number, room, mission.relays()) else {
+        let Some(start) = Start::number(self.number, room) else {
             // All have been tried.
             let Some((_, number)) = self.best else {
                 return Poll::Ready(Err(Infeasible));
@@ -297,7 +297,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             return Poll::Pending;
         };
         let floor = chain.floor();
-        if matches!(start, Start::Near { .. })
+        if matches!(start, Start::Near)
             && !self.again
             && self.best.is_some_and(|(best, _)| best > floor)
         {
@@ -308,7 +308,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.ascent = Ascent::new(chain.distance_m(), 0.0, 0.0, 0.0);
         self.restart();
         self.work = match start {
-            Start::Near { .. } => Work::Settle(floor + 0.04, Purpose::Start),
+            Start::Near => Work::Settle(floor + 0.04, Purpose::Start),
             Start::Arch { .. } | Start::Around { .. } | Start::Far => {
                 Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, 0.02), Purpose::Start)
             }
@@ -520,7 +520,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.work = match purpose {
             Purpose::Start => {
                 let floor = match self.start {
-                    Start::Near { .. } => chain.floor(),
+                    Start::Near => chain.floor(),
                     _ => f32::NEG_INFINITY,
                 };
                 let penalty = self.ascent.penalty;

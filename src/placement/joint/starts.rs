@@ -17,28 +17,21 @@ pub(super) enum Start {
     Arch { aside: f32, up: f32 },
     /// A spiral about the interferer: toward a place right above it or beside it, and from there to Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// The same, from a target so high that no hop leaps to the far side of the interferer.
-    Near { aside: f32, up: f32 },
+    /// Low, from a target so high that no hop leaps to the far side of the interferer.
+    Near,
     /// Relay 1 right above Rx, as high or far aside as pays, the others on the way down from there.
     Far,
 }
 
 /// The shapes of arches: aside, up.
-const ARCHES: [(f32, f32); 14] = [
+const ARCHES: [(f32, f32); 7] = [
     (0.0, 0.0),
     (0.0, 1.0),
     (0.0, 0.25),
-    (0.0, 0.5),
-    (0.0, 0.1),
-    (0.0, 2.0),
     (-1.0, 0.0),
     (1.0, 0.0),
-    (-0.7, 0.7),
-    (0.7, 0.7),
     (-0.25, 0.0),
     (0.25, 0.0),
-    (-0.2, 0.2),
-    (0.2, 0.2),
 ];
 
 /// Spirals.
@@ -115,8 +108,8 @@ impl Start {
         })
     }
 
-    /// Start `number` for relays with that `room`, of which there are `relays`; `None` after the last, `Some(None)` where it is no use.
-    pub(super) fn number(number: u8, room: Room, relays: u16) -> Option<Option<Self>> {
+    /// Start `number` for relays with that `room`; `None` after the last, `Some(None)` where it is no use.
+    pub(super) fn number(number: u8, room: Room) -> Option<Option<Self>> {
         let Room { lateral, band } = room;
         let fits = |(aside, up): (f32, f32)| {
             let sideways = if aside < 0.0 {
@@ -129,31 +122,27 @@ impl Start {
             sideways && (!(up > 0.0) || !band.is_single())
         };
         let free = !(band.is_single() && lateral.is_single());
-        let count = ARCHES.len();
         let number = usize::from(number);
-        if number == 2 * count {
-            return Some(free.then_some(Self::Far));
+        if let Some(&(aside, up)) = ARCHES.get(number) {
+            return Some(fits((aside, up)).then_some(Self::Arch { aside, up }));
         }
-        if number > 2 * count {
-            let &(aside, up, far) = SPIRALS.get(number - 2 * count - 1)?;
-            return Some((free && fits((aside, up))).then_some(Self::Around { aside, up, far }));
+        let number = number.checked_sub(ARCHES.len())?;
+        if let Some(&(aside, up, far)) = SPIRALS.get(number) {
+            let fits = free && fits((aside, up));
+            return Some(fits.then_some(Self::Around { aside, up, far }));
         }
-        let &(aside, up) = ARCHES
-            .get(number)
-            .or_else(|| ARCHES.get(number.checked_sub(count)?))?;
-        let fits = fits((aside, up));
-        Some(if number < count {
-            fits.then_some(Self::Arch { aside, up })
-        } else {
-            (fits && free).then_some(Self::Near { aside, up })
-        })
+        match number.checked_sub(SPIRALS.len())? {
+            0 => Some(free.then_some(Self::Far)),
+            1 => Some(free.then_some(Self::Near)),
+            _ => None,
+        }
     }
 
     /// Where a relay flies across the line that comes after one at `x_m`, of a chain `distance_m` long.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
-            Self::Arch { aside, up } | Self::Near { aside, up } => (aside, up),
-            Self::Far | Self::Around { .. } => (0.0, 0.0),
+            Self::Arch { aside, up } => (aside, up),
+            Self::Near | Self::Far | Self::Around { .. } => (0.0, 0.0),
         };
         let t = (x_m / distance_m).clamp(0.0, 1.0);
         let rise = 2.0 * distance_m * t * (1.0 - t);
