@@ -169,7 +169,10 @@ fn the_joint_optima_are_reached_in_one_round_trip() {
             outcome.bytes,
             outcome.virtual_s()
         );
-        assert!(sir >= best * (1.0 - 1e-4) && sir <= best * (1.0 + 1e-6), "{sir}");
+        assert!(
+            sir >= best * (1.0 - 1e-4) && sir <= best * (1.0 + 1e-6),
+            "{sir}"
+        );
         assert_eq!(outcome.sweeps, 1);
         assert_eq!(outcome.messages, 2 * (relays as u64 - 1));
         let corridor = Corridor {

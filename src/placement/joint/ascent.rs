@@ -20,6 +20,13 @@ const LEAST_TRUST: f32 = 1e-4;
 /// Hops as long as D in all lose half of it for each e-fold of the target: less than that is a chain that does not feel it yet.
 const LEAST_SLOPE: f32 = 0.3;
 
+/// By how much the target is above the ceiling when a chain is probed again, in ln gamma, at first.
+const EXCESS: f32 = 0.03;
+
+/// How much of the slack counts where it would outweigh a penalty, in parts of D: at first, and what is not made less.
+const SPARE: f32 = 3e-3;
+const LEAST_SPARE: f32 = 4e-5;
+
 /// What slack that is missing is worth against such that is left over.
 const SHORT: f32 = 2.0;
 
@@ -95,7 +102,7 @@ impl Ascent {
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
-            excess: 0.03,
+            excess: EXCESS,
             ..self
         }
     }
@@ -112,10 +119,10 @@ impl Ascent {
 
     /// Whether less of the slack is to count from now on: where there is a penalty.
     pub(crate) fn tighten(&mut self) -> bool {
-        if self.spare < 1e-4 || self.penalty <= 4e-5 * self.distance_m {
+        if self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m {
             return false;
         }
-        self.spare = (0.1 * self.spare).min(3e-3);
+        self.spare = (0.1 * self.spare).min(SPARE);
         true
     }
 

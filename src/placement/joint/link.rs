@@ -400,6 +400,7 @@ pub(super) fn tail(
     (slack, outlook)
 }
 
+/// What of a ceiling is aimed at.
 const LITTLE: f32 = 0.999_97;
 
 /// What lies on the way from `best` to `wanted` within a circle; `None` if nothing does.

@@ -29,6 +29,15 @@ const PLAIN: u16 = 40;
 /// How close to the optimum a start is judged, in ln gamma.
 const JUDGED: f32 = 4e-6;
 
+/// What penalty a chain may have that is judged, in parts of D.
+const FORGIVEN: f32 = 5e-5;
+
+/// How close to the ceiling of the first or the last hop is close enough, in ln gamma.
+const CEILING: f32 = 5e-5;
+
+/// How far above that ceiling the other hops are when a chain is probed first, in ln gamma.
+const PROBED: f32 = 3e-4;
+
 /// What one relay brings along, as far as it is known.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -296,7 +305,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             return Poll::Pending;
         };
         let floor = chain.floor();
-        if matches!(start, Start::Near { .. })
+        if matches!(start, Start::Near)
             && !self.again
             && self.best.is_some_and(|(best, _)| best > floor)
         {
@@ -307,7 +316,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.ascent = Ascent::new(chain.distance_m(), 0.0, 0.0, 0.0);
         self.restart();
         self.work = match start {
-            Start::Near { .. } => Work::Settle(floor + 0.04, Purpose::Start),
+            Start::Near => Work::Settle(floor + 0.04, Purpose::Start),
             Start::Arch { .. } | Start::Around { .. } | Start::Far => {
                 Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, 0.02), Purpose::Start)
             }
@@ -381,7 +390,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 }
                 let (slack, _) = chain.tail(target, self.pass.from);
                 let penalty = self.pass.penalty;
-                if purpose == Purpose::Judge && penalty > 5e-5 * chain.distance_m() {
+                if purpose == Purpose::Judge && penalty > FORGIVEN * chain.distance_m() {
                     return Poll::Ready(Some(-penalty));
                 }
                 return Poll::Ready(Some(slack.min(self.ascent.spare_m()) - penalty));
@@ -473,15 +482,19 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
+    /// Whether the chain meets the ceiling by the rules of the sweep; if not, its other hops have to be shorter.
     fn probe(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>) {
         let ceiling = chain.ceiling();
-        let Poll::Ready(slack) = self.plain(chain, ceiling - 5e-5, Purpose::Last, false) else {
+        let Poll::Ready(slack) = self.plain(chain, ceiling - CEILING, Purpose::Last, false) else {
             return;
         };
         self.restart();
         self.work = if slack.is_some_and(|slack| slack >= 0.0) {
             self.best = Some((ceiling, self.number));
-            Work::Seek(Seek::down(ceiling + 7e-5, 1e-5, 2.0, 1e-6), Purpose::Last)
+            Work::Seek(
+                Seek::down(ceiling + 2.0 * CEILING, 1e-5, 2.0, 1e-6),
+                Purpose::Last,
+            )
         } else {
             let turn = self.ascent.probed();
             self.next(turn, chain.mission)
@@ -513,12 +526,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.work = match purpose {
             Purpose::Start => {
                 let floor = match self.start {
-                    Start::Near { .. } => chain.floor(),
+                    Start::Near => chain.floor(),
                     _ => f32::NEG_INFINITY,
                 };
                 let penalty = self.ascent.penalty;
                 self.ascent = Ascent::new(chain.distance_m(), sigma, slack, floor)
-                    .probed_at(chain.ceiling() + 3e-4);
+                    .probed_at(chain.ceiling() + PROBED);
                 self.ascent.penalty = penalty;
                 self.look_back(chain.mission)
             }
@@ -538,11 +551,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// An ascent has come to `sigma`.
     fn judged(&mut self, sigma: f32, ceiling: f32) -> Work {
         if self.again {
-            let sigma = sigma.min(ceiling + 5e-5);
+            let sigma = sigma.min(ceiling + CEILING);
             return Work::Seek(Seek::down(sigma + 2e-5, 1e-5, 2.0, 1e-6), Purpose::Last);
         }
-        if self.best.is_none_or(|(best, _)| sigma > best) {
-            self.best = Some((sigma, self.number));
+        // What is above the ceiling has been probed in vain, and the more so the higher it is.
+        let worth = sigma.min(2.0 * ceiling - sigma);
+        if self.best.is_none_or(|(best, _)| worth > best) {
+            self.best = Some((worth, self.number));
         }
         self.number += 1;
         Work::Begin
@@ -573,8 +588,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 Work::Settle(self.ascent.sigma, Purpose::Tighten)
             }
             Turn::Over => {
-                let Ascent { sigma, slack, .. } = self.ascent;
-                let _ = slack;
+                let sigma = self.ascent.sigma;
                 Work::Seek(
                     Seek::down(sigma + JUDGED, JUDGED, 3.0, JUDGED),
                     Purpose::Judge,

@@ -17,31 +17,25 @@ pub(super) enum Start {
     Arch { aside: f32, up: f32 },
     /// A spiral about the interferer: toward a place right above it or beside it, and from there to Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// The same, from a target so high that no hop leaps to the far side of the interferer.
-    Near { aside: f32, up: f32 },
+    /// Low, from a target so high that no hop leaps to the far side of the interferer.
+    Near,
     /// Relay 1 right above Rx, as high or far aside as pays, the others on the way down from there.
     Far,
 }
 
 /// The shapes of arches: aside, up.
-const ARCHES: [(f32, f32); 14] = [
+const ARCHES: [(f32, f32); 7] = [
     (0.0, 0.0),
     (0.0, 1.0),
     (0.0, 0.25),
-    (0.0, 0.5),
-    (0.0, 0.1),
-    (0.0, 2.0),
     (-1.0, 0.0),
     (1.0, 0.0),
-    (-0.7, 0.7),
-    (0.7, 0.7),
     (-0.25, 0.0),
     (0.25, 0.0),
-    (-0.2, 0.2),
-    (0.2, 0.2),
 ];
 
-/// Spirals.
+/// Spirals: aside and up of the place they lead to first, and how far that is from the interferer, in parts of the geometric mean of
+/// the distances of Tx and Rx.
 const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 1.0),
     (1.0, 0.0, 1.0),
@@ -53,6 +47,58 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (-1.0, 0.0, 0.3),
     (0.0, 1.0, 2.0),
 ];
+
+/// A way about the interferer on which the distance to it changes in its logarithm as the direction turns.
+struct Way {
+    /// Where it leads to: the direction.
+    to: Triple,
+    angle: f32,
+    /// By how much the logarithm of the distance rises.
+    rise: f32,
+    length: f32,
+}
+
+impl Way {
+    fn new(here: Triple, to: Triple) -> Self {
+        let (r, t) = (length(here), length(to));
+        let (here, to) = (here.map(|v| v / r), to.map(|v| v / t));
+        let chord = square(length(minus(here, to)));
+        // 2 asin(chord / 2) / chord
+        let angle = sqrt(chord) * (1.0 + chord * (1.0 / 24.0 + chord * (3.0 / 640.0)));
+        let rise = libm::logf(t / r);
+        let length = sqrt(square(angle) + square(rise)).max(SHORTEST);
+        Self {
+            to,
+            angle,
+            rise,
+            length,
+        }
+    }
+
+    /// After a hop from `here` that is `step` of the distance at its end, as seen from the interferer.
+    fn after(&self, here: Triple, step: f32) -> Triple {
+        let bend = 0.5 * step * self.rise / self.length;
+        let share = (step * libm::expf(bend.clamp(-1.0, 1.0)) / self.length).min(1.0);
+        let r = length(here);
+        let unit = here.map(|v| v / r);
+        let cos: f32 = unit.iter().zip(self.to).map(|(a, b)| a * b).sum();
+        let aside = minus(self.to, unit.map(|v| cos * v));
+        let turn = (share * self.angle).min(MOST_TURN) / length(aside).max(SHORTEST);
+        let direction = minus(unit, aside.map(|v| -turn * v));
+        let scale = r * libm::expf(share * self.rise) / length(direction);
+        direction.map(|v| scale * v)
+    }
+}
+
+/// What a way is not divided by less than.
+const SHORTEST: f32 = 1e-6;
+
+/// The most that a hop turns about the interferer, as a tangent.
+const MOST_TURN: f32 = 1.5;
+
+fn length([x, y, z]: Triple) -> f32 {
+    sqrt(square(x) + square(y) + square(z)).max(f32::MIN_POSITIVE)
+}
 
 impl Start {
     /// Where a relay flies across the line that comes after one at `from`, by a spiral.
@@ -68,54 +114,27 @@ impl Start {
             return room.nearest(from.cross_section());
         };
         let m = [interferer.x_m, interferer.y_m, 0.0];
-        let length =
-            |[x, y, z]: Triple| sqrt(square(x) + square(y) + square(z)).max(1e-9 * distance_m);
         let here = minus(triple(from), m);
         let end = minus([distance_m, 0.0, 0.0], m);
-        let r = length(here);
-        let step = 1.0 / sqrt(c);
-        let toward = |to: Triple| {
-            let t = length(to);
-            let [dx, dy, dz] = minus(here.map(|v| v / r), to.map(|v| v / t));
-            let chord = square(dx) + square(dy) + square(dz);
-            let angle = sqrt(chord) * (1.0 + chord * (1.0 / 24.0 + chord * (3.0 / 640.0)));
-            let rise = libm::logf(t / r);
-            (angle, rise, sqrt(square(angle) + square(rise)))
-        };
-        let between = far * sqrt(length(end) * length([m[0], m[1], 0.0]));
+        let between = far * sqrt(length(end) * length(m));
         let middle = [0.0, aside * between, up * between];
-        let (mut to, mut way) = (end, toward(end));
-        if here[0] < 0.0 && m[0] < distance_m {
-            let via = toward(middle);
-            if via.2 > step {
-                (to, way) = (middle, via);
+        let step = 1.0 / sqrt(c);
+        let [before, ..] = here;
+        let mut way = Way::new(here, end);
+        if before < 0.0 && interferer.x_m < distance_m {
+            let first = Way::new(here, middle);
+            if first.length > step {
+                way = first;
             }
         }
-        let (angle, rise, whole) = way;
-        let step =
-            (step * libm::expf((0.5 * step * rise / whole.max(1e-6)).clamp(-1.0, 1.0))).min(whole);
-        let share = step / whole.max(1e-6);
-        let (turn, grow) = ((share * angle).min(1.5), libm::expf(share * rise));
-        // e: across, of length one.
-        let t = length(to);
-        let u = here.map(|v| v / r);
-        let v = to.map(|v| v / t);
-        let cos = u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-        let e = [v[0] - cos * u[0], v[1] - cos * u[1], v[2] - cos * u[2]];
-        let sin = length(e).max(1e-6);
-        let d = [
-            u[0] + turn * e[0] / sin,
-            u[1] + turn * e[1] / sin,
-            u[2] + turn * e[2] / sin,
-        ];
-        let norm = length(d);
+        let [_, y, h] = way.after(here, step);
         room.nearest(CrossSection {
-            y_m: m[1] + r * grow * d[1] / norm,
-            altitude_m: r * grow * d[2] / norm,
+            y_m: interferer.y_m + y,
+            altitude_m: h,
         })
     }
 
-    /// Start `number` for relays with that `room`, of which there are `relays`; `None` after the last, `Some(None)` where it is no use.
+    /// Start `number` for relays with that `room`; `None` after the last, `Some(None)` where it is no use.
     pub(super) fn number(number: u8, room: Room) -> Option<Option<Self>> {
         let Room { lateral, band } = room;
         let fits = |(aside, up): (f32, f32)| {
@@ -129,31 +148,27 @@ impl Start {
             sideways && (!(up > 0.0) || !band.is_single())
         };
         let free = !(band.is_single() && lateral.is_single());
-        let count = ARCHES.len();
         let number = usize::from(number);
-        if number == 2 * count {
-            return Some(free.then_some(Self::Far));
+        if let Some(&(aside, up)) = ARCHES.get(number) {
+            return Some(fits((aside, up)).then_some(Self::Arch { aside, up }));
         }
-        if number > 2 * count {
-            let &(aside, up, far) = SPIRALS.get(number - 2 * count - 1)?;
-            return Some((free && fits((aside, up))).then_some(Self::Around { aside, up, far }));
+        let number = number.checked_sub(ARCHES.len())?;
+        if let Some(&(aside, up, far)) = SPIRALS.get(number) {
+            let fits = free && fits((aside, up));
+            return Some(fits.then_some(Self::Around { aside, up, far }));
         }
-        let &(aside, up) = ARCHES
-            .get(number)
-            .or_else(|| ARCHES.get(number.checked_sub(count)?))?;
-        let fits = fits((aside, up));
-        Some(if number < count {
-            fits.then_some(Self::Arch { aside, up })
-        } else {
-            (fits && free).then_some(Self::Near { aside, up })
-        })
+        match number.checked_sub(SPIRALS.len())? {
+            0 => Some(free.then_some(Self::Far)),
+            1 => Some(free.then_some(Self::Near)),
+            _ => None,
+        }
     }
 
     /// Where a relay flies across the line that comes after one at `x_m`, of a chain `distance_m` long.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
-            Self::Arch { aside, up } | Self::Near { aside, up } => (aside, up),
-            Self::Far | Self::Around { .. } => (0.0, 0.0),
+            Self::Arch { aside, up } => (aside, up),
+            Self::Near | Self::Far | Self::Around { .. } => (0.0, 0.0),
         };
         let t = (x_m / distance_m).clamp(0.0, 1.0);
         let rise = 2.0 * distance_m * t * (1.0 - t);
