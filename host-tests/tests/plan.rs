@@ -10,5 +10,7 @@
 
 #[path = "plan/command.rs"]
 mod command;
+#[path = "plan/joint.rs"]
+mod joint_plans;
 #[path = "plan/random.rs"]
 mod random_scenarios;

@@ -1,30 +1,97 @@
-//! Plans that choose altitudes and sides too, against one interferer: a chain of relays is run in the planner, with the messages and
-//! all, and ends where it would end in the air.
+//! Plans that choose altitudes and sides too, against one interferer: the joint method's own solver, and the places by the rules of
+//! the sweep that settles the relays.
 
+use core::task::Poll;
+
+use uav_relay::mission::MAX_RELAYS;
+use uav_relay::placement::PerTarget;
+use uav_relay::placement::joint::{Seat, Solver};
+use uav_relay::placement::pass::{Behind, Link};
+use uav_relay::sir::Station;
 use uav_relay::{Method, Placement};
 
 use super::{Briefed, NoPlan, Plan, source};
 use crate::scenario::Scenario;
-use crate::sim::chain::Chain;
+use crate::sim::chain;
 use crate::sim::outcome::Ending;
 use crate::sim::setup::Setup;
 
-/// The best places and altitudes of so many relays.
+/// A solver for any chain.
+type Chain = Solver<{ MAX_RELAYS as usize }, { MAX_RELAYS as usize / 10 }>;
+
+/// The best places, sides and altitudes of so many relays that the joint method finds.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, relays, tolerance)?;
+    let found = joint(&briefed);
+    // Relays that differ agree by messages, and seldom on the same.
+    let told = (!briefed.own.is_empty())
+        .then(|| agreed(&briefed))
+        .flatten();
+    let plans = [found, told].into_iter().flatten().map(|places| {
+        let briefed = Briefed::new(scenario, relays, tolerance)?;
+        Ok(briefed.plan(&places, "the joint method", false))
+    });
+    let plans: Vec<Plan> = plans.collect::<Result<_, NoPlan>>()?;
+    match plans.into_iter().max_by(|a, b| a.sir().total_cmp(&b.sir())) {
+        Some(plan) => Ok(plan),
+        // As the relays do, which then stay at the altitudes they hold.
+        None => source::best(scenario, relays, tolerance),
+    }
+}
+
+/// The places that simulated relays agree on, with the messages and all; `None` where they agree on none.
+fn agreed(briefed: &Briefed) -> Option<Vec<Placement>> {
     let mut setup = Setup::new(briefed.mission);
     setup.settings.method = Method::Joint;
     setup.profiles.clone_from(&briefed.own);
     setup.held.clone_from(&briefed.held);
-    let mut chain = Chain::new(setup).map_err(|error| NoPlan::Wrong(error.to_string()))?;
-    while !chain.step(100_000) {}
-    let outcome = chain.finish();
-    let places: Option<Vec<Placement>> =
-        outcome.relays.iter().map(|relay| relay.setpoint).collect();
-    let Some(places) = places.filter(|_| outcome.ending == Ending::Settled) else {
-        return Err(source::nothing());
+    let outcome = chain::run(setup).ok()?;
+    let places = outcome.relays.iter().map(|relay| relay.setpoint);
+    places
+        .collect::<Option<_>>()
+        .filter(|_| outcome.ending == Ending::Settled)
+}
+
+/// The places that the joint method finds; `None` where it finds none.
+fn joint(briefed: &Briefed) -> Option<Vec<Placement>> {
+    let mission = &briefed.mission;
+    let seat_of = |index| {
+        let holds = briefed.held.contains(&index);
+        Seat::of(mission, briefed.profile(index), holds)
     };
-    Ok(briefed.plan(&places, "the joint method", false))
+    let mut solver = Box::new(Chain::new(mission)?);
+    let target = loop {
+        if let Poll::Ready(solved) = solver.step(mission, seat_of) {
+            break solved.ok()?;
+        }
+    };
+    let mut places: Vec<Placement> = Vec::new();
+    let mut behind = None;
+    for index in 1..=mission.relays() {
+        let seat = seat_of(index);
+        let own = Station {
+            at: solver.at(index, seat),
+            power_w: seat.power_w,
+        };
+        let link = Link {
+            mission,
+            behind,
+            index,
+            own,
+            measured_per_w: None,
+            plain: false,
+            end_m: Some(solver.end_m(mission, &seat_of, index)),
+        };
+        let from_m = places.last().map_or(0.0, |place| place.x_m);
+        let mut reaches = PerTarget::new();
+        link.extend(&[target], &[from_m], &mut reaches);
+        places.push(own.at.at(*reaches.first()?));
+        behind = Some(Behind {
+            relay: own,
+            measured_per_w: None,
+        });
+    }
+    Some(places)
 }
 
 /// The altitudes of the band at which a common one is tried: what many relays can do, few cannot do worse when each may choose.

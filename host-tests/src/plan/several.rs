@@ -9,11 +9,17 @@ use super::{Ask, Briefed, Fitted, MOST_RELAYS, NoPlan, Number, Plan};
 use super::{altitude, source};
 use crate::brief::{self, Refusal};
 use crate::command::narrow;
-use crate::scenario::{Interference, Scenario};
-use crate::several::{Hypothetical, Scene, best_common_altitude, optimum, polish};
+use crate::scenario::{Interference, Scenario, Source};
+use crate::several::{Hypothetical, Place, Scene, best_common_altitude, optimum, polish};
 
 /// By how much the places for the hypothetical interferer may fall short, relative, and still be kept.
 const LOSS: f64 = 0.01;
+
+/// How many of the starts are polished: the best against the true sum.
+const POLISHED: usize = 2;
+
+/// How many of the interferers are tried alone, to begin with.
+const ALONE: usize = 4;
 
 pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     let hypothetical = brief::hypothetical(scenario).ok_or(Refusal::NoHypothetical)?;
@@ -118,19 +124,66 @@ impl Planner<'_> {
         let mut scene = scene.clone();
         let mut starts = Vec::new();
         if self.ask.free_altitude {
-            starts.extend(best_common_altitude(&scene).map(|chain| chain.places));
+            let common = best_common_altitude(&scene).map(|chain| chain.places);
+            starts.extend(common.map(|chain| chain.into_iter().map(Place::from).collect()));
+            starts.extend(self.variants().iter().filter_map(|variant| {
+                let relays = u16::try_from(scene.relays.len()).ok()?;
+                let plan = altitude::best(variant, relays, self.ask.tolerance).ok()?;
+                Some(places(&plan))
+            }));
         } else {
-            // Altitudes differ, and each is to be kept.
+            // Altitudes differ, and each is to be kept, right above the line.
+            (scene.band.left_m, scene.band.right_m) = (0.0, 0.0);
             for relay in &mut scene.relays {
                 relay.holds = true;
             }
         }
-        starts.extend(start.and_then(|plan| on_line(&plan.chain())));
+        starts.extend(start.map(places));
+        let mut starts: Vec<(f64, Vec<Place>)> = starts
+            .into_iter()
+            .map(|start| (scene.chain_sir(&start), start))
+            .collect();
+        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        starts.truncate(POLISHED);
         starts
             .into_iter()
-            .filter_map(|start| polish(&scene, &start, scene.band))
+            .filter_map(|(_, start)| polish(&scene, &start, scene.band))
             .map(|polished| Best::new(&scene, &polished.places, false))
             .max_by(|a, b| a.sir.total_cmp(&b.sir))
+    }
+
+    /// Scenarios with one interferer whose chains may go another way than the first: with the hypothetical interferer on the
+    /// other side, with room to one side or to none, and with each of the first interferers alone.
+    fn variants(&self) -> Vec<Scenario> {
+        let one = self.with_one();
+        let mut variants = Vec::new();
+        if one.lateral_min_m < one.lateral_max_m {
+            let (left, right) = (one.lateral_min_m, one.lateral_max_m);
+            for (lateral_min_m, lateral_max_m) in [(left, 0.0), (0.0, right), (0.0, 0.0)] {
+                variants.push(Scenario {
+                    lateral_min_m,
+                    lateral_max_m,
+                    ..one.clone()
+                });
+            }
+            if let Interference::Sources(sources) = &one.interference {
+                let mirrored = sources.iter().map(|source| Source {
+                    y_m: -source.y_m,
+                    ..source.clone()
+                });
+                variants.push(Scenario {
+                    interference: Interference::Sources(mirrored.collect()),
+                    ..one.clone()
+                });
+            }
+        }
+        if let Interference::Sources(sources) = &self.scenario.interference {
+            variants.extend(sources.iter().take(ALONE).map(|source| Scenario {
+                interference: Interference::Sources(vec![source.clone()]),
+                ..one.clone()
+            }));
+        }
+        variants
     }
 
     /// The fewest relays one of whose chains meets `target`: more are taken to do no worse.
@@ -222,10 +275,17 @@ impl Candidates {
 
 impl Best {
     /// The chain at the f32 places that relays are told.
-    fn new(scene: &Scene, places: &[(f64, f64)], proven: bool) -> Self {
+    fn new(scene: &Scene, places: &[impl Copy + Into<Place>], proven: bool) -> Self {
         let places: Vec<Placement> = places
             .iter()
-            .map(|&(x, h)| Placement::on_line(narrow(x), narrow(h)))
+            .map(|&place| {
+                let Place { x, y, h } = place.into();
+                Placement {
+                    x_m: narrow(x),
+                    y_m: narrow(y),
+                    altitude_m: narrow(h),
+                }
+            })
             .collect();
         Self {
             sir: scene.chain_sir(&places),
@@ -235,13 +295,9 @@ impl Best {
     }
 }
 
-/// The places as (x, h), m, where all are right above the line.
-fn on_line(places: &[Placement]) -> Option<Vec<(f64, f64)>> {
-    let each = places.iter().map(|place| {
-        let above = (f64::from(place.x_m), f64::from(place.altitude_m));
-        (place.y_m.to_bits() == 0).then_some(above)
-    });
-    each.collect()
+/// The places of a plan.
+fn places(plan: &Plan) -> Vec<Place> {
+    plan.chain().into_iter().map(Place::from).collect()
 }
 
 /// One relay at `x_m`: the best altitude of a fine scan of the band, closed in on four times.

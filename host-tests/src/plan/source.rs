@@ -167,7 +167,7 @@ fn upward(case: given_x::Case) -> &'static str {
 }
 
 /// The best places of so many relays at the altitudes they hold: Algorithm 1 without its messages.
-fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
+pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, relays, tolerance)?;
     let target = solved(&briefed)?;
     let places = placed(&briefed, target).ok_or_else(nothing)?;

@@ -34,18 +34,21 @@ pub struct Scene {
     pub mu_nlos: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
-    /// The altitudes that relays without one of their own may be given.
+    /// The altitudes that relays without one of their own may be given, and how far to the side all may go.
     pub band: Corridor,
     /// The relays from Tx to Rx; their number is N.
     pub relays: Vec<Relay>,
 }
 
-/// Where a relay stands, in metres: x along the line, y to the right of it, h > 0 above the ground.
+/// Where a relay stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    pub(super) x: f64,
-    pub(super) y: f64,
-    pub(super) h: f64,
+    /// Along the line from Tx, metres.
+    pub x: f64,
+    /// To the right of the line, metres.
+    pub y: f64,
+    /// Above the ground, metres, > 0.
+    pub h: f64,
 }
 
 impl From<(f64, f64)> for Place {
@@ -91,7 +94,12 @@ impl Scene {
             mu_los: channel.mu_los(),
             mu_nlos: channel.mu_nlos(),
             eta: channel.eta(),
-            band: Corridor::plane(scenario.altitude_min_m, scenario.altitude_max_m),
+            band: Corridor {
+                least_m: scenario.altitude_min_m,
+                most_m: scenario.altitude_max_m,
+                left_m: scenario.lateral_min_m,
+                right_m: scenario.lateral_max_m,
+            },
             relays: (1..=relays).map(|index| relay(scenario, index)).collect(),
         })
     }

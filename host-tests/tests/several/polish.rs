@@ -3,7 +3,7 @@
 use host_tests::random::joint::{CROWDED, scenario};
 use host_tests::random::seed;
 use host_tests::reference::joint::{self, Corridor, Effort};
-use host_tests::several::{Polished, Scene, best_common_altitude, optimum, polish};
+use host_tests::several::{Place, Polished, Scene, best_common_altitude, optimum, polish};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -21,20 +21,26 @@ fn even(scene: &Scene, h: f64) -> Vec<(f64, f64)> {
 }
 
 /// The polished chain, and that it is no worse than its start, in order, within the band and apart.
-fn checked(scene: &Scene, start: &[(f64, f64)], band: Corridor) -> Polished {
+fn checked(scene: &Scene, start: &[impl Copy + Into<Place>], band: Corridor) -> Polished {
     let found = polish(scene, start, band).unwrap();
     assert!(found.sir >= scene.chain_sir(start), "{scene:?}");
     assert_eq!(found.sir, scene.chain_sir(&found.places));
     assert!(found.rounds <= 200);
-    let within = |&(x, h): &(f64, f64)| {
-        (0.0..=scene.distance_m).contains(&x) && (band.least_m..=band.most_m).contains(&h)
+    let within = |&Place { x, y, h }: &Place| {
+        (0.0..=scene.distance_m).contains(&x)
+            && (band.least_m..=band.most_m).contains(&h)
+            && (band.left_m..=band.right_m).contains(&y)
     };
     assert!(found.places.iter().all(within), "{found:?}");
     for pair in found.places.windows(2) {
-        let (dx, dh) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
+        let (dx, dy, dh) = (
+            pair[1].x - pair[0].x,
+            pair[1].y - pair[0].y,
+            pair[1].h - pair[0].h,
+        );
         assert!(dx >= 0.0, "{found:?}");
         assert!(
-            dx.hypot(dh) >= scene.min_separation_m * (1.0 - 1e-9),
+            dx.hypot(dy).hypot(dh) >= scene.min_separation_m * (1.0 - 1e-9),
             "{found:?}"
         );
     }
@@ -109,11 +115,31 @@ fn with_several_sources_in_a_band_the_rules_are_kept() {
         gained += u32::from(found.sir > 1.1 * scene.chain_sir(&start));
         let held = scene.relays.iter().zip(start.iter().zip(&found.places));
         for (_, (before, after)) in held.filter(|(relay, _)| relay.holds) {
-            assert_eq!(before.1, after.1);
+            assert_eq!(before.1, after.h);
         }
     }
     println!("{gained} of 40 gained more than a tenth");
     assert!(gained >= 20, "{gained}");
+}
+
+/// With room to the side the chain only gains, and keeps to the room.
+#[test]
+fn with_room_to_the_side_it_gains() {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed(83));
+    let mut gained = 0;
+    for _ in 0..40 {
+        let mut scene = scene(&mut rng, 2..=8, 2..=4);
+        scene.band.most_m = scene.band.least_m + 0.2 * scene.distance_m;
+        let hops = scene.relays.len() as f64 + 1.0;
+        scene.min_separation_m = scene.min_separation_m.min(0.5 * scene.distance_m / hops);
+        let start = even(&scene, scene.band.least_m);
+        let above = checked(&scene, &start, scene.band);
+        (scene.band.left_m, scene.band.right_m) = (-0.2 * scene.distance_m, 0.3 * scene.distance_m);
+        let beside = checked(&scene, &above.places, scene.band);
+        gained += u32::from(beside.sir > 1.01 * above.sir);
+    }
+    println!("{gained} of 40 gained more than a hundredth by the side");
+    assert!(gained >= 15, "{gained}");
 }
 
 #[test]
@@ -123,5 +149,5 @@ fn a_start_that_is_no_chain_is_refused() {
     let start = even(&scene, scene.band.least_m);
     assert!(polish(&scene, &start, scene.band).is_some());
     assert_eq!(polish(&scene, &start[1..], scene.band), None);
-    assert_eq!(polish(&scene, &[], scene.band), None);
+    assert_eq!(polish(&scene, &[] as &[Place], scene.band), None);
 }

@@ -4,7 +4,9 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use host_tests::brief;
+use host_tests::plan::{Ask, NoPlan, Number, plan};
 use host_tests::report::hop_sirs;
+use host_tests::scenario::Scenario;
 use host_tests::sim::chain;
 use host_tests::sim::outcome::{Ending, Outcome};
 use host_tests::sim::setup::Setup;
@@ -36,6 +38,16 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
             &places,
         ));
     }
+    if problem.choice == Choice::Altitudes {
+        let scenario = problem.scenario()?;
+        let (time_s, places) = timed(|| solved(&scenario, problem.relays))?;
+        runs.push(run(
+            "**uav-relay**, every relay by itself",
+            time_s,
+            &mission,
+            &places,
+        ));
+    }
     let mut setup = Setup::new(mission);
     if problem.choice == Choice::Altitudes {
         setup.settings.method = Method::Joint;
@@ -58,6 +70,20 @@ fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
     (1..=mission.relays())
         .map(|index| place(mission, agreed.target, index, common).ok_or_else(none))
         .collect()
+}
+
+/// The chain from the mission alone by the joint method, as every relay solves it.
+fn solved(scenario: &Scenario, relays: u16) -> Result<Vec<Placement>, String> {
+    let ask = Ask {
+        number: Number::Of(relays),
+        free_altitude: true,
+        x_m: None,
+        tolerance: TOLERANCE,
+    };
+    match plan(black_box(scenario), &ask) {
+        Ok(plan) => Ok(plan.places.iter().map(|(place, _)| *place).collect()),
+        Err(NoPlan::Wrong(why) | NoPlan::Unmet(why, _)) => Err(why),
+    }
 }
 
 /// The chain that simulated relays settle on: what every one of them computes, and every frame they exchange.

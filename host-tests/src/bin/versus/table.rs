@@ -26,6 +26,8 @@ const NOTES: &str = "\
 In parentheses: times as long as the first line of that N in the same run.
 
 - `uav-relay, as the head predicts`: what the head computes from the mission before the first sweep, and every relay's place. \
+`every relay by itself`: the joint method on the whole chain from the scenario, from all of its starts, which each relay works out \
+alone. \
 `all relays by messages`: the computing of all relays of a simulated chain one after the other, and every frame they exchange.
 - The others have the whole problem in one place, in f64. SLSQP: the largest t with ln SIR >= t at every hop, order and least \
 separation as constraints, with their slopes; choices from 0 to 10; from equal spacings (at five altitudes where those are chosen) and random chains. \
