@@ -1,4 +1,4 @@
-//! One relay with room beside the line, against grids in f64 that know of no theorem.
+//! One relay with room beside the line, against searches in f64 that know of no theorem.
 
 use std::collections::BTreeMap;
 
@@ -96,7 +96,7 @@ impl Roomy {
     }
 
     /// The best SIR over the box: a grid over all of it, even and ever closer to where a hop begins or ends, and from each of
-    /// its best places finer and finer grids about the best so far.
+    /// its best places that are well apart a search with random steps.
     fn brute(&self, ranges: [(f64, f64); 3]) -> f64 {
         let link = &self.scene.link;
         let of = [
@@ -112,37 +112,47 @@ impl Roomy {
             }
         }
         seen.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let starts = [0, 1, 7, 40];
-        let starts = starts.iter().filter_map(|&at| seen.get(at));
+        let mut starts: Vec<[f64; 3]> = Vec::new();
+        let apart = |a: &[f64; 3], b: &[f64; 3]| {
+            (0..3).any(|axis| {
+                let (low, high) = ranges[axis];
+                (a[axis] - b[axis]).abs() > 0.1 * (high - low)
+            })
+        };
+        for (_, at) in seen {
+            if starts.len() < 5 && starts.iter().all(|start| apart(start, &at)) {
+                starts.push(at);
+            }
+        }
         starts
-            .map(|&(_, at)| self.about(at, ranges))
+            .into_iter()
+            .map(|at| self.about(at, ranges))
             .fold(0.0, f64::max)
     }
 
+    /// The best SIR of a search from `at`: steps in random directions, each axis with its own length, shorter and shorter ones
+    /// where none is better. Steps along the axes alone would stay on the ridges on which the best places lie.
     fn about(&self, mut at: [f64; 3], ranges: [(f64, f64); 3]) -> f64 {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut most = self.sir(at);
-        let mut half = ranges.map(|(low, high)| (high - low) / 6.0);
-        for _ in 0..70 {
-            let centre = at;
-            let steps = |axis: usize| -> Vec<f64> {
-                let (low, high) = ranges[axis];
-                let count = if low < high { 2 } else { 0 };
-                (-count..=count)
-                    .map(|i| (centre[axis] + half[axis] * f64::from(i) / 2.0).clamp(low, high))
-                    .collect()
-            };
-            let [xs, ys, hs] = [0, 1, 2].map(steps);
-            for &x in &xs {
-                for &y in &ys {
-                    for &h in &hs {
-                        let here = self.sir([x, y, h]);
-                        if here > most {
-                            (most, at) = (here, [x, y, h]);
-                        }
+        let mut reach = 0.2;
+        for _ in 0..300 {
+            let before = most;
+            for _ in 0..20 {
+                let mut to = at;
+                for (value, (low, high)) in to.iter_mut().zip(ranges) {
+                    if low < high {
+                        let part = rng.random_range(-1.0..1.0_f64);
+                        let part = part * part.abs() * part.abs();
+                        *value = (*value + (high - low) * reach * part).clamp(low, high);
                     }
                 }
+                let here = self.sir(to);
+                if here > most {
+                    (most, at) = (here, to);
+                }
             }
-            half = half.map(|half| half * 0.75);
+            reach *= if most > before { 1.1 } else { 0.8 };
         }
         most
     }
@@ -221,11 +231,11 @@ fn no_worse_than_brute_force(
     }
     let largest = |of: fn(&Seen) -> f64| seen.iter().map(of).fold(f64::MIN, f64::max);
     println!(
-        "{} scenes: short of brute force by at most {:.1e}, told off by {:.1e}; brute force fell short by more than 1e-6 in {}, by at most {:.1e}; {cases:?}",
+        "{} scenes: short of brute force by at most {:.1e}, told off by {:.1e}; brute force fell short by more than 1e-4 in {}, by at most {:.1e}; {cases:?}",
         seen.len(),
         largest(|one| one.short),
         largest(|one| one.told.abs()),
-        seen.iter().filter(|one| one.short < -1e-6).count(),
+        seen.iter().filter(|one| one.short < -ALLOWED).count(),
         largest(|one| -one.short),
     );
     cases
