@@ -1,4 +1,4 @@
-//! One relay and one interferer: Lemmas 1 and 2, Corollary 1 and Theorems 1 to 3 against brute force in f64.
+//! One relay and one interferer: Lemmas 1 and 2, Corollary 1, Theorems 1 to 3 and one relay aside against brute force in f64.
 //!
 //! `COUNT` and `SEED` in the environment take other scenarios.
 #![allow(
@@ -9,6 +9,8 @@
     missing_docs
 )]
 
+#[path = "theorems/aside.rs"]
+mod aside;
 #[path = "theorems/brute.rs"]
 mod brute;
 #[path = "theorems/known.rs"]

@@ -43,10 +43,10 @@ pub struct Ask {
     pub tolerance: f64,
 }
 
-/// Which of the paper's theorems placed the only relay, and by which of its cases.
+/// Which of the paper's theorems, or what stands in for one, placed the only relay, and by which of its cases.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Theorem {
-    /// 1 to 3.
+    /// 1 to 3; 4 for one relay aside, which is not in the paper.
     pub number: u8,
     /// The number of the case there; 0 for one that the paper leaves out.
     pub case: u8,

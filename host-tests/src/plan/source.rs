@@ -1,6 +1,6 @@
 //! Plans against one interferer.
 
-use uav_relay::placement::single::{Found, free, given_altitude, given_x};
+use uav_relay::placement::single::{Found, aside, free, given_altitude, given_x};
 use uav_relay::placement::{fleet, plan as silent};
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 
@@ -10,17 +10,6 @@ use crate::scenario::Scenario;
 
 pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     match ask.number {
-        Number::Of(1) if is_beside(scenario, ask) => {
-            let above = Plan {
-                proven: false,
-                ..alone(scenario, ask)?
-            };
-            let beside = altitude::best(scenario, 1, ask.tolerance);
-            Ok(beside
-                .ok()
-                .filter(|plan| plan.sir() > above.sir())
-                .unwrap_or(above))
-        }
         Number::Of(1) => alone(scenario, ask),
         Number::Of(relays) if ask.free_altitude => altitude::best(scenario, relays, ask.tolerance),
         Number::Of(relays) => best(scenario, relays, ask.tolerance),
@@ -29,12 +18,6 @@ pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
         }
         Number::Meeting(target) => level(scenario, target, ask.tolerance),
     }
-}
-
-/// Whether the only relay may go beside the line, which the theorems leave out.
-fn is_beside(scenario: &Scenario, ask: &Ask) -> bool {
-    let room = scenario.lateral_min_m < scenario.lateral_max_m;
-    room && ask.free_altitude && ask.x_m.is_none()
 }
 
 /// The fewest relays at the altitudes they hold, by eq. (Opt).
@@ -47,7 +30,7 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
     })
 }
 
-/// One relay, by Theorem 1, 2 or 3.
+/// One relay, by Theorem 1, 2 or 3, or beside the line. One that holds its altitude holds its place above the line too.
 fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, 1, ask.tolerance)?;
     let profile = briefed.profile(1);
@@ -58,6 +41,9 @@ fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     };
     let (found, theorem) = if let Some(x_m) = ask.x_m {
         second(&mission, narrow(x_m), profile.power_w)
+    } else if ask.free_altitude && briefed.held.is_empty() && !mission.config().lateral.is_single()
+    {
+        beside(&mission, profile.power_w)
     } else if ask.free_altitude {
         third(&mission, profile.power_w)
     } else {
@@ -67,7 +53,7 @@ fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     if !(found.sir > 0.0) {
         return Err(nothing());
     }
-    let how = ["Theorem 1", "Theorem 2", "Theorem 3"]
+    let how = ["Theorem 1", "Theorem 2", "Theorem 3", "one relay aside"]
         .get(usize::from(theorem.number) - 1)
         .copied()
         .unwrap_or("a theorem");
@@ -132,6 +118,35 @@ fn third(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
             words,
         },
     ))
+}
+
+fn beside(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
+    let (found, case) = aside::best_place(mission, power_w)?;
+    Some((
+        found,
+        Theorem {
+            number: 4,
+            case: case.number(),
+            words: sideways(case).to_owned(),
+        },
+    ))
+}
+
+/// A case of one relay aside in words.
+fn sideways(case: aside::Case) -> &'static str {
+    use aside::{Axis, Case};
+    match case {
+        Case::Touching => {
+            "where the circles of equal SIR of both hops touch, at the lowest altitude"
+        }
+        Case::Hilltop => "the first hop is the worse one even at its best place",
+        Case::AboveRx => "the first hop is the better one even above Rx",
+        Case::Edge(Axis::Along) => "on an edge of the corridor along the line",
+        Case::Edge(Axis::Across) => "on an edge of the corridor across the line, at Tx or Rx",
+        Case::Edge(Axis::Upward) => "on an upright edge of the corridor, at Tx or Rx",
+        Case::Level => "the interferer stands at Tx: the first hop is the same everywhere",
+        Case::Drowned => "the interferer stands at Rx: nothing is heard",
+    }
 }
 
 /// A case of Theorem 1 in words.

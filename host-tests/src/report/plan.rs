@@ -63,11 +63,12 @@ pub struct PlanReport {
     /// Whether no places are better, and no fewer relays enough. False means that it is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proven: Option<bool>,
-    /// The theorem that placed the only relay, 1 to 3.
+    /// The theorem that placed the only relay, 1 to 3; 4 for one relay aside.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub theorem: Option<u8>,
     /// Its case as the paper counts them; 0 for one that the paper leaves out. For Theorem 3 the edge of the box: 1 lowest, 2
-    /// highest, 3 above Rx.
+    /// highest, 3 above Rx. For one relay aside: 1 where the circles of equal SIR touch, 2 on the hill of the first hop, 3 above
+    /// Rx, 4 to 6 on an edge of the corridor along x, along y or upward, 7 and 8 with the interferer at Tx or Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case: Option<u8>,
     /// The case in words.

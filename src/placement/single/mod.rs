@@ -5,6 +5,7 @@
 //! | the altitude, one interferer | [`given_altitude`] | Corollary 1, Theorem 1 |
 //! | the place along x, one interferer | [`given_x`] | Theorem 2 |
 //! | neither, one interferer | [`free`] | Theorem 3, as corrected |
+//! | with room beside the line, one interferer | [`aside`] | not in the paper |
 //! | the altitude, a field of interference | [`stochastic`] | Algorithm 3, as corrected |
 //! | noise alone | [`noise`] | the paper's special case without interference |
 //!
@@ -12,6 +13,8 @@
 //! ([`crate::sir::first_hop_turn`], Lemma 2); [`guide`] has C_1, C_2 and C_3, the ratios of powers at which the cases change.
 //! SIR_2 rises with x and falls with the altitude, always.
 
+pub mod aside;
+mod edge;
 pub mod free;
 pub mod given_altitude;
 pub mod given_x;
