@@ -6,6 +6,7 @@
     clippy::unwrap_used,
     clippy::indexing_slicing,
     clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
     missing_docs
 )]
 
@@ -67,13 +68,11 @@ fn plainly(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
             measured_per_w: None,
         });
         from = reaches;
-        match mission.after(index) {
-            Some(next) => index = next,
-            None => {
-                let end = link.ending(target as f32, reach);
-                return end.is_some_and(|(slack, _)| slack >= 0.0);
-            }
-        }
+        let Some(next) = mission.after(index) else {
+            let end = link.ending(target as f32, reach);
+            return end.is_some_and(|(slack, _)| slack >= 0.0);
+        };
+        index = next;
     }
 }
 
@@ -272,9 +271,9 @@ fn best_in_a_field(link: &StochasticLink) -> f64 {
             0.5 * (low + high)
         };
         if met(middle) {
-            low = middle
+            low = middle;
         } else {
-            high = middle
+            high = middle;
         }
         if high - low < 1e-6 * low {
             break;

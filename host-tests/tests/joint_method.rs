@@ -20,15 +20,19 @@ use host_tests::sim::outcome::{Ending, Outcome};
 use host_tests::sim::setup::Setup;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::{Adjust, Method, Mission, MissionConfig, Profile};
+use uav_relay::{Adjust, Band, Method, Mission, MissionConfig, Profile};
 
 /// The setup of a chain that chooses altitudes within `corridor`; `None` where a relay would refuse the numbers.
 fn setup(link: &Link, corridor: Corridor) -> Option<Setup> {
     let (mission, profiles) = of_link(link, 1e-4)?;
     let config = MissionConfig {
-        band: uav_relay::Band {
+        band: Band {
             least_m: corridor.least_m as f32,
             most_m: corridor.most_m as f32,
+        },
+        lateral: Band {
+            least_m: corridor.left_m as f32,
+            most_m: corridor.right_m as f32,
         },
         ..*mission.config()
     };
@@ -45,7 +49,11 @@ fn places(outcome: &Outcome) -> Vec<Place> {
         .iter()
         .map(|relay| {
             let at = place(relay);
-            Place::in_plane(f64::from(at.x_m), f64::from(at.altitude_m))
+            Place {
+                x_m: f64::from(at.x_m),
+                y_m: f64::from(at.y_m),
+                altitude_m: f64::from(at.altitude_m),
+            }
         })
         .collect()
 }
@@ -167,7 +175,7 @@ fn the_joint_optima_are_reached_in_one_round_trip() {
             outcome.sweeps,
             outcome.messages,
             outcome.bytes,
-            outcome.virtual_s()
+            outcome.ended.as_micros() as f64 / 1e6
         );
         assert!(
             sir >= best * (1.0 - 1e-4) && sir <= best * (1.0 + 1e-6),

@@ -37,7 +37,7 @@ fn agreed(scenario: &Scenario, relays: u16) -> f64 {
     let (mission, own) = brief::mission(scenario, relays, TOLERANCE).unwrap();
     let mut setup = Setup::new(mission);
     setup.settings.method = Method::Joint;
-    setup.profiles = own.clone();
+    setup.profiles.clone_from(&own);
     setup.held = brief::held(scenario, relays);
     let outcome = chain::run(setup).unwrap();
     if outcome.ending != Ending::Settled {

@@ -60,13 +60,11 @@ impl Share {
     pub(super) fn solve(&mut self, own: Own<'_>) -> Option<f32> {
         let seat = Seat::common(own.mission);
         if !matches!(self.lead, Lead::Solving(_)) {
-            match Chain::new(own.mission) {
-                Some(chain) => self.lead = Lead::Solving(chain),
-                None => {
-                    self.choose_given(own);
-                    return Some(0.0);
-                }
-            }
+            let Some(chain) = Chain::new(own.mission) else {
+                self.choose_given(own);
+                return Some(0.0);
+            };
+            self.lead = Lead::Solving(chain);
         }
         let Lead::Solving(chain) = &mut self.lead else {
             return None;
@@ -74,18 +72,15 @@ impl Share {
         let Poll::Ready(solved) = chain.step(own.mission, |_| seat) else {
             return None;
         };
-        let target = match solved {
-            Ok(target) => {
-                let end_m = chain.end_m(own.mission, &|_| seat, own.index);
-                let at = chain.at(own.index, seat);
-                let at = self.seat(own).room.nearest(at);
-                self.chosen = Some(Chosen { at, end_m });
-                target
-            }
-            Err(Infeasible) => {
-                self.choose_given(own);
-                0.0
-            }
+        let target = if let Ok(target) = solved {
+            let end_m = chain.end_m(own.mission, &|_| seat, own.index);
+            let at = chain.at(own.index, seat);
+            let at = self.seat(own).room.nearest(at);
+            self.chosen = Some(Chosen { at, end_m });
+            target
+        } else {
+            self.choose_given(own);
+            0.0
         };
         self.lead = Lead::No;
         Some(target)

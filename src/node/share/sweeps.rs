@@ -110,11 +110,11 @@ impl Share {
             self.at = self.station_for(chosen).at;
             self.setpoint = Some(self.at.at(x_m));
             self.target = Some(target);
-            if let Lead::Searching { search, .. } = &mut self.lead {
-                if !search.accept(target) {
-                    self.exchange.phase = Phase::Answered;
-                    return Next::Work { moved: true };
-                }
+            if let Lead::Searching { search, .. } = &mut self.lead
+                && !search.accept(target)
+            {
+                self.exchange.phase = Phase::Answered;
+                return Next::Work { moved: true };
             }
             return self.agree(own);
         }

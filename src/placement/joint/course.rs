@@ -162,8 +162,8 @@ impl Coursing {
         // Where there is no room nearer to the line, a hop may end before Tx.
         let sound = place.x_m >= 0.0 && penalty_m <= f32::MAX;
         sound.then_some(Trial {
-            place,
             penalty_m,
+            place,
             ..told
         })
     }

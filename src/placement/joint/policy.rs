@@ -164,7 +164,6 @@ impl Brief {
 }
 
 /// The upper half of an f32's bits, rounded.
-#[expect(clippy::cast_possible_truncation, reason = "the upper half")]
 const fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }

@@ -22,6 +22,8 @@ use crate::sir::{CrossSection, Placement, Sender, Station};
 
 /// Relays in a segment.
 const SEGMENT: usize = 10;
+/// The same number, to count relays by.
+const SEGMENT_RELAYS: u16 = 10;
 
 /// Relays in one portion of a pass that changes nothing.
 const PLAIN: u16 = 40;
@@ -599,9 +601,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// The numbers of the relays in `segment`.
     fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
-        let first = u16::from(segment) * SEGMENT as u16;
+        let first = u16::from(segment) * SEGMENT_RELAYS;
         // Counted in u16, which both are: to zip two ranges backward may panic.
-        (0..SEGMENT as u16)
+        (0..SEGMENT_RELAYS)
             .map(move |k| (usize::from(k), first + 1 + k))
             .filter(move |(_, index)| *index <= relays)
     }
@@ -670,7 +672,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Where the relay before `segment` is.
     fn nominal_before(&self, chain: &Chain<'_, impl Fn(u16) -> Seat>, segment: u8) -> Placement {
-        let index = u16::from(segment) * SEGMENT as u16;
+        let index = u16::from(segment) * SEGMENT_RELAYS;
         if index == 0 {
             return Placement::default();
         }

@@ -135,6 +135,10 @@ impl Start {
     }
 
     /// Start `number` for relays with that `room`; `None` after the last, `Some(None)` where it is no use.
+    #[expect(
+        clippy::option_option,
+        reason = "past the end, of no use, and a start are three things"
+    )]
     pub(super) fn number(number: u8, room: Room) -> Option<Option<Self>> {
         let Room { lateral, band } = room;
         let fits = |(aside, up): (f32, f32)| {
