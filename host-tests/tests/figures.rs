@@ -13,6 +13,8 @@
 
 #[path = "figures/altitudes.rs"]
 mod altitudes;
+#[path = "figures/aside.rs"]
+mod aside;
 #[path = "figures/chains.rs"]
 mod chains;
 #[path = "figures/fields.rs"]

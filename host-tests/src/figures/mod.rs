@@ -6,7 +6,7 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`locus`], [`single`], [`single_gains`] | one relay |
+//! | [`locus`], [`single`], [`single_gains`], [`aside`] | one relay |
 //! | [`fewest`], [`convergence`], [`gain`], [`cost`] | chains at one altitude |
 //! | [`beta`], [`stochastic`] | fields of interference |
 //! | [`altitude`], [`adjust`], [`joint`] | altitudes |
@@ -18,6 +18,7 @@
 
 pub mod adjust;
 pub mod altitude;
+pub mod aside;
 pub mod beta;
 pub mod chart;
 pub mod convergence;
@@ -52,7 +53,7 @@ pub struct Figure {
 }
 
 /// Every figure, in the order of the paper, then this project's own.
-pub const ALL: [Figure; 13] = [
+pub const ALL: [Figure; 15] = [
     figure("locus", locus::sheet),
     figure("single", single::sheet),
     figure("fewest-by-place", fewest::by_place_sheet),
@@ -66,6 +67,8 @@ pub const ALL: [Figure; 13] = [
     figure("rounds", adjust::rounds_sheet),
     figure("cost", cost::sheet),
     figure("joint", joint::sheet),
+    figure("aside", aside::places_sheet),
+    figure("aside-gain", aside::gains_sheet),
 ];
 
 const fn figure(name: &'static str, make: fn() -> Result<Sheet, Trouble>) -> Figure {

@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 use std::process::{Command, Output};
 
 use host_tests::cases::{self, Case};
+use host_tests::reference::Link;
+use host_tests::reference::joint::{Corridor, Effort, optimum};
 use serde_json::Value;
 
 fn plan(arguments: &[&str]) -> Output {
@@ -109,6 +111,33 @@ fn the_theorems_of_the_reference_come_out_of_the_command() {
             assert_eq!(report["proven"].as_bool(), Some(true));
         }
     }
+}
+
+/// With room beside the line the only relay goes there, and no place is better.
+#[test]
+fn one_relay_aside_is_the_judges_of_three_dimensions() {
+    let side = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/side.toml");
+    let report = json(&["--scenario", side, "--uavs", "1", "--altitude", "free"]);
+    assert_eq!(report["theorem"].as_u64(), Some(4), "{report}");
+    assert_eq!(report["how"].as_str(), Some("one relay aside"));
+    assert_eq!(report["proven"].as_bool(), Some(true));
+    assert!((1..=8).contains(&report["case"].as_u64().unwrap()));
+    let link = Link {
+        y_i: 150.0,
+        ..Link::paper(1)
+    };
+    let corridor = Corridor {
+        least_m: 20.0,
+        most_m: 300.0,
+        left_m: -280.0,
+        right_m: 280.0,
+    };
+    let best = optimum(&link, corridor, &[], Effort::usual(1)).unwrap();
+    let sir = number(&report["sir"]);
+    assert!((sir / best.sir - 1.0).abs() < 1e-5, "{sir} {best:?}");
+    // Without a free altitude it stays above the line.
+    let report = json(&["--scenario", side, "--uavs", "1"]);
+    assert_eq!(report["theorem"].as_u64(), Some(1), "{report}");
 }
 
 #[test]
