@@ -125,6 +125,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             own: false,
             commit: Some(0),
             slacks: vec![1.0],
+            stand: None,
         },
         Said::Busy { number },
         Said::Heartbeat {
@@ -452,12 +453,12 @@ fn tamed(said: Said) -> Said {
         Said::Sweep {
             number,
             mission,
+            anchor,
             gap,
             growth,
             altitude_m,
             power_w,
             mut reaches,
-            ..
         } => {
             for reach in &mut reaches {
                 *reach = into(*reach);
@@ -465,7 +466,7 @@ fn tamed(said: Said) -> Said {
             Said::Sweep {
                 number,
                 mission,
-                anchor: 1.0,
+                anchor: 1.0_f32.copysign(anchor),
                 gap: gap.min(140),
                 growth: if gap == 0 { 0 } else { growth.min(4) },
                 altitude_m,
@@ -478,6 +479,7 @@ fn tamed(said: Said) -> Said {
             mission,
             own,
             mut slacks,
+            stand,
             ..
         } => {
             slacks.truncate(1);
@@ -490,6 +492,7 @@ fn tamed(said: Said) -> Said {
                 own,
                 commit: (!slacks.is_empty()).then_some(0),
                 slacks,
+                stand: stand.map(into),
             }
         }
         Said::Aside {
