@@ -260,6 +260,7 @@ fn look_at(message: &Message) {
         }
         Message::Verdict(answer) => {
             assert!(answer.verdict.slacks.iter().all(|slack| slack.is_finite()));
+            assert!(answer.stand.is_none_or(|x_m| (0.0..=1e6).contains(&x_m)));
         }
         Message::Hail(hail) => assert!(hail.neighbour <= MAX_RELAYS, "{hail:?}"),
         Message::Roster(roster) => {

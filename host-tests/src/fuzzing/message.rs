@@ -234,7 +234,14 @@ impl Body<'_, '_> {
 
     fn sweep(&mut self, extra: Extra) {
         self.pass();
+        let plain = self.input.flag();
         self.sir();
+        if plain {
+            // The sign of the anchor.
+            if let Some(byte) = self.bytes.last_mut() {
+                *byte ^= 0x80;
+            }
+        }
         let single = self.input.flag();
         let (gap, growth) = if single {
             (0, 0)
@@ -262,6 +269,9 @@ impl Body<'_, '_> {
         }
         let distance_m = self.known.distance_m;
         self.list(16, -distance_m, distance_m);
+        if self.small(0, 1) == 1 {
+            self.place();
+        }
     }
 
     /// Trials of places beside the line, each with its own target.

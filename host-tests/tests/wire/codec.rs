@@ -39,6 +39,7 @@ pub(crate) enum Said {
         own: bool,
         commit: Option<u8>,
         slacks: Vec<f32>,
+        stand: Option<f32>,
     },
     Busy {
         number: u16,
@@ -178,11 +179,19 @@ impl Said {
                 own,
                 commit,
                 slacks,
+                stand,
             } => {
                 out = pass(1, [*number, *mission]);
                 out.push(u8::from(*own));
                 option(&mut out, *commit);
                 list(&mut out, slacks);
+                match stand {
+                    None => out.push(0),
+                    Some(x_m) => {
+                        out.push(1);
+                        reals(&mut out, &[*x_m]);
+                    }
+                }
             }
             Self::Busy { number } => {
                 out.push(2);
@@ -319,7 +328,7 @@ impl Said {
             } => Message::Sweep(Sweep {
                 number,
                 mission,
-                ladder: Ladder::from_parts(anchor, gap, growth).unwrap(),
+                ladder: laid_out(anchor, gap, growth),
                 relay: station(0.0, altitude_m, power_w),
                 chosen: false,
                 measured_per_w: None,
@@ -338,7 +347,7 @@ impl Said {
             } => Message::Sweep(Sweep {
                 number,
                 mission,
-                ladder: Ladder::from_parts(anchor, gap, growth).unwrap(),
+                ladder: laid_out(anchor, gap, growth),
                 relay: station(0.0, altitude_m, power_w),
                 chosen: false,
                 measured_per_w: Some(upsilon_per_w),
@@ -357,7 +366,7 @@ impl Said {
             } => Message::Sweep(Sweep {
                 number,
                 mission,
-                ladder: Ladder::from_parts(anchor, gap, growth).unwrap(),
+                ladder: laid_out(anchor, gap, growth),
                 relay: station(y_m, altitude_m, power_w),
                 chosen: true,
                 measured_per_w: None,
@@ -369,6 +378,7 @@ impl Said {
                 own,
                 commit,
                 ref slacks,
+                stand,
             } => Message::Verdict(Answer {
                 number,
                 mission,
@@ -376,6 +386,7 @@ impl Said {
                     commit,
                     slacks: per_target(slacks),
                 },
+                stand,
                 own,
             }),
             Self::Busy { number } => Message::Busy { sweep: number },
@@ -547,9 +558,15 @@ impl Said {
                     && is_power(*power_w)
                     && (1e-9..=1e32).contains(upsilon_per_w)
             }
-            Self::Verdict { commit, slacks, .. } => {
+            Self::Verdict {
+                commit,
+                slacks,
+                stand,
+                ..
+            } => {
                 commit.is_none_or(|target| target <= 15)
                     && slacks.iter().all(|slack| (-2e9..=2e9).contains(slack))
+                    && stand.is_none_or(is_place)
             }
             Self::Busy { .. } | Self::Heartbeat { .. } => true,
             Self::Aside {
@@ -668,9 +685,15 @@ fn is_sir(sir: f32) -> bool {
     (0.0..f32::INFINITY).contains(&sir)
 }
 
+/// The ladder that an anchor of either sign stands for: one below zero is of a plain pass.
+fn laid_out(anchor: f32, gap: u8, growth: u8) -> Ladder {
+    let ladder = Ladder::from_parts(anchor.abs(), gap, growth).unwrap();
+    ladder.plainly(anchor < 0.0)
+}
+
 /// Whether there is such a ladder, and the reaches are in range and no more than it has targets.
 fn is_sweep((anchor, gap, growth): (f32, u8, u8), reaches: &[f32]) -> bool {
-    let targets = targets(anchor, gap, growth);
+    let targets = targets(anchor.abs(), gap, growth);
     (gap > 0 || growth == 0)
         && targets[0] >= f32::MIN_POSITIVE
         && targets[targets.len() - 1] < f32::INFINITY
@@ -803,6 +826,11 @@ impl Reader<'_> {
                     None
                 },
                 slacks: self.list()?,
+                stand: if self.bool()? {
+                    Some(self.real()?)
+                } else {
+                    None
+                },
             },
             2 => Said::Busy {
                 number: self.word()?,

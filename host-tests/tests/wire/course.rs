@@ -87,6 +87,7 @@ fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
     let (aside, course) = (aside(), course(TRIALS));
     let mut ranges = vec![
         (&aside, 5, f32::MIN_POSITIVE, f32::MAX, "anchor"),
+        (&aside, 5, f32::MIN, -f32::MIN_POSITIVE, "anchor, plain"),
         (&aside, 11, 0.1, 1e5, "altitude"),
         (&aside, 15, 1e-6, 1e6, "power"),
         (&aside, 19, -1e5, 1e5, "y"),

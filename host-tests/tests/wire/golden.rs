@@ -199,6 +199,10 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
     some(|said| matches!(said, Said::Worth { slack_m, .. } if *slack_m == f32::MIN));
     some(|said| matches!(said, Said::Worth { outlook, .. } if outlook.contains(&f32::MAX)));
     some(|said| matches!(said, Said::Worth { outlook, .. } if outlook.contains(&f32::MIN)));
+    some(|said| matches!(said, Said::Sweep { anchor, .. } if *anchor < 0.0));
+    some(|said| matches!(said, Said::Verdict { stand: None, .. }));
+    some(|said| matches!(said, Said::Verdict { stand: Some(x_m), .. } if *x_m == 0.0));
+    some(|said| matches!(said, Said::Verdict { stand: Some(x_m), .. } if *x_m == 1e6));
     some(|said| matches!(said, Said::Verdict { own: true, .. }));
     some(|said| matches!(said, Said::Verdict { own: false, .. }));
     some(|said| matches!(said, Said::Token { turn: 0, .. }));

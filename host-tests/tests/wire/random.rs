@@ -41,7 +41,7 @@ proptest! {
         let len = frame::encode(head, &said.message(), &mut frame);
         let most = match &said {
             Said::Sweep { .. } => 100,
-            Said::Verdict { .. } => 89,
+            Said::Verdict { .. } => 94,
             Said::Busy { .. } => 19,
             Said::Heartbeat { .. } => 20,
             Said::Measured { .. } | Said::Aside { .. } => 104,
@@ -58,8 +58,14 @@ proptest! {
         prop_assert_eq!(only_frame(&frame[..len]).len(), len - 2);
         let expected = match said {
             Said::Sweep { reaches, .. } => 36 + 4 * reaches.len(),
-            Said::Verdict { commit, slacks, .. } => {
-                24 + usize::from(commit.is_some()) + 4 * slacks.len()
+            Said::Verdict {
+                commit,
+                slacks,
+                stand,
+                ..
+            } => {
+                let numbers = slacks.len() + usize::from(stand.is_some());
+                25 + usize::from(commit.is_some()) + 4 * numbers
             }
             Said::Busy { .. } => 19,
             Said::Heartbeat { .. } => 20,

@@ -46,6 +46,19 @@ fn verdict(commit: Option<u8>, slacks: &[f32]) -> Said {
         own: false,
         commit,
         slacks: slacks.to_vec(),
+        stand: None,
+    }
+}
+
+/// A verdict with a stand, which is at 10.
+fn stood(x_m: f32) -> Said {
+    Said::Verdict {
+        number: 1,
+        mission: 2,
+        own: false,
+        commit: Some(0),
+        slacks: Vec::new(),
+        stand: Some(x_m),
     }
 }
 
@@ -143,11 +156,17 @@ fn bodies_that_are_no_message_are_refused() {
     for byte in 2..=u8::MAX {
         let bool_byte = [&heartbeat[..], &[byte]].concat();
         assert_eq!(verdict_on(&bool_byte), Err(ENCODING), "bool {byte}");
-        let option_byte = [&option[..], &[byte, 0]].concat();
-        assert_eq!(verdict_on(&option_byte), Err(ENCODING), "Option {byte}");
         let option_byte = [&option[..], &[byte, 0, 0]].concat();
         assert_eq!(verdict_on(&option_byte), Err(ENCODING), "Option {byte}");
-        let bool_byte = [&verdict_head[..], &[byte, 0, 0]].concat();
+        let option_byte = [&option[..], &[byte, 0, 0, 0]].concat();
+        assert_eq!(verdict_on(&option_byte), Err(ENCODING), "Option {byte}");
+        for stand in [verdict(None, &[]), stood(1.0)] {
+            let mut option_byte = stand.body();
+            let at = if option_byte[6] == 0 { 8 } else { 9 };
+            option_byte[at] = byte;
+            assert_eq!(verdict_on(&option_byte), Err(ENCODING), "stand {byte}");
+        }
+        let bool_byte = [&verdict_head[..], &[byte, 0, 0, 0]].concat();
         assert_eq!(verdict_on(&bool_byte), Err(ENCODING), "bool {byte}");
         let mut bool_byte = moved().body();
         bool_byte[13] = byte;
@@ -225,14 +244,27 @@ fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
         reaches: vec![100.0],
     };
     let slack = verdict(None, &[1.0]);
+    let stood = stood(1.0);
+    let plain = Said::Sweep {
+        number: 1,
+        mission: 2,
+        anchor: -1.5,
+        gap: 0,
+        growth: 0,
+        altitude_m: 20.0,
+        power_w: 1.0,
+        reaches: vec![100.0],
+    };
     let (measured, moved) = (measured(), moved());
     let token = token(2, 10.0, 5, 5);
     for (said, at, least, most, what) in [
         (&single, 5, f32::MIN_POSITIVE, f32::MAX, "anchor"),
+        (&plain, 5, f32::MIN, -f32::MIN_POSITIVE, "anchor, plain"),
         (&single, 11, 0.1, 1e5, "altitude"),
         (&single, 15, 1e-6, 1e6, "power"),
         (&single, 20, 0.0, 2e9, "reach"),
         (&slack, 8, -2e9, 2e9, "slack"),
+        (&stood, 10, 0.0, 1e6, "stand"),
         (
             &measured,
             5,
@@ -264,7 +296,6 @@ fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
             f32::from_bits(0x7F80_0001),
             f32::INFINITY,
             f32::NEG_INFINITY,
-            f32::MIN,
         ] {
             let read = verdict_on(&with(said, at, bad));
             assert_eq!(read, Err(VALUE), "{what} {bad}");
@@ -274,6 +305,7 @@ fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
         assert_eq!(verdict_on(&with(&single, 5, zero)), Err(VALUE));
         assert!(verdict_on(&with(&single, 20, zero)).is_ok());
         assert!(verdict_on(&with(&slack, 8, zero)).is_ok());
+        assert!(verdict_on(&with(&stood, 10, zero)).is_ok());
         for (said, at) in [
             (&token, 5),
             (&token, 18),
@@ -293,13 +325,17 @@ fn ladders_that_leave_the_normal_numbers_are_refused() {
         body[9..11].copy_from_slice(&[gap, growth]);
         verdict_on(&body)
     };
-    assert_eq!(ladder(1.5, 100, 2), Ok(()));
-    assert_eq!(ladder(1.0, 255, 255), Err(VALUE), "overflows");
-    assert_eq!(ladder(f32::MAX, 1, 0), Err(VALUE), "overflows at the top");
-    assert_eq!(ladder(f32::MIN_POSITIVE, 200, 0), Err(VALUE), "underflows");
-    assert_eq!(ladder(1e-30, 255, 0), Err(VALUE), "underflows");
-    for anchor in [0.0, -1.5, f32::NAN, f32::INFINITY, f32::from_bits(1)] {
-        assert_eq!(ladder(anchor, 100, 2), Err(VALUE), "{anchor}");
+    // The ladder of a plain pass is that of the positive anchor.
+    for sign in [1.0, -1.0] {
+        let ladder = |anchor: f32, gap, growth| ladder(sign * anchor, gap, growth);
+        assert_eq!(ladder(1.5, 100, 2), Ok(()));
+        assert_eq!(ladder(1.0, 255, 255), Err(VALUE), "overflows");
+        assert_eq!(ladder(f32::MAX, 1, 0), Err(VALUE), "overflows at the top");
+        assert_eq!(ladder(f32::MIN_POSITIVE, 200, 0), Err(VALUE), "underflows");
+        assert_eq!(ladder(1e-30, 255, 0), Err(VALUE), "underflows");
+        for anchor in [0.0, f32::NAN, f32::INFINITY, f32::from_bits(1)] {
+            assert_eq!(ladder(anchor, 100, 2), Err(VALUE), "{anchor}");
+        }
     }
 }
 
@@ -426,7 +462,7 @@ fn node_numbers_that_do_not_fit_are_not_written() {
 
 #[test]
 fn what_the_crate_writes_out_of_range_it_refuses_to_read() {
-    let answer = |slack| {
+    let answer = |slack, stand| {
         Message::Verdict(Answer {
             number: 0,
             mission: 0,
@@ -435,12 +471,22 @@ fn what_the_crate_writes_out_of_range_it_refuses_to_read() {
                 slacks: PerTarget::from_slice(&[slack]).unwrap(),
             },
             own: true,
+            stand,
         })
     };
-    for (slack, fits) in [(1.0, true), (f32::NAN, false), (3e9, false)] {
+    for (slack, stand, fits) in [
+        (1.0, None, true),
+        (1.0, Some(1.0), true),
+        (f32::NAN, None, false),
+        (3e9, None, false),
+        (1.0, Some(f32::NAN), false),
+        (1.0, Some(-1.0), false),
+        (1.0, Some(2e6), false),
+    ] {
         let mut body = [0; MAX_BODY];
-        let len = answer(slack).encode(&mut body).unwrap();
-        assert_eq!(Message::decode(&body[..len]).is_ok(), fits, "{slack}");
+        let len = answer(slack, stand).encode(&mut body).unwrap();
+        let read = Message::decode(&body[..len]);
+        assert_eq!(read.is_ok(), fits, "{slack} {stand:?}");
     }
     assert!(Ladder::from_parts(1.0, 255, 255).is_none());
 }

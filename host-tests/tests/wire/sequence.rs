@@ -125,6 +125,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             own: false,
             commit: Some(0),
             slacks: vec![1.0],
+            stand: None,
         },
         Said::Busy { number },
         Said::Heartbeat {
@@ -446,18 +447,19 @@ fn tokens_are_stale_in_a_field() {
 }
 
 /// Makes a message one that may well be of this mission.
+#[expect(clippy::too_many_lines, reason = "an arm for each message")]
 fn tamed(said: Said) -> Said {
     let into = |reach: f32| reach % 1000.0;
     match said {
         Said::Sweep {
             number,
             mission,
+            anchor,
             gap,
             growth,
             altitude_m,
             power_w,
             mut reaches,
-            ..
         } => {
             for reach in &mut reaches {
                 *reach = into(*reach);
@@ -465,7 +467,7 @@ fn tamed(said: Said) -> Said {
             Said::Sweep {
                 number,
                 mission,
-                anchor: 1.0,
+                anchor: 1.0_f32.copysign(anchor),
                 gap: gap.min(140),
                 growth: if gap == 0 { 0 } else { growth.min(4) },
                 altitude_m,
@@ -478,6 +480,7 @@ fn tamed(said: Said) -> Said {
             mission,
             own,
             mut slacks,
+            stand,
             ..
         } => {
             slacks.truncate(1);
@@ -490,6 +493,7 @@ fn tamed(said: Said) -> Said {
                 own,
                 commit: (!slacks.is_empty()).then_some(0),
                 slacks,
+                stand: stand.map(into),
             }
         }
         Said::Aside {
@@ -736,7 +740,7 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
     let seen = seen.take();
     println!("relay {own}: the setpoint moved by {seen:?}");
     for cause in expected {
-        assert!(seen.get(cause).is_some_and(|&count| count > 10), "{cause}");
+        assert!(seen.get(cause).is_some_and(|&count| count > 5), "{cause}");
     }
 }
 

@@ -61,23 +61,31 @@ pub(crate) fn sweeps(least: usize) -> BoxedStrategy<Said> {
     });
     let altitudes = prop_oneof![0.1..=1e5_f32, Just(0.1), Just(1e5)];
     let powers = prop_oneof![1e-6..=1e6_f32, Just(1e-6), Just(1e6)];
+    // One pass in four is a plain one.
+    let signs = prop_oneof![3 => Just(1.0_f32), 1 => Just(-1.0)];
     let numbers = (any::<u16>(), any::<u16>());
     (
         numbers,
-        ladders,
+        (ladders, signs),
         altitudes,
         powers,
         vec(metres(0.0), least..=16),
     )
         .prop_map(
-            |((number, mission), (anchor, gap, growth), altitude_m, power_w, mut reaches)| {
+            |(
+                (number, mission),
+                ((anchor, gap, growth), sign),
+                altitude_m,
+                power_w,
+                mut reaches,
+            )| {
                 if gap == 0 {
                     reaches.truncate(1);
                 }
                 Said::Sweep {
                     number,
                     mission,
-                    anchor,
+                    anchor: sign * anchor,
                     gap,
                     growth,
                     altitude_m,
@@ -376,14 +384,18 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         any::<bool>(),
         proptest::option::of(0..16_u8),
         vec(metres(-2e9), 0..=16),
+        proptest::option::of(along()),
     )
-        .prop_map(|(number, mission, own, commit, slacks)| Said::Verdict {
-            number,
-            mission,
-            own,
-            commit,
-            slacks,
-        });
+        .prop_map(
+            |(number, mission, own, commit, slacks, stand)| Said::Verdict {
+                number,
+                mission,
+                own,
+                commit,
+                slacks,
+                stand,
+            },
+        );
     prop_oneof![
         3 => sweeps(0),
         3 => verdicts,
@@ -427,9 +439,9 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
             // Where numbers begin in the messages of each tag; in lists every four bytes from the last of them.
             let starts: &[usize] = match body[0] {
                 0 => &[5, 11, 15, 20, 24],
-                1 => &[8, 9],
+                1 => &[8, 9, body.len() - 4],
                 4 | 5 => &[5, 11, 15, 19, 24, 28],
-                6 => &[5, 10, 14, 18, 22, 26, 30, 34, 38],
+                6 => &[5, 9, 13, 17, 22, 26, 30, 34, 38],
                 7 => &[6, 7, 10, 11, 70, 71],
                 8 => &[5, 9, 13, 18, 24],
                 9 => &[5, 9, 14],
@@ -453,10 +465,10 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         |(mut body, at, byte)| {
             let bytes: &[usize] = match body[0] {
                 0 => &[9, 10, 19],
-                1 => &[5, 6, 7],
+                1 => &[5, 6, 7, body.len() - 5, body.len() - 1],
                 3 => &[3],
                 4 | 5 => &[9, 10, 23],
-                6 => &[9],
+                6 => &[21],
                 7 => &[5, 6],
                 8 => &[17, 22, 23],
                 9 => &[13],
@@ -499,7 +511,7 @@ pub(crate) fn pad(body: &mut Vec<u8>, tag: bool, more: usize) {
         0 => 19,
         1 => 7 + usize::from(body[6]),
         4 | 5 => 23,
-        6 => 9,
+        6 => 21,
         _ => 0,
     };
     let at = if tag { 0 } else { count };

@@ -135,12 +135,12 @@ impl Share {
         if let Some(next) = arrival.refused(self.exchange) {
             return next;
         }
+        if own.mission.interferer().is_none() {
+            return Next::Stale;
+        }
         if self.chosen.is_none() {
             // It was not there when the places to begin with were agreed on.
             return Next::Foreign;
-        }
-        if own.mission.interferer().is_none() {
-            return Next::Stale;
         }
         self.exchange.take(course.number);
         self.take_course(own, Some(course.power_w), course.bar, &course.trials)
