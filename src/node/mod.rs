@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`settings`] | who the relay is and how it behaves, checked once |
 //! | [`exchange`] | the state table of a pass and what comes back of it |
-//! | `share` | a relay's share of every algorithm: sweeps, waves of altitude levels, turns |
+//! | `share` | a relay's share of every algorithm: sweeps, courses of the joint method, turns |
 //! | `lead` | what the leader has beyond that: which pass comes next |
 //! | `align` | a sweep of Algorithms 1 and 4 |
 //! | `adjust` | a turn of Algorithm 2 |

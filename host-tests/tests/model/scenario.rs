@@ -151,7 +151,10 @@ fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
             took_us: u64::MAX,
         },
     };
-    scenario.calm = World::new(&scenario, 1).unwrap().calm().unwrap();
+    scenario.calm = World::new(&scenario, 1)
+        .unwrap()
+        .calm()
+        .unwrap_or_else(|why| panic!("{kind:?}: {why:?}"));
     Some(scenario)
 }
 
