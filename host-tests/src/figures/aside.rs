@@ -12,7 +12,7 @@ use super::trouble::Trouble;
 use crate::scenario::Scenario;
 
 /// Power of the relay, W.
-pub const RELAY_W: f64 = 1.0;
+pub const RELAY_W: f64 = 0.5;
 
 /// Lowest and highest altitude, m.
 pub const ALTITUDES_M: (f64, f64) = (20.0, 300.0);
@@ -207,9 +207,9 @@ pub fn gains_sheet() -> Result<Sheet, Trouble> {
         name: "aside-gain",
         title: "What a single relay gains by side, by altitude and by both",
         says: vec![
-            "Not in the paper. With an interferer on the line, side and altitude are worth the same. \
-             Else the side is worth more, and with enough of it the altitude adds nothing: the \
-             lowest is best."
+            "Not in the paper. With an interferer on the line, side and altitude are worth all but the same. \
+             Else the side is worth more. Where all of the room is used, the altitude can add to it; \
+             where there is enough, the lowest is best."
                 .to_owned(),
         ],
         taken: [
