@@ -12,13 +12,13 @@ use super::trouble::Trouble;
 use crate::scenario::Scenario;
 
 /// Power of the relay, W.
-pub const RELAY_W: f64 = 20.0;
+pub const RELAY_W: f64 = 0.5;
 
 /// Lowest and highest altitude, m.
 pub const ALTITUDES_M: (f64, f64) = (20.0, 300.0);
 
 /// Offsets of the interferer whose places are drawn, m.
-pub const OFFSETS_M: [f64; 4] = [25.0, 50.0, 100.0, 200.0];
+pub const OFFSETS_M: [f64; 4] = [50.0, 100.0, 150.0, 250.0];
 
 /// The most room to each side, m.
 pub const MOST_ROOM_M: u16 = 400;
@@ -27,7 +27,7 @@ pub const MOST_ROOM_M: u16 = 400;
 const ROOM_STEP_M: u16 = 4;
 
 /// The room to each side that the gain is drawn for, m: as far as the altitude goes up.
-pub const ROOM_M: f64 = 280.0;
+pub const ROOM_M: f64 = 300.0;
 
 /// The offset of the interferer up to which the gain is drawn, m, and its step.
 const MOST_OFFSET_M: u16 = 400;
@@ -174,7 +174,7 @@ pub fn places_sheet() -> Result<Sheet, Trouble> {
             panels: vec![
                 Panel {
                     heading: "seen from above".to_owned(),
-                    x: Axis::linear("x, m").between(0.0, 1000.0),
+                    x: Axis::linear("x, m"),
                     y: Axis::linear("y, m"),
                     lines: lines(|row| (f64::from(row.x_m), f64::from(row.y_m))),
                 },
@@ -207,9 +207,9 @@ pub fn gains_sheet() -> Result<Sheet, Trouble> {
         name: "aside-gain",
         title: "What a single relay gains by side, by altitude and by both",
         says: vec![
-            "Not in the paper. With an interferer on the line, side and altitude are worth the same. \
-             Else the side is worth more, and with enough of it the altitude adds nothing: the \
-             lowest is best."
+            "Not in the paper. With an interferer on the line, side and altitude are worth all but the same. \
+             Else the side is worth more. Where all of the room is used, the altitude can add to it; \
+             where there is enough, the lowest is best."
                 .to_owned(),
         ],
         taken: [
@@ -219,7 +219,7 @@ pub fn gains_sheet() -> Result<Sheet, Trouble> {
         .concat(),
         chart: Chart::of(
             Axis::linear("offset Y of the interferer, m").between(0.0, f64::from(MOST_OFFSET_M)),
-            Axis::log("SIR of the worse hop, linear"),
+            Axis::linear("SIR of the worse hop, linear"),
             vec![
                 line("above the line, lowest", 0, |row| row.line_sir_linear),
                 line("altitude free", 1, |row| row.altitude_sir_linear),
