@@ -30,7 +30,13 @@ pub(crate) enum Lead {
     /// The joint method by messages.
     Ascending(Ascent),
     /// Trying targets at the altitudes held; whether the chain settles with what is agreed.
-    Searching { search: Search, last: bool },
+    Searching {
+        search: Search,
+        /// Nothing comes after it.
+        last: bool,
+        /// Of the places that the relays were given, though others were chosen.
+        given: bool,
+    },
     /// Algorithm 2.
     Adjusting(Rounds),
 }
@@ -100,8 +106,11 @@ impl Lead {
             Planner::new(mission, profile, settings.schedule).map(Self::Predicting)
         } else {
             let last = settings.method == Method::Align;
-            Search::new(mission, profile, settings.schedule)
-                .map(|search| Self::Searching { search, last })
+            Search::new(mission, profile, settings.schedule).map(|search| Self::Searching {
+                search,
+                last,
+                given: false,
+            })
         }
     }
 }

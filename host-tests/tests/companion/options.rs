@@ -138,7 +138,7 @@ const WRONG: &[(&[&str], &[&str])] = &[
         &["--field", "--interferer", "cannot be used"],
     ),
     (
-        &["--field", "0:1e6", "--method", "altitude"],
+        &["--field", "0:1e6", "--method", "joint"],
         &["--method altitude", "align with --field"],
     ),
     (&["--upload-file", "x"], &["--key-file", "not provided"]),

@@ -79,7 +79,21 @@ impl Share {
         if let Some(ladder) = ladder {
             search.begin_with(ladder);
         }
-        self.lead = Lead::Searching { search, last };
+        self.lead = Lead::Searching {
+            search,
+            last,
+            given: false,
+        };
+        Ok(())
+    }
+
+    /// The leader goes back to the places that the relays were given: nothing can be met at those chosen.
+    pub(super) fn search_given(&mut self, own: Own<'_>) -> Result<(), Infeasible> {
+        self.lead = Lead::Searching {
+            search: Search::new(own.mission, self.profile, Schedule::Bracketed)?,
+            last: true,
+            given: true,
+        };
         Ok(())
     }
 
@@ -87,9 +101,9 @@ impl Share {
     pub(super) fn begin_pass(&mut self, own: Own<'_>) -> Next {
         let mission = own.mission;
         match &self.lead {
-            Lead::Searching { search, .. } => {
+            Lead::Searching { search, given, .. } => {
                 let ladder = *search.ladder();
-                let chosen = own.joins() && self.chosen.is_some();
+                let chosen = own.joins() && self.chosen.is_some() && !given;
                 self.begin();
                 self.sweep_on(own, ladder, chosen, None, &origins(mission))
             }

@@ -102,10 +102,10 @@ impl Share {
         };
         if let Some((x_m, target)) = sweeping.agreed() {
             let chosen = sweeping.chosen;
-            if let Lead::Searching { search, .. } = &self.lead {
+            if let Lead::Searching { search, given, .. } = &self.lead {
                 // Of places that may be chosen otherwise it says nothing.
                 let most = search.most(&sweeping.verdict.slacks);
-                self.bound = most.filter(|_| !chosen);
+                self.bound = most.filter(|_| !chosen && !given);
             }
             self.at = self.station_for(chosen).at;
             self.setpoint = Some(self.at.at(x_m));
@@ -134,7 +134,10 @@ impl Share {
             None => search.advance(&verdict.slacks),
         };
         if next.is_err() {
-            return self.give_up();
+            let chosen = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.chosen);
+            if !chosen || self.search_given(own).is_err() {
+                return self.give_up();
+            }
         }
         Next::Work { moved: false }
     }
