@@ -228,60 +228,6 @@ fn with_a_separation_that_binds() {
     assert!(binding * 4 >= tally.scenes && tally.near * 100 >= tally.scenes * 88);
 }
 
-/// The best of equals in a field by ranges in f64, with nothing solved: each stretch is convex, and searched by thirds.
-fn best_in_a_field(link: &StochasticLink) -> f64 {
-    let (d, relay) = (link.distance_m, link.relays[0]);
-    let mut cuts: Vec<f64> = link.upsilon.iter().map(|point| point.0).collect();
-    cuts.retain(|x| *x > 0.0 && *x < d);
-    cuts.push(d);
-    let least = |low: f64, value: &dyn Fn(f64) -> f64| {
-        let mut left = low;
-        let mut best = value(low);
-        for &right in cuts.iter().filter(|cut| **cut > low) {
-            let (mut a, mut b) = (left, right);
-            for _ in 0..60 {
-                let (p, q) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
-                if value(p) <= value(q) { b = q } else { a = p }
-            }
-            best = best.min(value(0.5 * (a + b))).min(value(right));
-            left = right;
-        }
-        best
-    };
-    let met = |target: f64| {
-        let h2 = relay.altitude_m.powi(2);
-        let last = relay.power_w * link.upsilon_at(d) / (link.eta * target) - h2;
-        if last < 0.0 {
-            return false;
-        }
-        let mut low = (d - last.sqrt()).max(0.0);
-        let hop = |y: f64| y - (relay.power_w * link.upsilon_at(y) / (link.mu_los * target)).sqrt();
-        for _ in 1..link.relays.len() {
-            low = least(low, &hop).max(0.0).min(low);
-        }
-        // Convex where the first hop's square is above 0, which is where it counts.
-        let head = |x: f64| x * x + h2 - link.tx_w * link.upsilon_at(x) / (link.eta * target);
-        least(low, &head) <= 0.0
-    };
-    let (mut low, mut high) = (0.0, link.ceiling());
-    for k in 0..60 {
-        let middle: f64 = if k < 30 && low <= 0.0 {
-            high / 10.0
-        } else {
-            0.5 * (low + high)
-        };
-        if met(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-        if high - low < 1e-6 * low {
-            break;
-        }
-    }
-    low
-}
-
 /// Relays alike, with two to twelve points of Upsilon within a factor of up to 300.
 fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
@@ -316,7 +262,7 @@ fn in_uneven_fields() {
         let relays = log_uniform(&mut rng, 1.0, 40.99) as usize;
         let link = uneven(&mut rng, relays);
         let mission = of_stochastic_link(&link, 0.0).unwrap();
-        let best = best_in_a_field(&link);
+        let best = link.best();
         let sir = |places: &[Placement]| link.chain_sir(&on_line(places));
         tally.judge(&mission, &[], best, sir, &format!("{link:?}"));
     }

@@ -67,9 +67,7 @@ impl Judge {
                     even.iid_optimum()
                         .is_some_and(|best| target <= best * (1.0 + ABOVE))
                 }
-                None => [1.0, 1.0 - 0.5 * ABOVE, 1.0 - ABOVE]
-                    .iter()
-                    .any(|part| link.backward_sir(target * part) >= target * (1.0 - ABOVE)),
+                None => target <= link.best() * (1.0 + ABOVE),
             },
         }
     }

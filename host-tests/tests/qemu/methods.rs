@@ -11,8 +11,9 @@ use uav_relay::{Adjust, Method};
 use crate::chain::{BAD_DAY, simulated};
 use crate::fleet::{Fleet, Image};
 
-/// An interferer `y_m` beside the link, and altitudes to get away from it; `held` has one of its own, by relay.
-fn past(y_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
+/// An interferer `y_m` beside the link, and altitudes to get away from it, `aside_m` of room to either side as well; `held` has an
+/// altitude of its own, by relay.
+fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
     let own = |(index, altitude)| {
         let own = RelayOverride {
             altitude_m: Some(altitude),
@@ -23,6 +24,8 @@ fn past(y_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
     let scenario = Scenario {
         relays: held.into_iter().map(own).collect(),
         altitude_max_m: 300.0,
+        lateral_min_m: -aside_m,
+        lateral_max_m: aside_m,
         interference: Interference::Sources(vec![Source {
             power_w: 80.0,
             x_m: 500.0,
@@ -76,26 +79,25 @@ fn settles(flight: &Flight) {
 
 #[test]
 fn five_choose_the_altitudes_of_the_simulated_chain() {
-    let flight = past(50.0, None, Method::Joint);
+    let flight = past(50.0, 0.0, None, Method::Joint);
     let low = 20.0_f32.to_bits();
     let places = simulated(&flight);
     assert!(places.iter().all(|[.., altitude]| *altitude != low));
     settles(&flight);
     // One of them may not.
-    let flight = past(50.0, Some((4, 200.0)), Method::Joint);
+    let flight = past(50.0, 0.0, Some((4, 200.0)), Method::Joint);
     let held = simulated(&flight);
     assert_eq!(held[3][2], 200.0_f32.to_bits());
     assert_ne!(held, places);
     settles(&flight);
 }
 
-/// From this interferer they get away along the link, and no altitude is better than theirs.
+/// With room to the side they leave the line, to the side that the interferer is not on, and stay low.
 #[test]
-fn five_stay_low_where_the_simulated_chain_does() {
-    let flight = past(150.0, None, Method::Joint);
-    let low = 20.0_f32.to_bits();
+fn five_go_to_the_side_as_the_simulated_chain_does() {
+    let flight = past(150.0, 280.0, None, Method::Joint);
     let places = simulated(&flight);
-    assert!(places.iter().all(|[.., altitude]| *altitude == low));
+    assert!(places.iter().all(|[_, y, _]| f32::from_bits(*y) < -1.0));
     settles(&flight);
 }
 
@@ -103,6 +105,7 @@ fn five_stay_low_where_the_simulated_chain_does() {
 fn five_adjust_themselves_as_the_simulated_chain_does() {
     settles(&past(
         50.0,
+        0.0,
         Some((2, 35.0)),
         Method::Adjust(Adjust {
             rounds: 3,

@@ -86,14 +86,15 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
         with(&good, 36, &f32::NAN.to_le_bytes()),
         with(&good, 60, &1.0_f64.to_le_bytes()),
         with(&good, 92, &30.0_f32.to_le_bytes()),
+        with(&good, 100, &30.0_f32.to_le_bytes()),
         with(&good, 14, &[3]),
         with(&good, 15, &[2]),
-        with(&good, 104, &[1]),
         with(&good, 112, &[1]),
-        with(&good, 106, &[17]),
-        with(&good, 200, &[1]),
+        with(&good, 120, &[1]),
+        with(&good, 114, &[17]),
+        with(&good, 208, &[1]),
         with(&field, 44, &80.0_f32.to_le_bytes()),
-        with(&field, 120, &0.0_f32.to_le_bytes()),
+        with(&field, 128, &0.0_f32.to_le_bytes()),
     ];
     let words = [
         "no configuration: the block is blank",
@@ -105,6 +106,7 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
         "configuration refused: own altitude or power",
         "configuration refused: channel, Carrier",
         "configuration refused: mission, Band",
+        "configuration refused: mission, Lateral",
         "configuration refused: method unknown, or not for a field",
         "configuration refused: byte 15 is neither 0 nor 1",
         "configuration refused: rounds or altitudes of adjust",
@@ -125,7 +127,7 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
 #[test]
 fn a_drone_with_half_a_secret_takes_no_part_and_says_why() {
     let good = paper(3).block(2).unwrap().to_vec();
-    let blocks = [with(&good, 244, &[1]), with(&good, 248, &[1])];
+    let blocks = [with(&good, 252, &[1]), with(&good, 256, &[1])];
     let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
     fleet.wait("word from every drone", |lines| lines.len() >= 4);
     for drone in [1, 2] {
