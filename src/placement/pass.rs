@@ -6,7 +6,7 @@
 //! wherever the one that hears it stands. So no chain that meets the target is left out, and a target that is missed is out of
 //! reach of every chain: see [`spacing`](super::spacing) and [`retreat`](super::retreat) for what may hold a relay back.
 //!
-//! On the way back each relay has taken its place, and [`stand`] tells where the one before it on the pass is to be.
+//! On the way back each relay has taken its place, and [`stand`](Link::stand) tells where the one before it on the pass is to be.
 //! A *plain* pass holds nobody back: every hop leads from reach to reach, as in the paper.
 
 use super::PerTarget;

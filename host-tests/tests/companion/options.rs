@@ -139,7 +139,7 @@ const WRONG: &[(&[&str], &[&str])] = &[
     ),
     (
         &["--field", "0:1e6", "--method", "joint"],
-        &["--method altitude", "align with --field"],
+        &["--method joint", "align with --field"],
     ),
     (&["--upload-file", "x"], &["--key-file", "not provided"]),
     (&["--nonsense"], &["--nonsense"]),
