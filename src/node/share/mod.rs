@@ -168,6 +168,8 @@ impl Share {
     /// The leader begins from the start: with Algorithm 1 or 4, at the altitudes the relays were given.
     pub(crate) fn restart(&mut self) {
         self.lead = Lead::No;
+        // Solved once more, the chain is tried at the same targets as the first time.
+        self.chosen = None;
         self.exchange.phase = Phase::Planning;
     }
 
