@@ -224,11 +224,11 @@ impl HypotheticalReport {
             ),
             (false, Some(sir)) => writeln!(
                 text,
-                "its places are not good enough: SIR {sir:.6} against all interferers; these are the best against all{gain}"
+                "its places are not good enough: SIR {sir:.6} against all interferers; these are the best found against all{gain}"
             ),
             (false, None) => writeln!(
                 text,
-                "no places are good against it; these are the best against all"
+                "no places are good against it; these are the best found against all"
             ),
         };
     }
