@@ -15,9 +15,12 @@ pub(crate) const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else
 pub(crate) type Chain = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
 /// What the leader is at.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "there is one of it, and nothing allocates"
+#[cfg_attr(
+    feature = "altitude",
+    expect(
+        clippy::large_enum_variant,
+        reason = "there is one of it, and nothing allocates"
+    )
 )]
 #[derive(Clone, Debug)]
 pub(crate) enum Lead {
