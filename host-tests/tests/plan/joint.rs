@@ -157,17 +157,22 @@ fn a_plan_for_relays_that_differ_is_no_worse_than_what_they_agree_on() {
     }
 }
 
-/// Forty scenarios of up to 30 relays whose optima are stored; two are short by up to a hundredth.
+/// Forty scenarios of up to 30 relays whose optima are stored; two are short by up to a hundredth. `COUNT=2000` takes all of them,
+/// of up to 100 relays, and prints how many are short, and which.
 #[test]
 fn a_plan_comes_near_the_optimum_of_the_judge() {
     let optima = optima().unwrap();
+    let count: Option<usize> = std::env::var("COUNT")
+        .ok()
+        .map(|text| text.parse().unwrap());
+    let (enough, most) = count.map_or((40, 30), |count| (count, 100));
     let (mut judged, mut least) = (0, f64::INFINITY);
     let mut missed = Vec::new();
     for number in 0..COUNT {
         let Drawn { link, corridor, .. } = numbered(number);
         let optimum = optima[number as usize];
         let relays = u16::try_from(link.len()).unwrap();
-        if relays > 30 || !(optimum > 0.0) || judged == 40 {
+        if relays > most || !(optimum > 0.0) || judged == enough {
             continue;
         }
         judged += 1;
@@ -182,11 +187,13 @@ fn a_plan_comes_near_the_optimum_of_the_judge() {
         }
     }
     println!(
-        "{} of {judged} short by more than a thousandth: {missed:?}; least {least}",
-        missed.len()
+        "{} of {judged} short by more than a thousandth, {} of them by more than a fiftieth: {missed:?}; least {least}",
+        missed.len(),
+        missed.iter().filter(|(_, ratio)| *ratio < 0.98).count()
     );
-    // A local optimum now and then, never far below.
-    assert!(missed.len() <= 2 && least > 0.98);
+    // A local optimum now and then. Of these forty none is far below; of two thousand some are, and only their share is held.
+    assert!(missed.len() * 20 <= judged);
+    assert!(count.is_some() || least > 0.98);
 }
 
 #[test]
