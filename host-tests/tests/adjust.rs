@@ -11,19 +11,19 @@
 
 use core::task::Poll;
 
-use host_tests::brief::of_link;
-use host_tests::random;
-use host_tests::reference::{Link, Station};
-use host_tests::sim::chain::run;
-use host_tests::sim::faults::Faults;
-use host_tests::sim::outcome::{Ending, Outcome};
-use host_tests::sim::setup::Setup;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::gain::Gain;
 use uav_relay::placement::local::{Beside, Hops, Search};
 use uav_relay::sir::{self, Sender, at_receiver};
 use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig, Placement, Profile};
+use uav_relay_oracle::mission::of_link;
+use uav_relay_oracle::random;
+use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
 
 /// X = 500, Y = 150, all relays at 220 m to begin with, 20 m to 300 m allowed, 4 m apart.
 fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {

@@ -8,13 +8,19 @@
     missing_docs
 )]
 
-use host_tests::baseline::random::mean;
-use host_tests::baseline::{blind, equal};
-use host_tests::cases;
-use host_tests::random::{self, Chain, Style};
-use host_tests::reference::Link;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use uav_relay_oracle::cases;
+use uav_relay_oracle::mission::scene_of;
+use uav_relay_oracle::random::{self, Chain, Style};
+use uav_relay_oracle::reference::Link;
+use uav_relay_sim::scene::Scene;
+use uav_relay_tools::baseline::random::mean;
+use uav_relay_tools::baseline::{blind, equal};
+
+fn scene(link: &Link) -> Scene {
+    scene_of(link).unwrap()
+}
 
 /// The relative difference of `got` from `want`.
 fn off(got: f64, want: f64) -> f64 {
@@ -28,12 +34,12 @@ fn a_single_relay_stands_where_the_reference_says() {
     for case in cases {
         let mut link = case.link(1);
         link.relays[0].altitude_m = case.arg("h").unwrap();
-        let places = blind::places(&link);
+        let places = blind::places(&scene(&link));
         assert!(off(places[0], case.part("chen_x").unwrap()) < case.rtol);
         assert!(off(link.chain_sir(&places), case.part("chen_sir").unwrap()) < case.rtol);
-        let middle = link.chain_sir(&equal::places(&link));
+        let middle = link.chain_sir(&equal::places(&scene(&link)));
         assert!(off(middle, case.part("midpoint_sir").unwrap()) < case.rtol);
-        let random = mean(&link, 200_000, 1);
+        let random = mean(&scene(&link), 200_000, 1);
         let want = case.part("random_mean").unwrap();
         assert!(random.error < 2e-3 * want, "{random:?}");
         assert!(
@@ -49,12 +55,12 @@ fn chains_stand_where_the_reference_says() {
     assert!(!cases.is_empty());
     for case in cases {
         let link = case.link(case.relays().unwrap());
-        let places = blind::places(&link);
+        let places = blind::places(&scene(&link));
         for (got, want) in places.iter().zip(case.part_list("chen_x").unwrap()) {
             assert!(off(*got, want) < case.rtol, "{got} against {want}");
         }
         assert!(off(link.chain_sir(&places), case.part("chen_sir").unwrap()) < case.rtol);
-        let equal = link.chain_sir(&equal::places(&link));
+        let equal = link.chain_sir(&equal::places(&scene(&link)));
         assert!(off(equal, case.part("equal_sir").unwrap()) < case.rtol);
     }
 }
@@ -102,7 +108,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
         };
         for _ in 0..links {
             let link = random::link(&mut rng, &style);
-            let places = blind::places(&link);
+            let places = blind::places(&scene(&link));
             assert_eq!(places.len(), link.len());
             assert!(places.windows(2).all(|pair| pair[0] <= pair[1]));
             assert!((0.0..=link.distance_m).contains(&places[0]));
@@ -126,7 +132,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
 #[test]
 fn a_chain_with_more_relays_than_the_signal_needs_keeps_its_proportions() {
     let link = Link::paper(50);
-    let places = blind::places(&link);
+    let places = blind::places(&scene(&link));
     assert!(off(places[49], link.distance_m) < 1e-12);
     let first = (80.0_f64 - 1.0).sqrt() * 20.0;
     let (step, whole) = (20.0, first + 49.0 * 20.0);
@@ -139,7 +145,7 @@ fn a_chain_with_more_relays_than_the_signal_needs_keeps_its_proportions() {
 fn the_weaker_ground_station_has_its_relay_above_it() {
     let mut link = Link::paper(60);
     link.tx_w = 0.5;
-    let places = blind::places(&link);
+    let places = blind::places(&scene(&link));
     // At 0.5 W / (eta h^2): no step to the first relay, sqrt(2) h between relays, h to Rx.
     let (step, last) = (20.0 * 2.0_f64.sqrt(), 20.0);
     let whole = 59.0 * step + last;
@@ -177,7 +183,7 @@ fn the_mean_of_random_chains_is_the_integral() {
         }
     }
     let cells = f64::from(points * points);
-    let got = mean(&link, 200_000, 5);
+    let got = mean(&scene(&link), 200_000, 5);
     println!("{got:?}; {} {} {}", sum / cells, db / cells, rate / cells);
     assert!((got.sir - sum / cells).abs() < 4.0 * got.error, "{got:?}");
     assert!(got.error < 0.01 * got.sir);
@@ -188,15 +194,17 @@ fn the_mean_of_random_chains_is_the_integral() {
 #[test]
 fn the_same_seed_draws_the_same_chains_and_another_others() {
     let link = Link::paper(5);
-    assert_eq!(mean(&link, 100, 1), mean(&link, 100, 1));
-    assert_ne!(mean(&link, 100, 1), mean(&link, 100, 2));
+    assert_eq!(mean(&scene(&link), 100, 1), mean(&scene(&link), 100, 1));
+    assert_ne!(mean(&scene(&link), 100, 1), mean(&scene(&link), 100, 2));
 }
 
 /// The standard error is that of the means of many seeds.
 #[test]
 fn the_standard_error_is_the_scatter_of_means() {
     let link = Link::paper(8);
-    let means: Vec<_> = (0..400).map(|seed| mean(&link, 200, seed)).collect();
+    let means: Vec<_> = (0..400)
+        .map(|seed| mean(&scene(&link), 200, seed))
+        .collect();
     let count = means.len() as f64;
     let centre = means.iter().map(|mean| mean.sir).sum::<f64>() / count;
     let scatter = (means

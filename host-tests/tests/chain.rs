@@ -8,18 +8,18 @@
     missing_docs
 )]
 
-use host_tests::brief::{as_relays_know_it, of_link};
-use host_tests::cases::OPTIMA;
-use host_tests::random::{self, Chain as Kind, Style};
-use host_tests::reference::Link;
-use host_tests::sim::chain::run;
-use host_tests::sim::faults::Faults;
-use host_tests::sim::outcome::{Ending, Outcome};
-use host_tests::sim::setup::Setup;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::plan;
 use uav_relay::{Duration, Instant, Mission, Profile, Schedule, Side};
+use uav_relay_oracle::cases::OPTIMA;
+use uav_relay_oracle::mission::{as_relays_know_it, of_link};
+use uav_relay_oracle::random::{self, Chain as Kind, Style};
+use uav_relay_oracle::reference::Link;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
 
 fn paper(relays: u16) -> Mission {
     of_link(&Link::paper(usize::from(relays)), 1e-4).unwrap().0

@@ -10,20 +10,20 @@
     missing_docs
 )]
 
-use host_tests::brief::{as_relays_know_it, of_link, of_stochastic_link};
-use host_tests::random::{self, Chain, Style, log_uniform};
-use host_tests::reference::stochastic::StochasticLink;
-use host_tests::reference::{Link, Station, joint};
-use host_tests::sim::chain::run;
-use host_tests::sim::faults::Faults;
-use host_tests::sim::outcome::Ending;
-use host_tests::sim::setup::Setup;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::PerTarget;
 use uav_relay::placement::pass::{self, Behind};
 use uav_relay::placement::{fleet, plan};
 use uav_relay::{Mission, Placement, Profile, Schedule};
+use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
+use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
+use uav_relay_oracle::reference::stochastic::StochasticLink;
+use uav_relay_oracle::reference::{Link, Station, joint};
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::Ending;
+use uav_relay_sim::simulator::setup::Setup;
 
 /// What counts as the optimum, relative.
 const NEAR: f64 = 1e-3;

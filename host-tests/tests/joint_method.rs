@@ -9,18 +9,18 @@
     missing_docs
 )]
 
-use host_tests::brief::{as_relays_know_it, of_link};
-use host_tests::random::joint::{CROWDED, ROOMY, scenario};
-use host_tests::random::{self, log_uniform};
-use host_tests::reference::Link;
-use host_tests::reference::joint::{self, Corridor, Effort, Place};
-use host_tests::sim::chain::run;
-use host_tests::sim::faults::Faults;
-use host_tests::sim::outcome::{Ending, Outcome};
-use host_tests::sim::setup::Setup;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::{Adjust, Band, Method, Mission, MissionConfig, Profile};
+use uav_relay_oracle::mission::{as_relays_know_it, of_link};
+use uav_relay_oracle::random::joint::{CROWDED, ROOMY, scenario};
+use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_oracle::reference::Link;
+use uav_relay_oracle::reference::joint::{self, Corridor, Effort, Place};
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
 
 /// The setup of a chain that chooses altitudes within `corridor`; `None` where a relay would refuse the numbers.
 fn setup(link: &Link, corridor: Corridor) -> Option<Setup> {
@@ -43,7 +43,7 @@ fn setup(link: &Link, corridor: Corridor) -> Option<Setup> {
 }
 
 fn places(outcome: &Outcome) -> Vec<Place> {
-    let place = |relay: &host_tests::sim::outcome::RelayEnd| relay.setpoint.unwrap();
+    let place = |relay: &uav_relay_sim::simulator::outcome::RelayEnd| relay.setpoint.unwrap();
     outcome
         .relays
         .iter()

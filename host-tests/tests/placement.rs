@@ -9,17 +9,17 @@
     missing_docs
 )]
 
-use host_tests::brief::{as_relays_know_it, of_link};
-use host_tests::cases;
-use host_tests::random::{self, Chain, Style, log_uniform};
-use host_tests::reference::Link;
-use host_tests::report::hop_sirs;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::plan::{self, Agreed};
 use uav_relay::placement::spacing::{Hop, receiver_reach};
 use uav_relay::sir::Sender;
 use uav_relay::{Mission, Placement, Profile, Schedule};
+use uav_relay_oracle::cases;
+use uav_relay_oracle::mission::{as_relays_know_it, of_link};
+use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
+use uav_relay_oracle::reference::Link;
+use uav_relay_sim::report::hop_sirs;
 
 const SINGLE: f64 = f32::EPSILON as f64;
 

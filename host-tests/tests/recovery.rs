@@ -8,14 +8,14 @@
     missing_docs
 )]
 
-use host_tests::brief::of_link;
-use host_tests::reference::Link;
-use host_tests::report::ChainReport;
-use host_tests::report::recovery::RecoveryReport;
-use host_tests::sim::chain::run;
-use host_tests::sim::outcome::{Ending, Outcome};
-use host_tests::sim::setup::Setup;
 use uav_relay::Instant;
+use uav_relay_oracle::mission::of_link;
+use uav_relay_oracle::reference::Link;
+use uav_relay_sim::report::ChainReport;
+use uav_relay_sim::report::recovery::RecoveryReport;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
 
 /// When the relay goes silent: long after the chain has settled.
 const AT_S: u64 = 60;

@@ -11,7 +11,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use host_tests::scenario::{
+use uav_relay_sim::scenario::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, Problem, RelayOverride, Scenario,
     ScenarioError, Source,
 };

@@ -7,14 +7,14 @@
     missing_docs
 )]
 
-use host_tests::brief::of_stochastic_link;
-use host_tests::random::{self, log_uniform};
-use host_tests::reference::Station;
-use host_tests::reference::stochastic::StochasticLink;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Mission;
 use uav_relay::placement::single::stochastic::{best_place, stepped};
+use uav_relay_oracle::mission::of_stochastic_link;
+use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_oracle::reference::Station;
+use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 fn mission(link: &StochasticLink) -> Mission {
     of_stochastic_link(link, 0.0).unwrap()

@@ -9,19 +9,20 @@
     missing_docs
 )]
 
-use host_tests::brief::of_stochastic_link;
-use host_tests::random::{self, beta::beta_w, log_uniform};
-use host_tests::reference::stochastic::StochasticLink;
-use host_tests::reference::{Link, Station};
-use host_tests::sim::chain::{Chain, run};
-use host_tests::sim::faults::Faults;
-use host_tests::sim::outcome::{Ending, Outcome};
-use host_tests::sim::setup::Setup;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::plan::silent_place;
 use uav_relay::placement::retreat::Retreat;
 use uav_relay::{Interference, Measure, Mission, Profile, Schedule};
+use uav_relay_oracle::mission::of_stochastic_link;
+use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_oracle::reference::stochastic::StochasticLink;
+use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_sim::beta::beta_w;
+use uav_relay_sim::simulator::chain::{Chain, run};
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
 
 fn mission(link: &StochasticLink, min_separation_m: f32) -> Mission {
     of_stochastic_link(link, min_separation_m).unwrap()

@@ -10,7 +10,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use super::uploads::{self, Record};
-use super::{MISSING, QEMU, config};
+use uav_relay_tools::provision::config;
+
+use super::{MISSING, QEMU};
 
 /// How much faster than the wall clock the drone's own clock runs.
 pub const SPEED: f64 = 168.0 / 16.0;

@@ -9,8 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::wire::frame::MAX_FRAME;
 
 use super::emulator::SPEED;
-use crate::sim::faults::{Faults, Injected};
-use crate::sim::link::LinkSpec;
+use uav_relay_sim::simulator::faults::{Faults, Injected};
+use uav_relay_sim::simulator::link::LinkSpec;
 
 /// Any byte stream that goes on for so long without a delimiter is passed on as it is.
 const LONGEST: usize = 2 * MAX_FRAME;

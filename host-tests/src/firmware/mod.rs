@@ -2,26 +2,18 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`config`] | the configuration block, byte by byte; the firmware's own file |
 //! | [`epoch`] | the number that rises at every start, and where it is kept; the firmware's own file |
 //! | [`uploads`] | the missions that were uploaded in flight, and where they are kept; the firmware's own file |
-//! | [`key`] | the network's key, from a file; the Linux companion's own file |
-//! | [`block`] | from a scenario to the block of one drone |
 //! | [`image`] | the image, built by cargo |
 //! | [`emulator`] | one emulated drone: a process, and a socket for each serial port |
 //! | [`medium`] | what happens to frames between drones, and when they arrive |
 //! | [`network`] | who hears whom: threads that carry bytes between sockets |
 
-pub mod block;
-#[path = "../../../examples/stm32f405/config.rs"]
-pub mod config;
 #[cfg(unix)]
 pub mod emulator;
 #[path = "../../../examples/stm32f405/epoch.rs"]
 pub mod epoch;
 pub mod image;
-#[path = "../../../examples/linux_companion/key.rs"]
-pub mod key;
 #[cfg(unix)]
 pub mod medium;
 #[cfg(unix)]

@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::medium::Medium;
-use crate::sim::faults::Injected;
+use uav_relay_sim::simulator::faults::Injected;
 
 /// How long a socket may take nothing before its bytes are dropped: nobody reads at the other end.
 const PATIENCE: Duration = Duration::from_secs(2);

@@ -1,15 +1,15 @@
 //! Authenticated chains settle at the very places of others, through a bad day and reboots too.
 
-use host_tests::brief;
-use host_tests::random::seed;
-use host_tests::scenario::Scenario;
-use host_tests::sim::chain::run;
-use host_tests::sim::faults::Faults;
-use host_tests::sim::outcome::{Ending, Outcome};
-use host_tests::sim::setup::Setup;
 use uav_relay::{
     Adjust, Auth, Identity, Instant, Key, Method, Phase, Relay, Settings, Stats, Wiring,
 };
+use uav_relay_oracle::random::seed;
+use uav_relay_sim::mission;
+use uav_relay_sim::scenario::Scenario;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
 
 use super::net::{Deed, KEY, NETWORK, Net, mission};
 
@@ -92,7 +92,7 @@ fn other_methods_choose_the_same() {
         altitude_max_m: 300.0,
         ..Scenario::default()
     };
-    let mut setup = Setup::new(brief::mission(&scenario, 5, 1e-4).unwrap().0);
+    let mut setup = Setup::new(mission::mission(&scenario, 5, 1e-4).unwrap().0);
     for method in [
         Method::Joint,
         Method::Adjust(Adjust {

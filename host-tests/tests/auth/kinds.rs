@@ -1,10 +1,10 @@
 //! The attacks, and which counter each has to raise, by `FORMAT.md` alone.
 
-use host_tests::random::seed;
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::{Port, Stats};
+use uav_relay_oracle::random::seed;
 
 use super::frames::{HEADER, HELLO, Plain, SIGNED, TAG, hello, nonce, plain};
 use super::net::{Heard, NETWORK, Net};

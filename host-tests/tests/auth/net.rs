@@ -3,13 +3,13 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use host_tests::brief::of_link;
-use host_tests::reference::Link;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Auth, Duration, Event, Ground, Identity, Instant, Interference, Interferer, Key, Mission,
     MissionConfig, Port, Relay, Settings, Side, Stats, Upload, Wiring,
 };
+use uav_relay_oracle::mission::of_link;
+use uav_relay_oracle::reference::Link;
 
 pub(crate) const NETWORK: u16 = 7;
 pub(crate) const KEY: [u8; 32] = *b"the members of network 7 have it";

@@ -3,8 +3,8 @@
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use host_tests::scenario::Scenario;
 use rustix::process::Signal;
+use uav_relay_sim::scenario::Scenario;
 
 use crate::binary::companion;
 use crate::process::{Ended, Relay};

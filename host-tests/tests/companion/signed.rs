@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use host_tests::scenario::Scenario;
 use rustix::process::Signal;
+use uav_relay_sim::scenario::Scenario;
 
 use crate::medium::{Noise, QUIET};
 use crate::process::{Ended, Relay};

@@ -1,10 +1,10 @@
 //! A new mission from a ground process to relays that keep it, and fly it when they are switched on again.
 
-use host_tests::brief;
-use host_tests::scenario::{Interference, Scenario, Source};
 use rustix::process::Signal;
 use uav_relay::Upload;
 use uav_relay::wire::upload::LENGTH;
+use uav_relay_sim::mission;
+use uav_relay_sim::scenario::{Interference, Scenario, Source};
 
 use crate::medium::{Medium, Noise, QUIET};
 use crate::process::{Ended, Relay};
@@ -141,7 +141,7 @@ fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
 
 /// The file that a relay keeps of `config`, uploaded as version 5 to relays that were loaded with `base`.
 fn stored(base: &Scenario, config: &Scenario) -> Vec<u8> {
-    let [base, new] = [base, config].map(|scenario| brief::mission(scenario, 1, 1e-4).unwrap().0);
+    let [base, new] = [base, config].map(|scenario| mission::mission(scenario, 1, 1e-4).unwrap().0);
     let upload = Upload::new(&base, 5, *new.config()).unwrap();
     let mut bytes = vec![0; LENGTH];
     assert_eq!(upload.encode(&mut bytes), Some(LENGTH));

@@ -1,11 +1,11 @@
 //! The f64 judge of chains under stochastic interference, judged itself: by values of a separate program, and by methods
 //! of its own that must agree.
 
-use host_tests::random::{log_uniform, seed};
-use host_tests::reference::stochastic::StochasticLink;
-use host_tests::reference::{Link, Station};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use uav_relay_oracle::random::{log_uniform, seed};
+use uav_relay_oracle::reference::stochastic::StochasticLink;
+use uav_relay_oracle::reference::{Link, Station};
 
 use super::off;
 

@@ -1,7 +1,7 @@
 //! Upsilon in closed form against the integral of the moment-generating function, which knows nothing of it.
 
-use host_tests::reference::stochastic::upsilon_by_mgf;
 use uav_relay::field::{FieldPoint, beta_upsilon};
+use uav_relay_oracle::reference::stochastic::upsilon_by_mgf;
 
 use super::off;
 

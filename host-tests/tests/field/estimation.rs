@@ -1,13 +1,13 @@
 //! How good an estimate is, in hundreds of seeds: its error, and whether its own standard error holds.
 
-use host_tests::random::seed;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::field::beta_upsilon;
 use uav_relay::field::estimate::{Estimate, Estimator, MIN_SAMPLES};
+use uav_relay_oracle::random::seed;
 
 use super::off;
-use host_tests::random::beta::beta_w;
+use uav_relay_sim::beta::beta_w;
 
 const SEEDS: u64 = 100;
 

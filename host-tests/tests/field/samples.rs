@@ -1,6 +1,5 @@
 //! Which samples count, and that no stream of them can make an estimate of anything but finite numbers.
 
-use host_tests::random::seed;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
@@ -9,9 +8,10 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::field::Field;
 use uav_relay::field::FieldPoint;
 use uav_relay::field::estimate::{Estimate, Estimator, MIN_SAMPLES};
+use uav_relay_oracle::random::seed;
 
 use super::off;
-use host_tests::random::beta::beta_w;
+use uav_relay_sim::beta::beta_w;
 
 fn filled(alpha: f64, beta: f64, i_max_w: f32, samples: u32) -> Estimator {
     let mut rng = ChaCha8Rng::seed_from_u64(1);

@@ -1,9 +1,9 @@
 //! The table of Upsilon: what it refuses, and what it says between and beyond its points.
 
-use host_tests::random::{log_uniform, seed};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::field::{Field, FieldError, FieldPoint, MAX_POINTS};
+use uav_relay_oracle::random::{log_uniform, seed};
 
 use super::off;
 

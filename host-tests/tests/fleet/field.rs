@@ -1,13 +1,13 @@
 //! Counts and optima of equals in a field.
 
-use host_tests::brief::of_stochastic_link;
-use host_tests::random::{self, log_uniform};
-use host_tests::reference::Station;
-use host_tests::reference::stochastic::StochasticLink;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::fleet::{self, ranges};
 use uav_relay::{Mission, MissionConfig, Placement, Profile};
+use uav_relay_oracle::mission::of_stochastic_link;
+use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_oracle::reference::Station;
+use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::{ROUNDING, count, round};
 

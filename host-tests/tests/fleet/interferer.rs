@@ -1,12 +1,12 @@
 //! Counts against one interferer.
 
-use host_tests::brief::{as_relays_know_it, of_link};
-use host_tests::random::{self, Chain, Style, log_uniform};
-use host_tests::reference::Link;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::fleet;
 use uav_relay::{Mission, Placement, Profile};
+use uav_relay_oracle::mission::{as_relays_know_it, of_link};
+use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
+use uav_relay_oracle::reference::Link;
 
 use super::{ROUNDING, count, round};
 

@@ -1,11 +1,11 @@
 //! Values of an independent program, and what the printed rules get wrong.
 
-use host_tests::brief::of_stochastic_link;
-use host_tests::cases;
-use host_tests::reference::stochastic::StochasticLink;
-use host_tests::reference::{Link, Station};
 use uav_relay::Placement;
 use uav_relay::placement::fleet;
+use uav_relay_oracle::cases;
+use uav_relay_oracle::mission::of_stochastic_link;
+use uav_relay_oracle::reference::stochastic::StochasticLink;
+use uav_relay_oracle::reference::{Link, Station};
 
 use super::field::field;
 use super::interferer::briefed;

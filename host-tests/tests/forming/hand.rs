@@ -2,13 +2,13 @@
 
 use std::collections::VecDeque;
 
-use host_tests::brief::of_link;
-use host_tests::reference::Link;
-use host_tests::reference::joint::{self, Place};
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, MAX_FRAME};
 use uav_relay::wire::message::{Message, Turn};
 use uav_relay::{Band, Identity, Instant, Mission, MissionConfig, Phase, Port, Relay, Settings};
+use uav_relay_oracle::mission::of_link;
+use uav_relay_oracle::reference::Link;
+use uav_relay_oracle::reference::joint::{self, Place};
 
 /// A frame on its way: to which relay, counted from 0, through which port, and its bytes.
 pub(crate) struct Flying {

@@ -1,6 +1,6 @@
 //! The counter of what is asked of the heap counts, so that its zeros mean something.
 
-use host_tests::fuzzing::heap::{asked, without};
+use uav_relay_fuzz::heap::{asked, without};
 
 #[test]
 fn what_is_asked_of_the_heap_is_counted() {

@@ -1,9 +1,9 @@
 //! Each target on random bytes and on inputs of its corpus with a few bytes changed: a plain test run explores a little too.
 
-use host_tests::fuzzing::TARGETS;
-use host_tests::random::seed;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use uav_relay_fuzz::TARGETS;
+use uav_relay_oracle::random::seed;
 
 use super::corpus;
 

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use host_tests::fuzzing::counted::all;
-use host_tests::fuzzing::watch::Watched;
-use host_tests::fuzzing::{chain, relay};
 use uav_relay::{Method, Phase, Relay, Wiring};
+use uav_relay_fuzz::counted::all;
+use uav_relay_fuzz::watch::Watched;
+use uav_relay_fuzz::{chain, relay};
 
 use super::corpus;
 

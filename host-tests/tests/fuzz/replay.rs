@@ -1,6 +1,6 @@
 //! The corpora: every input again, and that they stay small.
 
-use host_tests::fuzzing::TARGETS;
+use uav_relay_fuzz::TARGETS;
 
 use super::corpus;
 

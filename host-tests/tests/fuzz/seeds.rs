@@ -9,12 +9,12 @@
 
 use std::fs;
 
-use host_tests::fuzzing::input::Input;
-use host_tests::fuzzing::watch::NETWORK;
-use host_tests::fuzzing::{TARGETS, setting};
 use serde::Deserialize;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Identity, Instant, Port, Relay, Settings};
+use uav_relay_fuzz::input::Input;
+use uav_relay_fuzz::watch::NETWORK;
+use uav_relay_fuzz::{TARGETS, setting};
 
 use super::folder;
 

@@ -1,9 +1,9 @@
 //! What the targets judge by: COBS against a published one, numbers that cover their ranges.
 
-use host_tests::fuzzing::cobs::{stuffed, unstuffed};
-use host_tests::fuzzing::input::Input;
 use proptest::collection::vec;
 use proptest::prelude::*;
+use uav_relay_fuzz::cobs::{stuffed, unstuffed};
+use uav_relay_fuzz::input::Input;
 
 proptest! {
     #[test]

@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use host_tests::brief::of_link;
-use host_tests::random::joint::judged::{COUNT, PATH, numbered, optima};
-use host_tests::reference::joint::Effort;
 use rayon::prelude::*;
+use uav_relay_oracle::mission::of_link;
+use uav_relay_oracle::random::joint::judged::{COUNT, PATH, numbered, optima};
+use uav_relay_oracle::reference::joint::Effort;
 
 use crate::checked;
 

@@ -1,11 +1,13 @@
 //! Relays that may stand to the side of the Tx-Rx plane.
 
-use host_tests::random::joint::{Scenario, in_space, with_own};
-use host_tests::random::{self, log_uniform};
-use host_tests::reference::Link;
-use host_tests::reference::joint::{Corridor, Effort, Hold, Place, keeps_rules, optimum, sir};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use uav_relay_oracle::random::joint::{Scenario, in_space, with_own};
+use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_oracle::reference::Link;
+use uav_relay_oracle::reference::joint::{
+    Corridor, Effort, Hold, Place, keeps_rules, optimum, sir,
+};
 
 use crate::{PAPER_BAND, checked, close, flown};
 

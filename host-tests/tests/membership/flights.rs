@@ -1,12 +1,12 @@
 //! Drones that fly: with a guard no two of them ever come nearer than the separation, whatever is lost, late or silent.
 
-use host_tests::sim::chain::FlightSpec;
-use host_tests::sim::faults::Faults;
-use host_tests::sim::outcome::Ending;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::guard::confines::Confines;
 use uav_relay::{Duration, MissionConfig};
+use uav_relay_sim::simulator::chain::FlightSpec;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 

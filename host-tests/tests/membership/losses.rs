@@ -1,10 +1,10 @@
 //! Relays that are lost on a good channel, and come back.
 
-use host_tests::brief::of_stochastic_link;
-use host_tests::reference::Station;
-use host_tests::reference::stochastic::StochasticLink;
-use host_tests::sim::outcome::Ending;
 use uav_relay::{Adjust, Band, Local, Method, MissionConfig};
+use uav_relay_oracle::mission::of_stochastic_link;
+use uav_relay_oracle::reference::Station;
+use uav_relay_oracle::reference::stochastic::StochasticLink;
+use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 

@@ -1,6 +1,6 @@
 //! Chains that are split in two, and links that come and go.
 
-use host_tests::sim::outcome::Ending;
+use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 

@@ -1,11 +1,11 @@
 //! Random schedules of faults at eight relays.
 
-use host_tests::random::seed;
-use host_tests::sim::faults::Faults;
-use host_tests::sim::outcome::Ending;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::{Duration, Profile};
+use uav_relay_oracle::random::seed;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 

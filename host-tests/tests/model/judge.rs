@@ -1,8 +1,8 @@
 //! What a mission's chain can meet, in f64 and by the formulas of the reference alone.
 
-use host_tests::reference::joint::Place;
-use host_tests::reference::stochastic::StochasticLink;
-use host_tests::reference::{Link, Station};
+use uav_relay_oracle::reference::joint::Place;
+use uav_relay_oracle::reference::stochastic::StochasticLink;
+use uav_relay_oracle::reference::{Link, Station};
 
 /// How far above the best a target may be, relative: the rounding of f32 arithmetic.
 const ABOVE: f64 = 1e-4;

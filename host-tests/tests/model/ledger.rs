@@ -1,8 +1,8 @@
 //! What one relay was told and has counted, as plain data, and what may never happen to a relay by itself.
 
-use host_tests::reference::joint::Place;
 use proptest::{prop_assert, prop_assert_eq};
 use uav_relay::{Event, Instant, Method, Phase, Placement, Profile, Relay, Settings, Side, Stats};
+use uav_relay_oracle::reference::joint::Place;
 
 use super::Checked;
 use super::scenario::Scenario;

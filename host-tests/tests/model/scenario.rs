@@ -1,11 +1,5 @@
 //! The missions that are flown: 2 to 6 relays, every method, drawn as the random tests of the placements draw theirs.
 
-use host_tests::brief::{as_relays_know_it, of_link, of_stochastic_link};
-use host_tests::random::joint::scenario as joint_scenario;
-use host_tests::random::{Chain, Style, link as random_link, log_uniform};
-use host_tests::reference::joint::{Corridor, Effort, optimum};
-use host_tests::reference::stochastic::StochasticLink;
-use host_tests::reference::{Link, Station};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::wire::auth::{Auth, Key};
@@ -13,6 +7,12 @@ use uav_relay::{
     Adjust, Identity, Instant, Local, Measure, Method, Mission, MissionConfig, Profile, Relay,
     Settings,
 };
+use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
+use uav_relay_oracle::random::joint::scenario as joint_scenario;
+use uav_relay_oracle::random::{Chain, Style, link as random_link, log_uniform};
+use uav_relay_oracle::reference::joint::{Corridor, Effort, optimum};
+use uav_relay_oracle::reference::stochastic::StochasticLink;
+use uav_relay_oracle::reference::{Link, Station};
 
 use super::chain::World;
 use super::judge::Judge;

@@ -2,18 +2,20 @@
 
 use std::collections::BTreeMap;
 
-use host_tests::brief;
-use host_tests::plan::{Ask, Number, Plan, plan};
-use host_tests::random::joint::Scenario as Drawn;
-use host_tests::random::joint::judged::{COUNT, numbered, optima};
-use host_tests::reference::Link;
-use host_tests::reference::joint::{self, Corridor, Effort};
-use host_tests::report::hop_sirs;
-use host_tests::scenario::{AirGround, ChannelSpec, Interference, RelayOverride, Scenario, Source};
-use host_tests::sim::chain;
-use host_tests::sim::outcome::Ending;
-use host_tests::sim::setup::Setup;
 use uav_relay::{Method, Profile};
+use uav_relay_oracle::random::joint::Scenario as Drawn;
+use uav_relay_oracle::random::joint::judged::{COUNT, numbered, optima};
+use uav_relay_oracle::reference::Link;
+use uav_relay_oracle::reference::joint::{self, Corridor, Effort};
+use uav_relay_sim::mission;
+use uav_relay_sim::report::hop_sirs;
+use uav_relay_sim::scenario::{
+    AirGround, ChannelSpec, Interference, RelayOverride, Scenario, Source,
+};
+use uav_relay_sim::simulator::chain;
+use uav_relay_sim::simulator::outcome::Ending;
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_tools::plan::{Ask, Number, Plan, plan};
 
 const TOLERANCE: f64 = 1e-4;
 
@@ -34,11 +36,11 @@ fn free(scenario: &Scenario, number: Number) -> Plan {
 
 /// SIR (linear) of the worst hop of what simulated relays agree on; 0 where that is nothing.
 fn agreed(scenario: &Scenario, relays: u16) -> f64 {
-    let (mission, own) = brief::mission(scenario, relays, TOLERANCE).unwrap();
+    let (mission, own) = mission::mission(scenario, relays, TOLERANCE).unwrap();
     let mut setup = Setup::new(mission);
     setup.settings.method = Method::Joint;
     setup.profiles.clone_from(&own);
-    setup.held = brief::held(scenario, relays);
+    setup.held = mission::held(scenario, relays);
     let outcome = chain::run(setup).unwrap();
     if outcome.ending != Ending::Settled {
         return 0.0;

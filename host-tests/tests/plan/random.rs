@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use host_tests::plan::{Ask, NoPlan, Number, Plan, plan};
-use host_tests::random::{self, Chain, Style, log_uniform};
-use host_tests::reference::{Link, Station};
-use host_tests::scenario::{
-    AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
-};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
+use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_sim::scenario::{
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
+};
+use uav_relay_tools::plan::{Ask, NoPlan, Number, Plan, plan};
 
 fn round(value: f64) -> f64 {
     f64::from(value as f32)

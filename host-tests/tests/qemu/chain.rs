@@ -1,11 +1,11 @@
 //! Chains of emulated drones with a wire to each neighbour, held against the simulated chain.
 
-use host_tests::firmware::block::Flight;
-use host_tests::scenario::Scenario;
-use host_tests::sim::chain::run;
-use host_tests::sim::faults::Faults;
-use host_tests::sim::outcome::Ending;
-use host_tests::sim::setup::Setup;
+use uav_relay_sim::scenario::Scenario;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::Ending;
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_tools::provision::block::Flight;
 
 use crate::fleet::{Fleet, Image};
 

@@ -8,14 +8,14 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use defmt_decoder::Table;
-use host_tests::firmware::block::Flight;
 use host_tests::firmware::emulator::Emulator;
 use host_tests::firmware::image;
 use host_tests::firmware::medium::Medium;
 use host_tests::firmware::network::{self, Network};
 use host_tests::firmware::uploads::Record;
-use host_tests::sim::faults::{Faults, Injected};
-use host_tests::sim::link::LinkSpec;
+use uav_relay_sim::simulator::faults::{Faults, Injected};
+use uav_relay_sim::simulator::link::LinkSpec;
+use uav_relay_tools::provision::block::Flight;
 
 use crate::log::{self, Line};
 

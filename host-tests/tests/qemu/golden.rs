@@ -2,11 +2,11 @@
 
 use std::io::{Read as _, Write as _};
 
-use host_tests::firmware::config::LEN;
 use host_tests::firmware::emulator::Emulator;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
+use uav_relay_tools::provision::config::LEN;
 
 use crate::fleet::{PATIENCE, image};
 
@@ -57,7 +57,7 @@ fn the_target_makes_of_every_vector_what_this_machine_does() {
         heard.extend(wire);
     }
     // And what it refuses, for whatever reason: a thousand frames with up to three bytes changed.
-    let seed = host_tests::random::seed(31);
+    let seed = uav_relay_oracle::random::seed(31);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for _ in 0..1_000 {
         let vector = &vectors.frames[rng.random_range(0..vectors.frames.len())];

@@ -3,10 +3,10 @@
 
 use std::time::Instant;
 
-use host_tests::firmware::block::Flight;
-use host_tests::scenario::{BetaPoint, Field, Interference, RelayOverride, Scenario, Source};
-use host_tests::sim::faults::Faults;
 use uav_relay::{Adjust, Method};
+use uav_relay_sim::scenario::{BetaPoint, Field, Interference, RelayOverride, Scenario, Source};
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_tools::provision::block::Flight;
 
 use crate::chain::{BAD_DAY, simulated};
 use crate::fleet::{Fleet, Image};

@@ -1,6 +1,6 @@
 //! Emulated drones that share one radio channel: each hears two drones to either side.
 
-use host_tests::sim::faults::Faults;
+use uav_relay_sim::simulator::faults::Faults;
 
 use crate::chain::{BAD_DAY, paper, simulated};
 use crate::fleet::{Fleet, Image};

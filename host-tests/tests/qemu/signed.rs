@@ -1,8 +1,8 @@
 //! Emulated drones whose frames are signed.
 
-use host_tests::firmware::block::Flight;
-use host_tests::firmware::config::Secret;
-use host_tests::sim::faults::Faults;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_tools::provision::block::Flight;
+use uav_relay_tools::provision::config::Secret;
 
 use crate::chain::{BAD_DAY, paper, simulated};
 use crate::fleet::{Fleet, Image};

@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use host_tests::firmware::config::LEN;
 use host_tests::firmware::emulator::SPEED;
-use host_tests::sim::faults::Faults;
 use uav_relay::Settings;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_tools::provision::config::LEN;
 
 use crate::chain::{paper, simulated};
 use crate::fleet::{Fleet, Image};

@@ -4,14 +4,14 @@ use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
-use host_tests::firmware::block::Flight;
-use host_tests::firmware::config::Secret;
 use host_tests::firmware::emulator::SPEED;
 use host_tests::firmware::uploads::{Record, record};
-use host_tests::scenario::{Interference, Scenario, Source};
-use host_tests::sim::faults::Faults;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Ground, Key, Progress, Side, Upload, Wiring};
+use uav_relay_sim::scenario::{Interference, Scenario, Source};
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_tools::provision::block::Flight;
+use uav_relay_tools::provision::config::Secret;
 
 use crate::chain::{BAD_DAY, paper, simulated};
 use crate::fleet::{Fleet, Image, PATIENCE};

@@ -1,6 +1,6 @@
 //! Reaches where formulas divide by zero or lose a root, each with an answer worked out by hand.
 
-use host_tests::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Station};
 
 use super::close;
 

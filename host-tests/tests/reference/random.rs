@@ -1,9 +1,9 @@
 //! The reference on random links: against scans and brute force, and where two of its methods must agree.
 
-use host_tests::random::{self, Chain, Style, log_uniform};
-use host_tests::reference::Link;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
+use uav_relay_oracle::reference::Link;
 
 /// Runs `check` on `count` random links with the generator that drew them.
 fn for_links(

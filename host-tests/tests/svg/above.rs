@@ -1,7 +1,7 @@
 //! The view from above: where there is room beside the line, and nowhere else.
 
-use host_tests::svg::{Picture, Room, draw};
 use roxmltree::{Document, Node};
+use uav_relay_sim::svg::{Picture, Room, draw};
 
 use super::{all, chain, extent, has_text, level, number, tip};
 

@@ -1,7 +1,7 @@
 //! Chains that have lost relays, and the strip of what happened to them.
 
-use host_tests::svg::{Picture, draw};
 use roxmltree::Document;
+use uav_relay_sim::svg::{Picture, draw};
 
 use super::{SIZE, all, extent, has_text, level, number, tip};
 

@@ -1,7 +1,7 @@
 //! The interferer of a mission that was replaced in flight.
 
-use host_tests::svg::{Picture, draw};
 use roxmltree::{Document, Node};
+use uav_relay_sim::svg::{Picture, draw};
 
 use super::{all, level, number, tip};
 

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use host_tests::random::{self, log_uniform};
-use host_tests::reference::Link;
-use host_tests::reference::joint::{Corridor, Effort, Place, optimum, sir};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use uav_relay::placement::single::aside::{self, Case};
 use uav_relay::placement::single::{Found, free, given_altitude};
 use uav_relay::{Band, Mission, MissionConfig};
+use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_oracle::reference::Link;
+use uav_relay_oracle::reference::joint::{Corridor, Effort, Place, optimum, sir};
 
 use super::ALLOWED;
 use super::scene::Scene;

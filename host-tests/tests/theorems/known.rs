@@ -1,8 +1,8 @@
 //! Values of an independent program, the printed theorems' counterexamples, and interferers in degenerate places.
 
-use host_tests::cases;
-use host_tests::reference::Link;
 use uav_relay::placement::single::{free, given_altitude, given_x, guide, locus};
+use uav_relay_oracle::cases;
+use uav_relay_oracle::reference::Link;
 
 use super::scene::Scene;
 
@@ -112,7 +112,7 @@ fn counterexamples_and_degenerate_places() {
         mu_los: 1.0,
         mu_nlos: kappa,
         eta: 1.0,
-        relays: vec![host_tests::reference::Station {
+        relays: vec![uav_relay_oracle::reference::Station {
             altitude_m: 5.0,
             power_w,
         }],

@@ -1,10 +1,10 @@
 //! Where the hops are equal, where SIR_1 turns, and at which powers the cases change.
 
-use host_tests::random;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::single::{given_altitude, guide, locus};
 use uav_relay::sir::{Turn, first_hop_turn};
+use uav_relay_oracle::random;
 
 use super::scene::Scene;
 

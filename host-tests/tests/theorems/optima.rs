@@ -1,9 +1,9 @@
 //! Theorems 1 to 3, and the limit of noise alone, against brute force.
 
-use host_tests::random::{self, log_uniform};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::placement::single::{Found, free, given_altitude, given_x, noise};
+use uav_relay_oracle::random::{self, log_uniform};
 
 use super::scene::Scene;
 use super::{ALLOWED, count};

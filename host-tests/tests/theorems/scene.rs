@@ -1,12 +1,12 @@
 //! One relay, one interferer, and a judge of places that shares no formula with the crate.
 
-use host_tests::brief::{as_relays_know_it, of_link};
-use host_tests::cases::Case;
-use host_tests::random::{self, Chain, Style, log_uniform};
-use host_tests::reference::Link;
 use rand::{Rng, RngExt};
 use uav_relay::placement::single::Found;
 use uav_relay::{Band, Mission, MissionConfig};
+use uav_relay_oracle::cases::Case;
+use uav_relay_oracle::mission::{as_relays_know_it, of_link};
+use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
+use uav_relay_oracle::reference::Link;
 
 /// One relay, its link as the relay's own f32 numbers, and the band it may choose from.
 pub(crate) struct Scene {

@@ -1,10 +1,10 @@
 //! Drones that fly through an upload, guarded.
 
-use host_tests::sim::chain::FlightSpec;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Duration;
 use uav_relay::guard::confines::Confines;
+use uav_relay_sim::simulator::chain::FlightSpec;
 
 use super::*;
 

@@ -1,10 +1,10 @@
 //! Random schedules of uploads, faults, losses and reboots at eight relays.
 
-use host_tests::random::seed;
-use host_tests::sim::faults::Faults;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::{Duration, Profile};
+use uav_relay_oracle::random::seed;
+use uav_relay_sim::simulator::faults::Faults;
 
 use super::*;
 

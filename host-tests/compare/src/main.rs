@@ -1,0 +1,123 @@
+//! `cargo versus`: this crate's placements beside those of the optimisers that a user would take instead.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | `problem` | what is solved, and its true optima |
+//! | `own` | this crate's chains, and the time they take |
+//! | `environment` | Python with SciPy and NLopt |
+//! | `rivals` | their chains, and the time they take |
+//! | `results` | everything that came out, as `--json` prints it |
+//! | `score` | what a chain is worth, whoever found it |
+//! | `table` | that as markdown |
+//! | `machine` | where and when |
+
+mod environment;
+mod machine;
+mod own;
+mod problem;
+mod results;
+mod rivals;
+mod score;
+mod table;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+use uav_relay_sim::command::{self, Failure};
+
+use machine::Machine;
+use problem::Problem;
+use results::{Results, Solved};
+use rivals::{Rivals, SOLVERS};
+
+/// Finds the best places for relays with this crate, SciPy and NLopt, on this machine and in one run, and prints what each
+/// reached and how long it took as a table in markdown.
+#[derive(Parser, Debug)]
+#[command(
+    name = "versus",
+    bin_name = "cargo versus",
+    disable_version_flag = true
+)]
+struct Options {
+    /// Most time on the processor that a solver of Python has for one problem, seconds, 1 to 600
+    #[arg(long, value_name = "S", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=600))]
+    limit: u16,
+    /// One JSON object with every chain on standard output instead of the table
+    #[arg(long)]
+    json: bool,
+    /// Score the chains of an earlier --json again; nothing is solved, and Python is not needed
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["limit", "venv"])]
+    from: Option<PathBuf>,
+    /// Where the virtual environment of Python is, or is made; without it beside what is built, target/versus
+    #[arg(long, value_name = "DIR")]
+    venv: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match Options::try_parse() {
+        Ok(options) => command::ended(run(&options).map(|text| command::print(&text))),
+        Err(error) => command::usage(&error),
+    }
+}
+
+fn run(options: &Options) -> Result<String, Failure> {
+    let results = match &options.from {
+        Some(file) => read(file)?,
+        None => solve(options)?,
+    };
+    if options.json {
+        return command::json(&results);
+    }
+    table::table(&results).map_err(Failure::input)
+}
+
+fn read(file: &Path) -> Result<Results, Failure> {
+    let text = std::fs::read_to_string(file).map_err(|error| error.to_string());
+    let results =
+        text.and_then(|text| serde_json::from_str(&text).map_err(|error| error.to_string()));
+    results.map_err(|error| Failure::input(format!("--from {}: {error}", file.display())))
+}
+
+/// Solves every problem by everything there is, one after the other.
+fn solve(options: &Options) -> Result<Results, Failure> {
+    let problems = problem::all();
+    // Hidden unless standard error is a terminal.
+    let bar = ProgressBar::new((problems.len() * SOLVERS.len()) as u64);
+    if let Ok(style) = ProgressStyle::with_template("{bar:24} {pos}/{len} {elapsed} {msg}") {
+        bar.set_style(style);
+    }
+    bar.set_message("Python's packages");
+    let python = environment::python(
+        options
+            .venv
+            .as_deref()
+            .unwrap_or(Path::new(environment::USUAL)),
+    )
+    .map_err(Failure::input)?;
+    bar.set_message("warming up");
+    let mut rivals = Rivals::start(&python, f64::from(options.limit)).map_err(Failure::unmet)?;
+    let mut solved = Vec::new();
+    for problem in problems {
+        solved.push(by_all(problem, &mut rivals, &bar).map_err(Failure::unmet)?);
+    }
+    bar.finish_and_clear();
+    Ok(Results {
+        machine: Machine::this(),
+        versions: rivals.versions().clone(),
+        limit_s: f64::from(options.limit),
+        problems: solved,
+    })
+}
+
+/// This crate first: its time is what the others' is compared with, so it is taken right before theirs.
+fn by_all(problem: Problem, rivals: &mut Rivals, bar: &ProgressBar) -> Result<Solved, String> {
+    let mut runs = own::runs(problem)?;
+    for solver in SOLVERS {
+        bar.set_message(format!("{problem}: {}", solver.title));
+        runs.push(rivals.run(solver, problem)?);
+        bar.inc(1);
+    }
+    Ok(Solved { problem, runs })
+}

@@ -1,0 +1,147 @@
+//! This crate's chains, and the time they take on this machine.
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use uav_relay::placement::plan::{place, solve};
+use uav_relay::{Method, Mission, Placement, Profile, Schedule};
+use uav_relay_sim::mission;
+use uav_relay_sim::report::hop_sirs;
+use uav_relay_sim::scenario::Scenario;
+use uav_relay_sim::simulator::chain;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_tools::plan::{Ask, NoPlan, Number, plan};
+
+use crate::machine::Clock;
+use crate::problem::{Choice, Problem};
+use crate::results::{Answer, Found, Good, Run};
+
+/// Relative tolerance on the achieved SIR: that of `cargo chain`.
+const TOLERANCE: f64 = 1e-4;
+
+/// Something is timed over this long, and so many runs at once: the clock of the processor goes in steps of milliseconds.
+const LONG_ENOUGH: Duration = Duration::from_secs(1);
+const RUNS_AT_ONCE: u32 = 5;
+
+/// What this crate does about the problem; the first is what the other solvers are compared with.
+pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
+    let briefed = mission::mission(&problem.scenario()?, problem.relays, TOLERANCE);
+    let (mission, _) = briefed.map_err(|error| error.to_string())?;
+    let mut runs = Vec::new();
+    if problem.choice == Choice::Places {
+        let (time_s, places) = timed(|| planned(&mission))?;
+        runs.push(run(
+            "**uav-relay**, as the head predicts",
+            time_s,
+            &mission,
+            &places,
+        ));
+    }
+    if problem.choice == Choice::Altitudes {
+        let scenario = problem.scenario()?;
+        let (time_s, places) = timed(|| solved(&scenario, problem.relays))?;
+        runs.push(run(
+            "**uav-relay**, every relay by itself",
+            time_s,
+            &mission,
+            &places,
+        ));
+    }
+    let mut setup = Setup::new(mission);
+    if problem.choice == Choice::Altitudes {
+        setup.settings.method = Method::Joint;
+    }
+    let (time_s, places) = timed(|| flown(setup.clone()))?;
+    runs.push(run(
+        "**uav-relay**, all relays by messages",
+        time_s,
+        &mission,
+        &places,
+    ));
+    Ok(runs)
+}
+
+/// The chain from the mission alone, as the head solves it: at most about fifty passes of N hops, and N^2 / 2 hops for places.
+fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
+    let none = || "no target can be met".to_owned();
+    let common = |_| mission.config().common;
+    let agreed = solve(black_box(mission), Schedule::Bracketed, common).map_err(|_| none())?;
+    (1..=mission.relays())
+        .map(|index| place(mission, agreed.target, index, common).ok_or_else(none))
+        .collect()
+}
+
+/// The chain from the mission alone by the joint method, as every relay solves it.
+fn solved(scenario: &Scenario, relays: u16) -> Result<Vec<Placement>, String> {
+    let ask = Ask {
+        number: Number::Of(relays),
+        free_altitude: true,
+        x_m: None,
+        tolerance: TOLERANCE,
+    };
+    match plan(black_box(scenario), &ask) {
+        Ok(plan) => Ok(plan.places.iter().map(|(place, _)| *place).collect()),
+        Err(NoPlan::Wrong(why) | NoPlan::Unmet(why, _)) => Err(why),
+    }
+}
+
+/// The chain that simulated relays settle on: what every one of them computes, and every frame they exchange.
+fn flown(setup: Setup) -> Result<Vec<Placement>, String> {
+    let outcome: Outcome = chain::run(setup).map_err(|error| error.to_string())?;
+    let places = outcome.relays.iter().map(|relay| relay.setpoint).collect();
+    let settled: Option<_> = (outcome.ending == Ending::Settled).then_some(());
+    settled
+        .and(places)
+        .ok_or_else(|| format!("the chain ended {:?}", outcome.ending))
+}
+
+/// The mean time of `work` on the processor, s, and what it gives.
+fn timed<T>(work: impl Fn() -> Result<T, String>) -> Result<(f64, T), String> {
+    // Not timed: the first touch of code and memory.
+    let result = work()?;
+    let (wall, clock) = (Instant::now(), Clock::start());
+    let mut runs: u32 = 0;
+    while wall.elapsed() < LONG_ENOUGH {
+        for _ in 0..RUNS_AT_ONCE {
+            black_box(work()?);
+        }
+        runs += RUNS_AT_ONCE;
+    }
+    Ok((clock.elapsed_s() / f64::from(runs), result))
+}
+
+fn run(solver: &str, time_s: f64, mission: &Mission, places: &[Placement]) -> Run {
+    let power_w = mission.config().common.power_w;
+    let with_profile = |place: &Placement| {
+        let altitude_m = place.altitude_m;
+        (
+            *place,
+            Profile {
+                altitude_m,
+                power_w,
+            },
+        )
+    };
+    let flown: Vec<_> = places.iter().map(with_profile).collect();
+    let chain: Vec<[f64; 2]> = places
+        .iter()
+        .map(|place| [f64::from(place.x_m), f64::from(place.altitude_m)])
+        .collect();
+    Run {
+        solver: solver.to_owned(),
+        answer: Answer::Found(Found {
+            time_s,
+            evaluations: None,
+            sir: hop_sirs(mission, &flown)
+                .into_iter()
+                .fold(f64::INFINITY, f64::min),
+            good: Some(Good {
+                after_s: time_s,
+                chain: chain.clone(),
+            }),
+            chain,
+            cut: false,
+        }),
+    }
+}

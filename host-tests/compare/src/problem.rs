@@ -1,0 +1,126 @@
+//! What is solved: relays at a common altitude, and relays that choose their altitudes.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use uav_relay_oracle::reference::joint::Corridor;
+use uav_relay_oracle::reference::{Link, Station, path_loss_factor};
+use uav_relay_sim::scenario::{Interference, Scenario};
+
+/// What relays choose.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Choice {
+    /// Their places, at the altitude they hold.
+    Places,
+    /// Their places and their altitudes.
+    Altitudes,
+}
+
+/// The best places of a number of relays.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub(crate) struct Problem {
+    /// What they choose.
+    pub(crate) choice: Choice,
+    /// Number of relays.
+    pub(crate) relays: u16,
+}
+
+/// The true optima (linear SIR) by number of relays, from an independent program, to nine or ten digits.
+const OPTIMA: [(Choice, &[(u16, f64)]); 2] = [
+    (
+        Choice::Places,
+        &[
+            (1, 1.490_121_510),
+            (2, 1.616_583_018),
+            (8, 2.465_535_745),
+            (50, 13.859_132_9),
+        ],
+    ),
+    (
+        Choice::Altitudes,
+        &[
+            (2, 0.881_533_886_7),
+            (5, 1.047_463_457_8),
+            (8, 1.235_783_782_6),
+            (50, 6.498_377_624_8),
+        ],
+    ),
+];
+
+/// Every problem, in the order of the tables.
+pub(crate) fn all() -> Vec<Problem> {
+    let of = |(choice, optima): (Choice, &[(u16, f64)])| {
+        let relays = optima.iter().map(|(relays, _)| *relays);
+        relays
+            .map(|relays| Problem { choice, relays })
+            .collect::<Vec<_>>()
+    };
+    OPTIMA.into_iter().flat_map(of).collect()
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let what = match self.choice {
+            Choice::Places => "places",
+            Choice::Altitudes => "places and altitudes",
+        };
+        write!(f, "{what} of {}", self.relays)
+    }
+}
+
+impl Problem {
+    /// The true optimum, linear SIR; `None` for a problem that is not one of [`all`].
+    pub(crate) fn optimum(self) -> Option<f64> {
+        let (_, optima) = OPTIMA.iter().find(|(choice, _)| *choice == self.choice)?;
+        let known = optima.iter().find(|(relays, _)| *relays == self.relays)?;
+        Some(known.1)
+    }
+
+    /// The scenario that is solved, as `cargo chain` reads it.
+    pub(crate) fn scenario(self) -> Result<Scenario, String> {
+        match self.choice {
+            Choice::Places => Ok(Scenario::default()),
+            Choice::Altitudes => {
+                let text = include_str!("../../../examples/altitudes.toml");
+                Scenario::parse("altitudes.toml", text).map_err(|error| error.to_string())
+            }
+        }
+    }
+
+    /// The same for the judge and the other solvers, and the altitudes that relays may fly at.
+    pub(crate) fn link(self) -> Result<(Link, Corridor), String> {
+        let scenario = self.scenario()?;
+        let Interference::Sources(sources) = &scenario.interference else {
+            return Err("a scenario without an interferer".to_owned());
+        };
+        let source = sources.first().ok_or("a scenario without an interferer")?;
+        let channel = &scenario.channel;
+        let factor =
+            |loss_db: f64| path_loss_factor(channel.carrier_hz, 10_f64.powf(loss_db / 10.0));
+        let mu_los = factor(channel.excess_loss_los_db);
+        let station = Station {
+            altitude_m: scenario.altitude_m,
+            power_w: scenario.uav_w,
+        };
+        let link = Link {
+            distance_m: scenario.distance_m,
+            min_separation_m: scenario.min_separation_m,
+            tx_w: scenario.tx_w,
+            interferer_w: source.power_w,
+            x_i: source.x_m,
+            y_i: source.y_m,
+            mu_los,
+            mu_nlos: factor(channel.excess_loss_nlos_db),
+            // Both scenarios see the ground in line of sight.
+            eta: mu_los,
+            relays: vec![station; usize::from(self.relays)],
+        };
+        let band = match self.choice {
+            Choice::Places => (scenario.altitude_m, scenario.altitude_m),
+            Choice::Altitudes => (scenario.altitude_min_m, scenario.altitude_max_m),
+        };
+        let (least_m, most_m) = band;
+        Ok((link, Corridor::plane(least_m, most_m)))
+    }
+}

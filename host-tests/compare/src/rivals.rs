@@ -1,0 +1,172 @@
+//! The solvers of SciPy and NLopt: one Python process that is handed a problem a line.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use crate::problem::{Choice, Problem};
+use crate::results::{Run, Versions};
+use crate::score::GOOD;
+
+const PROGRAM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/rivals/serve.py");
+
+/// What an answer may take by the clock on the wall: the limit is on the processor's time, of which a busy machine gives a
+/// share, and there are steps that cannot be cut.
+fn patience(limit_s: f64) -> Duration {
+    Duration::from_secs_f64(20.0 * limit_s + 60.0)
+}
+
+/// One solver.
+#[derive(Clone, Copy)]
+pub(crate) struct Solver {
+    name: &'static str,
+    /// Its name in the table.
+    pub(crate) title: &'static str,
+}
+
+/// All of them.
+pub(crate) const SOLVERS: [Solver; 4] = [
+    Solver {
+        name: "scipy-slsqp",
+        title: "SciPy SLSQP, 20 starts",
+    },
+    Solver {
+        name: "scipy-de",
+        title: "SciPy differential evolution, then SLSQP",
+    },
+    Solver {
+        name: "nlopt-slsqp",
+        title: "NLopt LD_SLSQP, 20 starts",
+    },
+    Solver {
+        name: "nlopt-mlsl",
+        title: "NLopt G_MLSL_LDS, then LD_SLSQP",
+    },
+];
+
+/// The Python process, warm.
+pub(crate) struct Rivals {
+    child: Child,
+    tasks: ChildStdin,
+    answers: Receiver<String>,
+    limit_s: f64,
+    versions: Versions,
+}
+
+impl Rivals {
+    /// Starts Python, which solves a small problem with every solver before anything is timed.
+    pub(crate) fn start(python: &Path, limit_s: f64) -> Result<Self, String> {
+        let mut child = Command::new(python)
+            .args(["-B", "-W", "ignore", PROGRAM])
+            // Threads cost more than they bring at this size: SciPy's SLSQP took fifteen times as long
+            // with two on a busy machine.
+            .env("OPENBLAS_NUM_THREADS", "1")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|error| format!("{}: {error}", python.display()))?;
+        let pipes = child.stdin.take().zip(child.stdout.take());
+        let (tasks, lines) = pipes.ok_or("Python has no pipes")?;
+        let (sender, answers) = channel();
+        std::thread::spawn(move || {
+            for line in BufReader::new(lines).lines().map_while(Result::ok) {
+                if sender.send(line).is_err() {
+                    break;
+                }
+            }
+        });
+        let mut rivals = Self {
+            child,
+            tasks,
+            answers,
+            limit_s,
+            versions: Versions {
+                python: String::new(),
+                scipy: String::new(),
+                nlopt: String::new(),
+            },
+        };
+        let small = Problem {
+            choice: Choice::Altitudes,
+            relays: 3,
+        };
+        let link = link(small)?;
+        let versions = rivals.ask(&json!({ "good_sir": 1.0, "link": link }))?;
+        rivals.versions = serde_json::from_value(versions).map_err(|error| error.to_string())?;
+        Ok(rivals)
+    }
+
+    /// What Python says it runs.
+    pub(crate) const fn versions(&self) -> &Versions {
+        &self.versions
+    }
+
+    /// Has `solver` solve `problem`.
+    pub(crate) fn run(&mut self, solver: Solver, problem: Problem) -> Result<Run, String> {
+        let optimum = problem.optimum().ok_or("a problem without an optimum")?;
+        let task = json!({
+            "solver": solver.name,
+            "limit_s": self.limit_s,
+            "good_sir": optimum * (1.0 - GOOD),
+            "link": link(problem)?,
+        });
+        let answer = self.ask(&task)?;
+        let answer =
+            serde_json::from_value(answer).map_err(|error| format!("{}: {error}", solver.name))?;
+        let solver = solver.title.to_owned();
+        Ok(Run { solver, answer })
+    }
+
+    fn ask(&mut self, task: &Value) -> Result<Value, String> {
+        // A process that has died shows below, in what it does not answer.
+        _ = writeln!(self.tasks, "{task}");
+        match self.answers.recv_timeout(patience(self.limit_s)) {
+            Ok(line) => serde_json::from_str(&line).map_err(|error| error.to_string()),
+            Err(_) => Err(format!("Python gives no answer: {}", self.last_words())),
+        }
+    }
+
+    /// Ends the process; the last line it wrote to standard error.
+    fn last_words(&mut self) -> String {
+        _ = self.child.kill();
+        let mut text = String::new();
+        if let Some(mut errors) = self.child.stderr.take() {
+            _ = errors.read_to_string(&mut text);
+        }
+        let last = text.lines().rfind(|line| !line.trim().is_empty());
+        last.unwrap_or("it says nothing").to_owned()
+    }
+}
+
+impl Drop for Rivals {
+    fn drop(&mut self) {
+        _ = self.child.kill();
+        _ = self.child.wait();
+    }
+}
+
+/// The problem in numbers.
+fn link(problem: Problem) -> Result<Value, String> {
+    let (link, band) = problem.link()?;
+    let relay = link.relays.first().ok_or("a problem without relays")?;
+    Ok(json!({
+        "relays": link.len(),
+        "distance_m": link.distance_m,
+        "min_separation_m": link.min_separation_m,
+        "low_m": band.least_m,
+        "high_m": band.most_m,
+        "tx_w": link.tx_w,
+        "relay_w": relay.power_w,
+        "interferer_w": link.interferer_w,
+        "x_i": link.x_i,
+        "y_i": link.y_i,
+        "mu_los": link.mu_los,
+        "mu_nlos": link.mu_nlos,
+        "eta": link.eta,
+    }))
+}

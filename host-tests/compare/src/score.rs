@@ -1,0 +1,107 @@
+//! What a chain is worth: the SIR of its places by formulas that no solver here shares, if it keeps the rules.
+
+use std::fmt;
+
+use uav_relay_oracle::reference::Link;
+use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
+
+use crate::results::Found;
+
+/// How far below the optimum a chain is good enough, relative: the tolerance of the relays' mission.
+pub(crate) const GOOD: f64 = 1e-4;
+
+/// By how much a place may be off, m: what an f32 rounds away at a kilometre, sixteen times over.
+const SLACK_M: f64 = 1e-3;
+
+/// By how much a solver's own figure may differ, relative: what the f32 formulas of a relay round away, ten times over.
+const SIR_SLACK: f64 = 1e-5;
+
+/// Why a chain does not count.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Refusal {
+    /// It has another number of relays.
+    Count(usize),
+    /// A relay is not between transmitter and receiver: its index from 1, and x in m.
+    Outside(usize, f64),
+    /// A relay is not in the band of altitudes: its index from 1, and h in m.
+    Altitude(usize, f64),
+    /// A relay stands behind the one before it: its index from 1.
+    Order(usize),
+    /// A relay is too close to the one before it: its index from 1, and their distance in m.
+    Separation(usize, f64),
+    /// The solver reports another SIR than its chain has: its figure, and the chain's.
+    Sir(f64, f64),
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count(relays) => write!(f, "it has {relays} relays"),
+            Self::Outside(relay, x_m) => write!(f, "relay {relay} is at x = {x_m} m"),
+            Self::Altitude(relay, h_m) => write!(f, "relay {relay} is at h = {h_m} m"),
+            Self::Order(relay) => write!(f, "relay {relay} is behind the one before it"),
+            Self::Separation(relay, gap_m) => {
+                write!(f, "relay {relay} is {gap_m:.3} m from the one before it")
+            }
+            Self::Sir(own, judged) => write!(f, "it reports SIR {own:.6}, and has {judged:.6}"),
+        }
+    }
+}
+
+/// SIR (linear) of the worst hop of a chain of [x, h] in m.
+pub(crate) fn judge(link: &Link, band: Corridor, chain: &[[f64; 2]]) -> Result<f64, Refusal> {
+    let count = Refusal::Count(chain.len());
+    if chain.len() != link.len() {
+        return Err(count);
+    }
+    // Not a number is within no range.
+    let within =
+        |low: f64, value: f64, high: f64| (low - SLACK_M..=high + SLACK_M).contains(&value);
+    for (relay, [x_m, h_m]) in (1..).zip(chain) {
+        if !within(0.0, *x_m, link.distance_m) {
+            return Err(Refusal::Outside(relay, *x_m));
+        }
+        if !within(band.least_m, *h_m, band.most_m) {
+            return Err(Refusal::Altitude(relay, *h_m));
+        }
+    }
+    for (relay, ([from_x, from_h], [x, h])) in (2..).zip(chain.iter().zip(chain.iter().skip(1))) {
+        let gap_m = (x - from_x).hypot(h - from_h);
+        if x - from_x < -SLACK_M {
+            return Err(Refusal::Order(relay));
+        }
+        if gap_m < link.min_separation_m - SLACK_M {
+            return Err(Refusal::Separation(relay, gap_m));
+        }
+    }
+    let place = |&[x_m, altitude_m]: &[f64; 2]| Place::in_plane(x_m, altitude_m);
+    let places: Vec<Place> = chain.iter().map(place).collect();
+    sir(link, &places).ok_or(count)
+}
+
+/// What a solver's chain is worth.
+pub(crate) struct Score {
+    /// SIR of the worst hop, linear.
+    pub(crate) sir: f64,
+    /// When the solver first had a chain that is good enough, s; `None` if it never had.
+    pub(crate) good_after_s: Option<f64>,
+}
+
+/// The score of what a solver found; its own word is taken for the time alone.
+pub(crate) fn score(
+    link: &Link,
+    band: Corridor,
+    optimum: f64,
+    found: &Found,
+) -> Result<Score, Refusal> {
+    let sir = judge(link, band, &found.chain)?;
+    if !((found.sir / sir - 1.0).abs() <= SIR_SLACK) {
+        return Err(Refusal::Sir(found.sir, sir));
+    }
+    let least = optimum * (1.0 - GOOD);
+    let good_after_s = match &found.good {
+        Some(good) if judge(link, band, &good.chain)? >= least * (1.0 - 1e-9) => Some(good.after_s),
+        _ => None,
+    };
+    Ok(Score { sir, good_after_s })
+}

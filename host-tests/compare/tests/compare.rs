@@ -1,0 +1,326 @@
+//! `cargo versus` without Python: what chains are worth to it, how it lays out its tables, how it fails where Python is not.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs
+)]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+use uav_relay_oracle::cases;
+use uav_relay_oracle::reference::Link;
+use uav_relay_oracle::reference::joint::{self, Corridor, Effort};
+
+fn versus(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_compare"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+/// The one line on standard error, and that the exit status is `status`.
+fn refusal(output: &Output, status: i32) -> String {
+    let text = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    assert!(output.stdout.is_empty());
+    assert_eq!(output.status.code(), Some(status), "{text}");
+    text
+}
+
+/// Results with these runs of one problem, in the form of `--json`.
+fn results(choice: &str, relays: u16, runs: &[Value]) -> Value {
+    json!({
+        "machine": { "date": "2000-01-01", "processor": "Some CPU" },
+        "versions": { "python": "3.11.1", "scipy": "1.2.3", "nlopt": "4.5.6" },
+        "limit_s": 30.0,
+        "problems": [{ "problem": { "choice": choice, "relays": relays }, "runs": runs }],
+    })
+}
+
+/// What `--from` says of `results`.
+fn rescored(results: &Value, more: &[&str]) -> Output {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("results.json");
+    std::fs::write(&file, results.to_string()).unwrap();
+    versus(&[&["--from", file.to_str().unwrap()], more].concat())
+}
+
+fn table(results: &Value) -> String {
+    let output = rescored(results, &[]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && errors.is_empty(), "{errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The best chain of eight relays at 20 m by the independent program: its SIR, and [x, h] of every relay.
+fn best_of_eight() -> (f64, Vec<[f64; 2]>) {
+    let cases = cases::of("gamma_star").unwrap();
+    let found = cases.iter().find(|case| {
+        let scene = case.params.y.total_cmp(&400.0).is_eq();
+        scene && case.relays() == Some(8) && case.part_list("x").is_some()
+    });
+    let case = found.unwrap();
+    let x = case.part_list("x").unwrap();
+    let chain = x.into_iter().map(|x| [x, 20.0]).collect();
+    (case.part("gamma").unwrap(), chain)
+}
+
+fn run(solver: &str, time_s: f64, sir: f64, chain: &[[f64; 2]]) -> Value {
+    let found = json!({ "time_s": time_s, "sir": sir, "chain": chain, "cut": false });
+    json!({ "solver": solver, "answer": { "found": found } })
+}
+
+/// The line of solver "rival" in the table of eight relays, behind its name.
+fn line_of_rival(rival: Value) -> String {
+    let (sir, chain) = best_of_eight();
+    let own = run("own", 1e-5, sir, &chain);
+    let text = table(&results("places", 8, &[own, rival]));
+    let line = text.lines().find(|line| line.contains("| rival |"));
+    let cells = line.unwrap().trim_start_matches("| 8 | rival | ");
+    cells.to_owned()
+}
+
+#[test]
+fn help_names_every_option() {
+    let output = versus(&["--help"]);
+    assert!(output.status.success() && output.stderr.is_empty());
+    let help = String::from_utf8(output.stdout).unwrap();
+    for option in [
+        "--limit <S>",
+        "--json",
+        "--from <FILE>",
+        "--venv <DIR>",
+        "[default: 30]",
+    ] {
+        assert!(help.contains(option), "{option} in {help}");
+    }
+}
+
+#[test]
+fn wrong_options_are_named() {
+    for limit in ["0", "601", "soon"] {
+        let line = refusal(&versus(&["--limit", limit]), 2);
+        assert!(line.contains("--limit") && line.contains(limit), "{line}");
+    }
+    let line = refusal(&versus(&["--from", "nowhere.json"]), 2);
+    assert!(line.contains("--from nowhere.json"), "{line}");
+    let line = refusal(&rescored(&json!({ "limit_s": 3 }), &[]), 2);
+    assert!(
+        line.contains("results.json") && line.contains("machine"),
+        "{line}"
+    );
+    let (sir, chain) = best_of_eight();
+    let unknown = results("places", 7, &[run("own", 1e-5, sir, &chain)]);
+    let line = refusal(&rescored(&unknown, &[]), 2);
+    assert!(
+        line.contains("places of 7: not one of the problems"),
+        "{line}"
+    );
+}
+
+#[test]
+fn the_table_has_a_line_a_solver_and_says_where_and_when() {
+    let (sir, chain) = best_of_eight();
+    let own = run("own", 1.26e-5, sir, &chain);
+    let mut quick = run("quick", 0.00251, sir, &chain);
+    quick["answer"]["found"]["evaluations"] = json!(1_234_567);
+    quick["answer"]["found"]["good"] = json!({ "after_s": 6.3e-4, "chain": chain });
+    let mut slow = run("slow", 31.0, sir, &chain);
+    slow["answer"]["found"]["cut"] = json!(true);
+    let lost = json!({ "solver": "lost", "answer": { "error": "no | way" } });
+    let text = table(&results("places", 8, &[own, quick, slow, lost]));
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(
+        &lines[..8],
+        [
+            "Places, all at 20 m (the default scenario):",
+            "",
+            "| N | solver | SIR of the worst hop | short of the optimum by | chains evaluated | within 1e-4 of it after | time in all |",
+            "| --- | --- | --- | --- | --- | --- | --- |",
+            "| 8 | own | 2.465536 | less than 1e-8 |  | never | 13 µs (1.0) |",
+            "| 8 | quick | 2.465536 | less than 1e-8 | 1 234 567 | 630 µs (50) | 2.5 ms (200) |",
+            "| 8 | slow | 2.465536 | less than 1e-8 |  | never | 31 s (2 500 000), cut off |",
+            "| 8 | lost | no   way | | | | |",
+        ]
+    );
+    assert!(!text.contains("examples/altitudes.toml"), "{text}");
+    let last = "2000-01-01 on Some CPU; Python 3.11.1, SciPy 1.2.3, NLopt 4.5.6, at most 30 s a solver and problem.";
+    assert_eq!(lines.last(), Some(&last));
+}
+
+#[test]
+fn the_sir_is_that_of_the_places() {
+    let (sir, chain) = best_of_eight();
+    assert!(
+        line_of_rival(run("rival", 1.0, sir, &chain)).starts_with("2.465536 | less than 1e-8 |")
+    );
+    // All hops of the best chain are equal: one relay moved by a metre makes one hop worse.
+    let mut moved = chain.clone();
+    moved[3][0] -= 1.0;
+    let x: Vec<f64> = moved.iter().map(|[x, _]| *x).collect();
+    let worse = Link::paper(8).chain_sir(&x);
+    let line = line_of_rival(run("rival", 1.0, worse, &moved));
+    let short = (sir - worse) / sir;
+    assert!(
+        line.starts_with(&format!("{worse:.6} | {short:.1e} |")),
+        "{line}"
+    );
+    // What a solver says of itself is not believed.
+    let line = line_of_rival(run("rival", 1.0, sir, &moved));
+    assert!(
+        line.starts_with("does not count: it reports SIR 2.465536, and has 2.3"),
+        "{line}"
+    );
+}
+
+#[test]
+fn the_altitudes_that_were_chosen_are_judged() {
+    let corridor = Corridor::plane(20.0, 300.0);
+    let link = Link {
+        y_i: 150.0,
+        min_separation_m: 4.0,
+        ..Link::paper(8)
+    };
+    let best = joint::optimum(&link, corridor, &[], Effort::usual(1)).unwrap();
+    let mut chain: Vec<[f64; 2]> = best
+        .places
+        .iter()
+        .map(|place| [place.x_m, place.altitude_m])
+        .collect();
+    let own = run("own", 0.01, best.sir, &chain);
+    chain[2][1] = 300.5;
+    let high = run("high", 0.01, best.sir, &chain);
+    let text = table(&results("altitudes", 8, &[own, high]));
+    assert!(
+        text.starts_with("Places and altitudes (`examples/altitudes.toml`):\n"),
+        "{text}"
+    );
+    assert!(
+        text.contains("| 8 | own | 1.235784 | less than 1e-8 |"),
+        "{text}"
+    );
+    assert!(
+        text.contains("| 8 | high | does not count: relay 3 is at h = 300.5 m |"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_chain_that_breaks_a_rule_does_not_count() {
+    let (sir, best) = best_of_eight();
+    let broken = |change: &dyn Fn(&mut Vec<[f64; 2]>)| {
+        let mut chain = best.clone();
+        change(&mut chain);
+        line_of_rival(run("rival", 1.0, sir, &chain))
+    };
+    for (line, reason) in [
+        (broken(&|chain| _ = chain.pop()), "it has 7 relays"),
+        (
+            broken(&|chain| chain[0][0] = -0.5),
+            "relay 1 is at x = -0.5 m",
+        ),
+        (
+            broken(&|chain| chain[7][0] = 1000.5),
+            "relay 8 is at x = 1000.5 m",
+        ),
+        (
+            broken(&|chain| chain[4][1] = 20.5),
+            "relay 5 is at h = 20.5 m",
+        ),
+        (
+            broken(&|chain| chain.swap(2, 3)),
+            "relay 4 is behind the one before it",
+        ),
+        (
+            broken(&|chain| chain[4][0] = chain[5][0] - 3.99),
+            "relay 6 is 3.990 m from the one before it",
+        ),
+    ] {
+        assert_eq!(line, format!("does not count: {reason} | | | | |"));
+    }
+    // What an f32 rounds away is forgiven.
+    let line = broken(&|chain| chain[4][0] = chain[5][0] - 3.9995);
+    assert!(!line.contains("m from the one before it"), "{line}");
+}
+
+#[test]
+fn good_enough_is_checked() {
+    let (sir, chain) = best_of_eight();
+    let mut moved = chain.clone();
+    moved[3][0] -= 0.01;
+    let mut rival = run("rival", 1.0, sir, &chain);
+    rival["answer"]["found"]["good"] = json!({ "after_s": 0.5, "chain": chain });
+    assert!(line_of_rival(rival.clone()).contains("| 500 ms (50 000) |"));
+    rival["answer"]["found"]["good"]["chain"] = json!(moved);
+    assert!(line_of_rival(rival.clone()).contains("| never |"));
+    rival["answer"]["found"]["good"]["chain"][3] = json!(chain[4]);
+    assert!(line_of_rival(rival).starts_with("does not count: relay 5 is 0.000 m"));
+}
+
+#[test]
+fn json_is_given_back_as_it_was() {
+    let (sir, chain) = (2.25, [[350.5, 20.0], [400.25, 20.0]]);
+    let own = run("own", 1e-5, sir, &chain);
+    let mut rival = run("rival", 1.5, sir, &chain);
+    rival["answer"]["found"]["good"] = json!({ "after_s": 0.5, "chain": chain });
+    rival["answer"]["found"]["evaluations"] = json!(7);
+    let lost = json!({ "solver": "lost", "answer": { "error": "why" } });
+    let results = results("places", 2, &[own, rival, lost]);
+    let output = rescored(&results, &["--json"]);
+    assert_eq!(
+        serde_json::from_slice::<Value>(&output.stdout).unwrap(),
+        results
+    );
+}
+
+/// Runs the command with nothing on PATH but what `folder` has, its virtual environment to be in there too.
+fn with_path(folder: &Path) -> Output {
+    let venv = folder.join("venv");
+    Command::new(env!("CARGO_BIN_EXE_compare"))
+        .env("PATH", folder)
+        .args(["--limit", "1", "--venv", venv.to_str().unwrap()])
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn without_python_it_says_so() {
+    let folder = TempDir::new().unwrap();
+    let line = refusal(&with_path(folder.path()), 2);
+    assert!(line.starts_with("python3 is not on PATH: "), "{line}");
+}
+
+/// Programs that do nothing stand in for Python: one that fails, one that succeeds.
+#[cfg(target_os = "linux")]
+#[test]
+fn without_venv_pip_or_packages_it_says_so() {
+    use std::os::unix::fs::symlink;
+
+    let folder = TempDir::new().unwrap();
+    let python3 = folder.path().join("python3");
+    symlink("/bin/false", &python3).unwrap();
+    let line = refusal(&with_path(folder.path()), 2);
+    assert!(line.contains("are venv and pip there?"), "{line}");
+
+    std::fs::remove_file(&python3).unwrap();
+    symlink("/bin/true", &python3).unwrap();
+    let bin = folder.path().join("venv/bin");
+    std::fs::create_dir_all(&bin).unwrap();
+    symlink("/bin/false", bin.join("python")).unwrap();
+    let line = refusal(&with_path(folder.path()), 2);
+    assert!(
+        line.contains("pip cannot install nlopt==") && line.contains("is there a network"),
+        "{line}"
+    );
+
+    // An environment that is finished but does not answer.
+    std::fs::remove_file(bin.join("python")).unwrap();
+    symlink("/bin/true", bin.join("python")).unwrap();
+    let line = refusal(&with_path(folder.path()), 1);
+    assert!(line.contains("Python gives no answer"), "{line}");
+}

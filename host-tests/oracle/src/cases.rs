@@ -1,0 +1,173 @@
+//! Reference values computed by an independent program, as data for tests.
+
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::reference::{Link, Station};
+
+/// The optimum (linear SIR) of the default scenario by number of relays, from the same program, to nine digits.
+pub const OPTIMA: [(u16, f64); 12] = [
+    (1, 1.490_121_51),
+    (2, 1.616_583_02),
+    (3, 1.747_031_29),
+    (4, 1.881_667_00),
+    (5, 2.020_675_28),
+    (8, 2.465_535_75),
+    (10, 2.786_622_55),
+    (16, 3.875_573_20),
+    (20, 4.710_644_20),
+    (32, 7.756_114_78),
+    (50, 13.859_132_9),
+    (100, 40.441_345_0),
+];
+
+/// The scenario of a case, SI units; the field names of the file are kept.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Params {
+    /// Transmit power of Tx, watts.
+    pub p_t: f64,
+    /// Transmit power of each relay, watts.
+    pub p_u: f64,
+    /// Transmit power of the interferer, watts.
+    pub p_msi: f64,
+    /// Interferer's coordinate along Tx-Rx, metres.
+    #[serde(rename = "X")]
+    pub x: f64,
+    /// Interferer's offset, metres.
+    #[serde(rename = "Y")]
+    pub y: f64,
+    /// Tx-Rx distance, metres.
+    #[serde(rename = "D")]
+    pub d: f64,
+    /// Common altitude, metres.
+    pub h: f64,
+    /// Bottom of the altitude band, metres.
+    pub h_min: f64,
+    /// Top of the altitude band, metres.
+    pub h_max: f64,
+    /// Least distance between neighbours, metres.
+    pub d_min: f64,
+    /// Path-loss factor between relays, 1/m^2.
+    pub mu_los: f64,
+    /// Path-loss factor on the ground, 1/m^2.
+    pub mu_nlos: f64,
+    /// Path-loss factor between a relay and the ground, 1/m^2.
+    pub eta: f64,
+}
+
+/// One evaluation: what was evaluated, with which arguments, and what came out.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Case {
+    /// What is evaluated.
+    #[serde(rename = "fn")]
+    pub function: String,
+    /// The scenario.
+    pub params: Params,
+    /// The arguments, by name.
+    pub args: Value,
+    /// The value, or values by name.
+    pub out: Value,
+    /// Relative tolerance the value itself is good for in f64.
+    pub rtol: f64,
+    /// Name of the case, unique in the file.
+    pub id: String,
+}
+
+#[derive(Deserialize)]
+struct File {
+    cases: Vec<Case>,
+}
+
+/// Every case of the file, in its order.
+///
+/// # Errors
+/// When the file that was built in does not parse.
+pub fn load() -> Result<Vec<Case>, serde_json::Error> {
+    serde_json::from_str::<File>(include_str!("../data/reference.json")).map(|file| file.cases)
+}
+
+/// The cases that evaluate `function`, in file order.
+///
+/// # Errors
+/// As [`load`].
+pub fn of(function: &str) -> Result<Vec<Case>, serde_json::Error> {
+    Ok(load()?
+        .into_iter()
+        .filter(|case| case.function == function)
+        .collect())
+}
+
+impl Case {
+    /// The scenario with `n` relays at the common altitude.
+    pub fn link(&self, n: usize) -> Link {
+        let p = &self.params;
+        Link {
+            distance_m: p.d,
+            min_separation_m: p.d_min,
+            tx_w: p.p_t,
+            interferer_w: p.p_msi,
+            x_i: p.x,
+            y_i: p.y,
+            mu_los: p.mu_los,
+            mu_nlos: p.mu_nlos,
+            eta: p.eta,
+            relays: vec![
+                Station {
+                    altitude_m: p.h,
+                    power_w: p.p_u
+                };
+                n
+            ],
+        }
+    }
+
+    /// The number of relays the case asks for, its argument `N`.
+    pub fn relays(&self) -> Option<usize> {
+        self.args.get("N")?.as_u64()?.try_into().ok()
+    }
+
+    /// The argument `name` as a number.
+    pub fn arg(&self, name: &str) -> Option<f64> {
+        number(self.args.get(name)?)
+    }
+
+    /// The argument `name` as a list of numbers.
+    pub fn arg_list(&self, name: &str) -> Option<Vec<f64>> {
+        list(self.args.get(name)?)
+    }
+
+    /// The result, where it is one number.
+    pub fn value(&self) -> Option<f64> {
+        number(&self.out)
+    }
+
+    /// The result, where it is one list.
+    pub fn values(&self) -> Option<Vec<f64>> {
+        list(&self.out)
+    }
+
+    /// The part `name` of the result as a number.
+    pub fn part(&self, name: &str) -> Option<f64> {
+        number(self.out.get(name)?)
+    }
+
+    /// The part `name` of the result as a list of numbers.
+    pub fn part_list(&self, name: &str) -> Option<Vec<f64>> {
+        list(self.out.get(name)?)
+    }
+}
+
+/// A JSON number, or one of the words that stand for what JSON cannot write.
+fn number(value: &Value) -> Option<f64> {
+    match value.as_str() {
+        Some("nan") => Some(f64::NAN),
+        Some("inf") => Some(f64::INFINITY),
+        Some("-inf") => Some(f64::NEG_INFINITY),
+        Some(_) => None,
+        None => value.as_f64(),
+    }
+}
+
+fn list(value: &Value) -> Option<Vec<f64>> {
+    value.as_array()?.iter().map(number).collect()
+}

@@ -1,0 +1,138 @@
+//! From a judge's link to the mission that relays fly, and to the scene that the planner knows.
+
+use uav_relay::channel::AirGround;
+use uav_relay::{Band, Channel, Field, FieldPoint, Interferer, Mission, MissionConfig, Profile};
+use uav_relay_sim::command::narrow;
+use uav_relay_sim::scenario::Source;
+use uav_relay_sim::scene::{Corridor, Relay, Scene};
+
+use crate::reference::stochastic::StochasticLink;
+use crate::reference::{Link, Station};
+
+/// The mission of a reference link, and what single relays hold of their own; `None` where a relay would refuse its numbers.
+///
+/// The relays of a link may differ: the first one's profile is what the mission has in common.
+pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
+    let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
+    let channel = Channel::new(
+        UNIT_CARRIER_HZ,
+        link.mu_los,
+        link.mu_nlos,
+        AirGround::Weighted(weight.clamp(0.0, 1.0)),
+    )
+    .ok()?;
+    let profile = |station: &Station| Profile {
+        altitude_m: narrow(station.altitude_m),
+        power_w: narrow(station.power_w),
+    };
+    let common = profile(link.relays.first()?);
+    let config = MissionConfig {
+        relays: u16::try_from(link.len()).ok()?,
+        distance_m: narrow(link.distance_m),
+        min_separation_m: narrow(link.min_separation_m),
+        tx_power_w: narrow(link.tx_w),
+        common,
+        band: Band::at(common.altitude_m),
+        lateral: Band::NONE,
+        channel,
+        interference: uav_relay::Interference::Source(Interferer {
+            power_w: narrow(link.interferer_w),
+            x_m: narrow(link.x_i),
+            y_m: narrow(link.y_i),
+        }),
+        tolerance: narrow(tolerance),
+    };
+    let own = (1..)
+        .zip(link.relays.iter().map(profile))
+        .filter(|(_, profile)| *profile != common);
+    Some((Mission::try_new(config).ok()?, own.collect()))
+}
+
+/// The scene of a reference link, its corridor the altitude of the first relay; `None` without relays.
+pub fn scene_of(link: &Link) -> Option<Scene> {
+    let altitude_m = link.relays.first()?.altitude_m;
+    let relay = |station: &Station| Relay {
+        altitude_m: station.altitude_m,
+        power_w: station.power_w,
+        holds: false,
+    };
+    Some(Scene {
+        distance_m: link.distance_m,
+        min_separation_m: link.min_separation_m,
+        tx_w: link.tx_w,
+        sources: vec![Source {
+            power_w: link.interferer_w,
+            x_m: link.x_i,
+            y_m: link.y_i,
+        }],
+        mu_los: link.mu_los,
+        mu_nlos: link.mu_nlos,
+        eta: link.eta,
+        band: Corridor::plane(altitude_m, altitude_m),
+        relays: link.relays.iter().map(relay).collect(),
+    })
+}
+
+/// The mission of a reference link in a field, whose relays are alike; `None` where a relay would refuse its numbers.
+pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Option<Mission> {
+    let relay = link.relays.first()?;
+    let points: Vec<FieldPoint> = link
+        .upsilon
+        .iter()
+        .map(|&(x, upsilon)| FieldPoint {
+            x_m: narrow(x),
+            upsilon_per_w: narrow(upsilon),
+        })
+        .collect();
+    // Nothing hears over the ground here: any factor above both others lets eta be a mixture.
+    let mu_nlos = 2.0 * link.eta.max(link.mu_los);
+    let weight = (mu_nlos - link.eta) / (mu_nlos - link.mu_los);
+    let common = Profile {
+        altitude_m: narrow(relay.altitude_m),
+        power_w: narrow(relay.power_w),
+    };
+    let config = MissionConfig {
+        relays: u16::try_from(link.relays.len()).ok()?,
+        distance_m: narrow(link.distance_m),
+        min_separation_m,
+        tx_power_w: narrow(link.tx_w),
+        common,
+        band: Band::at(common.altitude_m),
+        lateral: Band::NONE,
+        channel: Channel::new(
+            UNIT_CARRIER_HZ,
+            link.mu_los,
+            mu_nlos,
+            AirGround::Weighted(weight.clamp(0.0, 1.0)),
+        )
+        .ok()?,
+        interference: uav_relay::Interference::Field(Field::try_new(points.leak()).ok()?),
+        tolerance: 1e-4,
+    };
+    Mission::try_new(config).ok()
+}
+
+/// At this carrier the wave number is 1, and the excess factors are the path-loss factors themselves.
+const UNIT_CARRIER_HZ: f64 = 299_792_458.0 / (4.0 * std::f64::consts::PI);
+
+/// `link` with every number rounded to the f32 that a relay is given, so that only a relay's arithmetic is judged.
+pub fn as_relays_know_it(link: &Link) -> Link {
+    let round = |value: f64| f64::from(narrow(value));
+    Link {
+        distance_m: round(link.distance_m),
+        min_separation_m: round(link.min_separation_m),
+        tx_w: round(link.tx_w),
+        interferer_w: round(link.interferer_w),
+        x_i: round(link.x_i),
+        y_i: round(link.y_i),
+        relays: link
+            .relays
+            .iter()
+            .map(|station| Station {
+                altitude_m: round(station.altitude_m),
+                power_w: round(station.power_w),
+            })
+            .collect(),
+        ..*link
+    }
+}

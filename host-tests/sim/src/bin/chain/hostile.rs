@@ -1,0 +1,201 @@
+//! What may happen to the chain in the air: relays that go silent, parts that do not hear each other, an attacker, a new mission.
+
+use clap::Args;
+use uav_relay::{Instant, Wiring};
+use uav_relay_sim::command::{Failure, number};
+use uav_relay_sim::simulator::attack::Attack;
+use uav_relay_sim::simulator::setup::{Partition, Setup};
+
+use crate::options::Options;
+use crate::upload::Uploads;
+
+/// The options for that.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Hostile air")]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is an option of its own"
+)]
+pub(crate) struct Hostile {
+    /// Relay I goes silent S virtual seconds after the start; the others form anew without it. Repeatable
+    #[arg(long, value_name = "I@S", value_parser = one)]
+    pub(crate) kill: Vec<One>,
+    /// Relay I is switched on again after S seconds, with nothing left of what it knew but a mission that was uploaded.
+    /// Repeatable
+    #[arg(long, value_name = "I@S", value_parser = one)]
+    boot: Vec<One>,
+    /// Relays 1 to K and the others do not hear each other from S seconds on, until T or for good. Repeatable
+    #[arg(long, value_name = "K@S[-T]", value_parser = partition, conflicts_with = "wires")]
+    partition: Vec<Partition>,
+    /// An attacker sends N forged frames, 1 to 100000: with guessed tags, altered, without a tag, with another key
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    forge: Option<u32>,
+    /// An attacker sends N of the frames that it has heard again, 1 to 100000
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    replay: Option<u32>,
+    #[command(flatten)]
+    pub(crate) uploads: Uploads,
+    /// Frames carry tags, with a key drawn from the seed; so they do when there is an attacker or an upload
+    #[arg(long, conflicts_with = "no_auth")]
+    auth: bool,
+    /// Frames carry no tags, even when there is an attacker; without them nothing can be uploaded
+    #[arg(long)]
+    no_auth: bool,
+    /// All relays talk by one radio, which those up to four away hear; so they do with any of --kill, --boot, --partition,
+    /// --forge, --replay and --upload
+    #[arg(long, conflicts_with = "wires")]
+    shared: bool,
+    /// Each relay has a wire to either neighbour, even then; there a break is reported, not closed
+    #[arg(long)]
+    wires: bool,
+}
+
+/// A relay, and when something happens to it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct One {
+    index: u16,
+    at: Instant,
+}
+
+/// An attack goes on for so long after all else has happened, s.
+const ATTACK_S: u64 = 30;
+
+/// A run in which something happens ends so long after the last of it at the latest, s.
+const PATIENCE_S: u64 = 3_600;
+
+impl Hostile {
+    /// Whether anything happens that a plain run does not have.
+    fn is_eventful(&self) -> bool {
+        !(self.kill.is_empty() && self.boot.is_empty() && self.partition.is_empty())
+            || self.is_attack()
+            || self.uploads.are_planned()
+    }
+
+    fn is_attack(&self) -> bool {
+        self.forge.is_some() || self.replay.is_some()
+    }
+
+    /// When the last of it happens, apart from an attack.
+    fn last(&self) -> Instant {
+        let ones = self.kill.iter().chain(&self.boot).map(|one| one.at);
+        let parts = self
+            .partition
+            .iter()
+            .map(|part| part.until.unwrap_or(part.from));
+        let all = ones.chain(parts).chain(self.uploads.times());
+        all.max().unwrap_or(Instant::ZERO)
+    }
+
+    /// Whether this goes together with a chain of `uavs`, and with the other options.
+    pub(crate) fn agree(&self, options: &Options) -> Result<(), Failure> {
+        let uavs = options.uavs;
+        for (name, ones) in [("--kill", &self.kill), ("--boot", &self.boot)] {
+            if let Some(one) = ones.iter().find(|one| !(1..=uavs).contains(&one.index)) {
+                let line = format!("{name} {}@..: relay must be within 1 to {uavs}", one.index);
+                return Err(Failure::input(line));
+            }
+        }
+        if let Some(part) = self
+            .partition
+            .iter()
+            .find(|part| !(1..uavs).contains(&part.after))
+        {
+            let after = part.after;
+            let line = match uavs {
+                1 => format!("--partition {after}@..: one relay cannot be parted"),
+                _ => format!(
+                    "--partition {after}@..: relay must be within 1 to {}",
+                    uavs - 1
+                ),
+            };
+            return Err(Failure::input(line));
+        }
+        if self.is_eventful() && options.closed_loop.is_some() {
+            let line = "--closed-loop goes with none of --kill, --boot, --partition, --forge, --replay and --upload";
+            return Err(Failure::input(line));
+        }
+        if self.uploads.are_planned() && self.no_auth {
+            let line = "--upload needs frames with tags, and --no-auth leaves them out";
+            return Err(Failure::input(line));
+        }
+        Ok(())
+    }
+
+    /// Puts all of it into a run.
+    pub(crate) fn prepare(&self, setup: &mut Setup) -> Result<(), Failure> {
+        let pairs = |ones: &[One]| ones.iter().map(|one| (one.index, one.at)).collect();
+        setup.kills = pairs(&self.kill);
+        setup.boots = pairs(&self.boot);
+        setup.partitions.clone_from(&self.partition);
+        let after =
+            |seconds: u64| Instant::from_micros(self.last().as_micros() + seconds * 1_000_000);
+        if self.shared || self.is_eventful() && !self.wires {
+            setup.settings.wiring = Wiring::Shared;
+        }
+        if self.is_attack() {
+            setup.attack = Some(Attack {
+                forged: self.forge.unwrap_or(0),
+                replayed: self.replay.unwrap_or(0),
+                until: after(ATTACK_S),
+            });
+        }
+        let asks = self.is_attack() || self.uploads.are_planned();
+        setup.auth = self.auth || asks && !self.no_auth;
+        setup.uploads = self.uploads.of(&setup.mission)?;
+        if !self.uploads.are_stored() {
+            setup.forgetful = (1..=setup.mission.relays()).collect();
+        }
+        if self.is_eventful() {
+            setup.deadline = after(PATIENCE_S);
+        }
+        Ok(())
+    }
+}
+
+fn one(text: &str) -> Result<One, String> {
+    let form = "must be I@S, a relay (1 to N) and seconds after the start (0 to 1e6)";
+    let (index, at) = text.split_once('@').ok_or(form)?;
+    Ok(One {
+        index: index.parse().map_err(|_| form)?,
+        at: instant(at).ok_or(form)?,
+    })
+}
+
+fn partition(text: &str) -> Result<Partition, String> {
+    let form = "must be K@S or K@S-T, a relay (1 to N - 1) and seconds after the start (0 to 1e6)";
+    let (after, times) = text.split_once('@').ok_or(form)?;
+    let after = after.parse().map_err(|_| form)?;
+    if let Some(from) = instant(times) {
+        return Ok(Partition {
+            after,
+            from,
+            until: None,
+        });
+    }
+    // A minus sign may also stand in an exponent.
+    let cuts = times.match_indices('-').filter_map(|(at, _)| {
+        let (from, until) = times.split_at_checked(at)?;
+        Some((instant(from)?, instant(until.get(1..)?)?))
+    });
+    let (from, until) = cuts.into_iter().next().ok_or(form)?;
+    if until <= from {
+        return Err("must be K@S-T with T after S".to_owned());
+    }
+    Ok(Partition {
+        after,
+        from,
+        until: Some(until),
+    })
+}
+
+/// Seconds after the start, 0 to 1e6.
+pub(crate) fn instant(text: &str) -> Option<Instant> {
+    let seconds = number(text, 0.0, 1e6).ok()?;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "within 0 to 1e12"
+    )]
+    let micros = (seconds * 1e6) as u64;
+    Some(Instant::from_micros(micros))
+}

@@ -1,0 +1,279 @@
+//! `cargo chain`: simulated relays, each running the on-board code, find their places over simulated serial links.
+
+mod hostile;
+mod options;
+mod upload;
+
+use std::io::IsTerminal as _;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::{Parser as _, ValueEnum as _};
+use indicatif::{ProgressBar, ProgressStyle};
+use uav_relay::{Measure, Mission, Placement, Schedule, Wiring};
+use uav_relay_sim::beta::beta_w;
+use uav_relay_sim::command::{self, Failure, narrow};
+use uav_relay_sim::mission::{self, Refusal};
+use uav_relay_sim::report::{self, AttackReport, ChainReport, timeline};
+use uav_relay_sim::scenario::{Interference, Scenario};
+use uav_relay_sim::simulator::chain::Chain;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::{Outcome, RelayEnd};
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_sim::svg::{self, Picture, room};
+
+use options::{Method, Options};
+
+fn main() -> ExitCode {
+    match Options::try_parse() {
+        Ok(options) => command::ended(run(&options)),
+        Err(error) => command::usage(&error),
+    }
+}
+
+fn run(options: &Options) -> Result<(), Failure> {
+    let method = options
+        .method
+        .to_possible_value()
+        .map_or_else(String::new, |value| value.get_name().to_owned());
+    let scenario = match &options.scenario {
+        Some(file) => Scenario::load(file).map_err(|error| Failure::input(error.to_string()))?,
+        None => Scenario::default(),
+    };
+    agree(options, &method, &scenario)?;
+    let (mission, profiles) = match mission::mission(&scenario, options.uavs, options.tolerance) {
+        Ok(briefed) => briefed,
+        Err(refusal @ Refusal::NoRoom) => {
+            let report =
+                ChainReport::refused(&method, options.uavs, options.seed, &refusal.to_string());
+            return show(options, &report);
+        }
+        Err(refusal) => {
+            let file = options
+                .scenario
+                .as_ref()
+                .map_or("default scenario".into(), |file| file.to_string_lossy());
+            return Err(Failure::input(format!("{file}: {refusal}")));
+        }
+    };
+    let mut setup = setup(options, mission)?;
+    setup.profiles = profiles;
+    setup.held = mission::held(&scenario, options.uavs);
+    let outcome = fly(options, &scenario, setup.clone())?;
+    let flown = report::flown(&setup, &outcome);
+    let mut report = ChainReport::new(&method, &flown, &outcome, options.seed);
+    report.channel = (setup.settings.wiring == Wiring::Shared).then_some("shared");
+    if setup.attack.take().is_some() {
+        let auth = setup.auth;
+        let attack = AttackReport::new(auth, &outcome, &fly(options, &scenario, setup)?);
+        report.error = report.error.or_else(|| attack.harm());
+        report.attack = Some(attack);
+    }
+    if let Some(file) = &options.svg {
+        let picture = picture(&flown, &scenario, &outcome, &report);
+        command::write(file, &svg::draw(&picture))?;
+    }
+    show(options, &report)
+}
+
+/// Whether the options go together, and with the scenario.
+fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Failure> {
+    if options.closed_loop.is_some() && !options.method.is_for_fields() {
+        let line = format!("--closed-loop: there is nothing to measure with --method {method}");
+        return Err(Failure::input(line));
+    }
+    options.hostile.agree(options)?;
+    let is_field = matches!(scenario.interference, Interference::Field(_));
+    if options.method.is_for_fields() != is_field {
+        let line = if is_field {
+            format!(
+                "--method {method} needs an [[interferer]], and the scenario has a [field]: take stochastic or stochastic-step"
+            )
+        } else {
+            format!("--method {method} needs a --scenario with a [field] of interference")
+        };
+        return Err(Failure::input(line));
+    }
+    let uploads = options.hostile.uploads.are_planned();
+    if uploads && is_field {
+        let line = "--upload needs an [[interferer]], and the scenario has a [field]";
+        return Err(Failure::input(line));
+    }
+    if let Some(one) = mission::hypothetical(scenario) {
+        eprintln!(
+            "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m stands for all, and SIRs are against it; `cargo plan` has what \
+             its places are worth against all",
+            one.power_w, one.x_m, one.y_m
+        );
+        if uploads {
+            eprintln!("note: an upload changes that one, and what it leaves out stays as it is");
+        }
+    }
+    for index in scenario
+        .relays
+        .keys()
+        .filter(|index| **index > options.uavs)
+    {
+        eprintln!(
+            "note: [[relay]] index {index} is left out of a chain of {}",
+            options.uavs
+        );
+    }
+    Ok(())
+}
+
+/// What the options say of the run.
+fn setup(options: &Options, mission: Mission) -> Result<Setup, Failure> {
+    let mut setup = Setup::new(mission);
+    setup.settings.schedule = match options.method {
+        Method::AlignStep | Method::StochasticStep => Schedule::FixedStep {
+            step: options.epsilon,
+        },
+        _ => Schedule::Bracketed,
+    };
+    setup.settings.method = match options.method {
+        Method::Joint => uav_relay::Method::Joint,
+        Method::Adjust => uav_relay::Method::Adjust(uav_relay::Adjust {
+            rounds: options.rounds,
+            explore_m: options.explore_m,
+            local: options.grid.unwrap_or_default(),
+        }),
+        _ => uav_relay::Method::Align,
+    };
+    setup.settings.predict = !options.no_predict;
+    setup.seed = options.seed;
+    options.hostile.prepare(&mut setup)?;
+    setup.faults = Faults {
+        loss: options.loss,
+        corrupt: options.corrupt,
+        duplicate: options.duplicate,
+        reorder: options.reorder,
+    };
+    Ok(setup)
+}
+
+/// Runs the chain to its end; in a closed loop as often as that measures.
+fn fly(options: &Options, scenario: &Scenario, mut setup: Setup) -> Result<Outcome, Failure> {
+    let start = |setup| Chain::new(setup).map_err(|error| Failure::input(error.to_string()));
+    let (Interference::Field(field), Some(rounds)) = (&scenario.interference, options.closed_loop)
+    else {
+        let mut chain = start(setup)?;
+        watch(&mut chain);
+        return Ok(chain.finish());
+    };
+    let i_max_w = narrow(field.i_max_w);
+    setup.mission = mission::told_of_an_even_field(&setup.mission);
+    setup.settings.measure = Some(Measure {
+        i_max_w,
+        samples: SAMPLES,
+    });
+    let mut chain = start(setup)?;
+    watch(&mut chain);
+    for _ in 0..rounds {
+        chain.measure(SAMPLES, |place, rng| {
+            let (alpha, beta) = mission::shapes(field, f64::from(place.x_m));
+            beta_w(rng, alpha, beta, i_max_w)
+        });
+        chain.restart();
+        watch(&mut chain);
+    }
+    Ok(chain.finish())
+}
+
+/// Samples that a relay of a closed loop takes at each place.
+const SAMPLES: u32 = 10_000;
+
+/// Runs the chain, with a progress line on a terminal once it takes longer than a second.
+fn watch(chain: &mut Chain) {
+    let started = Instant::now();
+    let mut line: Option<ProgressBar> = None;
+    while !chain.step(20_000) {
+        if line.is_none()
+            && started.elapsed() > Duration::from_secs(1)
+            && std::io::stderr().is_terminal()
+        {
+            let bar = ProgressBar::new_spinner();
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
+                bar.set_style(style);
+            }
+            line = Some(bar);
+        }
+        if let Some(bar) = &line {
+            let (sweeps, now) = chain.progress();
+            bar.set_message(format!(
+                "sweep {sweeps}, {:.0} s of virtual time",
+                now.as_micros() as f64 / 1e6
+            ));
+            bar.tick();
+        }
+    }
+    if let Some(bar) = line {
+        bar.finish_and_clear();
+    }
+}
+
+/// The chain at its places in the mission that it flies.
+fn picture(
+    mission: &Mission,
+    scenario: &Scenario,
+    outcome: &Outcome,
+    report: &ChainReport,
+) -> Picture {
+    let mut hop_sir: Vec<f64> = report.relays.iter().map(|relay| relay.sir).collect();
+    hop_sir.extend(report.rx_sir);
+    let silent = (1..)
+        .zip(&outcome.relays)
+        .filter(|(_, relay)| relay.killed.is_some());
+    let left_out: Vec<usize> = report.lost.iter().map(|relay| relay.index.into()).collect();
+    let lost = silent
+        .map(|(index, _)| index)
+        .filter(|index| !left_out.contains(index))
+        .collect();
+    let place = |relay: &RelayEnd| {
+        let at = |place: Placement| (f64::from(place.x_m), f64::from(place.altitude_m));
+        relay.setpoint.map_or((f64::NAN, f64::NAN), at)
+    };
+    let aside = outcome.relays.iter().map(|relay| {
+        relay
+            .setpoint
+            .map_or(f64::NAN, |place| f64::from(place.y_m))
+    });
+    let nodes = if report.relays.is_empty() && report.lost.is_empty() {
+        Vec::new()
+    } else {
+        outcome.relays.iter().map(place).collect()
+    };
+    let before = scenario.sources();
+    let (interferers, replaced) = match (report.version, mission.interference()) {
+        (Some(1..), uav_relay::Interference::Source(at)) => {
+            let now = [at.power_w, at.x_m, at.y_m].map(f64::from);
+            (vec![now.into()], before)
+        }
+        _ => (before, Vec::new()),
+    };
+    Picture {
+        title_method: report.method.clone(),
+        distance_m: f64::from(mission.config().distance_m),
+        interferers,
+        replaced,
+        nodes,
+        room: room(mission, aside),
+        hop_sir,
+        lost,
+        left_out,
+        events: timeline::words(&report.timeline),
+    }
+}
+
+/// Prints the report; what it says went wrong is the failure.
+fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
+    command::print(&if options.json {
+        command::json(report)?
+    } else {
+        report.table()
+    });
+    match &report.error {
+        None => Ok(()),
+        Some(error) => Err(Failure::unmet(error.clone())),
+    }
+}

@@ -1,0 +1,107 @@
+//! The options of `cargo chain`, and their ranges.
+
+use std::path::PathBuf;
+
+use clap::{Parser, ValueEnum};
+use uav_relay_sim::command::{narrow, number};
+
+use crate::hostile::Hostile;
+
+/// N simulated relays exchange real frames over simulated serial links until they hold the places that make the worst hop
+/// as good as it can be.
+#[derive(Parser, Debug)]
+#[command(name = "chain", bin_name = "cargo chain", disable_version_flag = true)]
+pub(crate) struct Options {
+    /// Scenario file (TOML); without it the paper's multi-hop scenario
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scenario: Option<PathBuf>,
+    /// Number of relays, 1 to 1000
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub(crate) uavs: u16,
+    /// How the places are found
+    #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
+    pub(crate) method: Method,
+    /// The fixed step of the -step methods, linear SIR, 1e-6 to 1e6
+    #[arg(long, value_name = "E", default_value_t = 0.1, value_parser = |text: &str| number(text, 1e-6, 1e6))]
+    pub(crate) epsilon: f64,
+    /// Rounds of `adjust` at most, 1 to 65535
+    #[arg(long, value_name = "K", default_value_t = 500, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) rounds: u16,
+    /// How far a relay may go up or down in one round of `adjust`, metres, 0 to 1e5
+    #[arg(long = "explore", value_name = "M", default_value_t = 10.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 1e5).map(narrow))]
+    pub(crate) explore_m: f32,
+    /// Have `adjust` search a grid of columns by rows, 2 to 255 each, instead of from coarse to fine
+    #[arg(long, value_name = "CxR", value_parser = grid)]
+    pub(crate) grid: Option<uav_relay::Local>,
+    /// The relays of a stochastic chain are told that Upsilon is everywhere what it is at Rx, fly, measure the true field where
+    /// they stand, and agree again, R times, 1 to 100
+    #[arg(long, value_name = "R", value_parser = clap::value_parser!(u8).range(1..=100))]
+    pub(crate) closed_loop: Option<u8>,
+    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
+    #[arg(long, value_name = "T", default_value_t = 1e-4, value_parser = |text: &str| number(text, 1e-6, 0.1))]
+    pub(crate) tolerance: f64,
+    /// Probability that a frame never arrives, 0 to 0.9
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    pub(crate) loss: f64,
+    /// Probability that bytes of a frame arrive changed, 0 to 0.9
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    pub(crate) corrupt: f64,
+    /// Probability that a frame arrives twice, 0 to 0.9
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    pub(crate) duplicate: f64,
+    /// Probability that a frame is overtaken by others, 0 to 0.9
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    pub(crate) reorder: f64,
+    /// The head does not solve the chain beforehand; it brackets from scratch
+    #[arg(long)]
+    pub(crate) no_predict: bool,
+    /// Seed of every random draw; the same seed gives the same run, byte for byte
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// One JSON object on standard output and nothing else there
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) hostile: Hostile,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub(crate) enum Method {
+    /// Algorithm 1 with bracketed targets
+    Align,
+    /// Algorithm 1 with the paper's fixed step
+    AlignStep,
+    /// Algorithm 1, then Algorithm 2
+    Adjust,
+    /// Places, sides and altitudes together
+    #[value(alias = "altitude")]
+    Joint,
+    /// Algorithm 4 with bracketed targets
+    Stochastic,
+    /// Algorithm 4 with the fixed step
+    StochasticStep,
+}
+
+impl Method {
+    /// Whether it is for a field of interference, and not for an interferer.
+    pub(crate) const fn is_for_fields(self) -> bool {
+        matches!(self, Self::Stochastic | Self::StochasticStep)
+    }
+}
+
+fn probability(text: &str) -> Result<f64, String> {
+    number(text, 0.0, 0.9)
+}
+
+fn grid(text: &str) -> Result<uav_relay::Local, String> {
+    let form = "must be CxR, columns and rows, 2 to 255 each";
+    let (columns, rows) = text.split_once('x').ok_or(form)?;
+    let side = |text: &str| text.parse().ok().filter(|side| *side >= 2).ok_or(form);
+    Ok(uav_relay::Local::Grid {
+        columns: side(columns)?,
+        rows: side(rows)?,
+    })
+}

@@ -1,0 +1,201 @@
+//! Missions that the ground uploads in flight: what the options say of them.
+
+use clap::{Args, ValueEnum};
+use uav_relay::{
+    Band, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Side, Upload,
+};
+use uav_relay_sim::command::{Failure, narrow, number};
+use uav_relay_sim::simulator::chain::UploadSpec;
+
+use crate::hostile::instant;
+
+/// The options for that.
+#[derive(Args, Debug)]
+pub(crate) struct Uploads {
+    /// The ground uploads the mission of the scenario with other parameters S virtual seconds after the start, and the chain
+    /// flies it. Keys as in a scenario file: x_m, y_m and power_w of the interferer, altitude_m, altitude_min_m,
+    /// altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m, distance_m, tx_w, uav_w; and tolerance. Repeatable: versions count from 1
+    #[arg(long, value_name = "S[:KEY=VALUE,..]", value_parser = planned)]
+    upload: Vec<Planned>,
+    /// Which end of the link uploads
+    #[arg(
+        long,
+        value_name = "END",
+        value_enum,
+        default_value_t = End::Tx,
+        requires = "upload"
+    )]
+    upload_from: End,
+    /// Relays do not store what was uploaded: one that is switched on again begins with the mission of the scenario
+    #[arg(long, requires = "upload")]
+    no_store: bool,
+}
+
+/// An end of the link.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum End {
+    /// The transmitter
+    Tx,
+    /// The receiver
+    Rx,
+}
+
+/// One upload, as it was asked for.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Planned {
+    text: String,
+    at: Instant,
+    changes: Vec<(Key, f64)>,
+}
+
+/// A parameter that an upload may change.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Key {
+    X,
+    Y,
+    Power,
+    Altitude,
+    Floor,
+    Ceiling,
+    Left,
+    Right,
+    Separation,
+    Distance,
+    TxPower,
+    UavPower,
+    Tolerance,
+}
+
+/// The names of the keys, and the ranges of their values: those of a scenario file and of `--tolerance`.
+const KEYS: [(&str, Key, f64, f64); 13] = [
+    ("x_m", Key::X, -1e7, 1e7),
+    ("y_m", Key::Y, -1e7, 1e7),
+    ("power_w", Key::Power, 1e-6, 1e9),
+    ("altitude_m", Key::Altitude, 0.1, 1e5),
+    ("altitude_min_m", Key::Floor, 0.1, 1e5),
+    ("altitude_max_m", Key::Ceiling, 0.1, 1e5),
+    ("lateral_min_m", Key::Left, -1e5, 0.0),
+    ("lateral_max_m", Key::Right, 0.0, 1e5),
+    ("min_separation_m", Key::Separation, 0.0, 1e5),
+    ("distance_m", Key::Distance, 1.0, 1e6),
+    ("tx_w", Key::TxPower, 1e-6, 1e6),
+    ("uav_w", Key::UavPower, 1e-6, 1e6),
+    ("tolerance", Key::Tolerance, 1e-6, 0.1),
+];
+
+impl Uploads {
+    /// Whether there are any.
+    pub(crate) fn are_planned(&self) -> bool {
+        !self.upload.is_empty()
+    }
+
+    /// Whether relays keep what was uploaded when they are switched off.
+    pub(crate) fn are_stored(&self) -> bool {
+        !self.no_store
+    }
+
+    /// When each of them begins.
+    pub(crate) fn times(&self) -> impl Iterator<Item = Instant> {
+        self.upload.iter().map(|one| one.at)
+    }
+
+    /// All of them, in the order of their times, for relays that are loaded with `base`.
+    pub(crate) fn of(&self, base: &Mission) -> Result<Vec<UploadSpec>, Failure> {
+        let end = match self.upload_from {
+            End::Tx => Side::Upstream,
+            End::Rx => Side::Downstream,
+        };
+        let mut planned: Vec<&Planned> = self.upload.iter().collect();
+        planned.sort_by_key(|one| one.at);
+        let specs = (1_u16..).zip(planned).map(|(version, one)| {
+            let refused = |why: &dyn std::fmt::Display| {
+                Failure::input(format!("--upload {}: {why}", one.text))
+            };
+            let config = one.changed(base.config()).map_err(|why| refused(&why))?;
+            let upload = Upload::new(base, version, config).map_err(|why| refused(&why))?;
+            Ok(UploadSpec {
+                end,
+                at: one.at,
+                upload,
+            })
+        });
+        specs.collect()
+    }
+}
+
+impl Planned {
+    /// `base` with what is to be changed.
+    fn changed(&self, base: &MissionConfig) -> Result<MissionConfig, &'static str> {
+        let Interference::Source(at) = base.interference else {
+            return Err("a [field] of interference cannot be uploaded");
+        };
+        let to = |key, old| {
+            let mut changes = self.changes.iter();
+            changes
+                .find(|(of, _)| *of == key)
+                .map_or(old, |(_, value)| narrow(*value))
+        };
+        let common = Profile {
+            altitude_m: to(Key::Altitude, base.common.altitude_m),
+            power_w: to(Key::UavPower, base.common.power_w),
+        };
+        // A band of one altitude is that of relays that keep to the common one, whichever that is.
+        let band = if base.band.is_single() {
+            Band::at(common.altitude_m)
+        } else {
+            base.band
+        };
+        Ok(MissionConfig {
+            distance_m: to(Key::Distance, base.distance_m),
+            min_separation_m: to(Key::Separation, base.min_separation_m),
+            tx_power_w: to(Key::TxPower, base.tx_power_w),
+            common,
+            band: Band {
+                least_m: to(Key::Floor, band.least_m),
+                most_m: to(Key::Ceiling, band.most_m),
+            },
+            lateral: Band {
+                least_m: to(Key::Left, base.lateral.least_m),
+                most_m: to(Key::Right, base.lateral.most_m),
+            },
+            interference: Interference::Source(Interferer {
+                power_w: to(Key::Power, at.power_w),
+                x_m: to(Key::X, at.x_m),
+                y_m: to(Key::Y, at.y_m),
+            }),
+            tolerance: to(Key::Tolerance, base.tolerance),
+            ..*base
+        })
+    }
+}
+
+fn planned(text: &str) -> Result<Planned, String> {
+    let form =
+        "must be S or S:KEY=VALUE,.., seconds after the start (0 to 1e6) and what is changed";
+    let (at, changes) = match text.split_once(':') {
+        Some((at, changes)) => (at, Some(changes)),
+        None => (text, None),
+    };
+    let at = instant(at).ok_or(form)?;
+    let mut known: Vec<(Key, f64)> = Vec::new();
+    for change in changes.into_iter().flat_map(|changes| changes.split(',')) {
+        let (name, value) = change.split_once('=').ok_or(form)?;
+        let Some((_, key, least, most)) = KEYS.into_iter().find(|(of, ..)| *of == name) else {
+            let names: Vec<&str> = KEYS.into_iter().map(|(name, ..)| name).collect();
+            return Err(format!(
+                "{name} is not a known key; allowed: {}",
+                names.join(", ")
+            ));
+        };
+        if known.iter().any(|(of, _)| *of == key) {
+            return Err(format!("{name} must be given once"));
+        }
+        let value = number(value, least, most).map_err(|range| format!("{name} {range}"))?;
+        known.push((key, value));
+    }
+    Ok(Planned {
+        text: text.to_owned(),
+        at,
+        changes: known,
+    })
+}

@@ -1,0 +1,215 @@
+//! From a scenario to the mission that the relays fly.
+
+use std::fmt;
+
+use uav_relay::channel::{AirGround, ChannelError};
+use uav_relay::field::FieldError;
+use uav_relay::mission::MissionError;
+use uav_relay::{Band, Channel, Field, FieldPoint, Interferer, Mission, MissionConfig, Profile};
+
+use crate::command::narrow;
+use crate::hypothetical::{self, Hypothetical};
+use crate::scenario::{self, Interference, Scenario, Source};
+use crate::scene::Scene;
+
+/// Why a scenario is no mission.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// No single interferer stands for the scenario's.
+    NoHypothetical,
+    /// The relays cannot stand that far apart on that distance.
+    NoRoom,
+    /// The mission refuses a parameter.
+    Mission(MissionError),
+    /// The channel refuses a parameter.
+    Channel(ChannelError),
+    /// The field refuses its points.
+    Field(FieldError),
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoHypothetical => f.write_str("no single interferer stands for these [[interferer]]"),
+            Self::NoRoom => f.write_str("no placement: (relays - 1) x geometry.min_separation_m is above geometry.distance_m"),
+            Self::Mission(error) => error.fmt(f),
+            Self::Channel(error) => error.fmt(f),
+            Self::Field(error) => write!(f, "field: {error}"),
+        }
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+/// The mission of `uavs` relays in `scenario`, with one interferer for several, and what single relays hold of their own (index from 1).
+///
+/// # Errors
+/// [`Refusal`] for what the relays cannot do, and for numbers they do not take.
+pub fn mission(
+    scenario: &Scenario,
+    uavs: u16,
+    tolerance: f64,
+) -> Result<(Mission, Vec<(u16, Profile)>), Refusal> {
+    let interference = match &scenario.interference {
+        Interference::Sources(sources) => {
+            let one = if let [source] = sources.as_slice() {
+                interferer(source)
+            } else {
+                let one = hypothetical(scenario).ok_or(Refusal::NoHypothetical)?;
+                interferer(&one.source())
+            };
+            uav_relay::Interference::Source(one)
+        }
+        Interference::Field(spec) => {
+            uav_relay::Interference::Field(field(spec).map_err(Refusal::Field)?)
+        }
+    };
+    let common = Profile {
+        altitude_m: narrow(scenario.altitude_m),
+        power_w: narrow(scenario.uav_w),
+    };
+    let config = MissionConfig {
+        relays: uavs,
+        distance_m: narrow(scenario.distance_m),
+        min_separation_m: narrow(scenario.min_separation_m),
+        tx_power_w: narrow(scenario.tx_w),
+        common,
+        band: Band {
+            least_m: narrow(scenario.altitude_min_m),
+            most_m: narrow(scenario.altitude_max_m),
+        },
+        lateral: Band {
+            least_m: narrow(scenario.lateral_min_m),
+            most_m: narrow(scenario.lateral_max_m),
+        },
+        channel: channel(scenario).map_err(Refusal::Channel)?,
+        interference,
+        tolerance: narrow(tolerance),
+    };
+    let mission = Mission::try_new(config).map_err(|error| match error {
+        MissionError::TooManyForDistance => Refusal::NoRoom,
+        other => Refusal::Mission(other),
+    })?;
+    let profiles = scenario
+        .relays
+        .iter()
+        .filter(|(index, _)| **index <= uavs)
+        .map(|(&index, own)| {
+            let altitude_m = own.altitude_m.map_or(common.altitude_m, narrow);
+            let power_w = own.power_w.map_or(common.power_w, narrow);
+            (
+                index,
+                Profile {
+                    altitude_m,
+                    power_w,
+                },
+            )
+        })
+        .collect();
+    Ok((mission, profiles))
+}
+
+/// The one interferer that stands for several in a mission; `None` where there are not several, or none stands for them.
+pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
+    match &scenario.interference {
+        Interference::Sources(sources) if sources.len() > 1 => {
+            let scene = Scene::new(scenario, 1)?;
+            let one = hypothetical::hypothetical(&scene)?;
+            Some(one.sided(&scene, scenario.lateral_min_m, scenario.lateral_max_m))
+        }
+        _ => None,
+    }
+}
+
+/// The relays that hold an altitude of their own, by index from 1.
+pub fn held(scenario: &Scenario, uavs: u16) -> Vec<u16> {
+    scenario
+        .relays
+        .iter()
+        .filter(|(index, own)| **index <= uavs && own.altitude_m.is_some())
+        .map(|(index, _)| *index)
+        .collect()
+}
+
+/// The mission with the Upsilon it has at Rx everywhere: all that relays may know before they have measured.
+#[must_use]
+pub fn told_of_an_even_field(mission: &Mission) -> Mission {
+    let config = mission.config();
+    let uav_relay::Interference::Field(field) = config.interference else {
+        return *mission;
+    };
+    let point = FieldPoint {
+        x_m: 0.0,
+        upsilon_per_w: field.upsilon(config.distance_m),
+    };
+    Field::try_new(vec![point].leak())
+        .ok()
+        .and_then(|field| {
+            let interference = uav_relay::Interference::Field(field);
+            Mission::try_new(MissionConfig {
+                interference,
+                ..*config
+            })
+            .ok()
+        })
+        .unwrap_or(*mission)
+}
+
+/// The shapes of the distribution of I / `i_max_w` at `x_m`: alpha interpolated, and beta so that Upsilon is.
+pub fn shapes(spec: &scenario::Field, x_m: f64) -> (f64, f64) {
+    let of = |point: &scenario::BetaPoint| {
+        let upsilon = (point.alpha + point.beta - 1.0) / (point.alpha - 1.0);
+        (point.alpha, upsilon)
+    };
+    let after = spec.beta.partition_point(|point| point.x_m <= x_m);
+    let (left, right) = (
+        after.checked_sub(1).and_then(|at| spec.beta.get(at)),
+        spec.beta.get(after),
+    );
+    let (alpha, upsilon) = match (left, right) {
+        (Some(left), Some(right)) => {
+            let part = (x_m - left.x_m) / (right.x_m - left.x_m);
+            let ((a, u), (b, v)) = (of(left), of(right));
+            (a + (b - a) * part, u + (v - u) * part)
+        }
+        (Some(end), None) | (None, Some(end)) => of(end),
+        (None, None) => (2.0, 2.0),
+    };
+    (alpha, (upsilon - 1.0) * (alpha - 1.0))
+}
+
+/// Upsilon at the points of `spec`. A field lives as long as the program: a relay's is part of its image.
+fn field(spec: &scenario::Field) -> Result<Field, FieldError> {
+    let points: Option<Vec<FieldPoint>> = spec
+        .beta
+        .iter()
+        .map(|point| {
+            FieldPoint::from_beta(narrow(point.x_m), point.alpha, point.beta, spec.i_max_w)
+        })
+        .collect();
+    Field::try_new(points.ok_or(FieldError::Upsilon)?.leak())
+}
+
+fn channel(scenario: &Scenario) -> Result<Channel, ChannelError> {
+    let spec = &scenario.channel;
+    let air_ground = match spec.air_ground {
+        scenario::AirGround::Los => AirGround::Los,
+        scenario::AirGround::Nlos => AirGround::Nlos,
+        scenario::AirGround::Weight(weight) => AirGround::Weighted(weight),
+    };
+    Channel::from_db(
+        spec.carrier_hz,
+        spec.excess_loss_los_db,
+        spec.excess_loss_nlos_db,
+        air_ground,
+    )
+}
+
+fn interferer(source: &Source) -> Interferer {
+    Interferer {
+        power_w: narrow(source.power_w),
+        x_m: narrow(source.x_m),
+        y_m: narrow(source.y_m),
+    }
+}

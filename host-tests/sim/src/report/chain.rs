@@ -1,0 +1,394 @@
+//! The report of a simulated chain.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use serde::Serialize;
+use uav_relay::{Interference, Mission};
+
+use super::attack::AttackReport;
+use super::flown::{offered, version};
+use super::left::{LostReport, left, lost};
+use super::recovery::{self, RecoveryReport, recoveries};
+use super::timeline::{self, MomentReport};
+use super::{RelayReport, db, hop_sirs};
+use crate::simulator::outcome::{Ending, Outcome, Turning};
+use crate::simulator::setup::Setup;
+
+/// What happened to frames.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct FaultReport {
+    /// Frames that never arrived.
+    pub lost: u64,
+    /// Frames that arrived changed.
+    pub corrupted: u64,
+    /// Frames that arrived twice.
+    pub duplicated: u64,
+    /// Frames that others could overtake.
+    pub reordered: u64,
+    /// Frames the relays refused, for whatever reason.
+    pub rejected: u64,
+}
+
+/// A relay whose silence was noticed.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct SilenceReport {
+    /// The relay that went silent.
+    pub silent: u16,
+    /// The neighbour that noticed.
+    pub noticed_by: u16,
+    /// When it had been silent for long enough, s of virtual time.
+    pub at_s: f64,
+}
+
+/// The result of `cargo chain`.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct ChainReport {
+    /// The method, as on the command line.
+    pub method: String,
+    /// Number of relays asked for.
+    pub uavs: u16,
+    /// Version of the mission that the chain flies, 0 for the one it took off with, if one was uploaded: what SIRs are of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
+    /// What went wrong, if anything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    /// The most that could be had, where nothing could be placed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub best_sir: Option<f64>,
+    /// SIR of the worst hop, linear; absent unless every relay of the chain has its place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir: Option<f64>,
+    /// The same in dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir_db: Option<f64>,
+    /// The target the relays agreed on, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<f64>,
+    /// In a field: whether no chain of equals can have a higher target. False means that it is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub promised: Option<bool>,
+    /// SIR of the chain before Algorithm 2 and after each of its rounds, linear.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rounds: Vec<f64>,
+    /// The relays of the chain, from the transmitter on, if all of them have a place.
+    pub relays: Vec<RelayReport>,
+    /// SIR at the receiver, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rx_sir: Option<f64>,
+    /// The same in dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rx_sir_db: Option<f64>,
+    /// Forward passes along the chain.
+    pub sweeps: u32,
+    /// Frames put on any link.
+    pub messages: u64,
+    /// Bytes put on any link.
+    pub bytes: u64,
+    /// Virtual time the run took, s.
+    pub virtual_s: f64,
+    /// What happened to frames.
+    pub faults: FaultReport,
+    /// Whose silence was noticed by whom.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub silences: Vec<SilenceReport>,
+    /// `shared` where the relays talk by one radio channel; absent where each has a link to either neighbour.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<&'static str>,
+    /// How many relays are in the chain at the end, where that is not what it began with, or might not have been.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left: Option<u16>,
+    /// The relays that are not, where they were last.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<LostReport>,
+    /// What happened when, if anything did but that the chain converged.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub timeline: Vec<MomentReport>,
+    /// How long it took each time the chain formed anew.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub recovery: Vec<RecoveryReport>,
+    /// What an attack came to, if there was one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub attack: Option<AttackReport>,
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// Whether there is room beside the line: the table then says where in it a relay is.
+    #[serde(skip)]
+    pub room: bool,
+}
+
+impl ChainReport {
+    /// The report of a run in which the chain flies `mission` in the end.
+    pub fn new(method: &str, mission: &Mission, outcome: &Outcome, seed: u64) -> Self {
+        let chain = left(outcome);
+        let timeline = timeline::timeline(&outcome.moments);
+        let places: Option<Vec<_>> = chain
+            .iter()
+            .map(|(_, relay)| Some((relay.setpoint?, relay.profile)))
+            .collect();
+        let places = places.unwrap_or_default();
+        let sirs = hop_sirs(mission, &places);
+        let worst = sirs.iter().copied().reduce(f64::min);
+        let mut relays = super::relays(&places, &sirs);
+        let offered = offered(&outcome.moments);
+        for (report, (node, relay)) in relays.iter_mut().zip(&chain) {
+            report.index = *node;
+            report.version = offered.map(|_| relay.version);
+        }
+        let flown = u16::try_from(chain.len()).unwrap_or(u16::MAX);
+        let rx_sir = sirs.last().copied();
+        let injected = outcome.injected;
+        let target = chain.first().and_then(|(_, head)| head.target);
+        // Whether no chain can have more, as far as the tolerance goes.
+        let bound = outcome.relays.iter().find_map(|relay| relay.bound);
+        let promised = match (mission.interference(), target, bound) {
+            (Interference::Field(_), Some(target), Some(bound)) => {
+                Some(bound <= target * (1.0 + 2.0 * mission.config().tolerance))
+            }
+            _ => None,
+        };
+        Self {
+            method: method.to_owned(),
+            uavs: mission.relays(),
+            version: offered.map(|_| version(outcome)),
+            error: error(method, outcome),
+            // A fixed step may have stepped over what there is.
+            best_sir: (outcome.ending == Ending::Infeasible && !method.ends_with("-step"))
+                .then_some(0.0),
+            sir: worst,
+            sir_db: worst.map(db),
+            target: target.map(f64::from),
+            promised,
+            rounds: outcome.rounds.iter().copied().map(f64::from).collect(),
+            relays,
+            rx_sir,
+            rx_sir_db: rx_sir.map(db),
+            sweeps: outcome.sweeps,
+            messages: outcome.messages,
+            bytes: outcome.bytes,
+            virtual_s: seconds(outcome.ended),
+            faults: FaultReport {
+                lost: injected.lost,
+                corrupted: injected.corrupted,
+                duplicated: injected.duplicated,
+                reordered: injected.reordered,
+                rejected: outcome
+                    .relays
+                    .iter()
+                    .map(|relay| u64::from(relay.stats.rejected()))
+                    .sum(),
+            },
+            silences: silences(outcome),
+            channel: None,
+            left: (!timeline.is_empty()).then_some(flown),
+            lost: lost(outcome, &chain),
+            recovery: recoveries(&outcome.moments, mission.relays()),
+            timeline,
+            attack: None,
+            seed,
+            room: !mission.config().lateral.is_single(),
+        }
+    }
+
+    /// The report of a run that could not be started.
+    pub fn refused(method: &str, uavs: u16, seed: u64, why: &str) -> Self {
+        Self {
+            method: method.to_owned(),
+            uavs,
+            version: None,
+            error: Some(why.to_owned()),
+            best_sir: None,
+            sir: None,
+            sir_db: None,
+            target: None,
+            promised: None,
+            rounds: Vec::new(),
+            relays: Vec::new(),
+            rx_sir: None,
+            rx_sir_db: None,
+            sweeps: 0,
+            messages: 0,
+            bytes: 0,
+            virtual_s: 0.0,
+            faults: FaultReport {
+                lost: 0,
+                corrupted: 0,
+                duplicated: 0,
+                reordered: 0,
+                rejected: 0,
+            },
+            silences: Vec::new(),
+            channel: None,
+            left: None,
+            lost: Vec::new(),
+            timeline: Vec::new(),
+            recovery: Vec::new(),
+            attack: None,
+            seed,
+            room: false,
+        }
+    }
+
+    /// The report as a table to read, and what it cost.
+    pub fn table(&self) -> String {
+        let mut text = super::hops_table(&self.relays, &self.lost, self.rx_sir, self.room);
+        if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
+            _ = writeln!(
+                text,
+                "worst hop: SIR {sir:.6} ({sir_db:.3} dB) with {} relays by `{}`",
+                self.relays_left(),
+                self.method
+            );
+        }
+        match self.version {
+            None => {}
+            Some(0) => {
+                _ = writeln!(
+                    text,
+                    "the chain flies the mission that it took off with: no upload was adopted"
+                );
+            }
+            Some(version) => {
+                _ = writeln!(text, "the chain flies mission {version}, as uploaded");
+            }
+        }
+        if self.channel.is_some() {
+            _ = writeln!(
+                text,
+                "by one radio channel that relays up to {} away hear",
+                Setup::RADIO_REACH
+            );
+        }
+        match self.promised {
+            Some(true) => {
+                _ = writeln!(text, "no chain of equals can have more in this field");
+            }
+            Some(false) => {
+                _ = writeln!(
+                    text,
+                    "this field is uneven: that no chain can have more is not certain"
+                );
+            }
+            None => {}
+        }
+        if let (Some(first), Some(last)) = (self.rounds.first(), self.rounds.last()) {
+            _ = writeln!(
+                text,
+                "Algorithm 2: {} rounds, from SIR {first:.6} to {last:.6}",
+                self.rounds.len() - 1
+            );
+        }
+        _ = writeln!(
+            text,
+            "cost: {} sweeps, {} messages, {} bytes, {:.3} s of virtual time",
+            self.sweeps, self.messages, self.bytes, self.virtual_s
+        );
+        let faults = self.faults;
+        if faults.lost + faults.corrupted + faults.duplicated + faults.reordered + faults.rejected
+            > 0
+        {
+            _ = writeln!(
+                text,
+                "faults: {} lost, {} corrupted, {} duplicated, {} reordered; {} frames rejected (seed {})",
+                faults.lost,
+                faults.corrupted,
+                faults.duplicated,
+                faults.reordered,
+                faults.rejected,
+                self.seed
+            );
+        }
+        if let Some(attack) = &self.attack {
+            text += &attack.text();
+        }
+        text += &timeline::text(&self.timeline);
+        text += &recovery::text(&self.recovery);
+        text
+    }
+
+    /// How many relays, of how many.
+    fn relays_left(&self) -> String {
+        match self.left {
+            Some(left) if left < self.uavs => format!("{left} of {}", self.uavs),
+            _ => self.uavs.to_string(),
+        }
+    }
+}
+
+/// Virtual time since the start, s.
+pub(super) fn seconds(at: uav_relay::Instant) -> f64 {
+    at.as_micros() as f64 / 1e6
+}
+
+/// Who noticed the relays that really went silent; over a bad link a living one may be missed for a while as well.
+fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
+    let killed = |index: u16| {
+        let at = usize::from(index).checked_sub(1);
+        at.and_then(|at| outcome.relays.get(at))
+            .is_some_and(|relay| relay.killed.is_some())
+    };
+    let mut silences: BTreeMap<(u16, u16), f64> = BTreeMap::new();
+    for moment in &outcome.moments {
+        let Some(other) = moment.other else {
+            continue;
+        };
+        match moment.what {
+            Turning::Lost(_) if killed(other) => {
+                silences.insert((moment.relay, other), seconds(moment.at));
+            }
+            Turning::Found(_) => {
+                silences.remove(&(moment.relay, other));
+            }
+            _ => {}
+        }
+    }
+    let reports = silences
+        .into_iter()
+        .map(|((noticed_by, silent), at_s)| SilenceReport {
+            silent,
+            noticed_by,
+            at_s,
+        });
+    reports.collect()
+}
+
+fn error(method: &str, outcome: &Outcome) -> Option<String> {
+    let error = ended(method, outcome)?;
+    let missing = offered(&outcome.moments).filter(|newest| *newest > version(outcome));
+    Some(match missing {
+        Some(version) => format!("{error}; mission {version} was not adopted"),
+        None => error,
+    })
+}
+
+/// Why a run has not ended well.
+fn ended(method: &str, outcome: &Outcome) -> Option<String> {
+    match outcome.ending {
+        Ending::Settled => None,
+        Ending::Infeasible if method.ends_with("-step") => Some(
+            "none of the targets that the fixed step takes can be met; a smaller one may find one"
+                .to_owned(),
+        ),
+        Ending::Infeasible => Some("no placement gives every hop an SIR above 0".to_owned()),
+        Ending::Broken => {
+            let silent: Vec<String> = (1..)
+                .zip(&outcome.relays)
+                .filter(|(_, relay): &(u16, _)| relay.killed.is_some())
+                .map(|(index, _)| index.to_string())
+                .collect();
+            Some(format!(
+                "the chain is broken: relay {} went silent",
+                silent.join(", ")
+            ))
+        }
+        Ending::Cut => Some(
+            "the chain is cut: too few relays can reach each other to go on without the others"
+                .to_owned(),
+        ),
+        Ending::OutOfTime => Some(format!(
+            "the chain had not settled after {:.0} s",
+            seconds(outcome.ended)
+        )),
+    }
+}

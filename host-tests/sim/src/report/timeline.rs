@@ -1,0 +1,273 @@
+//! The story of a run, moment by moment for programs and in a few lines for people.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use super::chain::seconds;
+use crate::simulator::outcome::{Moment, Turning};
+
+/// One moment.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct MomentReport {
+    /// When, s of virtual time.
+    pub at_s: f64,
+    /// Whose, by its number in the mission, from 1. Of a partition it is the last relay before it; of an upload that begins, 0 is the
+    /// transmitter, and the receiver comes after the last relay.
+    pub relay: u16,
+    /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted`, `healed`, `offered`, `held` or
+    /// `adopted`.
+    pub what: &'static str,
+    /// The neighbour that was lost or found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub other: Option<u16>,
+    /// Number of the view that was formed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub view: Option<u16>,
+    /// How many relays it has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relays: Option<u16>,
+    /// Version of the mission that was offered, held or adopted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
+    /// The target agreed on, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir: Option<f64>,
+}
+
+impl MomentReport {
+    fn of(moment: &Moment) -> Self {
+        let what = match moment.what {
+            Turning::Silent => "silent",
+            Turning::Booted => "on",
+            Turning::Lost(_) => "lost",
+            Turning::Found(_) => "found",
+            Turning::Reformed { .. } => "formed",
+            Turning::Cut => "cut",
+            Turning::Converged => "converged",
+            Turning::Infeasible => "infeasible",
+            Turning::Parted => "parted",
+            Turning::Healed => "healed",
+            Turning::Offered(_) => "offered",
+            Turning::Uploaded(_) => "held",
+            Turning::Adopted(_) => "adopted",
+        };
+        let (view, relays) = match moment.what {
+            Turning::Reformed { view, relays, .. } => (Some(view), Some(relays)),
+            _ => (None, None),
+        };
+        let version = match moment.what {
+            Turning::Offered(version) | Turning::Uploaded(version) | Turning::Adopted(version) => {
+                Some(version)
+            }
+            _ => None,
+        };
+        let sir = moment.target.filter(|_| what == "converged");
+        Self {
+            at_s: seconds(moment.at),
+            relay: moment.relay,
+            what,
+            other: moment.other,
+            view,
+            relays,
+            version,
+            sir: sir.map(f64::from),
+        }
+    }
+}
+
+/// The moments of a run; none if all it did was to converge.
+pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
+    let plain = |moment: &Moment| matches!(moment.what, Turning::Converged | Turning::Infeasible);
+    if moments.iter().all(plain) {
+        return Vec::new();
+    }
+    moments.iter().map(MomentReport::of).collect()
+}
+
+/// What several relays did in common.
+#[derive(Clone, PartialEq, Debug)]
+struct Group {
+    first_s: f64,
+    last_s: f64,
+    /// Who, in the order in which they did; a pair of neighbours that found each other, in order from Tx.
+    relays: Vec<u16>,
+    sample: MomentReport,
+}
+
+/// Seconds between two moments that belong together, at most: a neighbour may notice a silence so much later than another.
+const TOGETHER_S: f64 = 10.0;
+
+/// The story in groups, by the time that counts: the last one's where all have to agree, else the first one's.
+fn groups(timeline: &[MomentReport]) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for moment in timeline {
+        // What came before another view has nothing to do with what came after it.
+        let open = groups
+            .iter()
+            .rposition(|group| group.sample.what == "formed" && moment.what == "converged")
+            .unwrap_or(0);
+        let mut known = groups.iter_mut().skip(open).rev();
+        let same =
+            known.find(|group| moment.at_s - group.last_s <= TOGETHER_S && belongs(moment, group));
+        if let Some(group) = same {
+            group.last_s = moment.at_s;
+            if !group.relays.contains(&moment.relay) {
+                group.relays.push(moment.relay);
+            }
+        } else {
+            groups.push(Group {
+                first_s: moment.at_s,
+                last_s: moment.at_s,
+                relays: vec![moment.relay],
+                sample: moment.clone(),
+            });
+        }
+    }
+    groups.sort_by(|one, other| one.at_s().total_cmp(&other.at_s()));
+    groups
+}
+
+fn belongs(moment: &MomentReport, group: &Group) -> bool {
+    let one = &group.sample;
+    if one.what != moment.what {
+        return false;
+    }
+    match one.what {
+        "lost" => one.other == moment.other,
+        // Each of two neighbours finds the other.
+        "found" => {
+            one.other == Some(moment.relay) && moment.other == Some(one.relay)
+                || (one.relay, one.other) == (moment.relay, moment.other)
+        }
+        "formed" => one.view == moment.view,
+        // What is the same to the bit.
+        "converged" => one.sir.map(f64::to_bits) == moment.sir.map(f64::to_bits),
+        "silent" | "on" => one.at_s.to_bits() == moment.at_s.to_bits(),
+        "held" | "adopted" => one.version == moment.version,
+        "cut" => true,
+        _ => false,
+    }
+}
+
+impl Group {
+    fn at_s(&self) -> f64 {
+        match self.sample.what {
+            "formed" | "converged" | "held" | "adopted" => self.last_s,
+            _ => self.first_s,
+        }
+    }
+
+    /// What happened, in a few words, for a picture.
+    fn words(&self) -> String {
+        let who = list(&self.relays);
+        let one = &self.sample;
+        match one.what {
+            "silent" => format!("{who} silent"),
+            "on" => format!("{who} on again"),
+            "lost" => format!("{} is missed", one.other.unwrap_or_default()),
+            "found" => format!("{} meets {}", one.relay, one.other.unwrap_or_default()),
+            "formed" => format!("formed: {}", one.relays.unwrap_or_default()),
+            "converged" => format!("SIR {:.3}", one.sir.unwrap_or_default()),
+            "parted" => format!("parted after {}", one.relay),
+            "healed" => format!("joined after {}", one.relay),
+            "offered" | "held" | "adopted" => {
+                format!("mission {} {}", one.version.unwrap_or_default(), one.what)
+            }
+            other => other.to_owned(),
+        }
+    }
+
+    /// What happened, as a line of text.
+    fn line(&self) -> String {
+        let many = self.relays.len() > 1;
+        let who = format!(
+            "{} {}",
+            if many { "relays" } else { "relay" },
+            list(&self.relays)
+        );
+        let one = &self.sample;
+        let other = one.other.unwrap_or_default();
+        let relay = one.relay;
+        let version = one.version.unwrap_or_default();
+        match one.what {
+            "silent" => format!("{who} went silent"),
+            "on" => format!("{who} switched on again"),
+            "lost" => format!("{who} lost relay {other}"),
+            "found" if many => format!("{who} found each other"),
+            "found" => format!("{who} found relay {other}"),
+            "formed" => format!(
+                "formed anew: {}, view {}",
+                count(one.relays.unwrap_or_default().into()),
+                one.view.unwrap_or_default()
+            ),
+            "cut" => format!("{who} cut off: too few to go on without the others"),
+            "converged" => format!(
+                "converged: {}, SIR {:.3}",
+                count(self.relays.len()),
+                one.sir.unwrap_or_default()
+            ),
+            "parted" => format!("relays 1 to {relay} and the others do not hear each other"),
+            "healed" => format!("relays 1 to {relay} and the others hear each other again"),
+            "offered" if relay == 0 => format!("the transmitter uploads mission {version}"),
+            "offered" => format!("the receiver uploads mission {version}"),
+            "held" => format!(
+                "{who} {} mission {version}",
+                if many { "hold" } else { "holds" }
+            ),
+            "adopted" => format!("mission {version} adopted: {}", count(self.relays.len())),
+            _ => "no target can be met".to_owned(),
+        }
+    }
+}
+
+/// "3", "3 and 5", "1, 2 and 5", "1 to 3 and 5 to 9".
+pub(super) fn list(relays: &[u16]) -> String {
+    let mut sorted = relays.to_vec();
+    sorted.sort_unstable();
+    let mut parts: Vec<String> = Vec::new();
+    for run in sorted.chunk_by(|one, next| one + 1 == *next) {
+        match run {
+            [first, _, .., last] => parts.push(format!("{first} to {last}")),
+            few => parts.extend(few.iter().map(u16::to_string)),
+        }
+    }
+    match parts.as_slice() {
+        [] => String::new(),
+        [one] => one.clone(),
+        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
+    }
+}
+
+/// "1 relay", "8 relays".
+fn count(relays: usize) -> String {
+    format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
+}
+
+/// Lines at either end of a long story.
+const ENDS: usize = 20;
+
+/// The story as text: a line for each thing that happened, the middle of a very long one left out.
+pub(super) fn text(timeline: &[MomentReport]) -> String {
+    let groups = groups(timeline);
+    let mut text = String::new();
+    for (number, group) in groups.iter().enumerate() {
+        if number >= ENDS && groups.len() > 2 * ENDS && number + ENDS < groups.len() {
+            if number == ENDS {
+                _ = writeln!(text, "{:>12}  {} more", "...", groups.len() - 2 * ENDS);
+            }
+            continue;
+        }
+        _ = writeln!(text, "{:>10.3} s  {}", group.at_s(), group.line());
+    }
+    text
+}
+
+/// The same for a picture: seconds, and a few words.
+pub fn words(timeline: &[MomentReport]) -> Vec<(f64, String)> {
+    groups(timeline)
+        .iter()
+        .filter(|group| !matches!(group.sample.what, "found" | "held"))
+        .map(|group| (group.at_s(), group.words()))
+        .collect()
+}

@@ -1,0 +1,245 @@
+//! Who speaks and who disturbs: a chain of relays under several interferers whose powers add up.
+
+use uav_relay::channel::AirGround;
+use uav_relay::{Channel, Placement};
+
+use crate::scenario::{self, Interference, Scenario, Source};
+
+/// One relay of a [`Scene`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Relay {
+    /// Altitude at the start, metres, > 0.
+    pub altitude_m: f64,
+    /// Transmit power, watts, > 0.
+    pub power_w: f64,
+    /// Whether the altitude is its own to hold, whatever the band.
+    pub holds: bool,
+}
+
+/// Where relays may fly across the line: altitudes, and distances to the side, to the right above 0, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corridor {
+    /// The lowest altitude, > 0.
+    pub least_m: f64,
+    /// The highest.
+    pub most_m: f64,
+    /// As far as it goes to the left, <= 0.
+    pub left_m: f64,
+    /// As far as it goes to the right, >= 0.
+    pub right_m: f64,
+}
+
+impl Corridor {
+    /// The plane above Tx-Rx, between two altitudes, metres.
+    pub const fn plane(least_m: f64, most_m: f64) -> Self {
+        Self {
+            least_m,
+            most_m,
+            left_m: 0.0,
+            right_m: 0.0,
+        }
+    }
+}
+
+/// A chain of relays between Tx at (0, 0) and Rx at (D, 0) under any number of interferers on the ground.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// Distance D from Tx to Rx, metres, > 0.
+    pub distance_m: f64,
+    /// Least distance between two relays, metres, >= 0.
+    pub min_separation_m: f64,
+    /// Transmit power of Tx, watts, > 0.
+    pub tx_w: f64,
+    /// The interferers; at least one.
+    pub sources: Vec<Source>,
+    /// Path-loss factor between two relays, 1/m^2, > 0.
+    pub mu_los: f64,
+    /// Path-loss factor between two places on the ground, 1/m^2, > 0.
+    pub mu_nlos: f64,
+    /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
+    pub eta: f64,
+    /// The altitudes that relays without one of their own may be given, and how far to the side all may go.
+    pub band: Corridor,
+    /// The relays from Tx to Rx; their number is N.
+    pub relays: Vec<Relay>,
+}
+
+/// Where a relay stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Along the line from Tx, metres.
+    pub x: f64,
+    /// To the right of the line, metres.
+    pub y: f64,
+    /// Above the ground, metres, > 0.
+    pub h: f64,
+}
+
+impl From<(f64, f64)> for Place {
+    /// (x, h), right above the line.
+    fn from((x, h): (f64, f64)) -> Self {
+        Self { x, y: 0.0, h }
+    }
+}
+
+impl From<Placement> for Place {
+    fn from(place: Placement) -> Self {
+        let [x, y, h] = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
+        Self { x, y, h }
+    }
+}
+
+impl Scene {
+    /// The scene of `relays` relays in `scenario`.
+    ///
+    /// `None` for a field of interference, and for a channel or a list of interferers that no scenario file can have.
+    pub fn new(scenario: &Scenario, relays: u16) -> Option<Self> {
+        let Interference::Sources(sources) = &scenario.interference else {
+            return None;
+        };
+        let spec = &scenario.channel;
+        let air_ground = match spec.air_ground {
+            scenario::AirGround::Los => AirGround::Los,
+            scenario::AirGround::Nlos => AirGround::Nlos,
+            scenario::AirGround::Weight(weight) => AirGround::Weighted(weight),
+        };
+        let channel = Channel::from_db(
+            spec.carrier_hz,
+            spec.excess_loss_los_db,
+            spec.excess_loss_nlos_db,
+            air_ground,
+        )
+        .ok()?;
+        (!sources.is_empty()).then(|| Self {
+            distance_m: scenario.distance_m,
+            min_separation_m: scenario.min_separation_m,
+            tx_w: scenario.tx_w,
+            sources: sources.clone(),
+            mu_los: channel.mu_los(),
+            mu_nlos: channel.mu_nlos(),
+            eta: channel.eta(),
+            band: Corridor {
+                least_m: scenario.altitude_min_m,
+                most_m: scenario.altitude_max_m,
+                left_m: scenario.lateral_min_m,
+                right_m: scenario.lateral_max_m,
+            },
+            relays: (1..=relays).map(|index| relay(scenario, index)).collect(),
+        })
+    }
+
+    /// Interference power that a relay there receives, watts: the sum over all sources.
+    pub fn interference_w(&self, at: impl Into<Place>) -> f64 {
+        let Place { x, y, h } = at.into();
+        let each = self.sources.iter().map(|source| {
+            let (dx, dy) = (x - source.x_m, y - source.y_m);
+            received_w(source.power_w, self.eta, dx, dy, h)
+        });
+        each.sum()
+    }
+
+    /// Interference power that Rx receives, watts; infinite with an interferer at Rx.
+    pub fn interference_rx_w(&self) -> f64 {
+        let each = self.sources.iter().map(|source| {
+            let dx = self.distance_m - source.x_m;
+            received_w(source.power_w, self.mu_nlos, dx, source.y_m, 0.0)
+        });
+        each.sum()
+    }
+
+    /// SIR (linear) of the N + 1 hops of a chain whose relay k stands at `places[k - 1]`.
+    ///
+    /// Infinite where two relays share a place; empty unless there is one place per relay, and at least one relay.
+    pub fn hop_sirs(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
+        if places.len() != self.relays.len() {
+            return Vec::new();
+        }
+        let mut from = self.tx();
+        let mut sirs = Vec::with_capacity(places.len() + 1);
+        for (&at, relay) in places.iter().zip(&self.relays) {
+            sirs.push(self.sir_at(from, at));
+            from = self.sender(at, relay);
+        }
+        if let (Some(&last), Some(relay)) = (places.last(), self.relays.last()) {
+            sirs.push(self.sir_at_rx(last, relay));
+        }
+        sirs
+    }
+
+    /// SIR (linear) of the worst hop of a chain; 0 where [`Scene::hop_sirs`] is empty.
+    pub fn chain_sir(&self, places: &[impl Copy + Into<Place>]) -> f64 {
+        let sirs = self.hop_sirs(places).into_iter();
+        sirs.reduce(f64::min).unwrap_or(0.0)
+    }
+
+    /// SIR (linear) of the worst hop of a chain whose relays stand at `along`, metres from Tx, at their altitudes right above the line;
+    /// 0 where there is not one place per relay.
+    pub fn sir_along(&self, along: &[f64]) -> f64 {
+        let places = along.iter().zip(&self.relays);
+        let places: Vec<(f64, f64)> = places.map(|(&x, relay)| (x, relay.altitude_m)).collect();
+        self.chain_sir(&places)
+    }
+
+    /// Tx, as the one who speaks.
+    pub fn tx(&self) -> Sender {
+        Sender {
+            at: Place::from((0.0, 0.0)),
+            power_w: self.tx_w,
+            factor: self.eta,
+        }
+    }
+
+    /// A relay there, as the one who speaks to another.
+    pub fn sender(&self, at: impl Into<Place>, relay: &Relay) -> Sender {
+        Sender {
+            at: at.into(),
+            power_w: relay.power_w,
+            factor: self.mu_los,
+        }
+    }
+
+    /// SIR (linear) at a relay there.
+    pub fn sir_at(&self, from: Sender, at: impl Into<Place>) -> f64 {
+        let (to, by) = (at.into(), from.at);
+        let signal = received_w(
+            from.power_w,
+            from.factor,
+            to.x - by.x,
+            to.y - by.y,
+            to.h - by.h,
+        );
+        signal / self.interference_w(to)
+    }
+
+    /// SIR (linear) at Rx of what `relay`, the last one, sends from there.
+    pub fn sir_at_rx(&self, at: impl Into<Place>, relay: &Relay) -> f64 {
+        let Place { x, y, h } = at.into();
+        let signal = received_w(relay.power_w, self.eta, self.distance_m - x, y, h);
+        signal / self.interference_rx_w()
+    }
+}
+
+/// One who speaks to a relay: where, and how loud.
+#[derive(Debug, Clone, Copy)]
+pub struct Sender {
+    /// Where.
+    pub at: Place,
+    power_w: f64,
+    factor: f64,
+}
+
+/// Relay `index` of a scenario, from 1.
+fn relay(scenario: &Scenario, index: u16) -> Relay {
+    let own = scenario.relays.get(&index);
+    let altitude_m = own.and_then(|own| own.altitude_m);
+    Relay {
+        altitude_m: altitude_m.unwrap_or(scenario.altitude_m),
+        power_w: own.and_then(|own| own.power_w).unwrap_or(scenario.uav_w),
+        holds: altitude_m.is_some(),
+    }
+}
+
+/// Power received over a squared-distance path loss, watts; the offsets in metres.
+fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -> f64 {
+    power_w / (factor * (dx * dx + dy * dy + dz * dz))
+}

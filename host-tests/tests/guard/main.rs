@@ -1,0 +1,72 @@
+//! The motion guard: a line of simulated drones, a hostile medium, and agreements that come at all times and not to everybody.
+//!
+//! `COUNT` and `SEED` in the environment take other schedules; a failure names the seed of its one.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    missing_docs
+)]
+
+mod drone;
+mod known;
+mod medium;
+mod schedule;
+mod world;
+
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use uav_relay_oracle::random::seed;
+
+use schedule::{Report, fly};
+
+fn count() -> u64 {
+    let count = std::env::var("COUNT").ok();
+    let default = if cfg!(debug_assertions) { 300 } else { 10_000 };
+    count.and_then(|text| text.parse().ok()).unwrap_or(default)
+}
+
+/// No two drones come closer than agreed in any schedule, and everybody arrives in the end.
+#[test]
+fn nobody_comes_too_close_and_everybody_arrives() {
+    let first = seed(20_260);
+    let reports: Vec<Report> = (0..count())
+        .into_par_iter()
+        .map(|k| fly(first.wrapping_add(k)))
+        .collect();
+    let sum = |of: fn(&Report) -> u64| reports.iter().map(of).sum::<u64>();
+    println!(
+        "{} schedules, {} drone-steps, {} agreements heard, {} reboots, {} relays silent, {} gone",
+        reports.len(),
+        sum(|report| report.steps),
+        sum(|report| report.heard),
+        sum(|report| report.reboots),
+        sum(|report| report.silences),
+        sum(|report| report.gone),
+    );
+    let closest = reports
+        .iter()
+        .map(|report| report.closest_m)
+        .fold(f64::INFINITY, f64::min);
+    let latest = reports
+        .iter()
+        .map(|report| report.share_of_time)
+        .fold(0.0, f64::max);
+    println!(
+        "least of (distance - separation + allowed) {closest:.6} m, latest arrival at {latest:.3} of the time allowed"
+    );
+    println!(
+        "messages a relay and second while all fly to the last places: {:.2} on average, at most {:.2}",
+        reports.iter().map(|report| report.messages).sum::<f64>() / reports.len() as f64,
+        reports
+            .iter()
+            .map(|report| report.messages)
+            .fold(0.0, f64::max),
+    );
+    assert!(
+        sum(|report| report.reboots) > 0
+            && sum(|report| report.silences) > 0
+            && sum(|report| report.gone) > 0
+    );
+}

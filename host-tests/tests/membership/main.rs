@@ -1,0 +1,120 @@
+//! The chain loses relays and takes them in again: whoever is left ends in the places that a chain of just them would take.
+//!
+//! `COUNT` and `SEED` in the environment take other schedules.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs
+)]
+
+mod flights;
+mod losses;
+mod parts;
+mod schedules;
+
+use uav_relay::{Duration, Instant, Mission};
+use uav_relay_oracle::mission::of_link;
+use uav_relay_oracle::reference::Link;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome, Turning};
+use uav_relay_sim::simulator::setup::{Partition, Setup};
+
+/// The paper's chain of `relays` on one radio channel.
+fn paper(relays: usize) -> Setup {
+    Setup::on_shared_channel(mission(relays))
+}
+
+fn mission(relays: usize) -> Mission {
+    of_link(&Link::paper(relays), 1e-4).unwrap().0
+}
+
+const fn seconds(seconds: u64) -> Instant {
+    Instant::from_millis(1_000 * seconds)
+}
+
+/// Has the run go on until `at`, whatever has come of it before.
+fn go_on_until(setup: &mut Setup, at: Instant) {
+    // Nobody is beyond the last relay, so nobody is parted.
+    setup.partitions.push(Partition {
+        after: setup.mission.relays(),
+        from: at,
+        until: None,
+    });
+}
+
+/// The relays that are left in the end, by their number from 1.
+fn left(outcome: &Outcome) -> Vec<u16> {
+    let living = (1..).zip(&outcome.relays);
+    living
+        .filter(|(_, relay)| relay.killed.is_none())
+        .map(|(index, _)| index)
+        .collect()
+}
+
+/// Where a chain of just the relays `left` of `setup` ends when nothing happens to it, and the SIR it meets, to the bit.
+fn alone(setup: &Setup, left: &[u16]) -> (Vec<Option<[u32; 3]>>, u32) {
+    let relays = u16::try_from(left.len()).unwrap();
+    let mut clean = Setup::new(setup.mission.with_relays(relays).unwrap());
+    clean.settings.predict = setup.settings.predict;
+    clean.settings.method = setup.settings.method;
+    for (index, number) in (1..).zip(left) {
+        let own = setup.profiles.iter().find(|(of, _)| of == number);
+        clean
+            .profiles
+            .extend(own.map(|(_, profile)| (index, *profile)));
+    }
+    let outcome = run(clean).unwrap();
+    assert_eq!(outcome.ending, Ending::Settled);
+    (outcome.bits(), outcome.relays[0].target.unwrap().to_bits())
+}
+
+/// Holds the relays `left` of a run to what a chain of just them does; what is wrong with it, if anything is.
+fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {
+    let (bits, target) = alone(setup, left);
+    let relays: Vec<_> = left
+        .iter()
+        .map(|number| &outcome.relays[usize::from(*number) - 1])
+        .collect();
+    for (at, relay) in relays.iter().enumerate() {
+        let place = relay
+            .setpoint
+            .map(|place| [place.x_m, place.y_m, place.altitude_m].map(f32::to_bits));
+        if usize::from(relay.index) != at + 1 || usize::from(relay.relays) != left.len() {
+            return Err(format!(
+                "relay {} is {} of {}",
+                left[at], relay.index, relay.relays
+            ));
+        }
+        if relay.target.map(f32::to_bits) != Some(target) || place != bits[at] {
+            return Err(format!(
+                "relay {} is at {:?} for {:?}",
+                left[at], relay.setpoint, relay.target
+            ));
+        }
+    }
+    if outcome.unsafe_setpoints > 0 {
+        return Err(format!("{} unsafe setpoints", outcome.unsafe_setpoints));
+    }
+    Ok(())
+}
+
+/// How often a relay has agreed to a new view.
+fn views(outcome: &Outcome, relay: u16) -> usize {
+    let reformed = |what| matches!(what, Turning::Reformed { .. });
+    outcome
+        .moments
+        .iter()
+        .filter(|moment| moment.relay == relay && reformed(moment.what))
+        .count()
+}
+
+fn ms(span: Duration) -> u64 {
+    span.as_micros() / 1_000
+}
+
+/// The environment variable `name` as a number, or `usual`.
+fn number(name: &str, usual: u64) -> u64 {
+    std::env::var(name).map_or(usual, |text| text.parse().unwrap())
+}

@@ -1,0 +1,118 @@
+//! What it costs to place a chain by the hypothetical interferer instead of the true sum.
+//!
+//! COUNT scenes of each kind (30 if unset); the table is printed. The relays' own placement maths does the placing.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use uav_relay::placement::plan::{place, solve};
+use uav_relay::{Profile, Schedule};
+use uav_relay_oracle::random::seed;
+use uav_relay_sim::hypothetical::hypothetical;
+use uav_relay_sim::mission;
+use uav_relay_sim::scenario::{Interference, Scenario};
+use uav_relay_sim::scene::Scene;
+use uav_relay_tools::multi_interferer::optimum;
+
+use super::scenes::{Sources, scenario};
+
+/// Tolerance on the SIR that the relays are asked for, relative.
+const TOLERANCE: f64 = 1e-5;
+
+/// Upper ends of the classes of relative error.
+const CLASSES: [f64; 6] = [0.001, 0.01, 0.03, 0.1, 0.3, 1.0];
+
+/// A scene's relative error, and the share of the best SIR that is lost.
+struct Outcome {
+    error: f64,
+    lost: f64,
+}
+
+/// Where the relays go in a scenario of one interferer.
+fn placed(scenario: &Scenario, n: u16) -> Option<Vec<(f64, f64)>> {
+    let (mission, own) = mission::mission(scenario, n, TOLERANCE).ok()?;
+    let of = |index: u16| {
+        let own = own.iter().find(|(at, _): &&(u16, Profile)| *at == index);
+        own.map_or(mission.config().common, |(_, profile)| *profile)
+    };
+    let agreed = solve(&mission, Schedule::Bracketed, of).ok()?;
+    (1..=n)
+        .map(|index| {
+            let at = place(&mission, agreed.target, index, of)?;
+            Some((f64::from(at.x_m), f64::from(at.altitude_m)))
+        })
+        .collect()
+}
+
+fn outcomes(default_seed: u64, kind: Sources) -> Vec<Outcome> {
+    let count = std::env::var("COUNT")
+        .ok()
+        .and_then(|text| text.parse().ok());
+    let count = count.unwrap_or(30);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed(default_seed));
+    let mut outcomes = Vec::new();
+    while outcomes.len() < count {
+        let (mut scenario, n) = scenario(&mut rng, 1..=20, 2..=5, kind);
+        scenario.min_separation_m = 0.0;
+        let scene = Scene::new(&scenario, n).unwrap();
+        let best = optimum(&scene).unwrap().sir;
+        let stand_in = hypothetical(&scene).unwrap();
+        scenario.interference = Interference::Sources(vec![stand_in.source()]);
+        let places = placed(&scenario, n).expect("the relays know a place");
+        let lost = 1.0 - scene.chain_sir(&places) / best;
+        assert!((-1e-6..=1.0).contains(&lost), "{lost} in {scene:?}");
+        outcomes.push(Outcome {
+            error: stand_in.relative_error,
+            lost,
+        });
+    }
+    outcomes
+}
+
+/// How many of them lose more than `limit`.
+fn losing(outcomes: &[&Outcome], limit: f64) -> usize {
+    outcomes
+        .iter()
+        .filter(|outcome| outcome.lost > limit)
+        .count()
+}
+
+fn print(what: &str, outcomes: &[Outcome]) {
+    println!(
+        "{what}: relative error, scenes, of those that lose more than 1 %, 5 %, 20 %, the median loss"
+    );
+    let mut low = 0.0;
+    for high in CLASSES {
+        let class = |outcome: &&Outcome| (low..high).contains(&outcome.error);
+        let mut class: Vec<&Outcome> = outcomes.iter().filter(class).collect();
+        class.sort_by(|a, b| a.lost.total_cmp(&b.lost));
+        let [one, five, twenty] = [0.01, 0.05, 0.2].map(|limit| losing(&class, limit));
+        let median = class.get(class.len() / 2).map_or(0.0, |middle| middle.lost);
+        println!(
+            "{low:>6}..{high:<6}{:>5}{one:>5}{five:>5}{twenty:>5}{median:>9.4}",
+            class.len()
+        );
+        low = high;
+    }
+}
+
+#[test]
+fn placing_by_the_hypothetical_interferer_costs_sir() {
+    let any = outcomes(83, Sources::Any);
+    let aloof = outcomes(84, Sources::Aloof);
+    print("sources anywhere", &any);
+    print("sources well beside the line", &aloof);
+    let share = |outcomes: &[Outcome], limit: f64| {
+        let all: Vec<&Outcome> = outcomes.iter().collect();
+        losing(&all, limit) as f64 / all.len() as f64
+    };
+    // As good as its fit: a small relative error goes with a small loss, and a large one does not.
+    assert!(share(&aloof, 0.05) < share(&any, 0.05));
+    let halves = |outcomes: &[Outcome]| {
+        let mut sorted: Vec<&Outcome> = outcomes.iter().collect();
+        sorted.sort_by(|a, b| a.error.total_cmp(&b.error));
+        let (well, badly) = sorted.split_at(sorted.len() / 2);
+        (losing(well, 0.05), losing(badly, 0.05))
+    };
+    let (well, badly) = halves(&any);
+    assert!(well < badly, "{well} {badly}");
+}

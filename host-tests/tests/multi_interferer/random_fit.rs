@@ -1,0 +1,51 @@
+//! The hypothetical interferer against places drawn at random, each with its best power.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay_oracle::random::{log_uniform, seed};
+use uav_relay_sim::hypothetical::{Raster, fit};
+
+use super::above;
+use super::scenes::scene;
+
+/// Places drawn in each scene.
+const DRAWN: usize = 20_000;
+
+/// Of those, how many are weighed on the raster of the fit: the best by a rough one.
+const WEIGHED: usize = 100;
+
+#[test]
+fn no_random_place_is_better() {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed(75));
+    let mut nearest = f64::INFINITY;
+    for at in 0..20 {
+        let scene = scene(&mut rng, 1..=1, 2..=5);
+        let raster = Raster::graded(&scene, None, 2_000);
+        let found = fit(&scene, &raster).unwrap();
+        let rough = Raster::graded(&scene, None, 150);
+        let d = scene.distance_m;
+        let xs = || scene.sources.iter().map(|source| source.x_m);
+        let (low, high) = (xs().fold(0.0, f64::min), xs().fold(d, f64::max));
+        let mut drawn: Vec<(f64, f64, f64)> = (0..DRAWN)
+            .map(|_| {
+                let x = rng.random_range(low..=high);
+                let y = log_uniform(&mut rng, 1e-3 * d, 10.0 * d);
+                (rough.weigh(x, y).error, x, y)
+            })
+            .collect();
+        drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let best = drawn
+            .iter()
+            .take(WEIGHED)
+            .map(|&(_, x, y)| raster.weigh(x, y).error)
+            .fold(f64::INFINITY, f64::min);
+        let margin = above(best, found.weighed.error);
+        nearest = nearest.min(margin);
+        assert!(
+            margin > -1e-9,
+            "scene {at}: {best} below {found:?} in {scene:?}"
+        );
+    }
+    println!("the best of the random places came within {nearest:.1e} of the fit");
+    assert!(nearest < 0.01, "the draw is too coarse to tell anything");
+}

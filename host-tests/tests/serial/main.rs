@@ -1,0 +1,224 @@
+//! The facade over serial ports, on ports that hold a byte or three, fail, or are never read.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    missing_docs
+)]
+
+mod chain;
+mod driver_enable;
+mod pipe;
+mod uart;
+
+use chain::{BYTE_TIME, Kind, Node, chain, direct, has_lost, relay, run, setpoints};
+use pipe::{End, Trouble};
+use uav_relay::serial::{READ_LIMIT, SerialStats};
+use uav_relay::{Instant, Side, Wiring};
+
+const KINDS: [Kind; 2] = [Kind::Nb, Kind::Io];
+
+#[test]
+fn a_chain_on_ports_of_any_size_settles_where_the_bare_relays_do() {
+    let expected = direct(3);
+    assert!(expected.iter().all(Option::is_some));
+    for kind in KINDS {
+        for wiring in [Wiring::Pair, Wiring::Shared] {
+            for capacity in [1, 3, 16, 1000] {
+                let (mut nodes, _far) = chain(kind, wiring, 3, capacity, &Trouble::default());
+                run(&mut nodes, Instant::ZERO, Instant::from_millis(2_000));
+                let name = format!("{kind:?} {wiring:?} {capacity}");
+                assert_eq!(setpoints(&nodes), expected, "{name}");
+                for node in &nodes {
+                    assert_eq!(node.relay.stats().rejected(), 0, "{name}");
+                    for stats in node.driver.stats() {
+                        assert_eq!(stats, SerialStats::default(), "{name}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn an_end_that_never_reads_neither_blocks_nor_starves_the_other_link() {
+    for kind in KINDS {
+        // Relay 2 of 3, whose wire toward relay 1 ends at nobody; relay 3 is well.
+        let [nobody, deaf] = End::wire(3);
+        let [up, down] = End::wire(16);
+        let [last, _rx] = End::wire(16);
+        let none = Trouble::default();
+        let mut nodes = [
+            Node::new(kind, relay(3, 2, Wiring::Pair), &[deaf, up], &none),
+            Node::new(kind, relay(3, 3, Wiring::Pair), &[down, last], &none),
+        ];
+        let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(300_000));
+        assert_eq!(nobody.waiting(), 3, "{kind:?}: the wire is full");
+        assert!(has_lost(&nodes[0], Side::Upstream), "{kind:?}");
+        assert!(!has_lost(&nodes[0], Side::Downstream), "{kind:?}");
+        assert!(!has_lost(&nodes[1], Side::Upstream), "{kind:?}");
+        let stats = nodes[0].driver.stats();
+        assert!(
+            stats[0].dropped > 0,
+            "{kind:?}: what cannot be sent is counted"
+        );
+        assert_eq!(stats[1], SerialStats::default(), "{kind:?}");
+        // 128 byte times between attempts at the deaf end, and a little for the other one.
+        assert!(
+            nodes[0].polls < 35_000,
+            "{kind:?}: {} polls",
+            nodes[0].polls
+        );
+        // Nothing is lost in between: sent is what was dropped, and what is in the wire and the link.
+        let sent = nodes[0].relay.stats().sent;
+        assert!(sent > stats[0].dropped + 2, "{kind:?}: {sent}");
+
+        // Somebody begins to read: whole frames come out, the next one included.
+        let mut heard = Vec::new();
+        let mut now = now;
+        for _ in 0..400 {
+            heard.extend(std::iter::from_fn(|| nobody.get()));
+            now = run(&mut nodes, now, now + BYTE_TIME);
+        }
+        let frames: Vec<&[u8]> = heard.split_inclusive(|&byte| byte == 0).collect();
+        assert!(frames.len() >= 2, "{kind:?}: {heard:?}");
+        assert!(
+            frames.iter().all(|frame| [20, 30].contains(&frame.len())),
+            "{kind:?}: heartbeats, and hails that call for a view"
+        );
+        let before = nodes[0].driver.stats()[0].dropped;
+        for _ in 0..3_000 {
+            while nobody.get().is_some() {}
+            now = run(&mut nodes, now, now + BYTE_TIME.times(100));
+        }
+        assert_eq!(
+            nodes[0].driver.stats()[0].dropped,
+            before,
+            "{kind:?}: no more"
+        );
+    }
+}
+
+#[test]
+fn on_a_shared_channel_frames_wait_in_the_relay_and_none_is_dropped() {
+    for kind in KINDS {
+        let mut ends = End::channel(2, 3);
+        let (nobody, end) = (ends.remove(0), ends.remove(0));
+        let relay = relay(2, 1, Wiring::Shared);
+        let mut nodes = [Node::new(kind, relay, &[end], &Trouble::default())];
+        let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(60_000));
+        assert_eq!(nobody.waiting(), 3);
+        assert_eq!(nodes[0].driver.stats()[0], SerialStats::default());
+        // Two frames in the link at most, and a repetition cannot be sent before there is room.
+        assert!(nodes[0].relay.stats().sent <= 3, "{kind:?}");
+
+        let mut now = now;
+        let before = nodes[0].relay.stats().sent;
+        for _ in 0..2_000 {
+            while nobody.get().is_some() {}
+            now = run(&mut nodes, now, now + BYTE_TIME);
+        }
+        assert!(nodes[0].relay.stats().sent > before, "{kind:?}: it goes on");
+    }
+}
+
+#[test]
+fn read_errors_are_counted_by_kind_and_survived() {
+    let expected = direct(3);
+    for kind in KINDS {
+        for wiring in [Wiring::Pair, Wiring::Shared] {
+            let (mut nodes, _far) = chain(kind, wiring, 3, 16, &Trouble::times(10, 40));
+            run(&mut nodes, Instant::ZERO, Instant::from_millis(30_000));
+            assert_eq!(setpoints(&nodes), expected, "{kind:?} {wiring:?}");
+            // The second relay hears both of its neighbours.
+            let stats = nodes[1].driver.stats()[0];
+            let counted = [stats.overrun, stats.framing, stats.parity, stats.noise];
+            match kind {
+                Kind::Nb => assert!(counted.iter().all(|&count| count >= 1), "{stats:?}"),
+                // These ports do not say what it was, and may hand over what came before instead.
+                Kind::Io => assert!(counted == [0; 4] && stats.other >= 1, "{stats:?}"),
+            }
+            let rejected: u32 = nodes.iter().map(|node| node.relay.stats().rejected()).sum();
+            assert!(rejected > 0, "{kind:?} {wiring:?}: frames were hurt");
+        }
+    }
+}
+
+#[test]
+fn a_port_that_only_fails_gives_the_others_their_turn() {
+    let dead = Trouble::times(usize::MAX, 1);
+    let [up, _] = End::wire(16);
+    let [down, _] = End::wire(16);
+    up.stuff(&[1; 10_000]);
+    let mut node = Node::new(Kind::Nb, relay(2, 1, Wiring::Pair), &[up, down], &dead);
+    let now = Instant::from_millis(1);
+    let wake = node.driver.poll(now, &mut node.relay);
+    let stats = node.driver.stats()[0];
+    let counted = stats.overrun + stats.framing + stats.parity + stats.noise + stats.other;
+    assert_eq!(usize::try_from(counted).unwrap(), READ_LIMIT);
+    assert_eq!(wake, Some(now + BYTE_TIME));
+}
+
+#[test]
+fn a_poll_reads_no_more_than_its_limit_and_asks_to_be_called_soon() {
+    for kind in KINDS {
+        let [up, _] = End::wire(16);
+        let [down, _] = End::wire(16);
+        up.stuff(&[7; 3 * READ_LIMIT]);
+        let ends = [up.clone(), down];
+        let mut node = Node::new(kind, relay(2, 1, Wiring::Pair), &ends, &Trouble::default());
+        let mut now = Instant::ZERO;
+        for left in [2 * READ_LIMIT, READ_LIMIT, 0] {
+            let wake = node.driver.poll(now, &mut node.relay);
+            assert_eq!(up.waiting(), left, "{kind:?}");
+            let soon = node
+                .relay
+                .poll_timeout()
+                .map(|due| due.min(now + BYTE_TIME));
+            assert_eq!(wake, soon, "{kind:?}");
+            now = now + BYTE_TIME;
+        }
+        // Nothing to read and nothing to write: the relay's own time is all that is left.
+        let wake = node.driver.poll(now, &mut node.relay);
+        assert_eq!(wake, node.relay.poll_timeout(), "{kind:?}");
+    }
+}
+
+#[test]
+fn an_idle_facade_asks_for_nothing_but_what_the_relay_asks_for() {
+    for kind in KINDS {
+        // A chain of one has no timers once it is settled.
+        let (mut nodes, far) = chain(kind, Wiring::Pair, 1, 16, &Trouble::default());
+        let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(1_000));
+        assert!(nodes[0].relay.setpoint().is_some());
+        let Node { driver, relay, .. } = &mut nodes[0];
+        assert_eq!(driver.poll(now, relay), None, "{kind:?}");
+        assert!(far.iter().all(|end| end.carried() == 0));
+
+        // A settled chain of three wakes up for heartbeats only: a handful of polls a second, not one a byte time.
+        let (mut nodes, _far) = chain(kind, Wiring::Pair, 3, 1000, &Trouble::default());
+        let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(1_000));
+        for node in &mut nodes {
+            let wake = node.driver.poll(now, &mut node.relay);
+            assert_eq!(wake, node.relay.poll_timeout(), "{kind:?}");
+            assert!(
+                wake.is_some_and(|wake| wake > now + BYTE_TIME.times(1_000)),
+                "{kind:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn frames_for_a_port_that_is_not_there_are_counted() {
+    let [end, far] = End::wire(1000);
+    let relay = relay(2, 1, Wiring::Pair);
+    let mut nodes = [Node::new(Kind::Nb, relay, &[end], &Trouble::default())];
+    run(&mut nodes, Instant::ZERO, Instant::from_millis(1_000));
+    let stats = nodes[0].driver.stats()[0];
+    assert!(stats.unrouted > 0);
+    assert_eq!(stats.unrouted, nodes[0].relay.stats().sent);
+    assert_eq!(far.waiting(), 0);
+}

@@ -1,0 +1,146 @@
+//! A new mission in flight: from the ground at either end to all relays, or to none.
+//!
+//! `COUNT` and `SEED` in the environment take other schedules.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    missing_docs
+)]
+
+mod chain;
+mod flights;
+mod hand;
+mod restarts;
+mod schedules;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use uav_relay::{Instant, Interference, Interferer, Mission, MissionConfig, Side, Upload};
+use uav_relay_oracle::mission::of_link;
+use uav_relay_oracle::reference::Link;
+use uav_relay_sim::simulator::chain::{UploadSpec, run};
+use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, Turning};
+use uav_relay_sim::simulator::setup::Setup;
+
+/// The paper's chain of `relays`.
+fn mission(relays: usize) -> Mission {
+    of_link(&Link::paper(relays), 1e-4).unwrap().0
+}
+
+/// The same with the interferer somewhere else.
+fn moved(base: &Mission, x_m: f32, y_m: f32) -> MissionConfig {
+    MissionConfig {
+        interference: Interference::Source(Interferer {
+            power_w: 80.0,
+            x_m,
+            y_m,
+        }),
+        ..*base.config()
+    }
+}
+
+/// A chain of `base` whose frames are signed, on one radio or on wires.
+fn signed(base: Mission, shared: bool) -> Setup {
+    let mut setup = if shared {
+        Setup::on_shared_channel(base)
+    } else {
+        Setup::new(base)
+    };
+    setup.auth = true;
+    setup
+}
+
+/// Version `version` from the ground at `end` at `at`.
+fn upload(
+    base: &Mission,
+    end: Side,
+    at: Instant,
+    version: u16,
+    config: MissionConfig,
+) -> UploadSpec {
+    UploadSpec {
+        end,
+        at,
+        upload: Upload::new(base, version, config).unwrap(),
+    }
+}
+
+const fn seconds(seconds: u64) -> Instant {
+    Instant::from_millis(1_000 * seconds)
+}
+
+/// Holds a run to what must be true of any: who agrees to a view flies the mission that all others in it fly, and only once as many
+/// as it has have held it; no setpoint is outside its limits, and a chain that has settled flies `version` in the places of a chain of the relays left that was given
+/// `config` before flight. What is wrong with it, if anything is.
+fn judge(
+    setup: &Setup,
+    outcome: &Outcome,
+    version: u16,
+    config: MissionConfig,
+) -> Result<(), String> {
+    let mut flown = BTreeMap::new();
+    let mut holders: BTreeMap<u16, BTreeSet<u16>> = BTreeMap::new();
+    for moment in &outcome.moments {
+        match moment.what {
+            Turning::Uploaded(version) => {
+                holders.entry(version).or_default().insert(moment.relay);
+            }
+            Turning::Reformed {
+                view,
+                version,
+                relays,
+                ..
+            } => {
+                if *flown.entry(view).or_insert(version) != version {
+                    return Err(format!("view {view} is of several missions"));
+                }
+                let hold = holders.get(&version).map_or(0, BTreeSet::len);
+                if version > 0 && hold < relays.into() {
+                    return Err(format!("{hold} of {relays} held mission {version}"));
+                }
+            }
+            _ => {}
+        }
+    }
+    if outcome.unsafe_setpoints > 0 {
+        return Err(format!("{} unsafe setpoints", outcome.unsafe_setpoints));
+    }
+    if outcome.ending != Ending::Settled {
+        return Err(format!("{:?}", outcome.ending));
+    }
+    let left: Vec<_> = (1_u16..)
+        .zip(&outcome.relays)
+        .filter(|(_, relay)| relay.killed.is_none())
+        .collect();
+    let relays = u16::try_from(left.len()).unwrap();
+    let mission = Mission::try_new(config).unwrap();
+    let mut clean = Setup::new(mission.with_relays(relays).unwrap());
+    clean.settings = setup.settings;
+    clean.settings.wiring = uav_relay::Wiring::Pair;
+    for (index, (number, _)) in (1..).zip(&left) {
+        let own = setup.profiles.iter().find(|(of, _)| of == number);
+        let own = own.map(|(_, profile)| (index, *profile));
+        clean.profiles.extend(own);
+        clean
+            .held
+            .extend(setup.held.contains(number).then_some(index));
+    }
+    let clean = run(clean).unwrap();
+    assert_eq!(clean.ending, Ending::Settled);
+    let target =
+        |relay: &uav_relay_sim::simulator::outcome::RelayEnd| relay.target.map(f32::to_bits);
+    for ((number, relay), alone) in left.into_iter().zip(&clean.relays) {
+        if relay.version != version {
+            return Err(format!("relay {number} flies mission {}", relay.version));
+        }
+        if relay.setpoint != alone.setpoint || target(relay) != target(alone) {
+            return Err(format!(
+                "relay {number} is at {:?}, not at {:?}",
+                relay.setpoint, alone.setpoint
+            ));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,35 @@
+//! The options of `cargo figures`.
+
+use std::path::PathBuf;
+
+use clap::Parser;
+use uav_relay_tools::figures::ALL;
+
+/// Computes every figure of the paper's evaluation, and this project's own, with the code that flies: pictures (SVG), their
+/// numbers (CSV), and index.html with all of them.
+#[derive(Parser, Debug)]
+#[command(name = "figures", bin_name = "cargo figures", disable_version_flag = true, after_help = figures())]
+pub(crate) struct Options {
+    /// Where to put them; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "target/figures")]
+    pub(crate) out: PathBuf,
+    /// Only this figure; repeatable. index.html then shows only those asked for
+    #[arg(long, value_name = "NAME", value_parser = name)]
+    pub(crate) only: Vec<String>,
+}
+
+fn names() -> String {
+    ALL.map(|figure| figure.name).join(", ")
+}
+
+fn figures() -> String {
+    format!("Figures: {}", names())
+}
+
+fn name(text: &str) -> Result<String, String> {
+    if ALL.iter().any(|figure| figure.name == text) {
+        Ok(text.to_owned())
+    } else {
+        Err(format!("must be one of {}", names()))
+    }
+}

@@ -1,0 +1,93 @@
+//! `cargo plan`: how many relays, where, and what to expect of them, before anything flies.
+
+mod options;
+
+use std::process::ExitCode;
+
+use clap::Parser as _;
+use uav_relay_sim::command::{self, Failure};
+use uav_relay_sim::scenario::Scenario;
+use uav_relay_sim::svg::{self, Picture, room};
+use uav_relay_tools::plan::report::PlanReport;
+use uav_relay_tools::plan::{self, Ask, NoPlan, Plan};
+
+use options::{Altitude, Options};
+
+fn main() -> ExitCode {
+    match Options::try_parse() {
+        Ok(options) => command::ended(run(&options)),
+        Err(error) => command::usage(&error),
+    }
+}
+
+fn run(options: &Options) -> Result<(), Failure> {
+    let scenario = match &options.scenario {
+        Some(file) => Scenario::load(file).map_err(|error| Failure::input(error.to_string()))?,
+        None => Scenario::default(),
+    };
+    let number = options.number()?;
+    let ask = Ask {
+        number,
+        free_altitude: options.altitude == Altitude::Free,
+        x_m: options.x_m,
+        tolerance: options.tolerance,
+    };
+    match plan::plan(&scenario, &ask) {
+        Ok(plan) => {
+            if let Some(file) = &options.svg {
+                command::write(file, &svg::draw(&picture(&plan, &scenario)))?;
+            }
+            show(
+                options,
+                &PlanReport::new(&plan, number, options.bandwidth_hz),
+            )
+        }
+        Err(NoPlan::Wrong(line)) => {
+            let file = options
+                .scenario
+                .as_ref()
+                .map_or("default scenario".into(), |file| file.to_string_lossy());
+            let about_an_option = line.starts_with("--");
+            Err(Failure::input(if about_an_option {
+                line
+            } else {
+                format!("{file}: {line}")
+            }))
+        }
+        Err(NoPlan::Unmet(error, best_sir)) => {
+            show(options, &PlanReport::unmet(error, best_sir, number))
+        }
+    }
+}
+
+fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
+    Picture {
+        title_method: plan.how.to_owned(),
+        distance_m: f64::from(plan.mission.config().distance_m),
+        interferers: scenario.sources(),
+        nodes: plan
+            .places
+            .iter()
+            .map(|(place, _)| (f64::from(place.x_m), f64::from(place.altitude_m)))
+            .collect(),
+        room: room(
+            &plan.mission,
+            plan.places.iter().map(|(place, _)| f64::from(place.y_m)),
+        ),
+        hop_sir: plan.sirs.clone(),
+        ..Picture::default()
+    }
+}
+
+/// Prints the report; what it says went wrong is the failure.
+fn show(options: &Options, report: &PlanReport) -> Result<(), Failure> {
+    command::print(&if options.json {
+        command::json(report)?
+    } else {
+        report.table()
+    });
+    match &report.error {
+        None => Ok(()),
+        Some(error) => Err(Failure::unmet(error.clone())),
+    }
+}

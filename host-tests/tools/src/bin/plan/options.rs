@@ -1,0 +1,89 @@
+//! The options of `cargo plan`, and their ranges.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, ValueEnum};
+use uav_relay_sim::command::{Failure, number};
+use uav_relay_tools::plan::Number;
+use uav_relay_tools::plan::report::sir_for_rate;
+
+/// How many relays a target SIR needs, or the best places for a given number, worked out without any messages.
+#[derive(Parser, Debug)]
+#[command(name = "plan", bin_name = "cargo plan", disable_version_flag = true)]
+pub(crate) struct Options {
+    /// Scenario file (TOML); without it the paper's multi-hop scenario
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scenario: Option<PathBuf>,
+    #[command(flatten)]
+    wanted: Wanted,
+    /// Whether each relay holds the altitude the scenario gives it, or may choose one in the scenario's band
+    #[arg(long, value_name = "A", value_enum, default_value_t = Altitude::Given)]
+    pub(crate) altitude: Altitude,
+    /// Where the only relay has to stand, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    pub(crate) x_m: Option<f64>,
+    /// Bandwidth of a hop, hertz, 1 to 1e12: SIRs are also told as data rates, log2(1 + SIR) bits a second and hertz
+    #[arg(long, value_name = "B", value_parser = |text: &str| number(text, 1.0, 1e12))]
+    pub(crate) bandwidth_hz: Option<f64>,
+    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
+    #[arg(long, value_name = "T", default_value_t = 1e-4, value_parser = |text: &str| number(text, 1e-6, 0.1))]
+    pub(crate) tolerance: f64,
+    /// One JSON object on standard output and nothing else there
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
+}
+
+/// What is wanted: exactly one of these.
+#[derive(Args, Debug)]
+#[group(required = true, multiple = false)]
+struct Wanted {
+    /// The best places for this number of relays, 1 to 1000
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    uavs: Option<u16>,
+    /// The fewest relays that give every hop this SIR, linear, 1e-9 to 1e9
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-9, 1e9))]
+    target_sir: Option<f64>,
+    /// The same in dB, -90 to 90
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, -90.0, 90.0))]
+    target_sir_db: Option<f64>,
+    /// The fewest relays that carry this data rate, bit/s, above 0 to 1e15; needs --bandwidth-hz
+    #[arg(long, value_name = "R", requires = "bandwidth_hz", value_parser = |text: &str| number(text, 1e-9, 1e15))]
+    target_rate_bps: Option<f64>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub(crate) enum Altitude {
+    /// As the scenario gives it
+    Given,
+    /// Any in the scenario's band
+    Free,
+}
+
+impl Options {
+    /// How many relays are asked for.
+    pub(crate) fn number(&self) -> Result<Number, Failure> {
+        let wanted = &self.wanted;
+        if let Some(uavs) = wanted.uavs {
+            return Ok(Number::Of(uavs));
+        }
+        let target = match (wanted.target_sir, wanted.target_sir_db) {
+            (Some(target), _) => target,
+            (None, Some(db)) => 10_f64.powf(db / 10.0),
+            (None, None) => {
+                let rate = wanted.target_rate_bps.unwrap_or(f64::NAN);
+                let bandwidth = self.bandwidth_hz.unwrap_or(f64::NAN);
+                let target = sir_for_rate(bandwidth, rate);
+                if !(1e-9..=1e9).contains(&target) {
+                    return Err(Failure::input(format!(
+                        "--target-rate-bps {rate:?}: over {bandwidth:?} Hz it takes an SIR of {target:.3e}, which must be within 1e-9 to 1e9"
+                    )));
+                }
+                target
+            }
+        };
+        Ok(Number::Meeting(target))
+    }
+}

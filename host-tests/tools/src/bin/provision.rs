@@ -1,0 +1,164 @@
+//! `cargo brief`: what is written into one drone before it flies, from a scenario.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use clap::{Parser, ValueEnum};
+use uav_relay::{Adjust, Local, Measure};
+use uav_relay_sim::command::{self, Failure};
+use uav_relay_sim::scenario::{Interference, Scenario};
+use uav_relay_tools::provision::block::Flight;
+use uav_relay_tools::provision::config::{ADDRESS, LEN, Secret};
+use uav_relay_tools::provision::key;
+
+/// Writes the configuration block of one relay: which one it is, and the mission it flies.
+#[derive(Parser, Debug)]
+#[command(name = "brief", bin_name = "cargo brief", disable_version_flag = true)]
+struct Options {
+    /// Scenario file (TOML); without it the paper's multi-hop scenario
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Number of relays, 1 to 1000
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    uavs: u16,
+    /// Which of them this drone is, 1 (next to the transmitter) to N
+    #[arg(long, value_name = "I", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    index: u16,
+    /// Number of the network, 0 to 65535; frames of any other are ignored
+    #[arg(long, value_name = "W", default_value_t = 1)]
+    network: u16,
+    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
+    #[arg(long, value_name = "T", default_value_t = 1e-4)]
+    tolerance: f64,
+    /// How the places are found; in a field, only by `align`
+    #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
+    method: Method,
+    /// Rounds of `adjust` at most, 1 to 65535
+    #[arg(long, value_name = "K", default_value_t = 500, value_parser = clap::value_parser!(u16).range(1..))]
+    rounds: u16,
+    /// How far a relay may go up or down in one round of `adjust`, metres, 0 to 1e5
+    #[arg(long = "explore", value_name = "M", default_value_t = 10.0, value_parser = explore)]
+    explore_m: f32,
+    /// In a field: the relay measures it too, and believes this many samples at a place, 100 to 1000000
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
+    samples: Option<u32>,
+    /// File with the network's key, 64 hexadecimal digits; without one the frames of this relay are not signed
+    #[arg(long, value_name = "FILE")]
+    key_file: Option<PathBuf>,
+    /// The least epoch to sign with, 1 to 4294967294, above any that a relay of this index has signed with by this key: it rises
+    /// by itself from there. Without it the seconds of this machine's clock
+    #[arg(long, value_name = "E", requires = "key_file", value_parser = clap::value_parser!(u32).range(1..=0xFFFF_FFFE))]
+    epoch: Option<u32>,
+    /// File to write the block to
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Method {
+    /// Algorithm 1, in a field Algorithm 4
+    Align,
+    /// Places, sides and altitudes together
+    #[value(alias = "altitude")]
+    Joint,
+    /// Algorithm 1, then Algorithm 2
+    Adjust,
+}
+
+fn explore(text: &str) -> Result<f32, String> {
+    let value: Option<f32> = text.parse().ok();
+    value
+        .filter(|value| (0.0..=1e5).contains(value))
+        .ok_or_else(|| "must be a number within 0.0 to 100000.0".to_owned())
+}
+
+fn main() -> ExitCode {
+    match Options::try_parse() {
+        Ok(options) => {
+            let line = run(&options).map(|line| println!("{line}"));
+            command::ended(line.map_err(Failure::input))
+        }
+        Err(error) => command::usage(&error),
+    }
+}
+
+fn run(options: &Options) -> Result<String, String> {
+    let Options {
+        uavs,
+        index,
+        network,
+        ..
+    } = *options;
+    if index > uavs {
+        return Err(format!("--index {index}: must be within 1 to {uavs}"));
+    }
+    let scenario = match &options.scenario {
+        Some(file) => Scenario::load(file).map_err(|error| error.to_string())?,
+        None => Scenario::default(),
+    };
+    let name = options
+        .scenario
+        .as_ref()
+        .map_or("default scenario".into(), |file| file.to_string_lossy());
+    let method = match options.method {
+        Method::Align => uav_relay::Method::Align,
+        Method::Joint => uav_relay::Method::Joint,
+        Method::Adjust => uav_relay::Method::Adjust(Adjust {
+            rounds: options.rounds,
+            explore_m: options.explore_m,
+            local: Local::Fine,
+        }),
+    };
+    let flight = Flight::new(&scenario, uavs, options.tolerance, network)
+        .map_err(|error| format!("{name}: {error}"))?;
+    let secret = secret(options)?;
+    let block = flight
+        .by(method)
+        .signed(secret)
+        .measuring(measure(options, &scenario)?)
+        .block(index)
+        .map_err(|error| format!("{name}: {error}"))?;
+    let file = &options.out;
+    std::fs::write(file, block)
+        .map_err(|error| format!("{}: --out cannot be written: {error}", file.display()))?;
+    if secret.is_none() {
+        eprintln!("no --key-file: frames are not signed, and anybody can send some");
+    }
+    Ok(format!(
+        "{}: relay {index} of {uavs}, network {network}; {LEN} bytes for {ADDRESS:#010x}",
+        file.display()
+    ))
+}
+
+fn secret(options: &Options) -> Result<Option<Secret>, String> {
+    let Some(file) = &options.key_file else {
+        return Ok(None);
+    };
+    let seconds = || {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
+        u32::try_from(since.as_secs()).ok()
+    };
+    let epoch = options.epoch.or_else(seconds);
+    Ok(Some(Secret {
+        key: key::load(file)?,
+        epoch: epoch.ok_or("--epoch: is needed where the clock says no time")?,
+    }))
+}
+
+fn measure(options: &Options, scenario: &Scenario) -> Result<Option<Measure>, String> {
+    let Some(samples) = options.samples else {
+        return Ok(None);
+    };
+    let Interference::Field(field) = &scenario.interference else {
+        return Err(format!(
+            "--samples {samples}: is for a scenario with a [field]"
+        ));
+    };
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "1e-30 to 1e6 by the scenario"
+    )]
+    let i_max_w = field.i_max_w as f32;
+    Ok(Some(Measure { i_max_w, samples }))
+}

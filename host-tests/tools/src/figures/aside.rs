@@ -1,0 +1,233 @@
+//! A single relay that may go beside the line: where it goes as the room grows, and what side and altitude are worth.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use uav_relay::Mission;
+use uav_relay::placement::single::{Found, aside, free, given_altitude};
+
+use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::paper;
+use super::sheet::{Sheet, Table};
+use super::trouble::Trouble;
+use uav_relay_sim::scenario::Scenario;
+
+/// Power of the relay, W.
+pub const RELAY_W: f64 = 0.5;
+
+/// Lowest and highest altitude, m.
+pub const ALTITUDES_M: (f64, f64) = (20.0, 300.0);
+
+/// Offsets of the interferer whose places are drawn, m.
+pub const OFFSETS_M: [f64; 4] = [50.0, 100.0, 150.0, 250.0];
+
+/// The most room to each side, m.
+pub const MOST_ROOM_M: u16 = 400;
+
+/// From one room to the next, m.
+const ROOM_STEP_M: u16 = 4;
+
+/// The room to each side that the gain is drawn for, m: as far as the altitude goes up.
+pub const ROOM_M: f64 = 300.0;
+
+/// The offset of the interferer up to which the gain is drawn, m, and its step.
+const MOST_OFFSET_M: u16 = 400;
+const OFFSET_STEP_M: u16 = 5;
+
+/// The best place with some room.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Row {
+    /// Offset of the interferer, m.
+    pub interferer_y_m: f64,
+    /// Room to each side, m.
+    pub room_m: f64,
+    /// Its place along the line, m from Tx.
+    pub x_m: f32,
+    /// Across it, m.
+    pub y_m: f32,
+    /// SIR of the worse hop, linear.
+    pub sir_linear: f32,
+}
+
+/// What side and altitude are worth under one interferer.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Gain {
+    /// Offset of the interferer, m.
+    pub interferer_y_m: f64,
+    /// SIR right above the line at the lowest altitude, linear.
+    pub line_sir_linear: f32,
+    /// The same with the altitude free, linear.
+    pub altitude_sir_linear: f32,
+    /// With the side free at the lowest altitude, linear.
+    pub side_sir_linear: f32,
+    /// With both free, linear.
+    pub both_sir_linear: f32,
+    /// Altitude with both free, m.
+    pub both_altitude_m: f32,
+}
+
+fn mission(offset_m: f64, room_m: f64) -> Result<Mission, Trouble> {
+    let scenario = Scenario {
+        altitude_m: ALTITUDES_M.0,
+        altitude_min_m: ALTITUDES_M.0,
+        altitude_max_m: ALTITUDES_M.1,
+        lateral_min_m: -room_m,
+        lateral_max_m: room_m,
+        uav_w: RELAY_W,
+        ..paper::with_interferer(paper::multi_hop(), 500.0, offset_m)
+    };
+    paper::mission(&scenario, 1)
+}
+
+fn some<C>(found: Option<(Found, C)>) -> Result<Found, Trouble> {
+    let (found, _) = found.ok_or(Trouble::Unsettled("a single relay"))?;
+    Ok(found)
+}
+
+/// The best places at the lowest altitude for each offset, every `step_m` of room.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn data(step_m: u16) -> Result<Vec<Row>, Trouble> {
+    let mut rows = Vec::new();
+    for offset_m in OFFSETS_M {
+        for room_m in (0..=MOST_ROOM_M).step_by(usize::from(step_m)) {
+            let room_m = f64::from(room_m);
+            let mission = mission(offset_m, room_m)?;
+            let found = some(aside::best_at(&mission, mission.config().common))?;
+            rows.push(Row {
+                interferer_y_m: offset_m,
+                room_m,
+                x_m: found.place.x_m,
+                y_m: found.place.y_m,
+                sir_linear: found.sir,
+            });
+        }
+    }
+    Ok(rows)
+}
+
+/// What side and altitude are worth, every `step_m` of the interferer's offset.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn gains(step_m: u16) -> Result<Vec<Gain>, Trouble> {
+    let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
+    offsets.par_iter().map(|&offset| gain(offset)).collect()
+}
+
+fn gain(offset: u16) -> Result<Gain, Trouble> {
+    let offset_m = f64::from(offset);
+    let mission = mission(offset_m, ROOM_M)?;
+    let common = mission.config().common;
+    let both = some(aside::best_place(&mission, common.power_w))?;
+    Ok(Gain {
+        interferer_y_m: offset_m,
+        line_sir_linear: some(given_altitude::best_place(&mission, common))?.sir,
+        altitude_sir_linear: some(free::best_place(&mission, common.power_w))?.sir,
+        side_sir_linear: some(aside::best_at(&mission, common))?.sir,
+        both_sir_linear: both.sir,
+        both_altitude_m: both.place.altitude_m,
+    })
+}
+
+fn taken() -> Vec<String> {
+    let (low, high) = ALTITUDES_M;
+    vec![format!(
+        "D = 1000 m, p_t = p_MSI = 80 W, p_u = {RELAY_W} W, interferer at (500, Y) m, altitudes of {low} m to {high} m"
+    )]
+}
+
+/// The figure of the places.
+///
+/// # Errors
+/// Never in practice: see [`Trouble`].
+pub fn places_sheet() -> Result<Sheet, Trouble> {
+    let rows = data(ROOM_STEP_M)?;
+    let lines = |of: fn(&Row) -> (f64, f64)| -> Vec<Line> {
+        let line = |(index, offset): (usize, f64)| {
+            let own = rows
+                .iter()
+                .filter(|row| row.interferer_y_m.to_bits() == offset.to_bits());
+            Line::new(
+                &format!("Y = {offset} m"),
+                Look::number(index).spaced(),
+                own.map(of),
+            )
+        };
+        OFFSETS_M.into_iter().enumerate().map(line).collect()
+    };
+    Ok(Sheet {
+        name: "aside",
+        title: "The best place of a single relay as the room beside the line grows",
+        says: vec![
+            "Not in the paper. Seen from above: the relay leaves the line on the side away from the \
+             interferer, and keeps to the edge of the room until it has enough. There the circles \
+             of equal SIR of both hops touch, and more room changes nothing."
+                .to_owned(),
+        ],
+        taken: [
+            taken(),
+            vec!["at the lowest altitude, with the same room to both sides".to_owned()],
+        ]
+        .concat(),
+        chart: Chart {
+            panels: vec![
+                Panel {
+                    heading: "seen from above".to_owned(),
+                    x: Axis::linear("x, m"),
+                    y: Axis::linear("y, m"),
+                    lines: lines(|row| (f64::from(row.x_m), f64::from(row.y_m))),
+                },
+                Panel {
+                    heading: "what it gains".to_owned(),
+                    x: Axis::linear("room to each side, m").between(0.0, f64::from(MOST_ROOM_M)),
+                    y: Axis::linear("SIR, linear"),
+                    lines: lines(|row| (row.room_m, f64::from(row.sir_linear))),
+                },
+            ],
+        },
+        tables: vec![Table::new("aside", &rows)?],
+        shown: Vec::new(),
+    })
+}
+
+/// The figure of the gain.
+///
+/// # Errors
+/// Never in practice: see [`Trouble`].
+pub fn gains_sheet() -> Result<Sheet, Trouble> {
+    let rows = gains(OFFSET_STEP_M)?;
+    let line = |name: &str, index: usize, sir: fn(&Gain) -> f32| {
+        let points = rows
+            .iter()
+            .map(|row| (row.interferer_y_m, f64::from(sir(row))));
+        Line::new(name, Look::number(index).spaced(), points)
+    };
+    Ok(Sheet {
+        name: "aside-gain",
+        title: "What a single relay gains by side, by altitude and by both",
+        says: vec![
+            "Not in the paper. With an interferer on the line, side and altitude are worth all but the same. \
+             Else the side is worth more. Where all of the room is used, the altitude can add to it; \
+             where there is enough, the lowest is best."
+                .to_owned(),
+        ],
+        taken: [
+            taken(),
+            vec![format!("room of {ROOM_M} m to both sides")],
+        ]
+        .concat(),
+        chart: Chart::of(
+            Axis::linear("offset Y of the interferer, m").between(0.0, f64::from(MOST_OFFSET_M)),
+            Axis::linear("SIR of the worse hop, linear"),
+            vec![
+                line("above the line, lowest", 0, |row| row.line_sir_linear),
+                line("altitude free", 1, |row| row.altitude_sir_linear),
+                line("side free", 2, |row| row.side_sir_linear),
+                line("both free", 3, |row| row.both_sir_linear),
+            ],
+        ),
+        tables: vec![Table::new("aside-gain", &rows)?],
+        shown: Vec::new(),
+    })
+}

@@ -1,0 +1,174 @@
+//! The fewest relays for a target SIR, by where the interferer stands and by the power of the relays.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use uav_relay::placement::fleet;
+
+use super::chart::{Axis, Chart, Line, Look};
+use super::paper;
+use super::sheet::{Sheet, Table};
+use super::trouble::Trouble;
+use uav_relay_sim::scenario::Scenario;
+
+/// The most that is asked for, linear SIR: every whole number from 1 to this.
+pub const MOST_TARGET: u16 = 40;
+
+/// Places of the interferer, X and Y, m.
+pub const PLACES_M: [(f64, f64); 6] = [
+    (500.0, 400.0),
+    (100.0, 400.0),
+    (900.0, 400.0),
+    (500.0, 100.0),
+    (100.0, 100.0),
+    (900.0, 100.0),
+];
+
+/// Powers of the relays, W.
+pub const POWERS_W: [f64; 5] = [0.5, 1.0, 2.0, 5.0, 10.0];
+
+/// One target in one scenario.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Row {
+    /// Place of the interferer along x, m.
+    pub interferer_x_m: f64,
+    /// Its offset, m.
+    pub interferer_y_m: f64,
+    /// Power of each relay, W.
+    pub relay_w: f64,
+    /// SIR that is asked for, linear.
+    pub target_linear: u16,
+    /// The fewest relays that reach it, if any number does.
+    pub relays: Option<u16>,
+}
+
+/// The fewest relays for each of `targets` and each of the interferer's places, relays of 1 W.
+///
+/// # Errors
+/// [`Trouble::Mission`].
+pub fn by_place(targets: &[u16]) -> Result<Vec<Row>, Trouble> {
+    rows(targets, &PLACES_M.map(|place| (place, 1.0)))
+}
+
+/// The fewest relays for each of `targets` and each of their powers, the interferer at (500, 400) m.
+///
+/// # Errors
+/// [`Trouble::Mission`].
+pub fn by_power(targets: &[u16]) -> Result<Vec<Row>, Trouble> {
+    rows(targets, &POWERS_W.map(|power| ((500.0, 400.0), power)))
+}
+
+fn rows(targets: &[u16], scenarios: &[((f64, f64), f64)]) -> Result<Vec<Row>, Trouble> {
+    let of = |&((x_m, y_m), relay_w): &((f64, f64), f64)| -> Result<Vec<Row>, Trouble> {
+        let scenario = Scenario {
+            uav_w: relay_w,
+            ..paper::with_interferer(paper::multi_hop(), x_m, y_m)
+        };
+        let mission = paper::mission(&scenario, 1)?;
+        let common = mission.config().common;
+        let row = |&target: &u16| Row {
+            interferer_x_m: x_m,
+            interferer_y_m: y_m,
+            relay_w,
+            target_linear: target,
+            relays: fleet::fewest(&mission, f32::from(target), |_| common)
+                .ok()
+                .map(|fewest| fewest.relays),
+        };
+        Ok(targets.iter().map(row).collect())
+    };
+    let rows: Result<Vec<Vec<Row>>, Trouble> = scenarios.par_iter().map(of).collect();
+    Ok(rows?.concat())
+}
+
+fn all_targets() -> Vec<u16> {
+    (1..=MOST_TARGET).collect()
+}
+
+/// The lines of the scenarios that `name` tells apart.
+fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
+    let mut lines: Vec<Line> = Vec::new();
+    for row in rows {
+        let Some(relays) = row.relays else { continue };
+        let point = (f64::from(row.target_linear), f64::from(relays));
+        let name = name(row);
+        match lines.iter_mut().find(|line| line.name == name) {
+            Some(line) => line.points.push(point),
+            None => lines.push(Line::new(
+                &name,
+                Look::number(lines.len()).spaced(),
+                [point],
+            )),
+        }
+    }
+    Chart::of(
+        Axis::log("target SIR, linear").between(1.0, f64::from(MOST_TARGET)),
+        Axis::log("fewest relays"),
+        lines,
+    )
+}
+
+/// The figure by place.
+///
+/// # Errors
+/// Never in practice: see [`Trouble`].
+pub fn by_place_sheet() -> Result<Sheet, Trouble> {
+    let rows = by_place(&all_targets())?;
+    let at = |target: u16| {
+        PLACES_M.map(|place| {
+            let row = rows.iter().find(|row| {
+                row.target_linear == target && (row.interferer_x_m, row.interferer_y_m) == place
+            });
+            row.and_then(|row| row.relays).unwrap_or(0)
+        })
+    };
+    let [middle, near_tx, near_rx, close, close_tx, close_rx] = at(5);
+    let [_, _, _, low, low_tx, low_rx] = at(1);
+    Ok(Sheet {
+        name: "fewest-by-place",
+        title: "The fewest relays for a target SIR, by the place of the interferer",
+        says: vec![format!(
+            "The nearer the interferer to the line between Tx and Rx, the more relays. The paper \
+             has it that nearness to Tx or Rx itself does it, which holds for low targets and Rx \
+             alone: for a target of 1 and Y = 100 m, X = 500 m, 100 m and 900 m need {low}, \
+             {low_tx} and {low_rx} relays; for a target of 5 it is {close}, {close_tx} and \
+             {close_rx}, and with Y = 400 m {middle}, {near_tx} and {near_rx}."
+        )],
+        taken: vec![
+            "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, p_u = 1 W, no least separation".to_owned(),
+            "the paper leaves out the places of the interferer: those in the legend are chosen"
+                .to_owned(),
+        ],
+        chart: chart(&rows, |row| {
+            format!("({}, {}) m", row.interferer_x_m, row.interferer_y_m)
+        }),
+        tables: vec![Table::new("fewest-by-place", &rows)?],
+        shown: Vec::new(),
+    })
+}
+
+/// The figure by power.
+///
+/// # Errors
+/// Never in practice: see [`Trouble`].
+pub fn by_power_sheet() -> Result<Sheet, Trouble> {
+    let rows = by_power(&all_targets())?;
+    Ok(Sheet {
+        name: "fewest-by-power",
+        title: "The fewest relays for a target SIR, by the power of the relays",
+        says: vec![
+            "More power at the relays means fewer of them, as the paper says. The formulas as \
+             printed give too few: 16, 24, 36 and 54 relays of 1 W for targets of 5, 10, 20 and \
+             40."
+            .to_owned(),
+        ],
+        taken: vec![
+            "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, interferer at (500, 400) m, no least \
+             separation"
+                .to_owned(),
+            "the paper leaves out the powers: those in the legend are chosen".to_owned(),
+        ],
+        chart: chart(&rows, |row| format!("relays of {} W", row.relay_w)),
+        tables: vec![Table::new("fewest-by-power", &rows)?],
+        shown: Vec::new(),
+    })
+}

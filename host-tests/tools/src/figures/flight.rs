@@ -1,0 +1,56 @@
+//! A simulated chain that runs the code of the relays, message by message.
+
+use uav_relay::{Method, Mission, Placement, Schedule};
+
+use super::trouble::Trouble;
+use super::walk;
+use uav_relay_sim::simulator::chain;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
+
+/// What a settled chain came to.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Flown {
+    /// Where the relays stand, from Tx to Rx.
+    pub places: Vec<Placement>,
+    /// SIR of the worst hop, linear.
+    pub sir: f64,
+    /// SIR before Algorithm 2 and after each of its rounds, linear.
+    pub rounds: Vec<f32>,
+    /// Passes along the chain.
+    pub sweeps: u32,
+    /// Frames put on any link.
+    pub messages: u64,
+    /// Bytes put on any link.
+    pub bytes: u64,
+}
+
+/// Runs `mission` to the end; `predict` is whether the head first solves the chain for itself.
+///
+/// # Errors
+/// [`Trouble::Setup`] or [`Trouble::Unsettled`].
+pub fn fly(
+    mission: &Mission,
+    method: Method,
+    schedule: Schedule,
+    predict: bool,
+) -> Result<Flown, Trouble> {
+    let mut setup = Setup::new(*mission);
+    setup.settings.method = method;
+    setup.settings.schedule = schedule;
+    setup.settings.predict = predict;
+    let outcome: Outcome = chain::run(setup)?;
+    let places: Option<Vec<Placement>> =
+        outcome.relays.iter().map(|relay| relay.setpoint).collect();
+    match places {
+        Some(places) if outcome.ending == Ending::Settled => Ok(Flown {
+            sir: walk::worst(mission, &places),
+            places,
+            rounds: outcome.rounds,
+            sweeps: outcome.sweeps,
+            messages: outcome.messages,
+            bytes: outcome.bytes,
+        }),
+        _ => Err(Trouble::Unsettled("a simulated chain")),
+    }
+}

@@ -1,0 +1,136 @@
+//! Lemma 1: where the two hops of a single relay have the same SIR.
+
+use serde::Serialize;
+use uav_relay::Mission;
+use uav_relay::placement::single::locus::altitudes;
+
+use super::chart::{Axis, Chart, Line, Look};
+use super::paper;
+use super::sheet::{Sheet, Table};
+use super::trouble::Trouble;
+use uav_relay_sim::scenario::Scenario;
+
+/// Power of Tx, W, and place of the interferer, m, of each line.
+pub const CHOICES: [(f64, (f64, f64)); 4] = [
+    (20.0, (30.0, 30.0)),
+    (20.0, (30.0, 60.0)),
+    (40.0, (30.0, 30.0)),
+    (40.0, (30.0, 60.0)),
+];
+
+/// Distance from Tx to Rx, m.
+pub const DISTANCE_M: f64 = 35.0;
+
+/// Places along x for each metre.
+const FINENESS: u8 = 20;
+
+/// One place under one interferer.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Row {
+    /// Power of Tx, W.
+    pub tx_w: f64,
+    /// Place of the interferer along x, m.
+    pub interferer_x_m: f64,
+    /// Its offset, m.
+    pub interferer_y_m: f64,
+    /// Place of the relay, m from Tx.
+    pub x_m: f32,
+    /// The lower altitude at which both hops have the same SIR, m, if there is one.
+    pub lower_altitude_m: Option<f32>,
+    /// The higher one, m, if there is one.
+    pub upper_altitude_m: Option<f32>,
+}
+
+/// The mission of one relay of 1 W.
+///
+/// # Errors
+/// [`Trouble::Mission`].
+pub fn mission((tx_w, (x_m, y_m)): (f64, (f64, f64))) -> Result<Mission, Trouble> {
+    let scenario = Scenario {
+        distance_m: DISTANCE_M,
+        tx_w,
+        ..paper::with_interferer(paper::multi_hop(), x_m, y_m)
+    };
+    paper::mission(&scenario, 1)
+}
+
+/// The altitudes at `per_m` places for each metre from Tx to Rx.
+///
+/// # Errors
+/// [`Trouble::Mission`].
+pub fn data(per_m: u8) -> Result<Vec<Row>, Trouble> {
+    let mut rows = Vec::new();
+    for choice in CHOICES {
+        let mission = mission(choice)?;
+        let config = mission.config();
+        for place in 0..=u16::MAX {
+            let x_m = f32::from(place) / f32::from(per_m);
+            if x_m > config.distance_m {
+                break;
+            }
+            let [lower, upper] = altitudes(&mission, x_m, config.common.power_w);
+            rows.push(Row {
+                tx_w: choice.0,
+                interferer_x_m: choice.1.0,
+                interferer_y_m: choice.1.1,
+                x_m,
+                lower_altitude_m: lower,
+                upper_altitude_m: upper,
+            });
+        }
+    }
+    Ok(rows)
+}
+
+/// The figure.
+///
+/// # Errors
+/// Never in practice: see [`Trouble`].
+pub fn sheet() -> Result<Sheet, Trouble> {
+    let rows = data(FINENESS)?;
+    let mut lines = Vec::new();
+    for (index, (tx_w, (x_m, y_m))) in CHOICES.into_iter().enumerate() {
+        let of = rows
+            .iter()
+            .filter(|row| (row.tx_w, row.interferer_x_m, row.interferer_y_m) == (tx_w, x_m, y_m));
+        let branch = |altitude: fn(&Row) -> Option<f32>| -> Vec<(f64, f64)> {
+            of.clone()
+                .filter_map(|row| Some((f64::from(row.x_m), f64::from(altitude(row)?))))
+                .collect()
+        };
+        let (lower, upper) = (
+            branch(|row| row.lower_altitude_m),
+            branch(|row| row.upper_altitude_m),
+        );
+        let name = format!("Tx {tx_w} W, ({x_m}, {y_m}) m");
+        let line = |points| Line::new(&name, Look::number(index).spaced(), points);
+        // Where there is nothing above Tx, both begin at one place between.
+        if upper.first().is_some_and(|first| first.0 > 0.0) {
+            lines.push(line([lower.into_iter().rev().collect(), upper].concat()));
+        } else {
+            lines.extend([lower, upper].map(line));
+        }
+    }
+    Ok(Sheet {
+        name: "locus",
+        title: "Where both hops of a single relay have the same SIR",
+        says: vec![
+            "More power at Tx shifts the locus toward Rx; an interferer nearer to the line shifts \
+             it down: both as the paper says."
+                .to_owned(),
+        ],
+        taken: vec![
+            "p_u = 1 W, D = 35 m; the power of the interferer cancels".to_owned(),
+            "the paper leaves out p_t and the interferer's places: 20 W and 40 W, and (X, Y) as \
+             in the legend, are chosen"
+                .to_owned(),
+        ],
+        chart: Chart::of(
+            Axis::linear("x, m").between(0.0, DISTANCE_M),
+            Axis::linear("altitude, m"),
+            lines,
+        ),
+        tables: vec![Table::new("locus", &rows)?],
+        shown: Vec::new(),
+    })
+}

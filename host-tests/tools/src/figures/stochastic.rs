@@ -1,0 +1,256 @@
+//! Algorithm 4 with the paper's step, in a field that is the same everywhere and in one that is not.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use uav_relay::Mission;
+
+use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::sheet::{Sheet, Table};
+use super::trouble::Trouble;
+use super::{convergence, paper, walk};
+use uav_relay_sim::scenario::{BetaPoint, Field, Interference, Scenario};
+
+/// The chains that are drawn.
+pub const RELAYS: [u16; 5] = [10, 20, 30, 40, 50];
+
+/// Seed of the uneven field.
+pub const SEED: u64 = 4;
+
+/// From one drawn point of the uneven field to the next, m.
+const SPACING_M: u32 = 20;
+
+/// First shape of every distribution.
+const ALPHA: f64 = 3.0;
+
+/// The most interference power as a multiple of Lambda.
+const MOST: f64 = 2.0;
+
+/// Which field.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Upsilon from 0.6 / Lambda to 1 / Lambda.
+    Uneven,
+    /// Upsilon 0.8 / Lambda everywhere.
+    Even,
+}
+
+/// One sweep of one chain.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Row {
+    /// Which field.
+    pub field: Kind,
+    /// Number of relays.
+    pub relays: u16,
+    /// Which sweep, from 1.
+    pub sweep: u32,
+    /// Expected SIR that every hop is asked to meet, linear.
+    pub target_linear: f32,
+    /// Expected SIR of the worst hop, linear.
+    pub sir_linear: f64,
+}
+
+/// One point of the field.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct PointRow {
+    /// Which field.
+    pub field: Kind,
+    /// Place, m from Tx.
+    pub x_m: f64,
+    /// First shape of the Beta distribution of I / `I_max` there.
+    pub alpha: f64,
+    /// Second shape.
+    pub beta: f64,
+    /// The most interference power, W.
+    pub i_max_w: f64,
+}
+
+/// Lambda, W: what 1 W straight below a relay is when it has come up to it.
+fn lambda_w(mission: &Mission) -> f64 {
+    let height = f64::from(mission.config().common.altitude_m);
+    1.0 / (mission.config().channel.eta() * height * height)
+}
+
+/// The field's points.
+///
+/// # Errors
+/// [`Trouble::Mission`].
+pub fn field(kind: Kind) -> Result<Vec<PointRow>, Trouble> {
+    let lambda = lambda_w(&paper::mission(&paper::multi_hop(), 1)?);
+    let i_max_w = MOST * lambda;
+    // Upsilon = (1 + beta / (alpha - 1)) / I_max is `part` / Lambda.
+    let point = |x_m: f64, part: f64| PointRow {
+        field: kind,
+        x_m,
+        alpha: ALPHA,
+        beta: (MOST * part - 1.0) * (ALPHA - 1.0),
+        i_max_w,
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    Ok(match kind {
+        Kind::Even => vec![point(0.0, 0.8)],
+        Kind::Uneven => (0..=1000 / SPACING_M)
+            .map(|k| point(f64::from(k * SPACING_M), rng.random_range(0.6..=1.0)))
+            .collect(),
+    })
+}
+
+/// The mission of `relays` relays in the field.
+///
+/// # Errors
+/// [`Trouble::Mission`].
+pub fn mission(kind: Kind, relays: u16) -> Result<Mission, Trouble> {
+    let points = field(kind)?;
+    let spec = Field {
+        i_max_w: points.first().map_or(0.0, |point| point.i_max_w),
+        beta: points
+            .iter()
+            .map(|point| BetaPoint {
+                x_m: point.x_m,
+                alpha: point.alpha,
+                beta: point.beta,
+            })
+            .collect(),
+    };
+    let scenario = Scenario {
+        interference: Interference::Field(spec),
+        ..paper::multi_hop()
+    };
+    paper::mission(&scenario, relays)
+}
+
+/// The sweeps of both fields and these numbers of relays until each chain settles.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn data(relays: &[u16]) -> Result<Vec<Row>, Trouble> {
+    let mut rows = Vec::new();
+    for field in [Kind::Uneven, Kind::Even] {
+        for &relays in relays {
+            for sweep in walk::descent(&mission(field, relays)?, convergence::STEP)? {
+                let chain = sweep.chain.ok_or(Trouble::Unsettled("a sweep"))?;
+                rows.push(Row {
+                    field,
+                    relays,
+                    sweep: sweep.number,
+                    target_linear: sweep.target,
+                    sir_linear: chain.sir,
+                });
+            }
+        }
+    }
+    Ok(rows)
+}
+
+/// Where both fields' chains end with the paper's step, a tenth of it, and bracketed targets.
+fn shown() -> Result<Vec<Vec<String>>, Trouble> {
+    let mut rows = vec![
+        ["field", "N", "step 0.1", "step 0.01", "bracketed targets"]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
+    for field in [Kind::Uneven, Kind::Even] {
+        for relays in RELAYS {
+            let mission = mission(field, relays)?;
+            let stepped = |step: f64| -> Result<String, Trouble> {
+                let sweeps = walk::descent(&mission, step)?;
+                let chain = sweeps.last().and_then(|sweep| sweep.chain.as_ref());
+                let sir = chain.map_or(0.0, |chain| chain.sir);
+                Ok(format!("{sir:.4} in {} sweeps", sweeps.len()))
+            };
+            let name = match field {
+                Kind::Uneven => "not i.i.d.",
+                Kind::Even => "i.i.d.",
+            };
+            rows.push(vec![
+                name.to_owned(),
+                relays.to_string(),
+                stepped(convergence::STEP)?,
+                stepped(convergence::STEP / 10.0)?,
+                format!("{:.4}", walk::settled(&mission)?.sir),
+            ]);
+        }
+    }
+    Ok(rows)
+}
+
+/// The sweeps of one chain, and the last one held to the end of the picture.
+fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
+    let of = rows
+        .iter()
+        .filter(|row| row.field == field && row.relays == relays);
+    let mut points: Vec<_> = of
+        .map(|row| (f64::from(row.sweep), row.sir_linear))
+        .collect();
+    if let Some(&(last, sir)) = points.last() {
+        points.extend(
+            (1..=10)
+                .map(f64::from)
+                .filter(|&n| n > last)
+                .map(|n| (n, sir)),
+        );
+    }
+    Line::new(&format!("N = {relays}"), Look::number(index), points)
+}
+
+/// The figure.
+///
+/// # Errors
+/// Never in practice: see [`Trouble`].
+pub fn sheet() -> Result<Sheet, Trouble> {
+    let rows = data(&RELAYS)?;
+    let panel = |heading: &str, field: Kind| Panel {
+        heading: heading.to_owned(),
+        x: Axis::linear("sweep").between(1.0, 10.0),
+        y: Axis::log("expected SIR, linear").between(0.02, 1.0),
+        lines: RELAYS
+            .iter()
+            .enumerate()
+            .map(|(index, &relays)| line(&rows, field, index, relays))
+            .collect(),
+    };
+    let points = [field(Kind::Uneven)?, field(Kind::Even)?].concat();
+    Ok(Sheet {
+        name: "stochastic",
+        title: "Algorithm 4 with the paper's step of 0.1, sweep by sweep",
+        says: vec![
+            "A chain that has settled holds its SIR. Where the interference is not the same \
+             everywhere, a lower target may give a lower SIR, as the paper says."
+                .to_owned(),
+            "The step is an eighth of the largest expected SIR: what it loses is in the table. \
+             With 8 relays or fewer, i.i.d., it passes over all there is: 8 end with 0.0003 \
+             instead of 0.0912."
+                .to_owned(),
+        ],
+        taken: vec![
+            "D = 1000 m, h = 20 m, p_t = 80 W, p_u = 1 W, step 0.1 linear SIR; Lambda = 1 / (eta \
+             h^2)"
+                .to_owned(),
+            "Upsilon = (alpha + beta - 1) / ((alpha - 1) I_max); the paper prints (alpha + beta) \
+             / alpha, which is E[1/I] of no Beta distribution, without I_max, and 0.8 Lambda for \
+             what can only be 0.8 / Lambda"
+                .to_owned(),
+            "i.i.d.: Upsilon = 0.8 / Lambda; not i.i.d.: between 0.6 / Lambda and 1 / Lambda, \
+             drawn anew every 20 m (seed 4), straight lines between"
+                .to_owned(),
+            "alpha = 3 and I_max = 2 Lambda everywhere, beta by Upsilon; the paper gives neither, \
+             nor the numbers of relays"
+                .to_owned(),
+            "as corrected: the last hop follows the target, and no relay stands before \
+             Tx"
+            .to_owned(),
+        ],
+        chart: Chart {
+            panels: vec![
+                panel("not i.i.d. along x", Kind::Uneven),
+                panel("i.i.d. along x", Kind::Even),
+            ],
+        },
+        tables: vec![
+            Table::new("stochastic", &rows)?,
+            Table::new("stochastic-field", &points)?,
+        ],
+        shown: shown()?,
+    })
+}

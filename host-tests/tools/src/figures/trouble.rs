@@ -1,0 +1,75 @@
+//! Why a figure could not be made.
+
+use std::fmt;
+
+use uav_relay::node::settings::SetupError;
+use uav_relay::placement::search::Infeasible;
+
+use super::draw::NotDrawn;
+use uav_relay_sim::mission::Refusal;
+
+/// Why a figure could not be made: its numbers are fixed, so all but `File` would be a bug.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Trouble {
+    /// The mission refuses a number.
+    Mission(Refusal),
+    /// A relay refuses its settings.
+    Setup(SetupError),
+    /// No target is met, or the simulated chain has not settled.
+    Unsettled(&'static str),
+    /// The chart could not be drawn.
+    Drawing(NotDrawn),
+    /// A table could not be written.
+    Table(csv::Error),
+    /// A table holds a number that is not finite.
+    NotFinite(String),
+    /// A file could not be written.
+    File(String, std::io::Error),
+}
+
+impl fmt::Display for Trouble {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mission(refusal) => refusal.fmt(f),
+            Self::Setup(error) => error.fmt(f),
+            Self::Unsettled(what) => write!(f, "{what} has not settled"),
+            Self::Drawing(NotDrawn(why)) => write!(f, "the chart cannot be drawn: {why}"),
+            Self::Table(error) => write!(f, "the table cannot be written: {error}"),
+            Self::NotFinite(table) => write!(f, "{table} holds a number that is not finite"),
+            Self::File(file, error) => write!(f, "{file} cannot be written: {error}"),
+        }
+    }
+}
+
+impl std::error::Error for Trouble {}
+
+impl From<Refusal> for Trouble {
+    fn from(refusal: Refusal) -> Self {
+        Self::Mission(refusal)
+    }
+}
+
+impl From<SetupError> for Trouble {
+    fn from(error: SetupError) -> Self {
+        Self::Setup(error)
+    }
+}
+
+impl From<Infeasible> for Trouble {
+    fn from(_: Infeasible) -> Self {
+        Self::Unsettled("a chain")
+    }
+}
+
+impl From<NotDrawn> for Trouble {
+    fn from(why: NotDrawn) -> Self {
+        Self::Drawing(why)
+    }
+}
+
+impl From<csv::Error> for Trouble {
+    fn from(error: csv::Error) -> Self {
+        Self::Table(error)
+    }
+}

@@ -1,0 +1,146 @@
+//! A whole chain without a message, by the functions that the relays walk one hop each.
+
+use uav_relay::placement::PerTarget;
+use uav_relay::placement::ladder::TARGETS;
+use uav_relay::placement::pass::{Behind, Link, close};
+use uav_relay::placement::plan;
+use uav_relay::placement::search::Search;
+use uav_relay::{Heading, Mission, Placement, Profile, Schedule};
+
+use super::trouble::Trouble;
+use uav_relay_sim::report::hop_sirs;
+
+/// Relays at their places, all alike.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Chain {
+    /// The places from Tx to Rx.
+    pub places: Vec<Placement>,
+    /// SIR of the worst hop, linear.
+    pub sir: f64,
+}
+
+/// The chain that stretches every hop as far as `target` (linear, above 0) allows; `None` where a hop cannot meet it.
+///
+/// At a target that is too high it falls short of its end, and the SIR of the last hop is what it is. Work: N reaches.
+pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
+    let profile = mission.config().common;
+    let mut from = PerTarget::from(
+        [match mission.heading() {
+            Heading::TowardRx => 0.0,
+            Heading::TowardTx => mission.config().distance_m,
+        }; TARGETS],
+    );
+    let mut behind = None;
+    let mut places = Vec::with_capacity(usize::from(mission.relays()));
+    let mut next = Some(mission.leader());
+    while let Some(index) = next {
+        let mut reaches = PerTarget::new();
+        let link = Link {
+            mission,
+            behind,
+            index,
+            own: profile.on_line(),
+            measured_per_w: None,
+            plain: true,
+            end_m: None,
+        };
+        link.extend(&[target], &from, &mut reaches);
+        places.push(Placement::on_line(*reaches.first()?, profile.altitude_m));
+        behind = Some(Behind {
+            relay: profile.on_line(),
+            measured_per_w: None,
+        });
+        from = reaches;
+        next = mission.after(index);
+    }
+    if mission.heading() == Heading::TowardTx {
+        places.reverse();
+    }
+    let sir = worst(mission, &places);
+    Some(Chain { places, sir })
+}
+
+/// One sweep of the paper's schedule.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Sweep {
+    /// Which one, from 1.
+    pub number: u32,
+    /// SIR that every hop is asked to meet, linear.
+    pub target: f32,
+    /// The chain stretched for it; `None` where a hop cannot meet it.
+    pub chain: Option<Chain>,
+}
+
+/// The sweeps of the paper's Algorithm 1, in a field of Algorithm 4, with this `step` (linear SIR), up to the one that settles.
+///
+/// # Errors
+/// [`Trouble::Unsettled`] where none of the targets is met.
+pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, Trouble> {
+    let own = mission.config().common;
+    let mut search = Search::new(mission, own, Schedule::FixedStep { step })?;
+    let mut sweeps = Vec::new();
+    for number in 1.. {
+        let ladder = *search.ladder();
+        let targets = ladder.targets();
+        let &target = targets.first().ok_or(Trouble::Unsettled("a sweep"))?;
+        let chain = stretched(mission, target);
+        let last = chain.as_ref().and_then(|chain| match mission.heading() {
+            Heading::TowardRx => chain.places.last(),
+            Heading::TowardTx => chain.places.first(),
+        });
+        let reached: Vec<f32> = last.map(|place| place.x_m).into_iter().collect();
+        let verdict = close(
+            &Link {
+                mission,
+                behind: None,
+                index: mission.relays(),
+                own: own.on_line(),
+                measured_per_w: None,
+                plain: true,
+                end_m: None,
+            },
+            ladder,
+            &reached,
+        );
+        sweeps.push(Sweep {
+            number,
+            target,
+            chain,
+        });
+        if verdict.commit.is_some() {
+            break;
+        }
+        search.advance(&verdict.slacks)?;
+    }
+    Ok(sweeps)
+}
+
+/// The chain that the relays of `mission` agree on by Algorithm 1, in a field by Algorithm 4.
+///
+/// # Errors
+/// [`Trouble::Unsettled`] where no target is met.
+pub fn settled(mission: &Mission) -> Result<Chain, Trouble> {
+    let common = |_| mission.config().common;
+    let agreed = plan::solve(mission, Schedule::Bracketed, common)?;
+    stretched(mission, agreed.target).ok_or(Trouble::Unsettled("a chain"))
+}
+
+/// SIR of the worst hop of relays alike at `places`, linear; 0 without any.
+pub fn worst(mission: &Mission, places: &[Placement]) -> f64 {
+    let power_w = mission.config().common.power_w;
+    let standing: Vec<(Placement, Profile)> = places
+        .iter()
+        .map(|&place| {
+            let altitude_m = place.altitude_m;
+            (
+                place,
+                Profile {
+                    altitude_m,
+                    power_w,
+                },
+            )
+        })
+        .collect();
+    let sirs = hop_sirs(mission, &standing);
+    sirs.into_iter().reduce(f64::min).unwrap_or(0.0)
+}

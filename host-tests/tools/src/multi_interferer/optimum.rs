@@ -1,0 +1,110 @@
+//! The best chain against the true sum of the interference, for relays that hold one altitude.
+
+use super::line::Line;
+use super::spans::Span;
+use super::stages::Stages;
+use uav_relay_sim::scene::Scene;
+
+/// Relative width at which the bracket of a target is narrow enough.
+const TOLERANCE: f64 = 1e-13;
+
+/// Targets below this are not told from zero.
+const LEAST_TARGET: f64 = 1e-250;
+
+/// What rounding may take off the least separation, relative: a thousand relays that just fit must not fail for it.
+const ROUNDING: f64 = 1e-12;
+
+/// A chain that was found, and what it reaches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chain {
+    /// Where each relay stands from Tx to Rx, (x, h) in metres: x in [0, D], rising by the least separation or more (but for
+    /// 1e-12 of it, for rounding).
+    pub places: Vec<(f64, f64)>,
+    /// SIR (linear) of the worst hop, by [`Scene::hop_sirs`] of these places.
+    pub sir: f64,
+    /// What the best chain would reach if relays need not keep apart: `sir` where the least separation does not bind.
+    pub free_sir: f64,
+}
+
+impl Chain {
+    /// Whether the least separation costs more than a millionth of the SIR. It is kept in any case.
+    pub fn separation_binds(&self) -> bool {
+        self.sir < self.free_sir * (1.0 - 1e-6)
+    }
+}
+
+/// The best chain for relays that all hold the same altitude, with whatever powers; exact but for rounding.
+///
+/// Asserted to 1e-9 against the reference for one interferer and to 1e-6 against brute force for several
+/// (`of_one_source_it_is_the_optimum_of_the_reference`, `brute_force_finds_the_same` in `host-tests/tests/several`).
+///
+/// The least separation is kept: where it binds, the SIR is the best of the chains that keep it. Without one, relays may share
+/// a place when the rest of the chain is the bottleneck. `None` without relays or interferers, where altitudes differ, where
+/// the relays have no room on the way, and where no chain has an SIR above zero (an interferer at Rx).
+///
+/// About 50 targets, twice if there is a least separation; each looks once at some thousand places on the line (for every
+/// change of power along the chain), and at a few intervals a relay.
+pub fn optimum(scene: &Scene) -> Option<Chain> {
+    let altitude_m = scene.relays.first()?.altitude_m;
+    let same = |other: f64| other.total_cmp(&altitude_m).is_eq();
+    let alike = scene.relays.iter().all(|relay| same(relay.altitude_m));
+    alike.then(|| at_altitude(scene, altitude_m)).flatten()
+}
+
+/// The best chain at `altitude_m`, metres, > 0, whatever altitude the relays have in the scene.
+pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
+    let line = Line::new(scene, altitude_m);
+    let apart = scene.min_separation_m * (1.0 - ROUNDING);
+    let target = best_target(&line, apart, TOLERANCE)?;
+    let xs = Stages::new(&line, target, apart)?.chain()?;
+    let places: Vec<(f64, f64)> = xs.into_iter().map(|x| (x, altitude_m)).collect();
+    let sir = scene.chain_sir(&places);
+    let free_sir = if apart > 0.0 {
+        best_target(&line, 0.0, TOLERANCE)?.max(sir)
+    } else {
+        sir
+    };
+    Some(Chain {
+        places,
+        sir,
+        free_sir,
+    })
+}
+
+/// The best target (linear) at the scene's least separation, to `tolerance` (relative); `None` as for [`optimum`].
+pub(super) fn best_at_altitude(scene: &Scene, altitude_m: f64, tolerance: f64) -> Option<f64> {
+    let apart = scene.min_separation_m * (1.0 - ROUNDING);
+    best_target(&Line::new(scene, altitude_m), apart, tolerance)
+}
+
+fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
+    let scene = line.scene;
+    let gaps = scene.relays.len().checked_sub(1)? as f64;
+    if scene.sources.is_empty() || gaps * apart > scene.distance_m {
+        return None;
+    }
+    let met = |target: f64| Stages::new(line, target, apart).is_some_and(|found| found.is_met());
+    // No chain beats the best of its first hop.
+    let whole = Span {
+        low: 0.0,
+        high: scene.distance_m,
+    };
+    let mut above = 2.0 * line.first_sir(line.best_first(&[whole])?);
+    let mut below = above / 16.0;
+    while !met(below) {
+        (above, below) = (below, below / 16.0);
+        if below < LEAST_TARGET {
+            return None;
+        }
+    }
+    while above - below > tolerance * below {
+        // The geometric mean: the targets span many decades.
+        let middle = below * (above / below).sqrt();
+        if met(middle) {
+            below = middle;
+        } else {
+            above = middle;
+        }
+    }
+    Some(below)
+}

@@ -1,0 +1,163 @@
+//! Plans that choose altitudes and sides too, against one interferer: the joint method's own solver, and the places by the rules of
+//! the sweep that settles the relays.
+
+use core::task::Poll;
+
+use uav_relay::mission::MAX_RELAYS;
+use uav_relay::placement::PerTarget;
+use uav_relay::placement::joint::{Seat, Solver};
+use uav_relay::placement::pass::{Behind, Link};
+use uav_relay::sir::Station;
+use uav_relay::{Method, Placement};
+
+use super::{Briefed, NoPlan, Plan, source};
+use uav_relay_sim::scenario::Scenario;
+use uav_relay_sim::simulator::chain;
+use uav_relay_sim::simulator::outcome::Ending;
+use uav_relay_sim::simulator::setup::Setup;
+
+/// A solver for any chain.
+type Chain = Solver<{ MAX_RELAYS as usize }, { MAX_RELAYS as usize / 10 }>;
+
+/// The best places, sides and altitudes of so many relays that the joint method finds.
+pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
+    let briefed = Briefed::new(scenario, relays, tolerance)?;
+    let found = joint(&briefed);
+    // Relays that differ agree by messages, and seldom on the same.
+    let told = (!briefed.own.is_empty())
+        .then(|| agreed(&briefed))
+        .flatten();
+    let plans = [found, told].into_iter().flatten().map(|places| {
+        let briefed = Briefed::new(scenario, relays, tolerance)?;
+        Ok(briefed.plan(&places, "the joint method", false))
+    });
+    let plans: Vec<Plan> = plans.collect::<Result<_, NoPlan>>()?;
+    match plans.into_iter().max_by(|a, b| a.sir().total_cmp(&b.sir())) {
+        Some(plan) => Ok(plan),
+        // As the relays do, which then stay at the altitudes they hold.
+        None => source::best(scenario, relays, tolerance),
+    }
+}
+
+/// The places that simulated relays agree on, with the messages and all; `None` where they agree on none.
+fn agreed(briefed: &Briefed) -> Option<Vec<Placement>> {
+    let mut setup = Setup::new(briefed.mission);
+    setup.settings.method = Method::Joint;
+    setup.profiles.clone_from(&briefed.own);
+    setup.held.clone_from(&briefed.held);
+    let outcome = chain::run(setup).ok()?;
+    let places = outcome.relays.iter().map(|relay| relay.setpoint);
+    places
+        .collect::<Option<_>>()
+        .filter(|_| outcome.ending == Ending::Settled)
+}
+
+/// The places that the joint method finds; `None` where it finds none.
+fn joint(briefed: &Briefed) -> Option<Vec<Placement>> {
+    let mission = &briefed.mission;
+    let seat_of = |index| {
+        let holds = briefed.held.contains(&index);
+        Seat::of(mission, briefed.profile(index), holds)
+    };
+    let mut solver = Box::new(Chain::new(mission)?);
+    let target = loop {
+        if let Poll::Ready(solved) = solver.step(mission, seat_of) {
+            break solved.ok()?;
+        }
+    };
+    let mut places: Vec<Placement> = Vec::new();
+    let mut behind = None;
+    for index in 1..=mission.relays() {
+        let seat = seat_of(index);
+        let own = Station {
+            at: solver.at(index, seat),
+            power_w: seat.power_w,
+        };
+        let link = Link {
+            mission,
+            behind,
+            index,
+            own,
+            measured_per_w: None,
+            plain: false,
+            end_m: Some(solver.end_m(mission, &seat_of, index)),
+        };
+        let from_m = places.last().map_or(0.0, |place| place.x_m);
+        let mut reaches = PerTarget::new();
+        link.extend(&[target], &[from_m], &mut reaches);
+        places.push(own.at.at(*reaches.first()?));
+        behind = Some(Behind {
+            relay: own,
+            measured_per_w: None,
+        });
+    }
+    Some(places)
+}
+
+/// The altitudes of the band at which a common one is tried: what many relays can do, few cannot do worse when each may choose.
+const LEVELS: u8 = 9;
+
+/// The fewest relays that meet `target` when they may choose their altitudes.
+pub(super) fn fewest(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
+    fewest_of(
+        scenario,
+        target,
+        |level| source::level(level, target, tolerance),
+        |relays| best(scenario, relays, tolerance),
+    )
+}
+
+/// The fewest relays that meet `target`: between one and the fewest that do `at_level`, at one of the band's altitudes, by
+/// halving on what so many reach when `free` to choose. More relays are taken to do no worse.
+pub(super) fn fewest_of(
+    scenario: &Scenario,
+    target: f64,
+    at_level: impl Fn(&Scenario) -> Result<Plan, NoPlan>,
+    free: impl Fn(u16) -> Result<Plan, NoPlan>,
+) -> Result<Plan, NoPlan> {
+    let mut found: Option<Plan> = None;
+    let mut most: Option<(String, Option<f64>)> = None;
+    for step in 0..LEVELS {
+        let share = f64::from(step) / f64::from(LEVELS - 1);
+        let span = scenario.altitude_max_m - scenario.altitude_min_m;
+        let level = Scenario {
+            altitude_m: scenario.altitude_min_m + share * span,
+            ..scenario.clone()
+        };
+        match at_level(&level) {
+            Ok(plan) => {
+                let fewer = |best: &Plan| plan.places.len() < best.places.len();
+                if found.as_ref().is_none_or(fewer) {
+                    found = Some(plan);
+                }
+            }
+            Err(NoPlan::Unmet(why, best)) => {
+                if most.as_ref().is_none_or(|(_, most)| best > *most) {
+                    most = Some((why, best));
+                }
+            }
+            Err(wrong) => return Err(wrong),
+        }
+        if span <= 0.0 {
+            break;
+        }
+    }
+    let Some(mut found) = found else {
+        let (why, best) = most.unwrap_or_default();
+        return Err(NoPlan::Unmet(why, best));
+    };
+    let (mut too_few, mut enough) = (0, found.mission.relays());
+    while enough - too_few > 1 {
+        let middle = too_few + (enough - too_few) / 2;
+        match free(middle) {
+            Ok(plan) if plan.sir() >= target => (enough, found) = (middle, plan),
+            Ok(_) | Err(NoPlan::Unmet(..)) => too_few = middle,
+            Err(wrong) => return Err(wrong),
+        }
+    }
+    Ok(Plan {
+        most: found.most.or_else(|| Some(found.sir())),
+        proven: false,
+        ..found
+    })
+}

@@ -1,0 +1,56 @@
+//! Plans in a field of interference.
+//!
+//! The field is the same at every altitude, and the outer hops are best as low as may be: that is all there is to free altitudes.
+
+use uav_relay::placement::fleet::ranges;
+use uav_relay::placement::single::stochastic;
+
+use super::source::{fewest, nothing, placed, solved};
+use super::{Ask, Briefed, NoPlan, Number, Plan};
+use uav_relay_sim::scenario::Scenario;
+
+pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
+    let scenario = if ask.free_altitude {
+        &Scenario {
+            altitude_m: scenario.altitude_min_m,
+            ..scenario.clone()
+        }
+    } else {
+        scenario
+    };
+    match ask.number {
+        Number::Of(relays) => best(scenario, relays, ask.tolerance),
+        Number::Meeting(target) => {
+            let plan = fewest(scenario, target, ask.tolerance, "Problem 1")?;
+            let most = best(scenario, plan.mission.relays(), ask.tolerance);
+            Ok(Plan {
+                most: most.ok().map(|best| best.sir()),
+                ..plan
+            })
+        }
+    }
+}
+
+/// The best places of so many relays.
+fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
+    let briefed = Briefed::new(scenario, relays, tolerance)?;
+    let profile = briefed.profile(1);
+    if relays == 1 {
+        let found = stochastic::best_place(&briefed.mission, profile).ok_or_else(nothing)?;
+        return Ok(briefed.plan(&[found.place], "Algorithm 3", true));
+    }
+    if !briefed.own.is_empty() {
+        // Relays that differ: what they would settle on by themselves.
+        let target = solved(&briefed)?;
+        let places = placed(&briefed, target).ok_or_else(nothing)?;
+        return Ok(briefed.plan(&places, "Algorithm 4", false));
+    }
+    let target = ranges::best(&briefed.mission, profile).ok_or_else(nothing)?;
+    let places = placed(&briefed, target).ok_or_else(nothing)?;
+    let proven = super::is_free(scenario, |free| {
+        let free = Briefed::new(free, relays, tolerance).ok()?;
+        let most = ranges::best(&free.mission, profile)?;
+        Some(f64::from(most) <= f64::from(target) * (1.0 + tolerance))
+    });
+    Ok(briefed.plan(&places, "ranges that can be continued to Rx", proven))
+}

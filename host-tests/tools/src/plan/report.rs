@@ -1,0 +1,236 @@
+//! The report of a plan.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
+
+use super::{Number, Plan};
+
+/// The one interferer that stands for several.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct HypotheticalReport {
+    /// Its transmit power, W.
+    pub power_w: f64,
+    /// Its place along x, m.
+    pub x_m: f64,
+    /// Its distance from that line, m: to its right above 0.
+    pub y_m: f64,
+    /// How far the interference that a relay receives from it is from that of all, on average over where relays may be, W.
+    pub mean_abs_error_w: f64,
+    /// The same as a part of the average interference of all.
+    pub relative_error: f64,
+    /// SIR against all of the places that are best against it alone, linear; absent where there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir: Option<f64>,
+    /// Whether these places are the plan's. If not, the plan's are the best that were found against all.
+    pub kept: bool,
+    /// By how much the plan's SIR is above theirs, as a part of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f64>,
+}
+
+/// The result of `cargo plan`.
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
+pub struct PlanReport {
+    /// Number of relays; absent where no number meets the target.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uavs: Option<u16>,
+    /// What went wrong, if anything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    /// The most that was found, linear SIR, where what was asked for cannot be had.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub best_sir: Option<f64>,
+    /// SIR of the worst hop, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir: Option<f64>,
+    /// The same in dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir_db: Option<f64>,
+    /// The data rate of the worst hop over the bandwidth that was given, bit/s: bandwidth x log2(1 + SIR).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_bps: Option<f64>,
+    /// The target, linear SIR.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_sir: Option<f64>,
+    /// With a target: the most that so many relays can have, linear SIR.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub most_sir: Option<f64>,
+    /// How the places were found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub how: Option<&'static str>,
+    /// Whether no places are better, and no fewer relays enough. False means that it is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proven: Option<bool>,
+    /// The theorem that placed the only relay, 1 to 3; 4 for one relay aside.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub theorem: Option<u8>,
+    /// Its case as the paper counts them; 0 for one that the paper leaves out. For Theorem 3 the edge of the box: 1 lowest, 2
+    /// highest, 3 above Rx. For one relay aside: 1 where the circles of equal SIR touch, 2 on the hill of the first hop, 3 above
+    /// Rx, 4 to 6 on an edge of the corridor along x, along y or upward, 7 and 8 with the interferer at Tx or Rx.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub case: Option<u8>,
+    /// The case in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub case_words: Option<String>,
+    /// The relays, from the transmitter on.
+    pub relays: Vec<RelayReport>,
+    /// SIR at the receiver, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rx_sir: Option<f64>,
+    /// The same in dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rx_sir_db: Option<f64>,
+    /// For several interferers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hypothetical: Option<HypotheticalReport>,
+    /// Whether there is room beside the line: the table then says where in it a relay is.
+    #[serde(skip)]
+    pub room: bool,
+}
+
+/// The data rate at an SIR (linear) over a bandwidth, bit/s: Shannon's, with the interference as noise.
+pub fn rate_bps(bandwidth_hz: f64, sir: f64) -> f64 {
+    bandwidth_hz * sir.ln_1p() / std::f64::consts::LN_2
+}
+
+/// The SIR (linear) that a data rate takes over a bandwidth; the inverse of [`rate_bps`].
+pub fn sir_for_rate(bandwidth_hz: f64, rate_bps: f64) -> f64 {
+    (rate_bps / bandwidth_hz * std::f64::consts::LN_2).exp_m1()
+}
+
+impl PlanReport {
+    /// The report of a plan for `number` relays, with rates over `bandwidth_hz` where one is given.
+    pub fn new(plan: &Plan, number: Number, bandwidth_hz: Option<f64>) -> Self {
+        let sir = plan.sir();
+        let rx_sir = plan.sirs.last().copied();
+        let hypothetical = plan.fitted.as_ref().map(|fitted| {
+            let one = &fitted.hypothetical;
+            HypotheticalReport {
+                power_w: one.power_w,
+                x_m: one.x_m,
+                y_m: one.y_m,
+                mean_abs_error_w: one.mean_abs_error_w,
+                relative_error: one.relative_error,
+                sir: fitted.sir,
+                kept: fitted.kept,
+                gain: fitted
+                    .sir
+                    .filter(|by_one| *by_one > 0.0)
+                    .map(|by_one| sir / by_one - 1.0),
+            }
+        });
+        Self {
+            uavs: u16::try_from(plan.places.len()).ok(),
+            error: None,
+            best_sir: None,
+            sir: Some(sir),
+            sir_db: Some(db(sir)),
+            rate_bps: bandwidth_hz.map(|bandwidth_hz| rate_bps(bandwidth_hz, sir)),
+            target_sir: match number {
+                Number::Of(_) => None,
+                Number::Meeting(target) => Some(target),
+            },
+            most_sir: plan.most,
+            how: Some(plan.how),
+            proven: Some(plan.proven),
+            theorem: plan.theorem.as_ref().map(|theorem| theorem.number),
+            case: plan.theorem.as_ref().map(|theorem| theorem.case),
+            case_words: plan.theorem.as_ref().map(|theorem| theorem.words.clone()),
+            relays: relays(&plan.places, &plan.sirs),
+            rx_sir,
+            rx_sir_db: rx_sir.map(db),
+            hypothetical,
+            room: !plan.mission.config().lateral.is_single(),
+        }
+    }
+
+    /// The report of what could not be had: why, and the most that was found (linear SIR).
+    pub fn unmet(error: String, best_sir: Option<f64>, number: Number) -> Self {
+        let (uavs, target_sir) = match number {
+            Number::Of(relays) => (Some(relays), None),
+            Number::Meeting(target) => (None, Some(target)),
+        };
+        Self {
+            uavs,
+            error: Some(error),
+            best_sir,
+            target_sir,
+            ..Self::default()
+        }
+    }
+
+    /// The report as a table to read.
+    pub fn table(&self) -> String {
+        let mut text = hops_table(&self.relays, &[], self.rx_sir, self.room);
+        let (Some(uavs), Some(sir), Some(sir_db)) = (self.uavs, self.sir, self.sir_db) else {
+            return text;
+        };
+        let relays = if uavs == 1 { "relay" } else { "relays" };
+        _ = write!(text, "worst hop: SIR {sir:.6} ({sir_db:.3} dB)");
+        if let Some(rate) = self.rate_bps {
+            _ = write!(text, ", {rate:.6e} bit/s");
+        }
+        _ = writeln!(
+            text,
+            " with {uavs} {relays}, by {}",
+            self.how.unwrap_or("nothing")
+        );
+        if let (Some(case), Some(words)) = (self.case, &self.case_words) {
+            _ = writeln!(text, "case {case}: {words}");
+        }
+        if let (Some(target), Some(most)) = (self.target_sir, self.most_sir) {
+            _ = writeln!(
+                text,
+                "target: SIR {target:.6}; so many relays can have up to {most:.6} (--uavs {uavs})"
+            );
+        }
+        _ = writeln!(text, "{}", self.certainty());
+        if let Some(one) = &self.hypothetical {
+            one.describe(&mut text);
+        }
+        text
+    }
+
+    fn certainty(&self) -> &'static str {
+        match (self.proven, self.target_sir) {
+            (Some(true), Some(_)) => "no fewer relays meet the target",
+            (Some(true), None) => "no places are better",
+            (_, Some(_)) => "whether fewer relays could meet the target is not certain",
+            (_, None) => "whether other places could be better is not certain",
+        }
+    }
+}
+
+impl HypotheticalReport {
+    fn describe(&self, text: &mut String) {
+        _ = writeln!(
+            text,
+            "hypothetical interferer: {:.6} W at x = {:.3} m, y = {:.3} m; it is off by {:.3} % of the interference, {:.3e} W on average",
+            self.power_w,
+            self.x_m,
+            self.y_m,
+            100.0 * self.relative_error,
+            self.mean_abs_error_w
+        );
+        let gain = self.gain.map_or_else(String::new, |gain| {
+            format!(", a gain of {:.2} %", 100.0 * gain)
+        });
+        _ = match (self.kept, self.sir) {
+            (true, _) => writeln!(
+                text,
+                "its places are good enough against all interferers, and kept"
+            ),
+            (false, Some(sir)) => writeln!(
+                text,
+                "its places are not good enough: SIR {sir:.6} against all interferers; these are the best found against all{gain}"
+            ),
+            (false, None) => writeln!(
+                text,
+                "no places are good against it; these are the best found against all"
+            ),
+        };
+    }
+}

@@ -1,0 +1,326 @@
+//! Plans against several interferers.
+//!
+//! One hypothetical interferer stands for all, so that the relays can find their places by themselves. What its places are
+//! worth is judged against the true sum; where they lose more than a hundredth to the best against that sum, those are taken.
+
+use uav_relay::Placement;
+
+use super::{Ask, Briefed, Fitted, MOST_RELAYS, NoPlan, Number, Plan};
+use super::{altitude, source};
+use crate::multi_interferer::{best_common_altitude, optimum, polish};
+use uav_relay_sim::command::narrow;
+use uav_relay_sim::hypothetical::Hypothetical;
+use uav_relay_sim::mission::{self, Refusal};
+use uav_relay_sim::scenario::{Interference, Scenario, Source};
+use uav_relay_sim::scene::{Place, Scene};
+
+/// By how much the places for the hypothetical interferer may fall short, relative, and still be kept.
+const LOSS: f64 = 0.01;
+
+/// How many of the starts are polished: the best against the true sum.
+const POLISHED: usize = 2;
+
+/// How many of the interferers are tried alone, to begin with.
+const ALONE: usize = 4;
+
+pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
+    let hypothetical = mission::hypothetical(scenario).ok_or(Refusal::NoHypothetical)?;
+    let planner = Planner {
+        scenario,
+        ask,
+        hypothetical,
+    };
+    match ask.number {
+        Number::Of(relays) => planner.candidates(relays)?.chosen(&planner, None),
+        Number::Meeting(target) if ask.free_altitude => altitude::fewest_of(
+            scenario,
+            target,
+            |level| {
+                let ask = &Ask {
+                    free_altitude: false,
+                    ..*ask
+                };
+                let scenario = level;
+                Planner {
+                    scenario,
+                    ask,
+                    hypothetical,
+                }
+                .fewest(target)
+            },
+            |relays| planner.candidates(relays)?.chosen(&planner, Some(target)),
+        ),
+        Number::Meeting(target) => planner.fewest(target),
+    }
+}
+
+struct Planner<'a> {
+    scenario: &'a Scenario,
+    ask: &'a Ask,
+    hypothetical: Hypothetical,
+}
+
+/// Two chains of as many relays, with their SIRs against the true sum.
+struct Candidates {
+    scene: Scene,
+    relays: u16,
+    by_one: Option<(Plan, f64)>,
+    by_all: Option<Best>,
+}
+
+/// The best chain against the true sum that was found.
+struct Best {
+    places: Vec<Placement>,
+    sir: f64,
+    proven: bool,
+}
+
+impl Planner<'_> {
+    /// The scenario with the hypothetical interferer alone.
+    fn with_one(&self) -> Scenario {
+        let mut source = self.hypothetical.source();
+        // No mission takes more; only interferers next to that limit have one that is stronger.
+        source.power_w = source.power_w.min(1e9);
+        Scenario {
+            interference: Interference::Sources(vec![source]),
+            ..self.scenario.clone()
+        }
+    }
+
+    fn candidates(&self, relays: u16) -> Result<Candidates, NoPlan> {
+        let scene = Scene::new(self.scenario, relays)
+            .ok_or_else(|| NoPlan::Wrong("there is no interferer".to_owned()))?;
+        let ask = Ask {
+            number: Number::Of(relays),
+            ..*self.ask
+        };
+        let by_one = match source::plan(&self.with_one(), &ask) {
+            Ok(plan) => {
+                let sir = scene.chain_sir(&plan.chain());
+                Some((plan, sir))
+            }
+            Err(NoPlan::Unmet(..)) => None,
+            Err(wrong) => return Err(wrong),
+        };
+        let start = by_one.as_ref().map(|(plan, _)| plan);
+        let by_all = self.by_all(&scene, start);
+        Ok(Candidates {
+            scene,
+            relays,
+            by_one,
+            by_all,
+        })
+    }
+
+    /// The best chain against the true sum, which for altitudes that differ or may be chosen is polished from fair ones.
+    fn by_all(&self, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
+        if let Some(x_m) = self.ask.x_m {
+            return at(scene, x_m);
+        }
+        if !self.ask.free_altitude
+            && let Some(chain) = optimum(scene)
+        {
+            let proven = !chain.separation_binds();
+            return Some(Best::new(scene, &chain.places, proven));
+        }
+        let mut scene = scene.clone();
+        let mut starts = Vec::new();
+        if self.ask.free_altitude {
+            let common = best_common_altitude(&scene).map(|chain| chain.places);
+            starts.extend(common.map(|chain| chain.into_iter().map(Place::from).collect()));
+            starts.extend(self.variants().iter().filter_map(|variant| {
+                let relays = u16::try_from(scene.relays.len()).ok()?;
+                let plan = altitude::best(variant, relays, self.ask.tolerance).ok()?;
+                Some(places(&plan))
+            }));
+        } else {
+            // Altitudes differ, and each is to be kept, right above the line.
+            (scene.band.left_m, scene.band.right_m) = (0.0, 0.0);
+            for relay in &mut scene.relays {
+                relay.holds = true;
+            }
+        }
+        starts.extend(start.map(places));
+        let mut starts: Vec<(f64, Vec<Place>)> = starts
+            .into_iter()
+            .map(|start| (scene.chain_sir(&start), start))
+            .collect();
+        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        starts.truncate(POLISHED);
+        starts
+            .into_iter()
+            .filter_map(|(_, start)| polish(&scene, &start, scene.band))
+            .map(|polished| Best::new(&scene, &polished.places, false))
+            .max_by(|a, b| a.sir.total_cmp(&b.sir))
+    }
+
+    /// Scenarios with one interferer whose chains may go another way than the first: with the hypothetical interferer on the
+    /// other side, with room to one side or to none, and with each of the first interferers alone.
+    fn variants(&self) -> Vec<Scenario> {
+        let one = self.with_one();
+        let mut variants = Vec::new();
+        if one.lateral_min_m < one.lateral_max_m {
+            let (left, right) = (one.lateral_min_m, one.lateral_max_m);
+            for (lateral_min_m, lateral_max_m) in [(left, 0.0), (0.0, right), (0.0, 0.0)] {
+                variants.push(Scenario {
+                    lateral_min_m,
+                    lateral_max_m,
+                    ..one.clone()
+                });
+            }
+            if let Interference::Sources(sources) = &one.interference {
+                let mirrored = sources.iter().map(|source| Source {
+                    y_m: -source.y_m,
+                    ..source.clone()
+                });
+                variants.push(Scenario {
+                    interference: Interference::Sources(mirrored.collect()),
+                    ..one.clone()
+                });
+            }
+        }
+        if let Interference::Sources(sources) = &self.scenario.interference {
+            variants.extend(sources.iter().take(ALONE).map(|source| Scenario {
+                interference: Interference::Sources(vec![source.clone()]),
+                ..one.clone()
+            }));
+        }
+        variants
+    }
+
+    /// The fewest relays one of whose chains meets `target`: more are taken to do no worse.
+    fn fewest(&self, target: f64) -> Result<Plan, NoPlan> {
+        let mut most: f64 = 0.0;
+        let mut meets = |relays: u16| -> Result<Option<Candidates>, NoPlan> {
+            match self.candidates(relays) {
+                Ok(found) => {
+                    most = most.max(found.sir());
+                    Ok((found.sir() >= target).then_some(found))
+                }
+                Err(NoPlan::Unmet(..)) => Ok(None),
+                Err(wrong) => Err(wrong),
+            }
+        };
+        let (mut too_few, mut enough) = (0, 1);
+        let mut found = loop {
+            if let Some(found) = meets(enough)? {
+                break found;
+            }
+            if enough >= MOST_RELAYS {
+                let why = format!(
+                    "no number of relays that was tried, up to {MOST_RELAYS}, gives every hop an SIR of {target}: \
+                     the most found is {most:.6}"
+                );
+                return Err(NoPlan::Unmet(why, Some(most)));
+            }
+            (too_few, enough) = (enough, (enough * 2).min(MOST_RELAYS));
+        };
+        while enough - too_few > 1 {
+            let middle = too_few + (enough - too_few) / 2;
+            match meets(middle)? {
+                Some(better) => (enough, found) = (middle, better),
+                None => too_few = middle,
+            }
+        }
+        found.chosen(self, Some(target))
+    }
+}
+
+impl Candidates {
+    /// The better SIR of the two.
+    fn sir(&self) -> f64 {
+        let one = self.by_one.as_ref().map_or(0.0, |(_, sir)| *sir);
+        let all = self.by_all.as_ref().map_or(0.0, |best| best.sir);
+        one.max(all)
+    }
+
+    /// The plan: by the hypothetical interferer where that is good enough, for `target` if there is one, else by all of them.
+    fn chosen(self, planner: &Planner, target: Option<f64>) -> Result<Plan, NoPlan> {
+        let one = self.by_one.as_ref().map(|(_, sir)| *sir);
+        let best = self.by_all.as_ref().map_or(0.0, |best| best.sir);
+        let enough = target.unwrap_or(best * (1.0 - LOSS));
+        let is_kept = one.is_some_and(|one| one > 0.0 && one >= enough);
+        let fitted = Fitted {
+            hypothetical: planner.hypothetical,
+            sir: one,
+            kept: is_kept,
+        };
+        let most = target.map(|_| self.sir());
+        // With fewer relays not even the best chain meets the target.
+        let is_fewest = target.is_some() && self.by_all.as_ref().is_some_and(|best| best.proven);
+        let plan = match (self.by_one, self.by_all) {
+            (Some((plan, _)), _) if is_kept => Plan {
+                how: "the hypothetical interferer",
+                proven: is_fewest,
+                ..plan
+            },
+            (_, Some(best)) if best.sir > 0.0 => {
+                let briefed =
+                    Briefed::new(&planner.with_one(), self.relays, planner.ask.tolerance)?;
+                briefed.plan(&best.places, "the true sum of the interferers", best.proven)
+            }
+            _ => return Err(source::nothing()),
+        };
+        // Relays that share one place hear each other infinitely well.
+        let sirs = self.scene.hop_sirs(&plan.chain());
+        Ok(Plan {
+            sirs: sirs
+                .into_iter()
+                .map(|sir| sir.min(f64::from(f32::MAX)))
+                .collect(),
+            most,
+            fitted: Some(fitted),
+            ..plan
+        })
+    }
+}
+
+impl Best {
+    /// The chain at the f32 places that relays are told.
+    fn new(scene: &Scene, places: &[impl Copy + Into<Place>], proven: bool) -> Self {
+        let places: Vec<Placement> = places
+            .iter()
+            .map(|&place| {
+                let Place { x, y, h } = place.into();
+                Placement {
+                    x_m: narrow(x),
+                    y_m: narrow(y),
+                    altitude_m: narrow(h),
+                }
+            })
+            .collect();
+        Self {
+            sir: scene.chain_sir(&places),
+            places,
+            proven,
+        }
+    }
+}
+
+/// The places of a plan.
+fn places(plan: &Plan) -> Vec<Place> {
+    plan.chain().into_iter().map(Place::from).collect()
+}
+
+/// One relay at `x_m`: the best altitude of a fine scan of the band, closed in on four times.
+fn at(scene: &Scene, x_m: f64) -> Option<Best> {
+    const ROWS: u16 = 200;
+    let band = scene.band;
+    let (mut low, mut high) = (band.least_m, band.most_m);
+    let mut best = (0.0, low);
+    for _ in 0..5 {
+        let step = (high - low) / f64::from(ROWS);
+        for row in 0..=ROWS {
+            let h = (low + step * f64::from(row)).min(band.most_m);
+            let sir = scene.chain_sir(&[(x_m, h)]);
+            if sir > best.0 {
+                best = (sir, h);
+            }
+        }
+        (low, high) = (
+            (best.1 - step).max(band.least_m),
+            (best.1 + step).min(band.most_m),
+        );
+    }
+    (best.0 > 0.0).then(|| Best::new(scene, &[(x_m, best.1)], false))
+}

@@ -1,0 +1,267 @@
+//! Plans against one interferer.
+
+use uav_relay::placement::single::{Found, aside, free, given_altitude, given_x};
+use uav_relay::placement::{fleet, plan as silent};
+use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
+
+use super::{Ask, Briefed, MOST_RELAYS, NoPlan, Number, Plan, Theorem, altitude};
+use uav_relay_sim::command::narrow;
+use uav_relay_sim::scenario::Scenario;
+
+pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
+    match ask.number {
+        Number::Of(1) => alone(scenario, ask),
+        Number::Of(relays) if ask.free_altitude => altitude::best(scenario, relays, ask.tolerance),
+        Number::Of(relays) => best(scenario, relays, ask.tolerance),
+        Number::Meeting(target) if ask.free_altitude => {
+            altitude::fewest(scenario, target, ask.tolerance)
+        }
+        Number::Meeting(target) => level(scenario, target, ask.tolerance),
+    }
+}
+
+/// The fewest relays at the altitudes they hold, by eq. (Opt).
+pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
+    let plan = fewest(scenario, target, tolerance, "eq. (Opt)")?;
+    let most = best(scenario, plan.mission.relays(), tolerance);
+    Ok(Plan {
+        most: most.ok().map(|best| best.sir()),
+        ..plan
+    })
+}
+
+/// One relay, by Theorem 1, 2 or 3, or beside the line. One that holds its altitude holds its place above the line too.
+fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
+    let briefed = Briefed::new(scenario, 1, ask.tolerance)?;
+    let profile = briefed.profile(1);
+    let mission = if briefed.held.is_empty() {
+        briefed.mission
+    } else {
+        at_one_altitude(&briefed.mission, profile)
+    };
+    let (found, theorem) = if let Some(x_m) = ask.x_m {
+        second(&mission, narrow(x_m), profile.power_w)
+    } else if ask.free_altitude && briefed.held.is_empty() && !mission.config().lateral.is_single()
+    {
+        beside(&mission, profile.power_w)
+    } else if ask.free_altitude {
+        third(&mission, profile.power_w)
+    } else {
+        first(&mission, profile)
+    }
+    .ok_or_else(|| NoPlan::Wrong("the place is not between Tx and Rx".to_owned()))?;
+    if !(found.sir > 0.0) {
+        return Err(nothing());
+    }
+    let how = ["Theorem 1", "Theorem 2", "Theorem 3", "one relay aside"]
+        .get(usize::from(theorem.number) - 1)
+        .copied()
+        .unwrap_or("a theorem");
+    let plan = briefed.plan(&[found.place], how, true);
+    Ok(Plan {
+        theorem: Some(theorem),
+        ..plan
+    })
+}
+
+/// The mission whose band is the one altitude that its relay holds.
+fn at_one_altitude(mission: &Mission, profile: Profile) -> Mission {
+    let config = MissionConfig {
+        band: Band::at(profile.altitude_m),
+        common: profile,
+        ..*mission.config()
+    };
+    Mission::try_new(config).unwrap_or(*mission)
+}
+
+pub(super) fn nothing() -> NoPlan {
+    let why = "no placement gives every hop an SIR above 0";
+    NoPlan::Unmet(why.to_owned(), Some(0.0))
+}
+
+fn first(mission: &Mission, profile: Profile) -> Option<(Found, Theorem)> {
+    let (found, case) = given_altitude::best_place(mission, profile)?;
+    Some((
+        found,
+        Theorem {
+            number: 1,
+            case: case.printed(),
+            words: along_x(case).to_owned(),
+        },
+    ))
+}
+
+fn second(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Theorem)> {
+    let (found, case) = given_x::best_place(mission, x_m, power_w)?;
+    Some((
+        found,
+        Theorem {
+            number: 2,
+            case: case.printed(),
+            words: upward(case).to_owned(),
+        },
+    ))
+}
+
+fn third(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
+    let (found, case) = free::best_place(mission, power_w)?;
+    let (number, words) = match case {
+        free::Case::Lowest(case) => (1, format!("at the lowest altitude: {}", along_x(case))),
+        free::Case::Highest(case) => (2, format!("at the highest altitude: {}", along_x(case))),
+        free::Case::AboveRx(case) => (3, format!("right above Rx: {}", upward(case))),
+    };
+    Some((
+        found,
+        Theorem {
+            number: 3,
+            case: number,
+            words,
+        },
+    ))
+}
+
+fn beside(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
+    let (found, case) = aside::best_place(mission, power_w)?;
+    Some((
+        found,
+        Theorem {
+            number: 4,
+            case: case.number(),
+            words: sideways(case).to_owned(),
+        },
+    ))
+}
+
+/// A case of one relay aside in words.
+fn sideways(case: aside::Case) -> &'static str {
+    use aside::{Axis, Case};
+    match case {
+        Case::Touching => {
+            "where the circles of equal SIR of both hops touch, at the lowest altitude"
+        }
+        Case::Hilltop => "the first hop is the worse one even at its best place",
+        Case::AboveRx => "the first hop is the better one even above Rx",
+        Case::Edge(Axis::Along) => "on an edge of the corridor along the line",
+        Case::Edge(Axis::Across) => "on an edge of the corridor across the line, at Tx or Rx",
+        Case::Edge(Axis::Upward) => "on an upright edge of the corridor, at Tx or Rx",
+        Case::Level => "the interferer stands at Tx: the first hop is the same everywhere",
+        Case::Drowned => "the interferer stands at Rx: nothing is heard",
+    }
+}
+
+/// A case of Theorem 1 in words.
+fn along_x(case: given_altitude::Case) -> &'static str {
+    use given_altitude::Case;
+    match case {
+        Case::AboveTx => "the first hop is the worse one even above Tx",
+        Case::Crossing => "where both hops have the same SIR",
+        Case::AboveRx => "the first hop is the better one even above Rx",
+        Case::BeforeValley => {
+            "the hops cross before the worst place of the first: there, or above Rx"
+        }
+        Case::OverValley => "the first hop is the better one even at its worst place",
+        Case::Hilltop => "the first hop is the worse one even at its best place",
+        Case::BeyondHill => "beyond the best place of the first hop, where both have the same SIR",
+        Case::HillAboveRx => {
+            "the interferer is behind Tx, and the first hop the better one even above Rx"
+        }
+        Case::Level => "the interferer stands at Tx: the first hop is the same everywhere",
+        Case::Drowned => "the interferer stands at Rx: nothing is heard",
+    }
+}
+
+/// A case of Theorem 2 in words.
+fn upward(case: given_x::Case) -> &'static str {
+    use given_x::Case;
+    match case {
+        Case::BothFall => "both hops fall with the altitude: the lowest",
+        Case::Crossing => "the altitude at which both hops have the same SIR",
+        Case::End => "the better end of the band",
+        Case::Drowned => "the interferer stands at Rx: nothing is heard",
+    }
+}
+
+/// The best places of so many relays at the altitudes they hold: Algorithm 1 without its messages.
+pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
+    let briefed = Briefed::new(scenario, relays, tolerance)?;
+    let target = solved(&briefed)?;
+    let places = placed(&briefed, target).ok_or_else(nothing)?;
+    let proven = briefed.level()
+        && super::is_free(scenario, |free| {
+            let most = solved(&Briefed::new(free, relays, tolerance).ok()?).ok()?;
+            Some(f64::from(most) <= f64::from(target) * (1.0 + 2.0 * tolerance))
+        });
+    Ok(briefed.plan(&places, "Algorithm 1", proven))
+}
+
+/// The target that the relays would settle on.
+pub(super) fn solved(briefed: &Briefed) -> Result<f32, NoPlan> {
+    silent::solve(&briefed.mission, Schedule::Bracketed, |index| {
+        briefed.profile(index)
+    })
+    .map(|agreed| agreed.target)
+    .map_err(|_| nothing())
+}
+
+/// Where they stand for it.
+pub(super) fn placed(briefed: &Briefed, target: f32) -> Option<Vec<Placement>> {
+    let mut places = vec![Placement::default(); usize::from(briefed.mission.relays())];
+    let profile_of = |index| briefed.profile(index);
+    fleet::places(&briefed.mission, target, profile_of, &mut places).then_some(places)
+}
+
+/// The fewest relays at the altitudes they hold, and their places for the target.
+pub(super) fn fewest(
+    scenario: &Scenario,
+    target: f64,
+    tolerance: f64,
+    how: &'static str,
+) -> Result<Plan, NoPlan> {
+    let (briefed, proven) = enough(scenario, target, tolerance)?;
+    let places = placed(&briefed, narrow(target)).ok_or_else(nothing)?;
+    Ok(briefed.plan(&places, how, proven))
+}
+
+/// The mission of the fewest relays that meet `target` at the altitudes they hold, and whether no fewer do.
+///
+/// # Errors
+/// [`NoPlan::Unmet`], with the most that any number of relays can have.
+pub(super) fn enough(
+    scenario: &Scenario,
+    target: f64,
+    tolerance: f64,
+) -> Result<(Briefed, bool), NoPlan> {
+    // Their number is not known yet: what differs for a relay counts once there are so many.
+    let alone = Briefed::new(scenario, 1, tolerance)?;
+    let own = Briefed {
+        own: own_profiles(scenario, &alone.mission),
+        ..alone
+    };
+    let profile_of = |index| own.profile(index);
+    if let Ok(found) = fleet::fewest(&own.mission, narrow(target), profile_of) {
+        let briefed = Briefed::new(scenario, found.relays, tolerance)?;
+        return Ok((briefed, found.proven));
+    }
+    let most = fleet::most(&own.mission, profile_of).ok_or_else(nothing)?;
+    let why = format!(
+        "no number of relays, up to {MOST_RELAYS}, gives every hop an SIR of {target}: the most is {:.6}, with {}",
+        most.target, most.relays
+    );
+    Err(NoPlan::Unmet(why, Some(f64::from(most.target))))
+}
+
+/// What any relay of the scenario would hold of its own, whatever their number.
+fn own_profiles(scenario: &Scenario, mission: &Mission) -> Vec<(u16, Profile)> {
+    let common = mission.config().common;
+    scenario
+        .relays
+        .iter()
+        .map(|(&index, own)| {
+            let profile = Profile {
+                altitude_m: own.altitude_m.map_or(common.altitude_m, narrow),
+                power_w: own.power_w.map_or(common.power_w, narrow),
+            };
+            (index, profile)
+        })
+        .collect()
+}

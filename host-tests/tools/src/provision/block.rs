@@ -1,0 +1,180 @@
+//! From a scenario to the block that is written into one drone.
+
+use std::fmt;
+
+use uav_relay::{Identity, Interference, Measure, Method, Mission, Profile};
+
+use super::config::{
+    Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, Secret, read, secret, write,
+};
+use uav_relay_sim::mission::{self, Refusal};
+use uav_relay_sim::scenario::{AirGround, ChannelSpec, Scenario};
+
+/// Why there is no block.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum BlockError {
+    /// The scenario is no mission.
+    Refused(Refusal),
+    /// The field has this many points, more than a block has room for.
+    Points(usize),
+    /// The drone would refuse the block.
+    Config(ConfigError),
+    /// The drone would read another mission than was meant.
+    Changed,
+}
+
+impl fmt::Display for BlockError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Refused(refusal) => refusal.fmt(f),
+            Self::Points(points) => write!(
+                f,
+                "field: a drone has room for {MAX_POINTS} points, and these are {points}"
+            ),
+            Self::Config(ConfigError::Index) => {
+                f.write_str("index must be within 1 to the number of relays")
+            }
+            Self::Config(ConfigError::Profile) => {
+                f.write_str("altitude or power of that relay is out of range")
+            }
+            Self::Config(ConfigError::Method) => f.write_str("method must be align in a field"),
+            Self::Config(ConfigError::Adjust) => {
+                f.write_str("rounds must be within 1 to 65535, explore within 0 to 1e5")
+            }
+            Self::Config(ConfigError::Measure) => {
+                f.write_str("samples must be within 100 to 1000000, i_max_w within 1e-30 to 1e6")
+            }
+            Self::Config(ConfigError::Secret) => {
+                f.write_str("the key must not be all 0, the epoch within 1 to 4294967294")
+            }
+            Self::Config(ConfigError::Mission(error)) => error.fmt(f),
+            Self::Config(ConfigError::Channel(error)) => error.fmt(f),
+            Self::Config(_) | Self::Changed => f.write_str("the block does not say the mission"),
+        }
+    }
+}
+
+impl std::error::Error for BlockError {}
+
+/// What the drones of one flight have in common.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    mission: Mission,
+    numbers: ChannelNumbers,
+    own: Vec<(u16, Profile)>,
+    held: Vec<u16>,
+    method: Method,
+    measure: Option<Measure>,
+    secret: Option<Secret>,
+    network: u16,
+}
+
+impl Flight {
+    /// The flight of `uavs` relays in `scenario`, on network `network`: places alone, and nothing is measured.
+    ///
+    /// # Errors
+    /// [`BlockError`] where the scenario is no mission, or none that a block has room for.
+    pub fn new(
+        scenario: &Scenario,
+        uavs: u16,
+        tolerance: f64,
+        network: u16,
+    ) -> Result<Self, BlockError> {
+        let (mission, own) =
+            mission::mission(scenario, uavs, tolerance).map_err(BlockError::Refused)?;
+        if let Interference::Field(field) = mission.interference()
+            && field.points().len() > MAX_POINTS
+        {
+            return Err(BlockError::Points(field.points().len()));
+        }
+        Ok(Self {
+            mission,
+            numbers: channel_numbers(&scenario.channel),
+            own,
+            held: mission::held(scenario, uavs),
+            method: Method::Align,
+            measure: None,
+            secret: None,
+            network,
+        })
+    }
+
+    /// The same, by another method.
+    pub fn by(self, method: Method) -> Self {
+        Self { method, ..self }
+    }
+
+    /// The same, with relays that measure the interference.
+    pub fn measuring(self, measure: Option<Measure>) -> Self {
+        Self { measure, ..self }
+    }
+
+    /// The same, with frames that are signed.
+    pub fn signed(self, secret: Option<Secret>) -> Self {
+        Self { secret, ..self }
+    }
+
+    /// The mission.
+    pub const fn mission(&self) -> &Mission {
+        &self.mission
+    }
+
+    /// What single relays hold of their own, by index from 1.
+    pub fn profiles(&self) -> &[(u16, Profile)] {
+        &self.own
+    }
+
+    /// Relays that keep to their altitude when altitudes are chosen, by index from 1.
+    pub fn held(&self) -> &[u16] {
+        &self.held
+    }
+
+    /// What the leader has the chain do.
+    pub const fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The block of relay `index`, read back to be sure.
+    ///
+    /// # Errors
+    /// [`BlockError`] where the drone would refuse it.
+    pub fn block(&self, index: u16) -> Result<Block, BlockError> {
+        let own = self.own.iter().find(|(of, _)| *of == index);
+        let config = Config {
+            identity: Identity {
+                network: self.network,
+                index,
+            },
+            mission: self.mission,
+            profile: own.map_or(self.mission.config().common, |(_, profile)| *profile),
+            hold_altitude: self.held.contains(&index),
+            method: self.method,
+            measure: self.measure,
+        };
+        let block = write(&config, &self.numbers, self.secret);
+        let read = read(&block, Box::leak(Box::new(EMPTY))).map_err(BlockError::Config)?;
+        let secret = secret(&block).map_err(BlockError::Config)?;
+        if (read, secret) == (config, self.secret) {
+            Ok(block)
+        } else {
+            Err(BlockError::Changed)
+        }
+    }
+}
+
+/// Decibels as factors, by the very function by which [`uav_relay::Channel::from_db`] has them, so that the drone's channel
+/// is the scenario's to the bit.
+fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
+    let factor = |db: f64| libm::pow(10.0, db / 10.0);
+    ChannelNumbers {
+        carrier_hz: spec.carrier_hz,
+        excess_los: factor(spec.excess_loss_los_db),
+        excess_nlos: factor(spec.excess_loss_nlos_db),
+        los_weight: match spec.air_ground {
+            AirGround::Los => 1.0,
+            AirGround::Nlos => 0.0,
+            AirGround::Weight(weight) => weight,
+        },
+    }
+}

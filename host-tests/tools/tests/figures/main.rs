@@ -1,0 +1,123 @@
+//! `cargo figures` as a person meets it, and the numbers in its tables: each table against a judge that shares no formula with
+//! the crate, or against values of a separate program.
+//!
+//! The tool runs once, in full; every test reads what it has written.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    missing_docs
+)]
+
+mod altitudes;
+mod aside;
+mod chains;
+mod fields;
+mod files;
+mod single;
+
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+use tempfile::TempDir;
+
+fn figures(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_figures"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+/// Where the one full run has written its files.
+fn written() -> &'static Path {
+    static DIR: OnceLock<TempDir> = OnceLock::new();
+    DIR.get_or_init(|| {
+        let dir = TempDir::new().unwrap();
+        let output = figures(&["--out", dir.path().to_str().unwrap()]);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && errors.is_empty(), "{errors}");
+        dir
+    })
+    .path()
+}
+
+/// A table as it was written.
+struct Table {
+    head: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    fn read(name: &str) -> Self {
+        let file = written().join(format!("{name}.csv"));
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .from_path(file)
+            .unwrap();
+        let owned = |record: &csv::StringRecord| record.iter().map(str::to_owned).collect();
+        let head = owned(reader.headers().unwrap());
+        let rows: Vec<Vec<String>> = reader.records().map(|row| owned(&row.unwrap())).collect();
+        assert!(!rows.is_empty(), "{name} is empty");
+        Self { head, rows }
+    }
+
+    fn column(&self, name: &str) -> usize {
+        self.head
+            .iter()
+            .position(|head| head == name)
+            .unwrap_or_else(|| panic!("no {name} in {:?}", self.head))
+    }
+
+    /// The rows in which each of these columns has this value.
+    fn rows(&self, of: &[(&str, f64)]) -> Vec<Row<'_>> {
+        let matches = |row: &Row<'_>| of.iter().all(|(name, value)| row.get(name) == Some(*value));
+        let all = self.rows.iter().map(|cells| Row { table: self, cells });
+        all.filter(matches).collect()
+    }
+
+    /// The only such row.
+    fn row(&self, of: &[(&str, f64)]) -> Row<'_> {
+        let mut rows = self.rows(of);
+        assert_eq!(rows.len(), 1, "{of:?}");
+        rows.remove(0)
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Row<'a> {
+    table: &'a Table,
+    cells: &'a [String],
+}
+
+impl Row<'_> {
+    fn text(&self, name: &str) -> &str {
+        &self.cells[self.table.column(name)]
+    }
+
+    /// The number in a column, if there is one.
+    fn get(&self, name: &str) -> Option<f64> {
+        self.text(name).parse().ok()
+    }
+
+    fn number(&self, name: &str) -> f64 {
+        self.get(name)
+            .unwrap_or_else(|| panic!("no number in {name}: {:?}", self.cells))
+    }
+}
+
+/// The relative difference of `got` from `want`.
+fn off(got: f64, want: f64) -> f64 {
+    (got / want - 1.0).abs()
+}
+
+/// Panics unless `got` is at most `most` above `want` and at most `least` below it, both relative.
+#[track_caller]
+fn within(got: f64, want: f64, least: f64, most: f64) {
+    assert!(
+        got >= want * (1.0 - least) && got <= want * (1.0 + most),
+        "{got} against {want}"
+    );
+}

@@ -1,0 +1,363 @@
+//! `cargo plan` as a person and a program meet it.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs
+)]
+
+use std::fmt::Write as _;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use uav_relay_oracle::cases::{self, Case};
+use uav_relay_oracle::reference::Link;
+use uav_relay_oracle::reference::joint::{Corridor, Effort, optimum};
+
+fn plan(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_plan"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let mut all = vec!["--json"];
+    all.extend(arguments);
+    let output = plan(&all);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        output.status.success() && text.is_empty(),
+        "{arguments:?}: {text}"
+    );
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The exit status and the one line on standard error.
+fn refusal(arguments: &[&str]) -> (i32, String) {
+    let output = plan(arguments);
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(text.trim_end().lines().count(), 1, "{arguments:?}: {text}");
+    (output.status.code().unwrap(), text)
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// The scenario of a reference case with the paper's channel, as a file.
+fn scenario(case: &Case, interference: &str) -> tempfile::NamedTempFile {
+    let p = &case.params;
+    let mut text = String::new();
+    write!(
+        text,
+        "[geometry]\ndistance_m = {:?}\naltitude_m = {:?}\naltitude_min_m = {:?}\naltitude_max_m = {:?}\n\
+         [power]\ntx_w = {:?}\nuav_w = {:?}\n{interference}",
+        p.d,
+        p.h.clamp(p.h_min, p.h_max),
+        p.h_min,
+        p.h_max,
+        p.p_t,
+        p.p_u
+    )
+    .unwrap();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), text).unwrap();
+    file
+}
+
+fn interferer(case: &Case) -> String {
+    let p = &case.params;
+    format!(
+        "[[interferer]]\npower_w = {:?}\nx_m = {:?}\ny_m = {:?}\n",
+        p.p_msi, p.x, p.y
+    )
+}
+
+/// The cases of `function` in the paper's channel, which is that of a file without one.
+fn with_the_papers_channel(function: &str) -> Vec<Case> {
+    let mut cases = cases::of(function).unwrap();
+    cases.retain(|case| (case.params.mu_los - 7_191.811_792).abs() < 1e-3);
+    assert!(!cases.is_empty(), "{function}");
+    cases
+}
+
+#[test]
+fn the_theorems_of_the_reference_come_out_of_the_command() {
+    for (function, options) in [
+        ("theorem1", &["--uavs", "1"][..]),
+        ("theorem3", &["--uavs", "1", "--altitude", "free"]),
+        ("theorem2", &["--uavs", "1", "--x-m"]),
+    ] {
+        for mut case in with_the_papers_channel(function) {
+            case.params.h = case.arg("h").unwrap_or(case.params.h_min);
+            let x_m = case.arg("x").map(|x| format!("{x:?}"));
+            let file = scenario(&case, &interferer(&case));
+            let mut arguments = vec!["--scenario", file.path().to_str().unwrap()];
+            arguments.extend(options);
+            arguments.extend(x_m.as_deref());
+            let report = json(&arguments);
+            let sir = number(&report["sir"]);
+            assert!(
+                (sir / case.part("sir").unwrap() - 1.0).abs() < 1e-5,
+                "{}: {sir}",
+                case.id
+            );
+            let theorem = function.trim_start_matches("theorem").parse().unwrap();
+            assert_eq!(report["theorem"].as_u64(), Some(theorem), "{}", case.id);
+            if let Some(expected) = case.part("case") {
+                assert!(
+                    (number(&report["case"]) - expected).abs() < 0.5,
+                    "{}",
+                    case.id
+                );
+            }
+            assert_eq!(report["proven"].as_bool(), Some(true));
+        }
+    }
+}
+
+/// With room beside the line the only relay goes there, and no place is better.
+#[test]
+fn one_relay_aside_is_the_judges_of_three_dimensions() {
+    let side = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/side.toml");
+    let report = json(&["--scenario", side, "--uavs", "1", "--altitude", "free"]);
+    assert_eq!(report["theorem"].as_u64(), Some(4), "{report}");
+    assert_eq!(report["how"].as_str(), Some("one relay aside"));
+    assert_eq!(report["proven"].as_bool(), Some(true));
+    assert!((1..=8).contains(&report["case"].as_u64().unwrap()));
+    let link = Link {
+        y_i: 150.0,
+        ..Link::paper(1)
+    };
+    let corridor = Corridor {
+        least_m: 20.0,
+        most_m: 300.0,
+        left_m: -280.0,
+        right_m: 280.0,
+    };
+    let best = optimum(&link, corridor, &[], Effort::usual(1)).unwrap();
+    let sir = number(&report["sir"]);
+    assert!((sir / best.sir - 1.0).abs() < 1e-5, "{sir} {best:?}");
+    // Without a free altitude it stays above the line.
+    let report = json(&["--scenario", side, "--uavs", "1"]);
+    assert_eq!(report["theorem"].as_u64(), Some(1), "{report}");
+}
+
+#[test]
+fn the_counts_of_the_reference_come_out_of_the_command() {
+    for case in with_the_papers_channel("min_uavs") {
+        let file = scenario(&case, &interferer(&case));
+        let target = format!("{:?}", case.arg("gamma").unwrap());
+        let path = file.path().to_str().unwrap();
+        let report = json(&["--scenario", path, "--target-sir", &target]);
+        assert!(
+            (number(&report["uavs"]) - case.part("N").unwrap()).abs() < 0.5,
+            "{}",
+            case.id
+        );
+        assert_eq!(
+            report["relays"].as_array().unwrap().len() as u64,
+            report["uavs"].as_u64().unwrap()
+        );
+        assert!(number(&report["sir"]) >= case.arg("gamma").unwrap() * (1.0 - 1e-5));
+        assert_eq!(report["proven"].as_bool(), Some(true));
+        // The same in dB.
+        let db = format!("{:?}", 10.0 * case.arg("gamma").unwrap().log10());
+        let again = json(&["--scenario", path, "--target-sir-db", &db]);
+        assert_eq!(again["uavs"], report["uavs"], "{}", case.id);
+        // One fewer cannot have it.
+        let fewer = report["uavs"].as_u64().unwrap() - 1;
+        if fewer > 0 {
+            let best = json(&["--scenario", path, "--uavs", &fewer.to_string()]);
+            assert!(
+                number(&best["sir"]) < case.arg("gamma").unwrap(),
+                "{}",
+                case.id
+            );
+        }
+    }
+}
+
+#[test]
+fn rates_are_those_of_the_sir() {
+    let report = json(&["--uavs", "8", "--bandwidth-hz", "1e7"]);
+    let expected = 1e7 * (1.0 + number(&report["sir"])).log2();
+    assert!((number(&report["rate_bps"]) / expected - 1.0).abs() < 1e-12);
+    // 2 bit/s and hertz take an SIR of 3, in either way of asking.
+    let by_rate = json(&["--target-rate-bps", "2e7", "--bandwidth-hz", "1e7"]);
+    let by_sir = json(&["--target-sir", "3"]);
+    assert!((number(&by_rate["target_sir"]) - 3.0).abs() < 1e-12);
+    assert_eq!(by_rate["uavs"], by_sir["uavs"]);
+    assert!(number(&by_rate["rate_bps"]) >= 2e7 * (1.0 - 1e-5));
+    let (status, line) = refusal(&["--target-rate-bps", "1e12", "--bandwidth-hz", "1"]);
+    assert!(status == 2 && line.contains("--target-rate-bps"), "{line}");
+}
+
+#[test]
+fn wrong_input_is_named_in_one_line_with_status_2() {
+    for (arguments, named) in [
+        (&[][..], "--uavs <N>|--target-sir <X>"),
+        (&["--uavs", "0"], "0 is not in 1..=1000"),
+        (&["--uavs", "1001"], "1..=1000"),
+        (&["--uavs", "3", "--target-sir", "2"], "--uavs"),
+        (&["--target-sir", "0"], "must be a number within 1e-9"),
+        (&["--target-sir", "nan"], "must be a number within 1e-9"),
+        (&["--target-sir", "-3"], "must be a number within 1e-9"),
+        (
+            &["--target-sir-db", "91"],
+            "must be a number within -90.0 to 90.0",
+        ),
+        (&["--target-rate-bps", "5"], "--bandwidth-hz"),
+        (
+            &["--uavs", "1", "--bandwidth-hz", "0"],
+            "must be a number within 1.0",
+        ),
+        (&["--uavs", "1", "--altitude", "low"], "'low'"),
+        (
+            &["--uavs", "1", "--x-m", "-1"],
+            "--x-m -1.0: must be within 0.0 to 1000.0",
+        ),
+        (&["--uavs", "1", "--x-m", "1000.5"], "geometry.distance_m"),
+        (&["--uavs", "1", "--x-m", "nan"], "--x-m NaN"),
+        (&["--uavs", "2", "--x-m", "3"], "needs --uavs 1"),
+        (&["--target-sir", "2", "--x-m", "3"], "needs --uavs 1"),
+        (
+            &["--uavs", "1", "--tolerance", "0"],
+            "must be a number within 1e-6",
+        ),
+        (
+            &["--uavs", "1", "--scenario", "no-such-file.toml"],
+            "no-such-file.toml",
+        ),
+        (
+            &["--uavs", "1", "--svg", "/no/such/folder/x.svg"],
+            "--svg cannot be written",
+        ),
+    ] {
+        let (status, line) = refusal(arguments);
+        assert_eq!(status, 2, "{arguments:?}: {line}");
+        assert!(line.contains(named), "{arguments:?}: {line}");
+    }
+    let field = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/field.toml");
+    let (status, line) = refusal(&["--uavs", "1", "--x-m", "3", "--scenario", field]);
+    assert!(status == 2 && line.contains("[[interferer]]"), "{line}");
+}
+
+#[test]
+fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
+    let output = plan(&["--target-sir-db", "60", "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let most = number(&report["best_sir"]);
+    assert!(
+        report["error"]
+            .as_str()
+            .unwrap()
+            .contains("the most is 125.31"),
+        "{report}"
+    );
+    // That much can be had, and no more.
+    let told = format!("{:?}", most * (1.0 - 1e-5));
+    assert!(number(&json(&["--target-sir", &told])["sir"]) >= most * (1.0 - 1e-4));
+    let more = format!("{:?}", most * 1.001);
+    assert_eq!(refusal(&["--target-sir", &more]).0, 1);
+    // Too many for the distance.
+    let (status, line) = refusal(&["--uavs", "1000"]);
+    assert!(status == 1 && line.contains("min_separation_m"), "{line}");
+}
+
+#[test]
+fn the_table_says_how_and_how_sure_and_the_picture_is_drawn() {
+    let svg = tempfile::NamedTempFile::new().unwrap();
+    let path = svg.path().to_str().unwrap();
+    let output = plan(&["--uavs", "8", "--svg", path]);
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        table.contains("worst hop: SIR 2.4655") && table.contains("8 relays, by Algorithm 1"),
+        "{table}"
+    );
+    assert!(table.contains("no places are better"), "{table}");
+    let drawing = std::fs::read_to_string(path).unwrap();
+    assert!(roxmltree::Document::parse(&drawing).is_ok());
+    let output = plan(&["--target-sir", "5"]);
+    let table = String::from_utf8(output.stdout).unwrap();
+    for part in [
+        "with 22 relays, by eq. (Opt)",
+        "no fewer relays meet the target",
+        "up to 5.16",
+    ] {
+        assert!(table.contains(part), "{part}: {table}");
+    }
+}
+
+#[test]
+fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
+    let case = &with_the_papers_channel("hyp_msi")[0];
+    let two = |x: [f64; 2], y: f64| {
+        x.map(|x| format!("[[interferer]]\npower_w = 40.0\nx_m = {x:?}\ny_m = {y:?}\n"))
+            .concat()
+    };
+    // Next to each other: one stands for both.
+    let file = scenario(case, &two([490.0, 510.0], 400.0));
+    let path = file.path().to_str().unwrap();
+    let near = json(&["--scenario", path, "--uavs", "8"]);
+    let one = &near["hypothetical"];
+    for key in [
+        "power_w",
+        "x_m",
+        "y_m",
+        "mean_abs_error_w",
+        "relative_error",
+    ] {
+        assert!(one[key].is_number(), "{key} in {one}");
+    }
+    assert!(
+        number(&one["relative_error"]) < 1e-3 && one["kept"] == true,
+        "{one}"
+    );
+    assert!(
+        (number(&one["x_m"]) - 500.0).abs() < 1.0 && (number(&one["power_w"]) - 80.0).abs() < 1.0
+    );
+    let alone = json(&["--uavs", "8"]);
+    assert!((number(&near["sir"]) / number(&alone["sir"]) - 1.0).abs() < 0.01);
+    // Far apart: none does, and the plan's places are better than its.
+    let file = scenario(case, &two([100.0, 900.0], 150.0));
+    let path = file.path().to_str().unwrap();
+    let far = json(&["--scenario", path, "--uavs", "8"]);
+    let one = &far["hypothetical"];
+    assert!(one["kept"] == false && number(&one["gain"]) > 0.01, "{far}");
+    let gained = number(&far["sir"]) / number(&one["sir"]) - 1.0;
+    assert!((gained - number(&one["gain"])).abs() < 1e-9);
+    let table = String::from_utf8(plan(&["--scenario", path, "--uavs", "8"]).stdout).unwrap();
+    assert!(
+        table.contains("its places are not good enough") && table.contains("a gain of"),
+        "{table}"
+    );
+}
+
+#[test]
+fn the_joint_optimum_comes_out_where_altitudes_are_free() {
+    let altitudes = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/altitudes.toml");
+    let free = json(&["--scenario", altitudes, "--uavs", "8", "--altitude", "free"]);
+    assert!(
+        (number(&free["sir"]) / 1.235_783_8 - 1.0).abs() < 1e-3,
+        "{free}"
+    );
+    assert_eq!(free["proven"].as_bool(), Some(false));
+    // Choosing altitudes takes no more relays.
+    let given = json(&["--scenario", altitudes, "--target-sir", "2"]);
+    let fewer = json(&[
+        "--scenario",
+        altitudes,
+        "--target-sir",
+        "2",
+        "--altitude",
+        "free",
+    ]);
+    assert!(number(&fewer["uavs"]) <= number(&given["uavs"]), "{fewer}");
+    assert!(number(&fewer["sir"]) >= 2.0);
+}

@@ -1,0 +1,665 @@
+//! The configuration of a drone: `cargo brief` writes it, the firmware's own code reads it, and nothing damaged gets through.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::float_cmp,
+    missing_docs
+)]
+
+mod secret;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::channel::ChannelError;
+use uav_relay::field::FieldError;
+use uav_relay::mission::MissionError;
+use uav_relay::{Adjust, Instant, Local, Measure, Method, Relay, Settings};
+use uav_relay_sim::scenario::{BetaPoint, Field, Interference, Scenario};
+use uav_relay_tools::provision::block::{BlockError, Flight};
+use uav_relay_tools::provision::config::{
+    Block, Config, ConfigError, EMPTY, LEN, MAX_POINTS, read,
+};
+
+fn example() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/scenario.toml")
+}
+
+fn paper() -> Block {
+    let flight = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
+    flight.block(3).unwrap()
+}
+
+/// A field of `points` points, up to 2e-10 W.
+fn in_a_field(points: usize) -> Scenario {
+    let point = |k| BetaPoint {
+        x_m: 100.0 * k as f64,
+        alpha: 2.0,
+        beta: 1.0 + k as f64,
+    };
+    Scenario {
+        interference: Interference::Field(Field {
+            i_max_w: 2e-10,
+            beta: (0..points).map(point).collect(),
+        }),
+        ..Scenario::default()
+    }
+}
+
+fn field(points: usize) -> Block {
+    let flight = Flight::new(&in_a_field(points), 5, 1e-4, 7).unwrap();
+    flight.block(3).unwrap()
+}
+
+/// What a drone makes of a block.
+fn reads(block: &Block) -> Result<Config, ConfigError> {
+    read(block, Box::leak(Box::new(EMPTY)))
+}
+
+/// The block of the paper's scenario with `bytes` at `at`, and the CRC that belongs to it.
+fn with(at: usize, bytes: &[u8]) -> Block {
+    changed(paper(), at, bytes)
+}
+
+fn changed(mut block: Block, at: usize, bytes: &[u8]) -> Block {
+    block[at..at + bytes.len()].copy_from_slice(bytes);
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&block[..LEN - 4]);
+    block[LEN - 4..].copy_from_slice(&crc.to_le_bytes());
+    block
+}
+
+fn brief(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_provision"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+/// The one line on standard error; the exit status is 2.
+fn refusal(arguments: &[&str]) -> String {
+    let output = brief(arguments);
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(text.trim_end().lines().count(), 1, "{arguments:?}: {text}");
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
+    text
+}
+
+/// A block by hand: `method` as its number and as what adjust is told, and what of it is not the paper's scenario.
+fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
+    let (method, hold, explore_m, rounds) = method;
+    let (interferer, rest) = noise;
+    let mut bytes: Vec<u8> = b"UAVR\x04\0\x24\x01\x03\0\x07\0\x05\0".to_vec();
+    bytes.extend([method, u8::from(hold)]);
+    for number in [1000.0_f32, 4.0, 80.0, 20.0, 1.0, 20.0, 1.0] {
+        bytes.extend(number.to_le_bytes());
+    }
+    for number in interferer.into_iter().chain([1e-4]) {
+        bytes.extend(number.to_le_bytes());
+    }
+    for number in [2e9_f64, libm::pow(10.0, 0.01), libm::pow(10.0, 2.1), 1.0] {
+        bytes.extend(number.to_le_bytes());
+    }
+    for number in band.into_iter().chain([0.0, 0.0, explore_m]) {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes.extend(rounds.to_le_bytes());
+    bytes.extend(rest);
+    bytes.resize(288, 0);
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
+    bytes.extend(crc.to_le_bytes());
+    bytes
+}
+
+const PAPER: ([f32; 3], &[u8]) = ([80.0, 500.0, 400.0], &[]);
+
+/// The table in `config.rs`, byte by byte.
+#[test]
+fn a_block_is_what_the_table_says() {
+    assert_eq!(by_hand((0, false, 0.0, 0), [20.0; 2], PAPER), paper());
+
+    let mut scenario = Scenario {
+        altitude_max_m: 300.0,
+        ..Scenario::default()
+    };
+    let own = scenario.relays.entry(3).or_default();
+    own.altitude_m = Some(20.0);
+    let flight = Flight::new(&scenario, 5, 1e-4, 7).unwrap();
+    let block = flight.clone().by(Method::Joint).block(3).unwrap();
+    assert_eq!(by_hand((1, true, 0.0, 0), [20.0, 300.0], PAPER), block);
+    let adjust = Method::Adjust(Adjust {
+        rounds: 0x1234,
+        explore_m: 2.5,
+        local: Local::Fine,
+    });
+    let block = flight.by(adjust).block(3).unwrap();
+    assert_eq!(by_hand((2, true, 2.5, 0x1234), [20.0, 300.0], PAPER), block);
+
+    // Upsilon = (alpha + beta - 1) / ((alpha - 1) I_max), which for alpha = 2 is (1 + beta) / I_max.
+    let mut rest = b"\x03\0".to_vec();
+    rest.extend(2e-10_f32.to_le_bytes());
+    rest.extend(100_000_u32.to_le_bytes());
+    for (x, upsilon) in [(0.0_f32, 1e10_f32), (100.0, 1.5e10), (200.0, 2e10)] {
+        rest.extend(x.to_le_bytes());
+        rest.extend(upsilon.to_le_bytes());
+    }
+    let measure = Measure {
+        i_max_w: 2e-10,
+        samples: 100_000,
+    };
+    let flight = Flight::new(&in_a_field(3), 5, 1e-4, 7).unwrap();
+    let block = flight.measuring(Some(measure)).block(3).unwrap();
+    assert_eq!(
+        by_hand((0, false, 0.0, 0), [20.0; 2], ([0.0; 3], &rest)),
+        block
+    );
+}
+
+/// What is set, and whatever else a block can say, comes back as it was.
+#[test]
+fn a_drone_reads_what_it_is_to_do() {
+    let scenario = Scenario {
+        altitude_max_m: 120.0,
+        ..Scenario::load(&example()).unwrap()
+    };
+    let adjust = Method::Adjust(Adjust {
+        rounds: 1,
+        explore_m: 0.0,
+        local: Local::Fine,
+    });
+    for method in [Method::Align, Method::Joint, adjust] {
+        let flight = Flight::new(&scenario, 6, 1e-4, 9).unwrap().by(method);
+        for index in 1..=6 {
+            let config = reads(&flight.block(index).unwrap()).unwrap();
+            assert_eq!(config.method, method);
+            assert_eq!(config.measure, None);
+            // Relay 2 has an altitude of its own, relay 5 but a power.
+            assert_eq!(config.hold_altitude, index == 2);
+            let band = config.mission.config().band;
+            assert_eq!((band.least_m, band.most_m), (40.0, 120.0));
+        }
+    }
+    for points in [1, 2, MAX_POINTS] {
+        let flight = Flight::new(&in_a_field(points), 6, 1e-4, 9).unwrap();
+        let config = reads(&flight.block(1).unwrap()).unwrap();
+        assert_eq!(config.mission, *flight.mission());
+    }
+}
+
+#[test]
+fn a_block_that_cannot_say_it_is_not_written() {
+    let too_many = Flight::new(&in_a_field(17), 5, 1e-4, 7);
+    assert_eq!(too_many.err(), Some(BlockError::Points(17)));
+    let grid = Adjust {
+        local: Local::Grid {
+            columns: 9,
+            rows: 9,
+        },
+        ..Adjust::default()
+    };
+    let measure = Measure {
+        i_max_w: 2e-10,
+        samples: 99,
+    };
+    let of = |scenario: &Scenario| Flight::new(scenario, 5, 1e-4, 7).unwrap();
+    for (flight, error) in [
+        (
+            of(&Scenario::default()).by(Method::Adjust(grid)),
+            BlockError::Changed,
+        ),
+        (
+            of(&in_a_field(3)).by(Method::Joint),
+            BlockError::Config(ConfigError::Method),
+        ),
+        (
+            of(&in_a_field(3)).by(Method::Adjust(Adjust::default())),
+            BlockError::Config(ConfigError::Method),
+        ),
+        (
+            of(&in_a_field(3)).measuring(Some(measure)),
+            BlockError::Config(ConfigError::Measure),
+        ),
+    ] {
+        assert_eq!(flight.block(3), Err(error));
+    }
+}
+
+#[test]
+fn a_drone_reads_the_very_mission_of_the_scenario() {
+    let scenario = Scenario::load(&example()).unwrap();
+    let flight = Flight::new(&scenario, 6, 1e-3, 9).unwrap();
+    for index in 1..=6 {
+        let config = reads(&flight.block(index).unwrap()).unwrap();
+        assert_eq!(config.mission, *flight.mission());
+        assert_eq!((config.identity.index, config.identity.network), (index, 9));
+        let altitude = if index == 2 { 55.0 } else { 40.0 };
+        let power = if index == 5 { 1.0 } else { 2.0 };
+        assert_eq!(
+            (config.profile.altitude_m, config.profile.power_w),
+            (altitude, power)
+        );
+    }
+    for index in [0, 7] {
+        assert_eq!(
+            flight.block(index),
+            Err(BlockError::Config(ConfigError::Index))
+        );
+    }
+}
+
+#[test]
+fn no_bit_can_flip_unnoticed() {
+    for (at, of) in (0..LEN).zip([paper(), field(4)].iter().cycle()) {
+        for bit in 0..8 {
+            let mut block = *of;
+            block[at] ^= 1 << bit;
+            let expected = match at {
+                0..4 => ConfigError::Magic,
+                4..8 => ConfigError::Version,
+                _ => ConfigError::Crc,
+            };
+            assert_eq!(reads(&block), Err(expected), "bit {bit} of byte {at}");
+        }
+    }
+}
+
+#[test]
+fn a_number_out_of_range_is_named() {
+    let nan = f32::NAN.to_le_bytes();
+    for (at, bytes, error) in [
+        (8, &[0, 0][..], ConfigError::Index),
+        (8, &[6, 0], ConfigError::Index),
+        (12, &[0, 0], ConfigError::Mission(MissionError::Relays)),
+        (14, &[3], ConfigError::Method),
+        (14, &[0xFF], ConfigError::Method),
+        (15, &[2], ConfigError::Hold),
+        (16, &nan, ConfigError::Mission(MissionError::Distance)),
+        (20, &nan, ConfigError::Mission(MissionError::Separation)),
+        (24, &nan, ConfigError::Mission(MissionError::TxPower)),
+        (28, &nan, ConfigError::Mission(MissionError::Common)),
+        (32, &nan, ConfigError::Mission(MissionError::Common)),
+        (36, &nan, ConfigError::Profile),
+        (40, &nan, ConfigError::Profile),
+        (
+            44,
+            &nan,
+            ConfigError::Mission(MissionError::InterfererPower),
+        ),
+        (
+            48,
+            &nan,
+            ConfigError::Mission(MissionError::InterfererPlace),
+        ),
+        (
+            52,
+            &nan,
+            ConfigError::Mission(MissionError::InterfererPlace),
+        ),
+        (56, &nan, ConfigError::Mission(MissionError::Tolerance)),
+        (60, &[0; 8], ConfigError::Channel(ChannelError::Carrier)),
+        (68, &[0; 8], ConfigError::Channel(ChannelError::ExcessLoss)),
+        (76, &[0; 8], ConfigError::Channel(ChannelError::ExcessLoss)),
+        (84, &[0xFF; 8], ConfigError::Channel(ChannelError::Weight)),
+        (92, &nan, ConfigError::Mission(MissionError::Band)),
+        (
+            92,
+            &20.5_f32.to_le_bytes(),
+            ConfigError::Mission(MissionError::Band),
+        ),
+        (96, &nan, ConfigError::Mission(MissionError::Band)),
+        (
+            96,
+            &19.5_f32.to_le_bytes(),
+            ConfigError::Mission(MissionError::Band),
+        ),
+        (100, &nan, ConfigError::Mission(MissionError::Lateral)),
+        (
+            100,
+            &0.5_f32.to_le_bytes(),
+            ConfigError::Mission(MissionError::Lateral),
+        ),
+        (104, &nan, ConfigError::Mission(MissionError::Lateral)),
+        (
+            104,
+            &(-0.5_f32).to_le_bytes(),
+            ConfigError::Mission(MissionError::Lateral),
+        ),
+        // Nobody adjusts, nothing is measured, and there is no field.
+        (108, &1.0_f32.to_le_bytes(), ConfigError::Adjust),
+        (108, &(-0.0_f32).to_le_bytes(), ConfigError::Adjust),
+        (112, &[1, 0], ConfigError::Adjust),
+        (114, &[17, 0], ConfigError::Points),
+        (114, &[0xFF; 2], ConfigError::Points),
+        (114, &[1, 0], ConfigError::Interferer),
+        (116, &1.0_f32.to_le_bytes(), ConfigError::Measure),
+        (120, &[100, 0], ConfigError::Measure),
+        (124, &[1], ConfigError::Unused),
+        (251, &[0x80], ConfigError::Unused),
+    ] {
+        assert_eq!(reads(&with(at, bytes)), Err(error), "byte {at}");
+    }
+    assert_eq!(reads(&[0xFF; LEN]), Err(ConfigError::Blank));
+    assert_eq!(reads(&[0; LEN]), Err(ConfigError::Blank));
+}
+
+/// `explore` and `rounds` of adjust, then `i_max_w` and `samples` of measuring, just inside and just outside.
+#[test]
+fn the_ranges_of_adjust_and_measure_are_those_of_a_relay() {
+    for (explore_m, rounds, good) in [
+        (0.0_f32, 1_u16, true),
+        (1e5, u16::MAX, true),
+        (10.0, 0, false),
+        (f32::NAN, 100, false),
+        (-0.1, 100, false),
+        (1e5_f32.next_up(), 100, false),
+    ] {
+        let block = with(14, &[2]);
+        let block = changed(block, 108, &explore_m.to_le_bytes());
+        let block = changed(block, 112, &rounds.to_le_bytes());
+        let adjust = Adjust {
+            rounds,
+            explore_m,
+            local: Local::Fine,
+        };
+        let expected = if good {
+            Ok(Method::Adjust(adjust))
+        } else {
+            Err(ConfigError::Adjust)
+        };
+        assert_eq!(reads(&block).map(|config| config.method), expected);
+    }
+    for (i_max_w, samples, good) in [
+        (1e-30_f32, 100_u32, true),
+        (1e6, 1_000_000, true),
+        (1.0, 99, false),
+        (1.0, 1_000_001, false),
+        (1.0, 0, false),
+        (0.0, 100, false),
+        (f32::NAN, 100, false),
+        (1e-30_f32.next_down(), 100, false),
+        (1e6_f32.next_up(), 100, false),
+    ] {
+        let block = changed(field(2), 116, &i_max_w.to_le_bytes());
+        let block = changed(block, 120, &samples.to_le_bytes());
+        let expected = if good {
+            Ok(Some(Measure { i_max_w, samples }))
+        } else {
+            Err(ConfigError::Measure)
+        };
+        assert_eq!(reads(&block).map(|config| config.measure), expected);
+    }
+}
+
+#[test]
+fn a_field_out_of_range_is_named() {
+    let one = 1.0_f32.to_le_bytes();
+    let nan = f32::NAN.to_le_bytes();
+    for (at, bytes, error) in [
+        (14, &[1][..], ConfigError::Method),
+        (44, &one, ConfigError::Interferer),
+        (48, &one, ConfigError::Interferer),
+        (52, &one, ConfigError::Interferer),
+        (114, &[2, 0], ConfigError::Unused),
+        (114, &[4, 0], ConfigError::Field(FieldError::Order)),
+        // Without points it is an interferer, and the points are not 0.
+        (114, &[0, 0], ConfigError::Unused),
+        (114, &[17, 0], ConfigError::Points),
+        (124, &nan, ConfigError::Field(FieldError::Place)),
+        (
+            124,
+            &2e7_f32.to_le_bytes(),
+            ConfigError::Field(FieldError::Place),
+        ),
+        (132, &[0; 4], ConfigError::Field(FieldError::Order)),
+        (136, &nan, ConfigError::Field(FieldError::Upsilon)),
+        (144, &[0; 4], ConfigError::Field(FieldError::Upsilon)),
+        (148, &one, ConfigError::Unused),
+        (248, &one, ConfigError::Unused),
+    ] {
+        assert_eq!(
+            reads(&changed(field(3), at, bytes)),
+            Err(error),
+            "byte {at}"
+        );
+    }
+}
+
+/// A relay takes what has been read.
+fn flies(config: &Config) {
+    let settings = Settings {
+        profile: Some(config.profile),
+        hold_altitude: config.hold_altitude,
+        method: config.method,
+        measure: config.measure,
+        ..Settings::default()
+    };
+    Relay::new(config.mission, config.identity, settings, 1, Instant::ZERO).unwrap();
+}
+
+/// Whatever is in the flash, with a good CRC: a configuration in range, or an error.
+#[test]
+fn any_bytes_are_a_configuration_or_an_error() {
+    let mut rng = ChaCha8Rng::seed_from_u64(uav_relay_oracle::random::seed(41));
+    let adjust = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
+    let adjust = adjust.by(Method::Adjust(Adjust::default()));
+    let field_of_four = Flight::new(&in_a_field(4), 5, 1e-4, 7).unwrap();
+    let measure = Measure {
+        i_max_w: 1e-9,
+        samples: 1_000,
+    };
+    let field_of_four = field_of_four.measuring(Some(measure));
+    for flight in [adjust, field_of_four] {
+        let block = flight.block(3).unwrap();
+        let mut good = 0;
+        for _ in 0..20_000 {
+            let at = rng.random_range(8..LEN - 8);
+            let bytes: [u8; 4] = rng.random();
+            // Four bytes of noise, or one, which is more often good.
+            let cut = if rng.random() { 1 } else { 4 };
+            if let Ok(config) = reads(&changed(block, at, &bytes[..cut])) {
+                flies(&config);
+                good += 1;
+            }
+            let noise: [u8; LEN] = rng.random();
+            assert!(reads(&noise).is_err());
+        }
+        assert!((100..19_000).contains(&good), "{good} of 20000 were good");
+    }
+}
+
+#[test]
+fn the_command_writes_the_block() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("relay3.bin");
+    let output = brief(&[
+        "--uavs",
+        "5",
+        "--index",
+        "3",
+        "--network",
+        "7",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(std::fs::read(&out).unwrap(), paper());
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        text.contains("relay 3 of 5, network 7") && text.contains("0x080e0000"),
+        "{text}"
+    );
+}
+
+#[test]
+fn the_command_writes_what_the_relay_is_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("relay.bin");
+    let file = folder.path().join("field.toml");
+    let written = |more: &[&str]| {
+        let mut arguments = vec!["--uavs", "5", "--index", "3", "--network", "7"];
+        arguments.extend(["--out", out.to_str().unwrap()]);
+        arguments.extend(more);
+        let output = brief(&arguments);
+        assert!(output.status.success(), "{output:?}");
+        let block: Block = std::fs::read(&out).unwrap().try_into().unwrap();
+        reads(&block).unwrap()
+    };
+    assert_eq!(written(&["--method", "align"]), reads(&paper()).unwrap());
+    assert_eq!(written(&["--method", "joint"]).method, Method::Joint);
+    let adjust = Adjust::default();
+    assert_eq!(
+        written(&["--method", "adjust"]).method,
+        Method::Adjust(adjust)
+    );
+    let adjust = Adjust {
+        rounds: 7,
+        explore_m: 2.5,
+        ..adjust
+    };
+    assert_eq!(
+        written(&["--method", "adjust", "--rounds", "7", "--explore", "2.5"]).method,
+        Method::Adjust(adjust)
+    );
+    std::fs::write(&file, toml(3)).unwrap();
+    let file = file.to_str().unwrap();
+    let config = written(&["--scenario", file, "--samples", "2000"]);
+    let flight = Flight::new(&Scenario::load(Path::new(file)).unwrap(), 5, 1e-4, 7).unwrap();
+    assert_eq!(config.mission, *flight.mission());
+    assert_eq!(
+        config.measure,
+        Some(Measure {
+            i_max_w: 2e-10,
+            samples: 2_000
+        })
+    );
+}
+
+/// A scenario with a field of `points` points.
+fn toml(points: usize) -> String {
+    let mut text = "[geometry]\ndistance_m = 1000.0\naltitude_m = 20.0\n\
+                    [power]\ntx_w = 80.0\nuav_w = 1.0\n\
+                    [field]\ni_max_w = 2e-10\n"
+        .to_owned();
+    for k in 0..points {
+        writeln!(text, "[[field.beta]]\nx_m = {k}.0\nalpha = 2.0\nbeta = 1.5").unwrap();
+    }
+    text
+}
+
+#[test]
+fn what_cannot_be_done_is_said_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("block.bin");
+    let out = out.to_str().unwrap();
+    let fields = [3, 17].map(|points| {
+        let file = folder.path().join(format!("{points}.toml"));
+        std::fs::write(&file, toml(points)).unwrap();
+        file.to_str().unwrap().to_owned()
+    });
+    let [field, long_field] = fields.each_ref().map(String::as_str);
+    let plain = ["--uavs", "5", "--index", "1", "--out", out];
+    for (arguments, words) in [
+        (&["--method", "stochastic"][..], "'--method <M>'"),
+        (&["--rounds", "0"], "0 is not in 1..=65535"),
+        (&["--explore=-1"], "must be a number within 0.0 to 100000.0"),
+        (
+            &["--explore", "NaN"],
+            "must be a number within 0.0 to 100000.0",
+        ),
+        (
+            &["--explore", "100001"],
+            "must be a number within 0.0 to 100000.0",
+        ),
+        (&["--samples", "99"], "99 is not in 100..=1000000"),
+        (
+            &["--samples", "100"],
+            "--samples 100: is for a scenario with a [field]",
+        ),
+        (
+            &["--scenario", field, "--method", "altitude"],
+            "3.toml: method must be align in a field",
+        ),
+        (
+            &["--scenario", long_field],
+            "17.toml: field: a drone has room for 16 points, and these are 17",
+        ),
+    ] {
+        let arguments = [&plain[..], arguments].concat();
+        let text = refusal(&arguments);
+        assert!(text.contains(words), "{arguments:?}: {text}");
+    }
+    assert!(!Path::new(out).exists());
+}
+
+#[test]
+fn what_is_wrong_is_said_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("block.bin");
+    let out = out.to_str().unwrap();
+    for (arguments, words) in [
+        (
+            &["--uavs", "5", "--index", "6", "--out", out][..],
+            "--index 6: must be within 1 to 5",
+        ),
+        (
+            &["--uavs", "5", "--index", "0", "--out", out],
+            "'--index <I>'",
+        ),
+        (&["--uavs", "5", "--out", out], "--index <I>"),
+        (
+            &[
+                "--uavs",
+                "5",
+                "--index",
+                "1",
+                "--network",
+                "65536",
+                "--out",
+                out,
+            ],
+            "--network",
+        ),
+        (
+            &[
+                "--uavs",
+                "5",
+                "--index",
+                "1",
+                "--tolerance",
+                "2",
+                "--out",
+                out,
+            ],
+            "tolerance must be within",
+        ),
+        (
+            &["--uavs", "600", "--index", "1", "--out", out],
+            "no placement",
+        ),
+        (
+            &["--uavs", "5", "--index", "1", "--out", "/nowhere/block.bin"],
+            "--out cannot be written",
+        ),
+        (
+            &[
+                "--scenario",
+                "/nowhere.toml",
+                "--uavs",
+                "5",
+                "--index",
+                "1",
+                "--out",
+                out,
+            ],
+            "/nowhere.toml",
+        ),
+    ] {
+        let text = refusal(arguments);
+        assert!(text.contains(words), "{arguments:?}: {text}");
+    }
+    assert!(!Path::new(out).exists());
+}

@@ -1,0 +1,226 @@
+//! What is read from the relay image: its sizes, its deepest stack, and that no panic can be reached in it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use object::{Object as _, ObjectSection as _, SectionFlags};
+use uav_relay_xtask::stack::Calls;
+use uav_relay_xtask::toolchain::llvm_tool;
+
+use super::{Row, row};
+
+const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The image a person flashes.
+const RELAY: &str = "stm32f405";
+
+pub(crate) fn of_the_relay_image() -> Result<Vec<Row>, String> {
+    let (flash_with_log, ram_with_log) = sizes(&build(RELAY, &["--features", "defmt"])?)?;
+    let mut rows = Vec::new();
+    for &(what, features, [flash, ram, stack]) in IMAGES {
+        rows.extend(of(what, features, flash, ram, stack)?);
+    }
+    rows.extend([
+        row("its flash with defmt", "bytes", flash_with_log, None),
+        row("its static RAM with defmt", "bytes", ram_with_log, None),
+    ]);
+    Ok(rows)
+}
+
+/// What an image is called, its features, and its budgets: flash, static RAM, stack.
+type Image = (&'static str, &'static [&'static str], [u64; 3]);
+
+const IMAGES: &[Image] = &[
+    (
+        "flash of the relay image, Algorithm 1 alone",
+        &["--no-default-features"],
+        [40 * 1024, 4608, 2560],
+    ),
+    (
+        "flash of that with `auth`",
+        &["--no-default-features", "--features", "auth"],
+        [48 * 1024, 6 * 1024, 3 * 1024],
+    ),
+    (
+        "flash of that with `auth` and `membership`",
+        &["--no-default-features", "--features", "auth,membership"],
+        [56 * 1024, 6 * 1024, 3 * 1024],
+    ),
+    (
+        "flash of that with `auth`, `membership` and `guard`",
+        &[
+            "--no-default-features",
+            "--features",
+            "auth,membership,guard",
+        ],
+        [60 * 1024, 6 * 1024, 3 * 1024],
+    ),
+    (
+        "flash of that with `auth`, `membership` and `upload`",
+        &["--no-default-features", "--features", "upload"],
+        [64 * 1024, 6 * 1024, 3 * 1024],
+    ),
+    (
+        "flash of the relay image, everything and `auth`",
+        &["--features", "auth"],
+        [112 * 1024, 10 * 1024, 5632],
+    ),
+    (
+        "flash of the relay image, everything and `upload`",
+        &["--features", "upload"],
+        [112 * 1024, 10 * 1024, 5632],
+    ),
+    (
+        "flash of the relay image, everything but `auth`",
+        &[],
+        [112 * 1024, 10 * 1024, 5632],
+    ),
+];
+
+fn of(
+    what: &'static str,
+    features: &[&str],
+    flash: u64,
+    ram: u64,
+    stack: u64,
+) -> Result<[Row; 3], String> {
+    let image = build(RELAY, features)?;
+    let (flash_taken, ram_taken) = sizes(&image)?;
+    let (thread, handler) = deepest_stack(&image)?;
+    Ok([
+        row(what, "bytes", flash_taken, Some(flash)),
+        row("its static RAM", "bytes", ram_taken, Some(ram)),
+        row(
+            "its stack, bound: thread and one interrupt",
+            "bytes",
+            thread + handler,
+            Some(stack),
+        ),
+    ])
+}
+
+/// Runs a command and gives its output if it succeeded.
+pub(crate) fn run(command: &mut Command) -> Result<Output, String> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    let output = command
+        .output()
+        .map_err(|error| format!("{name}: {error}"))?;
+    if output.status.success() {
+        Ok(output)
+    } else {
+        Err(format!(
+            "{name} failed:\n{}",
+            String::from_utf8_lossy(&output.stderr)
+        ))
+    }
+}
+
+/// Builds one example with the firmware profile; where its ELF is.
+pub(crate) fn build(example: &str, more: &[&str]) -> Result<PathBuf, String> {
+    let arguments = [
+        "build",
+        "-p",
+        "uav-relay",
+        "--profile",
+        "firmware",
+        "--target",
+        TARGET,
+        "--example",
+        example,
+    ];
+    run(Command::new("cargo").args(arguments).args(more))?;
+    Ok(PathBuf::from("target")
+        .join(TARGET)
+        .join("firmware/examples")
+        .join(example))
+}
+
+/// Bytes of flash and of static RAM that an image takes.
+pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
+    let bytes = std::fs::read(elf).map_err(|error| format!("{}: {error}", elf.display()))?;
+    let file = object::File::parse(&*bytes).map_err(|error| error.to_string())?;
+    let (mut flash, mut ram) = (0, 0);
+    for section in file.sections() {
+        let SectionFlags::Elf { sh_flags } = section.flags() else {
+            continue;
+        };
+        let taken = sh_flags & u64::from(object::elf::SHF_ALLOC) != 0;
+        let in_ram = section.address() >= 0x2000_0000;
+        let stored = section.kind() != object::SectionKind::UninitializedData;
+        flash += if taken && stored { section.size() } else { 0 };
+        ram += if taken && in_ram { section.size() } else { 0 };
+    }
+    Ok((flash, ram))
+}
+
+/// The deepest stack of the thread, from the entry that `Reset` calls, and of an interrupt on top of it: its frame with the FPU's registers is 104 bytes.
+pub(crate) fn deepest_stack(elf: &Path) -> Result<(u64, u64), String> {
+    const EXCEPTION_FRAME: u64 = 104;
+    let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
+    let objdump = llvm_tool("llvm-objdump").ok_or(missing)?;
+    let output = run(Command::new(objdump)
+        .args(["-d", "--no-show-raw-insn"])
+        .arg(elf))?;
+    let bytes = std::fs::read(elf).map_err(|error| error.to_string())?;
+    let file = object::File::parse(&*bytes).map_err(|error| error.to_string())?;
+    let constants = file
+        .sections()
+        .filter(|section| matches!(section.name(), Ok(".rodata" | ".data")));
+    let constants: Vec<u32> = constants
+        .filter_map(|section| section.data().ok())
+        .flat_map(|data| {
+            data.as_chunks::<4>()
+                .0
+                .iter()
+                .map(|word| u32::from_le_bytes(*word))
+        })
+        .collect();
+    let calls = Calls::read(
+        &String::from_utf8_lossy(&output.stdout),
+        constants.into_iter(),
+    )
+    .map_err(|error| error.to_string())?;
+    let deepest = |name: &str| calls.deepest(name).map_err(|error| error.to_string());
+    let (thread, path) = deepest("main")?;
+    println!("deepest stack: {thread} bytes by {}", path.join(" > "));
+    let mut handler = 0;
+    for name in ["USART2", "USART3", "SysTick"] {
+        handler = deepest(name)?.0.max(handler);
+    }
+    Ok((thread, EXCEPTION_FRAME + handler))
+}
+
+/// Links the relay image, with `auth`, with `upload` and without, with a panic handler that cannot be linked; and, as a control, one that does
+/// panic.
+pub(crate) fn no_panic() -> Result<(), String> {
+    let link = |features: &[&str], flags: &[&str]| {
+        let arguments = [
+            "rustc",
+            "-p",
+            "uav-relay",
+            "--profile",
+            "firmware",
+            "--target",
+            TARGET,
+            "--example",
+            RELAY,
+        ];
+        run(Command::new("cargo")
+            .args(arguments)
+            .args(features)
+            .arg("--")
+            .args(flags))
+    };
+    for features in [&[][..], &["--features", "auth"], &["--features", "upload"]] {
+        link(features, &["--cfg", "prove_no_panic"])
+            .map_err(|error| format!("a panic is reachable in the relay image: {error}"))?;
+    }
+    match link(
+        &[],
+        &["--cfg", "prove_no_panic", "--cfg", "panic_on_purpose"],
+    ) {
+        Ok(_) => Err("a panic put there on purpose was linked: the proof proves nothing".into()),
+        Err(error) if error.contains("a_panic_is_reachable") => Ok(()),
+        Err(error) => Err(format!("the control failed for another reason: {error}")),
+    }
+}
