@@ -7,7 +7,7 @@
 //! ```
 //! It is the transmitter or the receiver of the chain: connect it where the relay next to that listens, or to the channel that
 //! all hear (`--shared`). `--of`, `--network` and the options of the mission say what the relays were loaded with, as `linux_companion`
-//! was given it, or as a scenario of `cargo brief` has it; of one with a field, or with another channel or tolerance than the default, it
+//! was given it, or as a scenario of `cargo provision` has it; of one with a field, or with another channel or tolerance than the default, it
 //! cannot speak. The options that begin with `--new-` say what is different from now on. Every upload has a larger `--version` than the
 //! one before, and the epoch file is this program's own.
 //!

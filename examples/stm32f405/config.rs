@@ -1,7 +1,7 @@
 //! What is written into a drone once, apart from the image: which relay it is, and what it flies.
 //!
 //! One block at the start of the last flash sector, [`ADDRESS`], which no image reaches (`memory.x`) and no update touches.
-//! `cargo brief` writes it from a scenario. All numbers are little-endian, floats as in IEEE 754:
+//! `cargo provision` writes it from a scenario. All numbers are little-endian, floats as in IEEE 754:
 //!
 //! | byte | type | what |
 //! | --- | --- | --- |

@@ -7,7 +7,7 @@
 //! Every drone gets the same image. Which relay it is and what it flies stands in a sector of its own, written once and kept
 //! by updates (relay 3 of 5, for instance):
 //! ```text
-//! cargo brief --uavs 5 --index 3 --network 7 --out relay3.bin
+//! cargo provision --uavs 5 --index 3 --network 7 --out relay3.bin
 //! probe-rs download --chip STM32F405RGTx --binary-format bin --base-address 0x080E0000 relay3.bin
 //! ```
 //! A drone without that takes no part. With `--features defmt` the log says so, and whatever else happens.

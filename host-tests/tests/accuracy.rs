@@ -1,5 +1,5 @@
 //! What micromath and libm are worth in f32, function by function: why the one is used for bearings and the other for all
-//! the rest. `cargo test -p host-tests --test accuracy -- --nocapture` prints the table, and with `--release` and
+//! the rest. `cargo test --test accuracy -- --nocapture` prints the table, and with `--release` and
 //! `--include-ignored` how long each takes on the host.
 #![allow(
     clippy::unwrap_used,

@@ -1,6 +1,6 @@
 //! How fast a chain recovers from the loss of one relay, by its length and by which one is lost.
 //!
-//! `cargo test --release -p host-tests --test recovery -- --nocapture` prints the table of the README.
+//! `cargo test --test recovery -- --nocapture` prints the table of the README.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,

@@ -1,4 +1,4 @@
-//! `cargo versus`: this crate's placements beside those of the optimisers that a user would take instead.
+//! `cargo compare`: this crate's placements beside those of the optimisers that a user would take instead.
 //!
 //! | file | one idea |
 //! | --- | --- |
@@ -36,8 +36,8 @@ use rivals::{Rivals, SOLVERS};
 /// reached and how long it took as a table in markdown.
 #[derive(Parser, Debug)]
 #[command(
-    name = "versus",
-    bin_name = "cargo versus",
+    name = "compare",
+    bin_name = "cargo compare",
     disable_version_flag = true
 )]
 struct Options {
@@ -50,7 +50,7 @@ struct Options {
     /// Score the chains of an earlier --json again; nothing is solved, and Python is not needed
     #[arg(long, value_name = "FILE", conflicts_with_all = ["limit", "venv"])]
     from: Option<PathBuf>,
-    /// Where the virtual environment of Python is, or is made; without it beside what is built, target/versus
+    /// Where the virtual environment of Python is, or is made; without it beside what is built, target/compare
     #[arg(long, value_name = "DIR")]
     venv: Option<PathBuf>,
 }

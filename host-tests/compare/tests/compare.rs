@@ -1,4 +1,4 @@
-//! `cargo versus` without Python: what chains are worth to it, how it lays out its tables, how it fails where Python is not.
+//! `cargo compare` without Python: what chains are worth to it, how it lays out its tables, how it fails where Python is not.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -16,7 +16,7 @@ use uav_relay_oracle::cases;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Corridor, Effort};
 
-fn versus(arguments: &[&str]) -> Output {
+fn compare(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_compare"))
         .args(arguments)
         .output()
@@ -47,7 +47,7 @@ fn rescored(results: &Value, more: &[&str]) -> Output {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("results.json");
     std::fs::write(&file, results.to_string()).unwrap();
-    versus(&[&["--from", file.to_str().unwrap()], more].concat())
+    compare(&[&["--from", file.to_str().unwrap()], more].concat())
 }
 
 fn table(results: &Value) -> String {
@@ -87,7 +87,7 @@ fn line_of_rival(rival: Value) -> String {
 
 #[test]
 fn help_names_every_option() {
-    let output = versus(&["--help"]);
+    let output = compare(&["--help"]);
     assert!(output.status.success() && output.stderr.is_empty());
     let help = String::from_utf8(output.stdout).unwrap();
     for option in [
@@ -104,10 +104,10 @@ fn help_names_every_option() {
 #[test]
 fn wrong_options_are_named() {
     for limit in ["0", "601", "soon"] {
-        let line = refusal(&versus(&["--limit", limit]), 2);
+        let line = refusal(&compare(&["--limit", limit]), 2);
         assert!(line.contains("--limit") && line.contains(limit), "{line}");
     }
-    let line = refusal(&versus(&["--from", "nowhere.json"]), 2);
+    let line = refusal(&compare(&["--from", "nowhere.json"]), 2);
     assert!(line.contains("--from nowhere.json"), "{line}");
     let line = refusal(&rescored(&json!({ "limit_s": 3 }), &[]), 2);
     assert!(

@@ -1,7 +1,7 @@
 //! Where the corpora begin: golden frames, recorded flights, the example scenarios.
 //!
 //! ```sh
-//! cargo test -p host-tests --test fuzz -- --ignored write_the_seeds
+//! cargo test --test fuzz -- --ignored write_the_seeds
 //! cd host-tests
 //! cargo +nightly fuzz run relay                # and so on, for as long as you like; then
 //! cargo +nightly fuzz cmin relay -- -use_counters=0 -set_cover_merge=1

@@ -1,4 +1,4 @@
-//! `cargo brief`: what is written into one drone before it flies, from a scenario.
+//! `cargo provision`: what is written into one drone before it flies, from a scenario.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -14,7 +14,7 @@ use uav_relay_tools::provision::key;
 
 /// Writes the configuration block of one relay: which one it is, and the mission it flies.
 #[derive(Parser, Debug)]
-#[command(name = "brief", bin_name = "cargo brief", disable_version_flag = true)]
+#[command(name = "provision", bin_name = "cargo provision", disable_version_flag = true)]
 struct Options {
     /// Scenario file (TOML); without it the paper's multi-hop scenario
     #[arg(long, value_name = "FILE")]

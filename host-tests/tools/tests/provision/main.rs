@@ -1,4 +1,4 @@
-//! The configuration of a drone: `cargo brief` writes it, the firmware's own code reads it, and nothing damaged gets through.
+//! The configuration of a drone: `cargo provision` writes it, the firmware's own code reads it, and nothing damaged gets through.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -73,7 +73,7 @@ fn changed(mut block: Block, at: usize, bytes: &[u8]) -> Block {
     block
 }
 
-fn brief(arguments: &[&str]) -> Output {
+fn provision(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_provision"))
         .args(arguments)
         .output()
@@ -82,7 +82,7 @@ fn brief(arguments: &[&str]) -> Output {
 
 /// The one line on standard error; the exit status is 2.
 fn refusal(arguments: &[&str]) -> String {
-    let output = brief(arguments);
+    let output = provision(arguments);
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(text.trim_end().lines().count(), 1, "{arguments:?}: {text}");
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
@@ -475,7 +475,7 @@ fn any_bytes_are_a_configuration_or_an_error() {
 fn the_command_writes_the_block() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("relay3.bin");
-    let output = brief(&[
+    let output = provision(&[
         "--uavs",
         "5",
         "--index",
@@ -503,7 +503,7 @@ fn the_command_writes_what_the_relay_is_to_do() {
         let mut arguments = vec!["--uavs", "5", "--index", "3", "--network", "7"];
         arguments.extend(["--out", out.to_str().unwrap()]);
         arguments.extend(more);
-        let output = brief(&arguments);
+        let output = provision(&arguments);
         assert!(output.status.success(), "{output:?}");
         let block: Block = std::fs::read(&out).unwrap().try_into().unwrap();
         reads(&block).unwrap()

@@ -1,4 +1,4 @@
-//! Key and epoch in a block, and where `cargo brief` has them from.
+//! Key and epoch in a block, and where `cargo provision` has them from.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Block, ConfigError, Secret, secret};
 use uav_relay_tools::provision::key;
 
-use super::{brief, paper, reads, refusal, with};
+use super::{provision, paper, reads, refusal, with};
 
 const SECRET: Secret = Secret {
     key: *b"32 random bytes, known to nobody",
@@ -67,7 +67,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
         u32::try_from(since.as_secs()).unwrap()
     };
 
-    let output = brief(&plain);
+    let output = provision(&plain);
     assert!(output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(
@@ -78,7 +78,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
 
     let signed = [&plain[..], &["--key-file", &file]].concat();
     let before = clock();
-    let output = brief(&signed);
+    let output = provision(&signed);
     assert!(output.status.success() && output.stderr.is_empty());
     let Secret { key, epoch } = secret(&block()).unwrap().unwrap();
     assert_eq!(key, [[0x0A, 0xF1]; 16].concat()[..]);
@@ -86,7 +86,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(!said.to_lowercase().contains("0af1"), "{said}");
 
-    let output = brief(&[&signed[..], &["--epoch", "9"]].concat());
+    let output = provision(&[&signed[..], &["--epoch", "9"]].concat());
     assert!(output.status.success());
     assert_eq!(secret(&block()).unwrap().unwrap().epoch, 9);
 }
