@@ -8,10 +8,10 @@
 //! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
 
 use crate::mission::Mission;
-use crate::node::Side;
 use crate::node::beside::CANDIDATES;
-use crate::node::settings::Wiring;
 use crate::relay::signed::{greeting, say};
+use crate::settings::Wiring;
+use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;

@@ -3,6 +3,7 @@
 #![doc = include_str!("tour.md")]
 
 pub mod channel;
+pub mod event;
 pub mod field;
 pub mod gain;
 #[cfg(feature = "upload")]
@@ -10,30 +11,35 @@ pub mod ground;
 pub mod guard;
 pub mod mission;
 pub mod node;
-pub mod placement;
+pub mod optimiser;
+pub mod place;
+pub mod planning;
 pub mod pointing;
 pub mod relay;
 mod root;
 pub mod serial;
+pub mod settings;
+mod side;
 pub mod sir;
+pub mod stats;
 pub mod time;
 pub mod wire;
 
 pub use channel::Channel;
+pub use event::Event;
 pub use field::{Field, FieldPoint};
 #[cfg(feature = "upload")]
 pub use ground::{Ground, Progress};
 pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfig, Profile};
-pub use node::Side;
-pub use node::event::Event;
 pub use node::exchange::Phase;
 pub use node::sample::Sample;
-pub use node::settings::{Adjust, Identity, Measure, Method, Settings, Wiring};
-pub use node::stats::Stats;
-pub use placement::local::Local;
-pub use placement::search::Schedule;
+pub use optimiser::local::Local;
+pub use optimiser::search::Schedule;
+pub use place::Placement;
 pub use relay::{Port, Relay, Transmit};
-pub use sir::Placement;
+pub use settings::{Adjust, Identity, Measure, Method, Settings, Wiring};
+pub use side::Side;
+pub use stats::Stats;
 pub use time::{Duration, Instant};
 #[cfg(feature = "auth")]
 pub use wire::auth::{Auth, Key};

@@ -8,7 +8,7 @@
 use micromath::F32;
 
 use crate::mission::Mission;
-use crate::sir::Placement;
+use crate::place::Placement;
 
 /// No angle of a [`Bearing`] is farther off than this, rad: 0.17 degrees.
 pub const MAX_ERROR_RAD: f32 = 0.002_967;
@@ -99,7 +99,7 @@ mod tests {
     use super::{Bearing, MAX_ERROR_RAD};
     use crate::mission::Mission;
     use crate::mission::tests::paper;
-    use crate::sir::Placement;
+    use crate::place::Placement;
 
     /// Errors of azimuth and elevation (rad), of the pointed direction (rad) and of the distance (relative).
     fn errors(ahead_m: f32, aside_m: f32, climb_m: f32) -> [f64; 4] {

@@ -6,16 +6,17 @@ pub(crate) mod signed;
 #[cfg(feature = "upload")]
 mod uploads;
 
+use crate::event::Event;
 use crate::field::estimate::Estimate;
 use crate::guard::Hindrance;
 use crate::mission::{Mission, Profile};
-use crate::node::event::Event;
+use crate::node::Node;
 use crate::node::exchange::Phase;
 use crate::node::sample::Sample;
-use crate::node::settings::{Identity, Settings, SetupError, Wiring, check};
-use crate::node::stats::{Stats, bump};
-use crate::node::{Node, Side};
-use crate::sir::Placement;
+use crate::place::Placement;
+use crate::settings::{Identity, Settings, SetupError, Wiring, check};
+use crate::side::Side;
+use crate::stats::{Stats, bump};
 use crate::time::Instant;
 use crate::wire::deframe::{DeframeError, Deframer};
 use crate::wire::frame::{self, FrameBuf, Header};

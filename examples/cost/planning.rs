@@ -2,9 +2,9 @@
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
-use uav_relay::placement::fleet;
-use uav_relay::placement::joint::{Seat, Solver};
-use uav_relay::placement::single::{free, given_altitude, given_x};
+use uav_relay::optimiser::joint::{Seat, Solver};
+use uav_relay::planning::fleet;
+use uav_relay::planning::single::{free, given_altitude, given_x};
 
 use super::counter::instructions;
 use super::missions::{HIGH, MISSION};

@@ -5,9 +5,9 @@ use cortex_m_semihosting::hprintln;
 use uav_relay::Local;
 use uav_relay::Placement;
 use uav_relay::field::estimate::Estimator;
-use uav_relay::placement::local::Beside;
-use uav_relay::placement::local::Hops;
-use uav_relay::placement::local::Search;
+use uav_relay::optimiser::local::Beside;
+use uav_relay::optimiser::local::Hops;
+use uav_relay::optimiser::local::Search;
 
 use super::counter::instructions;
 use super::missions::{HIGH, INTERFERER};

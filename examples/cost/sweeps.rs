@@ -8,7 +8,7 @@ use uav_relay::Mission;
 use uav_relay::Phase;
 use uav_relay::Port;
 use uav_relay::Settings;
-use uav_relay::placement::spacing::Hop;
+use uav_relay::optimiser::spacing::Hop;
 use uav_relay::sir::Sender;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame;

@@ -1,7 +1,7 @@
 //! What the golden image answers, byte by byte, on the target and on the host alike.
 
 use uav_relay::FrameBuf;
-use uav_relay::placement::verdict::Verdict;
+use uav_relay::optimiser::verdict::Verdict;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
 use uav_relay::wire::message::{Answer, Message, MessageError};

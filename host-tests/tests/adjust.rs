@@ -14,8 +14,8 @@ use core::task::Poll;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::gain::Gain;
-use uav_relay::placement::local::{Beside, Hops, Search};
-use uav_relay::sir::{self, Sender, at_receiver};
+use uav_relay::optimiser::local::{Beside, Hops, Search};
+use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random;
@@ -152,7 +152,7 @@ fn the_grid_moves_where_a_separate_program_moves() {
             from = place.x_m;
             sender = Sender::relay(
                 &mission,
-                sir::Station {
+                uav_relay::place::Station {
                     at: place.cross_section(),
                     power_w: 1.0,
                 },

@@ -10,7 +10,7 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use uav_relay::placement::plan;
+use uav_relay::optimiser::plan;
 use uav_relay::{Duration, Instant, Mission, Profile, Schedule, Side};
 use uav_relay_oracle::cases::OPTIMA;
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};

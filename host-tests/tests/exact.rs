@@ -12,9 +12,10 @@
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::placement::PerTarget;
-use uav_relay::placement::pass::{self, Behind};
-use uav_relay::placement::{fleet, plan};
+use uav_relay::optimiser::PerTarget;
+use uav_relay::optimiser::pass::{self, Behind};
+use uav_relay::optimiser::plan;
+use uav_relay::planning::fleet;
 use uav_relay::{Mission, Placement, Profile, Schedule};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};

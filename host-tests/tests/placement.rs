@@ -11,8 +11,8 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::placement::plan::{self, Agreed};
-use uav_relay::placement::spacing::{Hop, receiver_reach};
+use uav_relay::optimiser::plan::{self, Agreed};
+use uav_relay::optimiser::spacing::{Hop, receiver_reach};
 use uav_relay::sir::Sender;
 use uav_relay::{Mission, Placement, Profile, Schedule};
 use uav_relay_oracle::cases;

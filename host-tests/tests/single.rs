@@ -10,7 +10,7 @@
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Mission;
-use uav_relay::placement::single::stochastic::{best_place, stepped};
+use uav_relay::planning::single::stochastic::{best_place, stepped};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};
 use uav_relay_oracle::reference::Station;

@@ -1,10 +1,10 @@
 //! The box that no setpoint leaves, and what else is set before flight.
 
 use crate::mission::{Mission, Profile};
-use crate::sir::Placement;
+use crate::place::Placement;
 use crate::time::Duration;
 
-use super::is_place;
+use super::fence::is_place;
 
 /// How long a setpoint takes to the flight controller at most, unless told otherwise.
 const LAG: Duration = Duration::from_millis(200);

@@ -1,9 +1,9 @@
 //! The fence downstream, which this relay places.
 
+use super::fence::{Fence, Hindrance};
 use super::hull::Hull;
 use super::tie::{Random, Tie, Wall};
-use super::{Fence, Hindrance};
-use crate::node::Side;
+use crate::side::Side;
 
 /// This relay's side of the fence toward Rx.
 #[derive(Clone, Copy, Debug)]

@@ -1,9 +1,9 @@
 //! The fence upstream, which the neighbour places.
 
+use super::fence::{Fence, Hindrance};
 use super::hull::Hull;
 use super::tie::{Random, Tie, Wall};
-use super::{Fence, Hindrance};
-use crate::node::Side;
+use crate::side::Side;
 
 /// A fence is newer than another one if its number is less than this ahead.
 const AHEAD: u16 = 0x8000;

@@ -5,7 +5,7 @@
 //! takes up another of the keeper's. So two numbers go together once, and what was said in an earlier talk cannot count in a
 //! later one, however late it comes.
 
-use crate::node::Side;
+use crate::side::Side;
 
 /// So many messages of another talk in a row are of a new one, not late ones of an old.
 const STRAYS: u8 = 3;

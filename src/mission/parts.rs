@@ -1,7 +1,7 @@
 //! What a mission is made of: interference, altitudes, what a relay brings along.
 
 use crate::field::Field;
-use crate::sir::{CrossSection, Station};
+use crate::place::{CrossSection, Station};
 
 /// The interferer (the paper's MSI), on the ground: a jammer, a base station, a licensed user.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -7,8 +7,8 @@ use core::task::Poll;
 
 use crate::gain::Gain;
 use crate::mission::{Interferer, Mission};
-use crate::placement::local::{Beside, Hops, Search};
-use crate::sir::Placement;
+use crate::optimiser::local::{Beside, Hops, Search};
+use crate::place::Placement;
 use crate::wire::message::Turn;
 
 /// A token, as one relay sees it.

@@ -2,11 +2,12 @@
 
 use super::MEMBERSHIP;
 use crate::mission::Heading;
-use crate::placement::PerTarget;
-use crate::placement::ladder::Ladder;
-use crate::placement::pass::{Behind, Link, Stand, close};
-use crate::placement::verdict::Verdict;
-use crate::sir::Station;
+use crate::optimiser::PerTarget;
+use crate::optimiser::ladder::Ladder;
+use crate::optimiser::pass::{Behind, Link, close};
+use crate::optimiser::spacing::Stand;
+use crate::optimiser::verdict::Verdict;
+use crate::place::Station;
 use crate::wire::message::Answer;
 
 /// A sweep, as one relay sees it.

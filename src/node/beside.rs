@@ -16,7 +16,7 @@
 
 use super::MEMBERSHIP;
 use super::liveness::{Neighbour, Silence, tick};
-use super::settings::Settings;
+use crate::settings::Settings;
 use crate::time::Instant;
 use crate::wire::digest::Stamp;
 

@@ -3,15 +3,16 @@
 //! [`members`](super::members) has the rules; what a new view consists of is worked out by `share::roll`.
 
 use super::beside::CANDIDATES;
-use super::event::Event;
 use super::exchange::Phase;
 use super::liveness::tick;
 use super::members::Members;
-use super::settings::Method;
-use super::stats::bump;
 use super::timers::Timer;
-use super::{MEMBERSHIP, Node, PAUSE, Side};
+use super::{MEMBERSHIP, Node, PAUSE};
+use crate::event::Event;
 use crate::mission::{Heading, Mission};
+use crate::settings::Method;
+use crate::side::Side;
+use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::digest::Stamp;
 use crate::wire::message::Hail;
@@ -101,7 +102,7 @@ impl Node {
         let settings = self.settings;
         let own = self.members.node;
         if self.beside(side).notice(now, &settings) {
-            self.timers.set(side.timer(), now + tick(&settings));
+            self.timers.set(Timer::of(side), now + tick(&settings));
         }
         if hail.neighbour == own || hail.neighbour == 0 {
             let node = self.beside(side).node();
@@ -113,7 +114,7 @@ impl Node {
             {
                 self.beside(side).holds = Some(hail.holds);
                 self.pending.raise(Event::NeighbourBack(side));
-                self.timers.set(side.timer(), now + tick(&settings));
+                self.timers.set(Timer::of(side), now + tick(&settings));
                 self.owe_hail(side, from, true);
                 self.told(now, side, courts);
             }
@@ -131,7 +132,7 @@ impl Node {
         } else {
             tick(&settings)
         };
-        self.timers.set(side.timer(), now + wait);
+        self.timers.set(Timer::of(side), now + wait);
         let newer = self.members.newest > self.members.view;
         if mutual && newer && !self.beside(side).has_grace(now) {
             // One of the two has missed something.

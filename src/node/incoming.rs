@@ -1,12 +1,13 @@
 //! What a message does: who it is from, which mission and view it is of, and then the relay's share.
 
-use super::event::Event;
 use super::exchange::{Next, Phase};
 use super::members::Members;
 use super::share::{ADJUST, ALTITUDE};
-use super::stats::bump;
 use super::timers::Timer;
-use super::{GUARD, MEMBERSHIP, Node, Side};
+use super::{GUARD, MEMBERSHIP, Node};
+use crate::event::Event;
+use crate::side::Side;
+use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::message::Message;
 
@@ -147,7 +148,7 @@ impl Node {
         let beside = self.beside(side);
         let back = beside.heard(now);
         if beside.is_mutual() {
-            self.timers.set(side.timer(), now + quiet);
+            self.timers.set(Timer::of(side), now + quiet);
         }
         if back {
             self.pending.raise(Event::NeighbourBack(side));

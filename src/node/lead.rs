@@ -1,11 +1,11 @@
 //! What the leader has beyond every other relay: which pass comes next.
 
-use super::settings::{Adjust, Method, Settings};
 use crate::mission::{Mission, Profile};
-use crate::placement::joint::Solver;
-use crate::placement::joint::ascent::Ascent;
-use crate::placement::plan::Planner;
-use crate::placement::search::{Infeasible, Schedule, Search};
+use crate::optimiser::joint::Solver;
+use crate::optimiser::joint::ascent::Ascent;
+use crate::optimiser::plan::Planner;
+use crate::optimiser::search::{Infeasible, Schedule, Search};
+use crate::settings::{Adjust, Method, Settings};
 use crate::wire::message::Turn;
 
 /// The most relays whose chain is solved in one relay, without a message; longer ones are solved by messages.

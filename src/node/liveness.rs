@@ -3,7 +3,7 @@
 //! Any intact frame from it is a sign of life. After `Settings::quiet` without one it is asked for a heartbeat, sixteen times
 //! over until `Settings::lost` has passed; then it is lost, and asked every `quiet` from there on.
 
-use super::settings::Settings;
+use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
 /// Questions between `quiet` and `lost`.

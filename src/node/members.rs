@@ -18,7 +18,7 @@ use crate::mission::Mission;
 use crate::time::Duration;
 use crate::wire::digest::{Stamp, digest};
 
-use super::settings::Settings;
+use crate::settings::Settings;
 
 /// The relay in its chain.
 #[derive(Clone, Copy, Debug)]

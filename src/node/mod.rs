@@ -2,7 +2,6 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`settings`] | who the relay is and how it behaves, checked once |
 //! | [`exchange`] | the state table of a pass and what comes back of it |
 //! | `share` | a relay's share of every algorithm: sweeps, courses of the joint method, turns |
 //! | `lead` | what the leader has beyond that: which pass comes next |
@@ -18,8 +17,6 @@
 //! | `uploads` | a newer mission, in flight |
 //! | [`timers`] | every timer, in one table |
 //! | `steering` | the setpoint on its way to the agreed place |
-//! | [`event`] | what the firmware is told |
-//! | [`stats`] | what was counted |
 //!
 //! `Node` connects them. It answers messages by setting flags, and builds what it sends from its state when asked to, so
 //! nothing queues up and a message sent twice is harmless.
@@ -27,7 +24,6 @@
 mod adjust;
 mod align;
 pub mod beside;
-pub mod event;
 pub mod exchange;
 mod forming;
 mod incoming;
@@ -37,10 +33,7 @@ pub mod members;
 mod outgoing;
 mod repeats;
 pub mod sample;
-pub mod settings;
 mod share;
-mod side;
-pub mod stats;
 mod steering;
 pub mod timers;
 #[cfg(feature = "upload")]
@@ -48,22 +41,22 @@ mod uploads;
 
 use crate::guard::Guard;
 use crate::mission::{Mission, Profile};
-use crate::sir::Placement;
+use crate::place::Placement;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::Stamp;
 #[cfg(feature = "upload")]
 use crate::wire::upload::Upload;
 
+use crate::event::{Event, Pending};
+use crate::settings::{Identity, Method, Settings, Wiring};
+use crate::side::Side;
+use crate::stats::{Stats, bump};
 use beside::{Beside, CANDIDATES};
-use event::{Event, Pending};
 use exchange::{Next, Phase};
 use members::Members;
 use repeats::Repeats;
 use sample::{Meter, Sample};
-use settings::{Identity, Method, Settings, Wiring};
 use share::{Own, Share};
-pub use side::Side;
-use stats::{Stats, bump};
 use steering::guard;
 use timers::{Timer, Timers};
 
@@ -147,7 +140,7 @@ impl Node {
         };
         for side in [Side::Upstream, Side::Downstream] {
             if node.beside(side).node() != 0 {
-                node.timers.set(side.timer(), now + settings.quiet);
+                node.timers.set(Timer::of(side), now + settings.quiet);
             }
         }
         if leader || settings.method == Method::Joint {
@@ -338,7 +331,7 @@ impl Node {
     fn silence(&mut self, now: Instant, side: Side) {
         let (settings, seeks) = (self.settings, self.seeks());
         let quiet = self.beside(side).silent(now, &settings, seeks);
-        self.timers.set(side.timer(), quiet.look_again);
+        self.timers.set(Timer::of(side), quiet.look_again);
         if quiet.lost {
             self.pending.raise(Event::NeighbourLost(side));
         }

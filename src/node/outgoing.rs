@@ -3,8 +3,9 @@
 use super::beside::Signs;
 use super::exchange::Phase;
 use super::timers::Timer;
-use super::{GUARD, MEMBERSHIP, Node, Side};
+use super::{GUARD, MEMBERSHIP, Node};
 use crate::mission::Heading;
+use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Message;
 

@@ -3,11 +3,12 @@
 //! Samples are gathered until there are as many as `Settings::measure` asks for; only then is what they say used, and until
 //! as many have come at another place it does not change: within one agreement a relay always says the same.
 
-use super::settings::Measure;
 use crate::field::estimate::{Estimate, Estimator};
 use crate::field::is_upsilon;
 use crate::mission::Mission;
-use crate::sir::{Placement, square};
+use crate::place::Placement;
+use crate::settings::Measure;
+use crate::sir::square;
 
 /// One measurement.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -1,11 +1,12 @@
 //! The setpoint on its way to the agreed place, where a [guard](crate::guard) is asked for.
 
-use super::event::Event;
-use super::settings::Settings;
 use super::timers::Timer;
-use super::{GUARD, Node, Side};
+use super::{GUARD, Node};
+use crate::event::Event;
 use crate::guard::{Guard, Hindrance};
-use crate::sir::Placement;
+use crate::place::Placement;
+use crate::settings::Settings;
+use crate::side::Side;
 use crate::time::{Duration, Instant};
 
 /// How long after the guard has said something it is said again, unless the neighbour is known to have heard it.

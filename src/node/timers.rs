@@ -1,5 +1,6 @@
 //! Every timer of a relay, in one table.
 
+use crate::side::Side;
 use crate::time::Instant;
 
 /// What a timer is for.
@@ -17,6 +18,16 @@ pub(crate) enum Timer {
     Call,
     /// What the guard has said may have been lost.
     Remind,
+}
+
+impl Timer {
+    /// The silence of the neighbour at `side`.
+    pub(crate) const fn of(side: Side) -> Self {
+        match side {
+            Side::Upstream => Self::Upstream,
+            Side::Downstream => Self::Downstream,
+        }
+    }
 }
 
 const ALL: [Timer; 6] = [

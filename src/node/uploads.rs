@@ -15,12 +15,13 @@
 //! | a roster that does not name the mission held | a hail, and no part in it |
 //! | a count of a view that was granted | its mission is flown: `Event::Adopted` |
 
+use super::Node;
 use super::beside::CANDIDATES;
-use super::event::Event;
-use super::settings::Wiring;
-use super::stats::bump;
-use super::{Node, Side};
+use crate::event::Event;
 use crate::mission::Mission;
+use crate::settings::Wiring;
+use crate::side::Side;
+use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::digest::Stamp;
 use crate::wire::message::{Hail, Message};

@@ -1,8 +1,9 @@
 //! What a relay does with a frame that has come in: checked, addressed and only then read.
 
 use super::Port;
-use crate::node::stats::bump;
-use crate::node::{Node, Side};
+use crate::node::Node;
+use crate::side::Side;
+use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::frame::{self, FrameError, Opened};
 use crate::wire::message::Message;

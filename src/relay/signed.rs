@@ -1,8 +1,9 @@
 //! What a relay that signs does beyond that: which frames count, and its own with their tags.
 
 use super::incoming::read;
-use crate::node::stats::bump;
-use crate::node::{Node, Side};
+use crate::node::Node;
+use crate::side::Side;
+use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::frame::{self, FrameBuf, Header, Opened};
 use crate::wire::message::Message;

@@ -7,8 +7,8 @@ use heapless::Deque;
 
 use super::port::SerialPort;
 use super::stats::SerialStats;
-use crate::node::stats::bump;
 use crate::relay::{Port, Relay};
+use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::frame::MAX_FRAME;
 

@@ -1,7 +1,7 @@
 //! What went wrong on this side of a serial link.
 
 use super::port::Fault;
-use crate::node::stats::bump;
+use crate::stats::bump;
 
 /// Counters of one link since it was made; each stays at its maximum once it gets there.
 ///

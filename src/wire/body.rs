@@ -9,11 +9,11 @@ use super::forming::Forming;
 use super::message::{Message, Turn};
 #[cfg(feature = "upload")]
 use super::upload::{LENGTH, Terms};
-use crate::placement::PerTarget;
-use crate::placement::joint::course::{TRIALS, Trial};
-use crate::placement::joint::outlook::PARTS;
-use crate::placement::local::Local;
-use crate::sir::Placement;
+use crate::optimiser::PerTarget;
+use crate::optimiser::joint::outlook::PARTS;
+use crate::optimiser::joint::trial::{TRIALS, Trial};
+use crate::optimiser::local::Local;
+use crate::place::Placement;
 
 /// Which pass, of which mission.
 #[derive(Clone, Copy, Serialize, Deserialize)]

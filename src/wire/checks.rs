@@ -7,13 +7,13 @@ use super::message::{Answer, Course, Message, MessageError, Moved, Sweep, Token,
 use crate::field::is_upsilon;
 use crate::guard::Fence;
 use crate::mission::Profile;
-use crate::placement::PerTarget;
-use crate::placement::joint::Outlook;
-use crate::placement::joint::course::{Bar, TRIALS, Trial, Trials};
-use crate::placement::ladder::{Ladder, TARGETS};
-use crate::placement::local::Local;
-use crate::placement::verdict::Verdict;
-use crate::sir::{CrossSection, Placement, Station};
+use crate::optimiser::PerTarget;
+use crate::optimiser::joint::Outlook;
+use crate::optimiser::joint::trial::{Bar, TRIALS, Trial, Trials};
+use crate::optimiser::ladder::{Ladder, TARGETS};
+use crate::optimiser::local::Local;
+use crate::optimiser::verdict::Verdict;
+use crate::place::{CrossSection, Placement, Station};
 
 /// No slack or reach in metres is larger: a place is at most 1e6, a reach of the last hop is cut at 1e9.
 const FARTHEST_M: f32 = 2e9;

@@ -4,13 +4,13 @@ use super::digest::Stamp;
 #[cfg(feature = "upload")]
 use super::upload::Upload;
 use crate::guard::Fence;
-use crate::placement::PerTarget;
-use crate::placement::joint::Outlook;
-use crate::placement::joint::course::{Bar, Trials};
-use crate::placement::ladder::Ladder;
-use crate::placement::local::Local;
-use crate::placement::verdict::Verdict;
-use crate::sir::{Placement, Station};
+use crate::optimiser::PerTarget;
+use crate::optimiser::joint::Outlook;
+use crate::optimiser::joint::trial::{Bar, Trials};
+use crate::optimiser::ladder::Ladder;
+use crate::optimiser::local::Local;
+use crate::optimiser::verdict::Verdict;
+use crate::place::{Placement, Station};
 
 /// The longest body: a sweep of sixteen targets with what was measured, or from aside of the line.
 pub const MAX_BODY: usize = 88;

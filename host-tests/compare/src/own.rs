@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use uav_relay::placement::plan::{place, solve};
+use uav_relay::optimiser::plan::{place, solve};
 use uav_relay::{Method, Mission, Placement, Profile, Schedule};
 use uav_relay_sim::mission;
 use uav_relay_sim::report::hop_sirs;

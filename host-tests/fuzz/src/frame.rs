@@ -1,7 +1,7 @@
 //! Any bytes behind a good check sequence: what can be read can be written, and is then the same.
 
 use uav_relay::mission::MAX_RELAYS;
-use uav_relay::placement::joint::course::{TRIALS, Trial};
+use uav_relay::optimiser::joint::trial::{TRIALS, Trial};
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};

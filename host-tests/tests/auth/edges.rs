@@ -1,6 +1,6 @@
 //! Counters and epochs at their limits, with frames that only somebody who has the key can make.
 
-use uav_relay::node::settings::SetupError;
+use uav_relay::settings::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings, Stats, Wiring};
 

@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::placement::fleet::{self, ranges};
+use uav_relay::planning::fleet::{self, ranges};
 use uav_relay::{Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};

@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::placement::fleet;
+use uav_relay::planning::fleet;
 use uav_relay::{Mission, Placement, Profile};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};

@@ -1,7 +1,7 @@
 //! Values of an independent program, and what the printed rules get wrong.
 
 use uav_relay::Placement;
-use uav_relay::placement::fleet;
+use uav_relay::planning::fleet;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::reference::stochastic::StochasticLink;

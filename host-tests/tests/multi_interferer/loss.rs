@@ -4,7 +4,7 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use uav_relay::placement::plan::{place, solve};
+use uav_relay::optimiser::plan::{place, solve};
 use uav_relay::{Profile, Schedule};
 use uav_relay_oracle::random::seed;
 use uav_relay_sim::hypothetical::hypothetical;

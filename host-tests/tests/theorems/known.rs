@@ -1,6 +1,6 @@
 //! Values of an independent program, the printed theorems' counterexamples, and interferers in degenerate places.
 
-use uav_relay::placement::single::{free, given_altitude, given_x, guide, locus};
+use uav_relay::planning::single::{free, given_altitude, given_x, guide, locus};
 use uav_relay_oracle::cases;
 use uav_relay_oracle::reference::Link;
 

@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::placement::single::{given_altitude, guide, locus};
+use uav_relay::planning::single::{given_altitude, guide, locus};
 use uav_relay::sir::{Turn, first_hop_turn};
 use uav_relay_oracle::random;
 

@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::placement::single::{Found, free, given_altitude, given_x, noise};
+use uav_relay::planning::single::{Found, free, given_altitude, given_x, noise};
 use uav_relay_oracle::random::{self, log_uniform};
 
 use super::scene::Scene;

@@ -1,7 +1,7 @@
 //! One relay, one interferer, and a judge of places that shares no formula with the crate.
 
 use rand::{Rng, RngExt};
-use uav_relay::placement::single::Found;
+use uav_relay::planning::single::Found;
 use uav_relay::{Band, Mission, MissionConfig};
 use uav_relay_oracle::cases::Case;
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};

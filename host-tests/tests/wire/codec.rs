@@ -4,12 +4,12 @@
 use crc::{CRC_32_ISCSI, Crc};
 use serde::Deserialize;
 use uav_relay::guard::Fence;
-use uav_relay::placement::PerTarget;
-use uav_relay::placement::joint::Outlook;
-use uav_relay::placement::joint::course::{Bar, Trial};
-use uav_relay::placement::ladder::Ladder;
-use uav_relay::placement::verdict::Verdict;
-use uav_relay::sir::{CrossSection, Station};
+use uav_relay::optimiser::PerTarget;
+use uav_relay::optimiser::joint::Outlook;
+use uav_relay::optimiser::joint::trial::{Bar, Trial};
+use uav_relay::optimiser::ladder::Ladder;
+use uav_relay::optimiser::verdict::Verdict;
+use uav_relay::place::{CrossSection, Station};
 use uav_relay::wire::digest::Stamp;
 use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{

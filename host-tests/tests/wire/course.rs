@@ -1,12 +1,12 @@
 //! What the joint method says: sweeps from beside the line, courses, and what came of them. Their ranges, number by number,
 //! their counts, what is refused, and what a relay does with them.
 
-use uav_relay::placement::PerTarget;
-use uav_relay::placement::joint::Outlook;
-use uav_relay::placement::joint::course::{Bar, TRIALS, Trial};
-use uav_relay::placement::joint::outlook::PARTS;
-use uav_relay::placement::ladder::Ladder;
-use uav_relay::sir::{CrossSection, Station};
+use uav_relay::optimiser::PerTarget;
+use uav_relay::optimiser::joint::Outlook;
+use uav_relay::optimiser::joint::outlook::PARTS;
+use uav_relay::optimiser::joint::trial::{Bar, TRIALS, Trial};
+use uav_relay::optimiser::ladder::Ladder;
+use uav_relay::place::{CrossSection, Station};
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::message::{Course, MAX_BODY, Message, MessageError, Sweep, Worth};
 use uav_relay::{Band, Instant, Interference, MissionConfig, Placement, Port, Relay, Wiring};

@@ -3,7 +3,7 @@
 //! with each step rounded).
 
 use serde::Deserialize;
-use uav_relay::placement::ladder::Ladder;
+use uav_relay::optimiser::ladder::Ladder;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message};

@@ -1,7 +1,7 @@
 //! Random ladders: the crate and the rules agree to the bit, on the targets and on which ladders are valid.
 
 use proptest::prelude::*;
-use uav_relay::placement::ladder::Ladder;
+use uav_relay::optimiser::ladder::Ladder;
 
 use super::codec::targets;
 use super::config;

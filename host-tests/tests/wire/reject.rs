@@ -1,8 +1,8 @@
 //! What must be refused although its CRC is right, and with which reason: other versions, bodies that are no message,
 //! numbers out of range. `document.rs` has the same for the rows of the document.
 
-use uav_relay::placement::ladder::Ladder;
-use uav_relay::placement::{PerTarget, verdict::Verdict};
+use uav_relay::optimiser::ladder::Ladder;
+use uav_relay::optimiser::{PerTarget, verdict::Verdict};
 use uav_relay::wire::frame::{self, FrameError, Header, MAX_FRAME};
 use uav_relay::wire::message::{Answer, MAX_BODY, Message, MessageError};
 

@@ -2,9 +2,9 @@
 
 use proptest::prelude::*;
 use uav_relay::Band;
-use uav_relay::placement::coded::{Coded, PLACES};
-use uav_relay::placement::levels::Levels;
-use uav_relay::placement::wave::Rungs;
+use uav_relay::optimiser::coded::{Coded, PLACES};
+use uav_relay::optimiser::levels::Levels;
+use uav_relay::optimiser::wave::Rungs;
 
 use super::codec::{altitudes, code, place, rungs};
 use super::config;

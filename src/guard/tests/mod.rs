@@ -4,8 +4,8 @@ mod pairs;
 
 use super::confines::{Confines, Geofence};
 use super::{Fence, Guard, Hindrance};
-use crate::node::Side;
-use crate::sir::Placement;
+use crate::place::Placement;
+use crate::side::Side;
 use crate::time::{Duration, Instant};
 
 const APART: f32 = 10.0;

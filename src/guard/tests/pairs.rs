@@ -2,8 +2,8 @@
 
 use super::{One, at, confines};
 use crate::guard::{Guard, Hindrance};
-use crate::node::Side;
-use crate::sir::Placement;
+use crate::place::Placement;
+use crate::side::Side;
 use crate::time::{Duration, Instant};
 
 /// The setpoints of the two, m along x: they are to be exact.

@@ -6,12 +6,13 @@ use core::task::Poll;
 use super::super::exchange::{Next, Phase};
 use super::super::lead::{Chain, Lead, MOST_SOLVED};
 use super::{Chosen, Own, Pass, Share};
-use crate::placement::joint::ascent::{Ascent, Turn};
-use crate::placement::joint::course::{Bar, Courser, Coursing, Trials};
-use crate::placement::joint::{Outlook, Seat};
-use crate::placement::ladder::Ladder;
-use crate::placement::pass::Link;
-use crate::placement::search::Infeasible;
+use crate::optimiser::joint::ascent::{Ascent, Turn};
+use crate::optimiser::joint::course::{Courser, Coursing};
+use crate::optimiser::joint::trial::{Bar, Trials};
+use crate::optimiser::joint::{Outlook, Seat};
+use crate::optimiser::ladder::Ladder;
+use crate::optimiser::pass::Link;
+use crate::optimiser::search::Infeasible;
 use crate::wire::message::{Course, Worth};
 
 impl Share {

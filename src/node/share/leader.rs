@@ -3,13 +3,13 @@
 use super::super::adjust::Turning;
 use super::super::exchange::Next;
 use super::super::lead::Lead;
-use super::super::settings::Method;
 use super::{ADJUST, ALTITUDE, Own, Share};
-use crate::placement::ladder::Ladder;
-use crate::placement::local::Beside;
-use crate::placement::pass::origins;
-use crate::placement::search::{Infeasible, Schedule, Search};
-use crate::sir::Placement;
+use crate::optimiser::ladder::Ladder;
+use crate::optimiser::local::Beside;
+use crate::optimiser::pass::origins;
+use crate::optimiser::search::{Infeasible, Schedule, Search};
+use crate::place::Placement;
+use crate::settings::Method;
 
 /// Hops of the prediction in one call of `work`: 16 reaches each. In an uneven field a part of one.
 const HOPS_AT_ONCE: u16 = 16;

@@ -190,7 +190,7 @@ mod tests {
     use super::{Next, Own, Pass, Phase, Rolling, Share};
     use crate::mission::Mission;
     use crate::mission::tests::paper;
-    use crate::node::settings::Settings;
+    use crate::settings::Settings;
     use crate::wire::digest::{Stamp, digest};
     use crate::wire::message::{Before, Count, Roster};
 

@@ -3,11 +3,11 @@
 use super::super::align::{Sweeping, told};
 use super::super::exchange::{Next, Phase};
 use super::super::lead::{Lead, Rounds};
-use super::super::settings::Method;
 use super::{ADJUST, ALTITUDE, Own, Pass, Share};
-use crate::placement::PerTarget;
-use crate::placement::ladder::Ladder;
-use crate::placement::pass::Behind;
+use crate::optimiser::PerTarget;
+use crate::optimiser::ladder::Ladder;
+use crate::optimiser::pass::Behind;
+use crate::settings::Method;
 use crate::wire::message::{Answer, Sweep};
 
 impl Share {

@@ -6,7 +6,7 @@ use super::super::adjust::Turning;
 use super::super::exchange::{Next, Phase};
 use super::super::lead::Lead;
 use super::{Own, PLACES_AT_ONCE, Pass, Share};
-use crate::placement::local::Beside;
+use crate::optimiser::local::Beside;
 use crate::wire::message::{Moved, Token, Turn};
 
 impl Share {

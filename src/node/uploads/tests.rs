@@ -3,7 +3,7 @@
 use super::{Hail, Message, Node, Side, Stamp, Upload};
 use crate::mission::tests::paper;
 use crate::mission::{Interference, Interferer, Mission, MissionConfig};
-use crate::node::settings::{Identity, Settings, Wiring};
+use crate::settings::{Identity, Settings, Wiring};
 use crate::time::Instant;
 use crate::wire::auth::{Auth, Key};
 use crate::wire::message::{Before, Roster};

@@ -10,7 +10,8 @@ pub mod timeline;
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use uav_relay::sir::{Sender, Station, at_receiver};
+use uav_relay::place::Station;
+use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Mission, Placement, Profile};
 
 pub use attack::AttackReport;

@@ -14,7 +14,11 @@ use uav_relay_tools::provision::key;
 
 /// Writes the configuration block of one relay: which one it is, and the mission it flies.
 #[derive(Parser, Debug)]
-#[command(name = "provision", bin_name = "cargo provision", disable_version_flag = true)]
+#[command(
+    name = "provision",
+    bin_name = "cargo provision",
+    disable_version_flag = true
+)]
 struct Options {
     /// Scenario file (TOML); without it the paper's multi-hop scenario
     #[arg(long, value_name = "FILE")]

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use uav_relay::Schedule;
-use uav_relay::placement::plan;
+use uav_relay::optimiser::plan;
 
 use super::chart::{Axis, Chart, Line, Look, Panel, Stroke};
 use super::sheet::{Sheet, Table};

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use uav_relay::Mission;
-use uav_relay::placement::single::{Found, aside, free, given_altitude};
+use uav_relay::planning::single::{Found, aside, free, given_altitude};
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
 use super::paper;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use uav_relay::placement::fleet;
+use uav_relay::planning::fleet;
 
 use super::chart::{Axis, Chart, Line, Look};
 use super::paper;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use uav_relay::Mission;
-use uav_relay::placement::single::locus::altitudes;
+use uav_relay::planning::single::locus::altitudes;
 
 use super::chart::{Axis, Chart, Line, Look};
 use super::paper;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use uav_relay::placement::single::given_altitude;
+use uav_relay::planning::single::given_altitude;
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
 use super::sheet::{Sheet, Table};

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use uav_relay::node::settings::SetupError;
-use uav_relay::placement::search::Infeasible;
+use uav_relay::optimiser::search::Infeasible;
+use uav_relay::settings::SetupError;
 
 use super::draw::NotDrawn;
 use uav_relay_sim::mission::Refusal;

@@ -1,10 +1,10 @@
 //! A whole chain without a message, by the functions that the relays walk one hop each.
 
-use uav_relay::placement::PerTarget;
-use uav_relay::placement::ladder::TARGETS;
-use uav_relay::placement::pass::{Behind, Link, close};
-use uav_relay::placement::plan;
-use uav_relay::placement::search::Search;
+use uav_relay::optimiser::PerTarget;
+use uav_relay::optimiser::ladder::TARGETS;
+use uav_relay::optimiser::pass::{Behind, Link, close};
+use uav_relay::optimiser::plan;
+use uav_relay::optimiser::search::Search;
 use uav_relay::{Heading, Mission, Placement, Profile, Schedule};
 
 use super::trouble::Trouble;

@@ -4,10 +4,10 @@
 use core::task::Poll;
 
 use uav_relay::mission::MAX_RELAYS;
-use uav_relay::placement::PerTarget;
-use uav_relay::placement::joint::{Seat, Solver};
-use uav_relay::placement::pass::{Behind, Link};
-use uav_relay::sir::Station;
+use uav_relay::optimiser::PerTarget;
+use uav_relay::optimiser::joint::{Seat, Solver};
+use uav_relay::optimiser::pass::{Behind, Link};
+use uav_relay::place::Station;
 use uav_relay::{Method, Placement};
 
 use super::{Briefed, NoPlan, Plan, source};

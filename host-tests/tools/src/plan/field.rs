@@ -2,8 +2,8 @@
 //!
 //! The field is the same at every altitude, and the outer hops are best as low as may be: that is all there is to free altitudes.
 
-use uav_relay::placement::fleet::ranges;
-use uav_relay::placement::single::stochastic;
+use uav_relay::planning::fleet::ranges;
+use uav_relay::planning::single::stochastic;
 
 use super::source::{fewest, nothing, placed, solved};
 use super::{Ask, Briefed, NoPlan, Number, Plan};

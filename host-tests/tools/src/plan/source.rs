@@ -1,7 +1,8 @@
 //! Plans against one interferer.
 
-use uav_relay::placement::single::{Found, aside, free, given_altitude, given_x};
-use uav_relay::placement::{fleet, plan as silent};
+use uav_relay::optimiser::plan as silent;
+use uav_relay::planning::fleet;
+use uav_relay::planning::single::{Found, aside, free, given_altitude, given_x};
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 
 use super::{Ask, Briefed, MOST_RELAYS, NoPlan, Number, Plan, Theorem, altitude};

@@ -7,7 +7,7 @@ use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Block, ConfigError, Secret, secret};
 use uav_relay_tools::provision::key;
 
-use super::{provision, paper, reads, refusal, with};
+use super::{paper, provision, reads, refusal, with};
 
 const SECRET: Secret = Secret {
     key: *b"32 random bytes, known to nobody",

@@ -1,0 +1,302 @@
+//! From iteration to iteration: how far the target is raised, which part of the step is taken, whom to believe.
+//!
+//! A pass back gives the slack's slope by ln gamma and what the steps should gain. A pass forward tries them with the target that they
+//! should just allow. It is taken if the target at which the slack would be zero is higher than before; else a smaller part of the step
+//! is tried, and in the end a smaller region in which the derivatives are trusted.
+
+use super::outlook::Outlook;
+use super::trial::{Bar, SHARES, TRUST, Trial, Trials};
+use crate::place::Placement;
+
+/// Trust below which nothing is gained any more.
+const LEAST_TRUST: f32 = 1e-4;
+
+/// Hops as long as D in all lose half of it for each e-fold of the target: less than that is a chain that does not feel it yet.
+const LEAST_SLOPE: f32 = 0.3;
+
+/// By how much the target is above the ceiling when a chain is probed again, in ln gamma, at first.
+const EXCESS: f32 = 0.03;
+
+/// How much of the slack counts where it would outweigh a penalty, in parts of D: at first, and what is not made less.
+const SPARE: f32 = 3e-3;
+const LEAST_SPARE: f32 = 4e-5;
+
+/// What slack that is missing is worth against such that is left over.
+const SHORT: f32 = 2.0;
+
+/// How close to the optimum is close enough, in ln gamma.
+const CLOSE: f32 = 3e-6;
+
+/// Iterations after which what there is has to do.
+const ITERATIONS: u8 = 40;
+
+/// What to do next.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Turn {
+    /// Try this part of the step with this target, in ln gamma.
+    Try { share: f32, sigma: f32 },
+    /// Raise the target as far as the chain goes as it stands.
+    Raise,
+    /// Work out the steps anew.
+    Again,
+    /// It is over.
+    Over,
+}
+
+/// The state of an ascent.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Ascent {
+    /// The target of the nominal chain, in ln gamma, and its slack, m.
+    pub(crate) sigma: f32,
+    pub(crate) slack: f32,
+    /// The least target that may be tried.
+    floor: f32,
+    /// The most that is tried before the chain is probed, in ln gamma, and by how much that is raised next.
+    limit: f32,
+    excess: f32,
+    /// How much of the slack counts, in parts of D: less and less where it would outweigh a penalty.
+    spare: f32,
+    /// The nominal chain's penalty, m.
+    pub(crate) penalty: f32,
+    distance_m: f32,
+    /// The slack's slope by ln gamma, m.
+    pub(crate) slope: f32,
+    linear: f32,
+    square: f32,
+    pub(crate) trust: f32,
+    /// Which of the shares is tried.
+    share: u8,
+    iterations: u8,
+    idle: u8,
+}
+
+impl Ascent {
+    /// From a chain that has `slack` for the target `sigma`.
+    pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
+        Self {
+            sigma,
+            slack,
+            floor,
+            limit: f32::INFINITY,
+            excess: 0.0,
+            spare: f32::INFINITY,
+            penalty: 0.0,
+            distance_m,
+            slope: -1.0,
+            linear: 0.0,
+            square: 0.0,
+            trust: TRUST,
+            share: 0,
+            iterations: 0,
+            idle: 0,
+        }
+    }
+
+    /// The same, to be probed at `limit` first.
+    pub(crate) const fn probed_at(self, limit: f32) -> Self {
+        Self {
+            limit,
+            excess: EXCESS,
+            ..self
+        }
+    }
+
+    /// The highest target for now.
+    pub(crate) const fn limit(&self) -> f32 {
+        self.limit
+    }
+
+    /// How much of the slack counts, m.
+    pub(crate) fn spare_m(&self) -> f32 {
+        self.spare * self.distance_m
+    }
+
+    /// Whether less of the slack is to count from now on: where there is a penalty.
+    pub(crate) fn tighten(&mut self) -> bool {
+        if self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m {
+            return false;
+        }
+        self.spare = (0.1 * self.spare).min(SPARE);
+        true
+    }
+
+    /// The nominal chain's slack is that.
+    pub(crate) const fn tightened(&mut self, slack: f32) -> Turn {
+        self.slack = slack;
+        self.trust = TRUST;
+        (self.idle, self.iterations) = (0, 0);
+        Turn::Again
+    }
+
+    /// Whether there is no higher one for now.
+    pub(crate) fn at_limit(&self) -> bool {
+        self.slack >= 0.0 && self.sigma >= self.limit
+    }
+
+    /// The probe came to nothing: the chain has to have more to spare.
+    pub(crate) fn probed(&mut self) -> Turn {
+        self.limit += self.excess;
+        self.excess *= 4.0;
+        self.trust = TRUST;
+        Turn::Again
+    }
+
+    /// The target at which the nominal chain's slack would be zero.
+    pub(crate) fn estimate(&self) -> f32 {
+        self.sigma - self.slack / self.slope
+    }
+
+    /// A pass back begins.
+    pub(crate) const fn look_back(&mut self) {
+        (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
+    }
+
+    /// A part of the chain has been looked through.
+    pub(crate) fn add(&mut self, outlook: &Outlook) {
+        self.slope += outlook.by_target;
+        self.linear += outlook.linear;
+        self.square += outlook.square;
+    }
+
+    /// The pass back has come to the head.
+    pub(crate) fn weighed(&mut self) -> Turn {
+        self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
+        self.share = 0;
+        self.iterations = self.iterations.saturating_add(1);
+        if self.iterations > ITERATIONS || !(self.linear + self.square).is_finite() {
+            return Turn::Over;
+        }
+        if self.at_limit() {
+            return Turn::Raise;
+        }
+        // More than enough, and no use for it but a higher target.
+        if self.slack > 1e-4 * self.distance_m && self.linear + self.square < 0.1 * self.slack {
+            return Turn::Raise;
+        }
+        self.attempt()
+    }
+
+    /// The target for each part of the step.
+    pub(crate) fn sigma_for(&self, share: f32) -> f32 {
+        let gain = (self.linear + self.square * share) * share;
+        let by = (self.slack + gain.max(0.0)) / -self.slope;
+        (self.sigma + by.max(-self.trust).min(self.trust))
+            .min(self.limit)
+            .max(self.floor)
+    }
+
+    fn attempt(&self) -> Turn {
+        match SHARES.get(usize::from(self.share)) {
+            Some(&share) => Turn::Try {
+                share,
+                sigma: self.sigma_for(share),
+            },
+            None => Turn::Again,
+        }
+    }
+
+    /// What a chain is worth that has `slack` for `sigma`: slack that is missing costs more than that which is left over gains.
+    fn merit(&self, sigma: f32, slack: f32) -> f32 {
+        sigma - slack.min(SHORT * slack) / self.slope
+    }
+
+    /// Whether a trial that has `slack` for `sigma` is better than the nominal chain.
+    pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
+        if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
+            return true;
+        }
+        let by = self.merit(sigma, slack) - self.merit(self.sigma, self.slack);
+        by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
+    }
+
+    /// The current trial came to nothing: the next part, or less trust.
+    pub(crate) fn failed(&mut self) -> Turn {
+        self.share = self.share.saturating_add(1);
+        let turn = self.attempt();
+        if turn == Turn::Again {
+            self.trust *= 0.2;
+            if self.trust < LEAST_TRUST {
+                return Turn::Over;
+            }
+        }
+        turn
+    }
+
+    /// The trial with `share` is the nominal chain from now on.
+    pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> Turn {
+        let before = self.merit(self.sigma, self.slack);
+        (self.sigma, self.slack) = (sigma, slack);
+        self.idle = if self.merit(sigma, slack) - before < CLOSE {
+            self.idle + 1
+        } else {
+            0
+        };
+        if share >= 1.0 {
+            self.trust = (2.0 * self.trust).min(1.0);
+        }
+        if self.idle >= 2 {
+            Turn::Over
+        } else {
+            Turn::Again
+        }
+    }
+
+    /// The next course, as the head says it.
+    pub(crate) fn course(&self) -> (Bar, Trials) {
+        let trial = |sigma: f32| Trial {
+            target: libm::expf(sigma),
+            penalty_m: 0.0,
+            place: Placement::default(),
+        };
+        if self.iterations == 0 {
+            let mut trials = Trials::new();
+            _ = trials.push(trial(self.sigma));
+            return (Bar::FIRST, trials);
+        }
+        let bar = Bar {
+            trust: self.trust,
+            slope: self.slope,
+            estimate: self.estimate(),
+        };
+        let trials = SHARES.map(|share| trial(self.sigma_for(share)));
+        (bar, Trials::from(trials))
+    }
+
+    /// What came of it.
+    pub(crate) fn heard(&mut self, trial: Option<u8>, slack: f32, outlook: &Outlook) -> Turn {
+        let turn = match trial.map(usize::from) {
+            Some(_) if self.iterations == 0 => {
+                self.slack = slack;
+                Turn::Again
+            }
+            Some(at) => {
+                let share = SHARES.get(at).copied().unwrap_or(1.0);
+                let sigma = self.sigma_for(share);
+                self.taken(share, sigma, slack)
+            }
+            None => {
+                self.trust *= 0.2;
+                if self.trust < LEAST_TRUST {
+                    Turn::Over
+                } else {
+                    Turn::Again
+                }
+            }
+        };
+        self.look_back();
+        self.add(outlook);
+        match self.weighed() {
+            _ if turn == Turn::Over => turn,
+            Turn::Over => Turn::Over,
+            _ => Turn::Again,
+        }
+    }
+
+    /// The target has been raised as far as the chain goes.
+    pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> Turn {
+        let gained = sigma - self.sigma > 1e-5;
+        (self.sigma, self.slack) = (sigma, slack);
+        self.trust = TRUST;
+        if gained { Turn::Again } else { Turn::Over }
+    }
+}

@@ -1,0 +1,35 @@
+//! Places, sides and altitudes together: the chain whose worst hop is as good as it can be, by differential dynamic programming.
+//!
+//! For a target gamma every hop but the last is as long as it may be, and so each relay's place follows from that of the one before it
+//! and from two numbers that are to be chosen within its room: where it flies across the line. What is to be made as large as can be
+//! is the slack at the end, by how much the chain overshoots Rx; and gamma is raised until that is zero.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | `axis` | which coordinate of a place follows from the other two |
+//! | `hop` | how a hop's end moves with everything it depends on |
+//! | [`outlook`] | what the rest of the chain is worth, as the relay before it sees it |
+//! | `policy` | a relay's step, and how it follows what changed before it |
+//! | [`link`] | one relay and the hop into it: both passes, one relay's worth of each |
+//! | `ascent` | how far the target is raised, and what is taken of a step |
+//! | `starts`, `seek`, `cells` | where an ascent begins; the target of a chain that does not change; a place in six bytes |
+//! | [`solver`] | a whole chain without a message |
+//! | [`trial`] | what a course carries |
+//! | [`course`] | one relay's share where relays hold what the others do not know |
+
+pub(crate) mod ascent;
+mod axis;
+mod cells;
+pub mod course;
+mod hop;
+pub mod link;
+pub mod outlook;
+mod policy;
+mod seek;
+pub mod solver;
+mod starts;
+pub mod trial;
+
+pub use link::Room;
+pub use outlook::Outlook;
+pub use solver::{Seat, Solver};

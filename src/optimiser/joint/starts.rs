@@ -1,0 +1,185 @@
+//! Where an ascent begins: chains that pass the interferer low, in an arch over it, beside it on either hand, or beyond it.
+//!
+//! The chain is a shortest way in a metric in which a metre near the interferer counts for more, and there is a locally shortest way on
+//! each side of it. Which of them is the best depends on the room, on the power and on the number of relays; each is tried.
+
+use crate::mission::Interferer;
+use crate::place::{CrossSection, Placement};
+use crate::root::sqrt;
+use crate::sir::square;
+
+use super::axis::Triple;
+use super::link::{Room, minus, triple};
+
+/// One of them.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Start {
+    /// A parabola over the line: so much to the side and upward in the middle, in halves of D.
+    Arch { aside: f32, up: f32 },
+    /// A spiral about the interferer: toward a place right above it or beside it, and from there to Rx.
+    Around { aside: f32, up: f32, far: f32 },
+    /// Low, from a target so high that no hop leaps to the far side of the interferer.
+    Near,
+    /// Relay 1 right above Rx, as high or far aside as pays, the others on the way down from there.
+    Far,
+}
+
+/// The shapes of arches: aside, up.
+const ARCHES: [(f32, f32); 7] = [
+    (0.0, 0.0),
+    (0.0, 1.0),
+    (0.0, 0.25),
+    (-1.0, 0.0),
+    (1.0, 0.0),
+    (-0.25, 0.0),
+    (0.25, 0.0),
+];
+
+/// Spirals: aside and up of the place they lead to first, and how far that is from the interferer, in parts of the geometric mean of
+/// the distances of Tx and Rx.
+const SPIRALS: [(f32, f32, f32); 9] = [
+    (0.0, 1.0, 1.0),
+    (1.0, 0.0, 1.0),
+    (-1.0, 0.0, 1.0),
+    (0.7, 0.7, 1.0),
+    (-0.7, 0.7, 1.0),
+    (0.0, 1.0, 0.3),
+    (1.0, 0.0, 0.3),
+    (-1.0, 0.0, 0.3),
+    (0.0, 1.0, 2.0),
+];
+
+/// A way about the interferer on which the distance to it changes in its logarithm as the direction turns.
+struct Way {
+    /// Where it leads to: the direction.
+    to: Triple,
+    angle: f32,
+    /// By how much the logarithm of the distance rises.
+    rise: f32,
+    length: f32,
+}
+
+impl Way {
+    fn new(here: Triple, to: Triple) -> Self {
+        let (r, t) = (length(here), length(to));
+        let (here, to) = (here.map(|v| v / r), to.map(|v| v / t));
+        let chord = square(length(minus(here, to)));
+        // 2 asin(chord / 2) / chord
+        let angle = sqrt(chord) * (1.0 + chord * (1.0 / 24.0 + chord * (3.0 / 640.0)));
+        let rise = libm::logf(t / r);
+        let length = sqrt(square(angle) + square(rise)).max(SHORTEST);
+        Self {
+            to,
+            angle,
+            rise,
+            length,
+        }
+    }
+
+    /// After a hop from `here` that is `step` of the distance at its end, as seen from the interferer.
+    fn after(&self, here: Triple, step: f32) -> Triple {
+        let bend = 0.5 * step * self.rise / self.length;
+        let share = (step * libm::expf(bend.clamp(-1.0, 1.0)) / self.length).min(1.0);
+        let r = length(here);
+        let unit = here.map(|v| v / r);
+        let cos: f32 = unit.iter().zip(self.to).map(|(a, b)| a * b).sum();
+        let aside = minus(self.to, unit.map(|v| cos * v));
+        let turn = (share * self.angle).min(MOST_TURN) / length(aside).max(SHORTEST);
+        let direction = minus(unit, aside.map(|v| -turn * v));
+        let scale = r * libm::expf(share * self.rise) / length(direction);
+        direction.map(|v| scale * v)
+    }
+}
+
+/// What a way is not divided by less than.
+const SHORTEST: f32 = 1e-6;
+
+/// The most that a hop turns about the interferer, as a tangent.
+const MOST_TURN: f32 = 1.5;
+
+fn length([x, y, z]: Triple) -> f32 {
+    sqrt(square(x) + square(y) + square(z)).max(f32::MIN_POSITIVE)
+}
+
+impl Start {
+    /// Where a relay flies across the line that comes after one at `from`, by a spiral.
+    pub(super) fn around(
+        self,
+        distance_m: f32,
+        interferer: &Interferer,
+        from: Placement,
+        c: f32,
+        room: Room,
+    ) -> CrossSection {
+        let Self::Around { aside, up, far } = self else {
+            return room.nearest(from.cross_section());
+        };
+        let m = [interferer.x_m, interferer.y_m, 0.0];
+        let here = minus(triple(from), m);
+        let end = minus([distance_m, 0.0, 0.0], m);
+        let between = far * sqrt(length(end) * length(m));
+        let middle = [0.0, aside * between, up * between];
+        let step = 1.0 / sqrt(c);
+        let [before, ..] = here;
+        let mut way = Way::new(here, end);
+        if before < 0.0 && interferer.x_m < distance_m {
+            let first = Way::new(here, middle);
+            if first.length > step {
+                way = first;
+            }
+        }
+        let [_, y, h] = way.after(here, step);
+        room.nearest(CrossSection {
+            y_m: interferer.y_m + y,
+            altitude_m: h,
+        })
+    }
+
+    /// Start `number` for relays with that `room`; `None` after the last, `Some(None)` where it is no use.
+    #[expect(
+        clippy::option_option,
+        reason = "past the end, of no use, and a start are three things"
+    )]
+    pub(super) fn number(number: u8, room: Room) -> Option<Option<Self>> {
+        let Room { lateral, band } = room;
+        let fits = |(aside, up): (f32, f32)| {
+            let sideways = if aside < 0.0 {
+                lateral.least_m < 0.0
+            } else if aside > 0.0 {
+                lateral.most_m > 0.0
+            } else {
+                true
+            };
+            sideways && (!(up > 0.0) || !band.is_single())
+        };
+        let free = !(band.is_single() && lateral.is_single());
+        let number = usize::from(number);
+        if let Some(&(aside, up)) = ARCHES.get(number) {
+            return Some(fits((aside, up)).then_some(Self::Arch { aside, up }));
+        }
+        let number = number.checked_sub(ARCHES.len())?;
+        if let Some(&(aside, up, far)) = SPIRALS.get(number) {
+            let fits = free && fits((aside, up));
+            return Some(fits.then_some(Self::Around { aside, up, far }));
+        }
+        match number.checked_sub(SPIRALS.len())? {
+            0 => Some(free.then_some(Self::Far)),
+            1 => Some(free.then_some(Self::Near)),
+            _ => None,
+        }
+    }
+
+    /// Where a relay flies across the line that comes after one at `x_m`, of a chain `distance_m` long.
+    pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
+        let (aside, up) = match self {
+            Self::Arch { aside, up } => (aside, up),
+            Self::Near | Self::Far | Self::Around { .. } => (0.0, 0.0),
+        };
+        let t = (x_m / distance_m).clamp(0.0, 1.0);
+        let rise = 2.0 * distance_m * t * (1.0 - t);
+        room.nearest(CrossSection {
+            y_m: aside * rise,
+            altitude_m: up * rise,
+        })
+    }
+}

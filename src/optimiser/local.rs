@@ -1,0 +1,350 @@
+//! Algorithm 2's local search: where one relay, its neighbours standing still, makes the worse of its two hops best.
+//!
+//! Two ways through the same rectangle, between the neighbours along x and within `explore` of the altitude held. The
+//! paper's is a grid. The other goes from coarse to fine: five altitudes, of which the best and its neighbours bound the next
+//! five; and for each of them the place where the SIR of one hop falls to that of the other is found by halving. Where all
+//! hops are equal, which is what Algorithm 1 leaves, a grid has no point that is better at all, and this has.
+//!
+//! Accuracy and effect: `host-tests/tests/adjust.rs`.
+
+use core::task::Poll;
+
+use crate::gain::Gain;
+use crate::mission::{Interferer, Mission};
+use crate::place::Placement;
+use crate::root::sqrt;
+use crate::sir::square;
+
+/// Altitudes in one round of the search from coarse to fine.
+const ROWS: u8 = 5;
+
+/// Rounds of it: each halves what is searched.
+const ROUNDS: u8 = 9;
+
+/// Halvings along x for each altitude.
+const HALVINGS: u8 = 20;
+
+/// What rounding may take from a step, as a part of the place.
+const ROUNDING: f32 = 3e-7;
+
+/// How the rectangle is searched.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Local {
+    /// From coarse to fine: at most 1080 evaluations of both hops.
+    #[default]
+    Fine,
+    /// The paper's grid, `columns` by `rows` evaluations.
+    Grid {
+        /// Places along x, the neighbours' own included, 2 to 255.
+        columns: u8,
+        /// Altitudes, 2 to 255.
+        rows: u8,
+    },
+}
+
+/// One of the two neighbours, or the ground station in its place.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Beside {
+    /// Where it stands; at altitude 0 for a ground station.
+    pub place: Placement,
+    /// The least distance to it, m; 0 for a ground station.
+    pub apart_m: f32,
+}
+
+/// The two hops of a relay.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Hops {
+    before: Beside,
+    after: Beside,
+    /// What the power of the node before is worth.
+    gain_in: Gain,
+    /// What the relay's own is worth: on a hop to a relay, or K in m^2 to Rx.
+    gain_out: f32,
+    to_rx: bool,
+    interferer: Interferer,
+    /// What the interference is at the relay after this one: (X - x)^2 + Y^2 + h^2, m^2.
+    quiet_after: f32,
+}
+
+impl Hops {
+    /// The hops of a relay of `power_w` watts, fed with `gain_in`; `after` is `None` for the tail.
+    pub fn new(
+        mission: &Mission,
+        interferer: &Interferer,
+        before: Beside,
+        gain_in: Gain,
+        power_w: f32,
+        after: Option<Beside>,
+    ) -> Self {
+        let rx = Beside {
+            place: Placement::on_line(mission.config().distance_m, 0.0),
+            apart_m: 0.0,
+        };
+        let to = after.unwrap_or(rx).place;
+        Self {
+            before,
+            after: after.unwrap_or(rx),
+            gain_in,
+            gain_out: match after {
+                Some(_) => mission.relay_gain(power_w).value(),
+                None => mission.receiver_gain(power_w),
+            },
+            to_rx: after.is_none(),
+            interferer: *interferer,
+            quiet_after: square(interferer.x_m - to.x_m)
+                + square(interferer.y_m)
+                + square(to.altitude_m),
+        }
+    }
+
+    /// The SIR of the hop to the relay at `at` and of the one from it, by the very operations of [`crate::sir`].
+    pub fn both(&self, at: Placement) -> (f32, f32) {
+        let (x, h) = (at.x_m, at.altitude_m);
+        let quiet = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
+        let (from, to) = (self.before.place, self.after.place);
+        let incoming =
+            self.gain_in.value() * quiet / (square(x - from.x_m) + square(h - from.altitude_m));
+        let (step, climb) = (square(to.x_m - x), square(to.altitude_m - h));
+        let outgoing = if self.to_rx {
+            self.gain_out / (step + climb)
+        } else {
+            self.gain_out * self.quiet_after / (step + climb)
+        };
+        (incoming, outgoing)
+    }
+
+    /// The worse of the two: the paper's local SIR.
+    pub fn worse(&self, at: Placement) -> f32 {
+        let (incoming, outgoing) = self.both(at);
+        incoming.min(outgoing)
+    }
+
+    /// Whether the relay at `at` is between its neighbours, and far enough from both.
+    fn is_clear(&self, at: Placement) -> bool {
+        let clear = |of: Beside| {
+            square(at.x_m - of.place.x_m) + square(at.altitude_m - of.place.altitude_m)
+                >= square(of.apart_m)
+        };
+        clear(self.before) && clear(self.after)
+    }
+}
+
+/// A search under way.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Search {
+    how: Local,
+    hops: Hops,
+    /// The altitudes that may be taken.
+    bottom_m: f32,
+    top_m: f32,
+    /// What is searched now.
+    low_m: f32,
+    high_m: f32,
+    round: u8,
+    row: u8,
+    column: u8,
+    /// The best row of this round: its altitude and its worse SIR.
+    best_row: (f32, f32),
+    /// The best place so far, if it is better than the one held, and its worse SIR or that of the one held.
+    found: Option<Placement>,
+    best_sir: f32,
+}
+
+impl Search {
+    /// A search by a relay at `at`, up to `explore_m` above and below within [`least_m`, `most_m`].
+    pub fn new(how: Local, hops: Hops, at: Placement, explore_m: f32, band: (f32, f32)) -> Self {
+        let low_m = (at.altitude_m - explore_m).max(band.0);
+        let high_m = (at.altitude_m + explore_m).min(band.1);
+        // A relay whose altitude is out of the band by more than that has nowhere to go.
+        let nowhere = !(low_m <= high_m);
+        Self {
+            how,
+            hops,
+            bottom_m: low_m,
+            top_m: high_m,
+            low_m,
+            high_m,
+            round: if nowhere { ROUNDS } else { 0 },
+            row: 0,
+            column: if nowhere { u8::MAX } else { 0 },
+            // Where no row of a round is allowed this bounds the next: from outside the band it would lead out of it.
+            best_row: (at.altitude_m.max(low_m).min(high_m), -1.0),
+            found: None,
+            best_sir: hops.worse(at),
+        }
+    }
+
+    /// Goes on for at most `budget` evaluations and one row of 24; ready when it is over: where to stand, if that is
+    /// strictly better than where the relay stands.
+    pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
+        let mut left = budget;
+        while left > 0 {
+            let spent = match self.how {
+                Local::Fine => self.fine(),
+                Local::Grid { columns, rows } => self.point(columns, rows),
+            };
+            let Some(spent) = spent else {
+                return Poll::Ready(self.found);
+            };
+            left = left.saturating_sub(spent);
+        }
+        Poll::Pending
+    }
+
+    /// Keeps `at` if it is allowed and better than anything before; its worse SIR, or less than any if it is not allowed.
+    fn weigh(&mut self, at: Placement) -> f32 {
+        if !self.hops.is_clear(at) {
+            return -1.0;
+        }
+        let sir = self.hops.worse(at);
+        if sir > self.best_sir {
+            self.best_sir = sir;
+            self.found = Some(at);
+        }
+        sir
+    }
+
+    /// The altitude at `part`, 0 to 1, of what is searched. Rounded, the sum may be above its end, which may be the band's.
+    fn altitude(&self, part: f32) -> f32 {
+        (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
+    }
+
+    /// One more row from coarse to fine; the evaluations it took, `None` when there is none left.
+    fn fine(&mut self) -> Option<u16> {
+        if self.row >= ROWS {
+            let (h, _) = self.best_row;
+            let spacing = (self.high_m - self.low_m) / f32::from(ROWS - 1);
+            self.low_m = (h - spacing).max(self.bottom_m);
+            self.high_m = (h + spacing).min(self.top_m);
+            self.best_row = (h, -1.0);
+            self.row = 0;
+            self.round += 1;
+        }
+        if self.round >= ROUNDS {
+            return None;
+        }
+        let part = f32::from(self.row) / f32::from(ROWS - 1);
+        let altitude_m = self.altitude(part);
+        let sir = self.crossing(altitude_m);
+        if sir > self.best_row.1 {
+            self.best_row = (altitude_m, sir);
+        }
+        self.row += 1;
+        Some(u16::from(HALVINGS) + 4)
+    }
+
+    /// The best of a row: where, going toward Rx, the hop into the relay stops being the better one.
+    fn crossing(&mut self, altitude_m: f32) -> f32 {
+        let gap = |of: Beside| {
+            let climb = altitude_m - of.place.altitude_m;
+            // What is left apart must still be so when the place has been rounded.
+            sqrt(square(of.apart_m) - square(climb)) + ROUNDING * of.place.x_m
+        };
+        let (before, after) = (self.hops.before, self.hops.after);
+        let mut low = before.place.x_m + gap(before);
+        let mut high = after.place.x_m - gap(after);
+        if !(low <= high) {
+            return -1.0;
+        }
+        let at = |x_m| Placement::on_line(x_m, altitude_m);
+        // Past the interferer the hop into the relay may get better with its length: then an end of the row is best.
+        let ends = self.weigh(at(low)).max(self.weigh(at(high)));
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            let (incoming, outgoing) = self.hops.both(at(middle));
+            if incoming > outgoing {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
+    }
+
+    /// One more point of the grid, along the altitudes first; `None` when there is none left.
+    fn point(&mut self, columns: u8, rows: u8) -> Option<u16> {
+        if self.row >= rows {
+            self.row = 0;
+            self.column += 1;
+        }
+        if self.column >= columns {
+            return None;
+        }
+        let part = |at: u8, of: u8| f32::from(at) / f32::from(of.saturating_sub(1).max(1));
+        let (from, to) = (self.hops.before.place.x_m, self.hops.after.place.x_m);
+        _ = self.weigh(Placement::on_line(
+            (from + (to - from) * part(self.column, columns)).min(to),
+            self.altitude(part(self.row, rows)),
+        ));
+        self.row += 1;
+        Some(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::task::Poll;
+
+    use super::{Beside, Hops, Local, Search};
+    use crate::gain::Gain;
+    use crate::mission::Interferer;
+    use crate::place::Placement;
+
+    /// A relay at `altitude_m` in the middle of two that are 100 m apart at `beside_m`, who may go anywhere within the band.
+    fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> Search {
+        let at = Placement::on_line;
+        let beside = |x_m| Beside {
+            place: at(x_m, beside_m),
+            apart_m,
+        };
+        let hops = Hops {
+            before: beside(0.0),
+            after: beside(100.0),
+            gain_in: Gain::new(1.0),
+            gain_out: 1.0,
+            to_rx: false,
+            interferer: Interferer {
+                power_w: 1.0,
+                x_m: 50.0,
+                y_m: 10.0,
+            },
+            quiet_after: 1e6,
+        };
+        Search::new(Local::Fine, hops, at(50.0, altitude_m), 1e5, band)
+    }
+
+    #[test]
+    fn from_outside_the_band_it_ends_in_it_or_stays() {
+        // Once with room in the band, once with room on the way there alone: that is no place to stop at.
+        for (from_m, beside_m, apart_m, band, ends_m) in [
+            (80_000.0, 20.0, 0.0, (20.0, 20.0), Some(20.0)),
+            (80_000.0, 20.0, 150.0, (20.0, 20.0), None),
+            (1.0, 500.0, 0.0, (200.0, 300.0), Some(300.0)),
+            (1.0, 500.0, 400.0, (200.0, 300.0), None),
+        ] {
+            let mut search = search(from_m, beside_m, apart_m, band);
+            let over = search.step(u16::MAX);
+            let ended = over.map(|found| found.map(|at| at.altitude_m));
+            assert_eq!(ended, Poll::Ready(ends_m), "from {from_m} m");
+        }
+    }
+
+    #[test]
+    fn the_highest_row_is_never_above_the_band() {
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f32::from((state >> 16) as u16) / 7.0 + 0.1
+        };
+        let mut rounded_up = 0;
+        for _ in 0..100_000 {
+            let (one, other) = (random(), random());
+            let (low_m, high_m) = (one.min(other), one.max(other));
+            let top_m = search(low_m, low_m, 0.0, (low_m, high_m)).altitude(1.0);
+            assert!(top_m <= high_m, "{top_m} above {high_m}");
+            rounded_up += u32::from(low_m + (high_m - low_m) > high_m);
+        }
+        assert!(rounded_up > 1000, "{rounded_up}");
+    }
+}

@@ -1,0 +1,351 @@
+//! How far a hop reaches: the closed forms of the paper's `d_1`, `d_k` and `d_max` as one stable rule.
+//!
+//! With the sender at (x0, y0, h0), the node at (x0 + d, y, h), the interferer at (X, Y, 0), u = X - x0 and A the sender's
+//! gain, SIR >= gamma is
+//!
+//! ```text
+//! f(d) = -e d^2 - 2 u d + C >= 0,    e = gamma / A - 1,    C = u^2 + H,
+//! H = (Y - y0) (Y + y0 - 2y) + h0 (2h - h0) - e ((y - y0)^2 + (h - h0)^2)
+//! ```
+//!
+//! The reach is the largest d in `[0, end - x0]` with f(d) >= 0. `end` if f is not negative there; else the largest root
+//! inside, which the signs of e, u and C decide:
+//!
+//! | C | u | largest root below `end` |
+//! | --- | --- | --- |
+//! | >= 0 | >= 0 | C / (u + r) |
+//! | >= 0 | < 0 | (r - u) / e, and e > 0 follows from f(end) < 0 |
+//! | < 0 | < 0 and e > 0 | (r - u) / e, if inside |
+//! | < 0 | otherwise | none: the target cannot be met |
+//!
+//! with r = sqrt((gamma / A) u^2 + e H); the discriminant u^2 + e C is the same number, but cancels, and so does 1 + e for
+//! small targets. e is formed from a gain of twice f32's width, so targets next to A lose nothing. The printed
+//! case distinction picks wrong roots once the chain has passed the interferer.
+//!
+//! Where every sender in [0, x0] counts, only the nearest to a place matters: the interference there does not depend on it, and
+//! none is louder. Up to x0 and the least step s beyond, that is one just s before, and a node at x is heard there if
+//!
+//! ```text
+//! (X - x)^2 + (Y - y)^2 + h^2 >= (gamma / A) (s^2 + (y - y0)^2 + (h - h0)^2):
+//! ```
+//!
+//! everywhere but within w of the interferer. So where nothing is heard from x0, the sender may *hold back*, for a node at X - w:
+//! to climb before it comes near, or to leave the least step room. `at_mixed_altitudes` and `with_a_separation_that_binds` in
+//! `host-tests/tests/exact.rs` holds it against all places at once.
+//!
+//! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement.rs` asserts it against a bisection of the
+//! SIR itself in f64.
+
+use crate::mission::{Interferer, Mission};
+use crate::place::{CrossSection, Station};
+use crate::root::sqrt;
+use crate::sir::{Sender, square};
+
+/// Where the relay before on the pass is to stand.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Stand {
+    /// At its own reach, or where it cannot be told: at Tx, at Rx.
+    AtReach,
+    /// There, m along x.
+    At(f32),
+}
+
+/// No hop is short enough for a target this far above its gain, and every term of f stays finite below it.
+const MOST_RATIO: f32 = 1e18;
+
+/// One hop toward Rx, ready to be evaluated for many targets.
+///
+/// The terms that do not depend on the target are worked out once, so a reach costs three divisions and a square root.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Hop {
+    sender: Sender,
+    /// X, m.
+    interferer_x_m: f32,
+    /// (Y - y)^2 + h^2, m^2.
+    aside_squared: f32,
+    /// (Y - y0) (Y + y0 - 2y) + h0 (2h - h0), m^2.
+    base: f32,
+    /// (y - y0)^2 + (h - h0)^2, m^2.
+    across_squared: f32,
+    /// The least step to the node, m.
+    least_step: f32,
+    /// Whether the sender is Tx, which cannot hold back.
+    from_tx: bool,
+    /// The last place the node may take, m.
+    end_m: f32,
+    /// The last places that the node and its sender take where all gather at the end, m.
+    gathered_m: [f32; 2],
+}
+
+impl Hop {
+    /// The hop from `sender` to relay `index`, which flies at `at`; neighbours among the relays after it may be `spread_squared`
+    /// m^2 apart across the line.
+    pub fn new(
+        mission: &Mission,
+        interferer: &Interferer,
+        sender: Sender,
+        index: u16,
+        at: CrossSection,
+        spread_squared: f32,
+    ) -> Self {
+        let (from, aside) = (sender.at, interferer.y_m);
+        let climb = at.altitude_m - from.altitude_m;
+        let across_squared = at.apart_squared(from);
+        Self {
+            sender,
+            interferer_x_m: interferer.x_m,
+            aside_squared: square(aside - at.y_m) + square(at.altitude_m),
+            base: (aside - from.y_m) * (aside + from.y_m - 2.0 * at.y_m)
+                + from.altitude_m * (at.altitude_m + climb),
+            across_squared,
+            from_tx: index <= 1,
+            // The transmitter stands on the ground: its altitude alone keeps the head clear of it.
+            least_step: if index <= 1 {
+                0.0
+            } else {
+                mission.least_step(across_squared)
+            },
+            end_m: mission.end_for(index, spread_squared),
+            gathered_m: [index, index.saturating_sub(1)]
+                .map(|index| mission.end_for(index, spread_squared)),
+        }
+    }
+
+    /// The same hop, to relay `index`, when those after it hold back to leave themselves room rather than this one.
+    pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
+        Self {
+            end_m: mission.end_freely(index),
+            ..self
+        }
+    }
+
+    /// The same hop, to a node that goes no farther than `end_m`.
+    pub(crate) fn ending(self, end_m: f32) -> Self {
+        Self { end_m, ..self }
+    }
+
+    /// The farthest place in [`from_m`, end] at which the node still meets `target`, m along x; `None` if there is none.
+    ///
+    /// `target` is a linear SIR above zero, `from_m` the sender's place in [0, D]. The place is rounded toward the sender,
+    /// so what is promised for the target holds at the f32 that is returned. Constant work.
+    pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
+        let room = self.end_m - from_m;
+        if room < self.least_step {
+            return None;
+        }
+        let ratio = self.sender.gain.ratio(target);
+        if !(ratio <= MOST_RATIO) {
+            return None;
+        }
+        let u = self.interferer_x_m - from_m;
+        // f(end) as the SIR's own two terms: expanded, they would cancel right next to the interferer.
+        if square(u - room) + self.aside_squared >= ratio * (square(room) + self.across_squared) {
+            return Some(self.end_m);
+        }
+        let e = self.sender.gain.excess(target);
+        let h = self.base - e * self.across_squared;
+        let c = square(u) + h;
+        let ahead = u >= 0.0;
+        if c < 0.0 && (ahead || e <= 0.0) {
+            return None;
+        }
+        let discriminant = ratio * square(u) + e * h;
+        if discriminant < 0.0 && c < 0.0 {
+            return None;
+        }
+        let r = sqrt(discriminant);
+        let d = if ahead { c / (u + r) } else { (r - u) / e };
+        if !(d >= self.least_step) {
+            return None;
+        }
+        if d >= room {
+            // With C < 0 the feasible stretch lies wholly beyond the end; else rounding put the root on it.
+            return if c < 0.0 { None } else { Some(self.end_m) };
+        }
+        let place = from_m + d;
+        let place = if place - from_m > d {
+            place.next_down()
+        } else {
+            place
+        };
+        // A hop too short for an f32 is none: two relays never share a place.
+        (place > from_m).then_some(place)
+    }
+
+    /// The farthest place at which the node meets `target` with its sender anywhere in [0, `from_m`]; `None` if there is none.
+    ///
+    /// Beyond `from_m` by the least step or more that is [`Hop::reach`]; short of it the sender stands just the least step
+    /// before, which is as near as it may be. Constant work.
+    pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
+        self.reach(target, from_m)
+            .or_else(|| self.held_back(target, from_m))
+    }
+
+    fn held_back(&self, target: f32, from_m: f32) -> Option<f32> {
+        let ratio = self.sender.gain.ratio(target);
+        if self.from_tx || !(ratio <= MOST_RATIO) {
+            return None;
+        }
+        let near = (from_m + self.least_step).min(self.end_m);
+        // Nobody hears even the nearest sender within this of the interferer.
+        let zone =
+            sqrt(ratio * (square(self.least_step) + self.across_squared) - self.aside_squared);
+        let place = if (near - self.interferer_x_m).abs() < zone {
+            (self.interferer_x_m - zone).next_down()
+        } else {
+            near
+        };
+        (self.before(place) >= 0.0).then_some(place)
+    }
+
+    /// The nearest that a sender may be before `place`, m.
+    fn before(&self, place: f32) -> f32 {
+        let from = place - self.least_step;
+        if place - from < self.least_step || from >= place {
+            from.next_down()
+        } else {
+            from
+        }
+    }
+
+    /// Where the sender, whose reach for `target` is `from_m`, is to stand when the node is at `place`; `None` if nowhere.
+    ///
+    /// The nearest that it may be, which is the loudest.
+    pub fn stand(&self, target: f32, from_m: f32, place: f32) -> Option<Stand> {
+        if self
+            .reach(target, from_m)
+            .is_some_and(|reach| place >= reach)
+        {
+            return Some(Stand::AtReach);
+        }
+        let heard = square(self.interferer_x_m - place) + self.aside_squared;
+        let ratio = self.sender.gain.ratio(target);
+        let at = |from: f32| {
+            let needed = ratio * (square(place - from) + self.across_squared);
+            let met = from >= 0.0 && heard >= needed * (1.0 - ROUNDING);
+            met.then_some(if from < from_m {
+                Stand::At(from)
+            } else {
+                Stand::AtReach
+            })
+        };
+        if self.from_tx {
+            return at(from_m);
+        }
+        let near = from_m.min(self.before(place));
+        // Where all gather at the end, as evenly as a pass that leaves them room from the start.
+        let [own, sender] = self.gathered_m;
+        let gathered = (place >= own && !(self.across_squared > 0.0)).then(|| at(near.min(sender)));
+        gathered.flatten().or_else(|| at(near))
+    }
+}
+
+/// What rounding may take from a hop's SIR at the edge of where it meets its target, relative.
+const ROUNDING: f32 = 4e-6;
+
+impl Hop {
+    /// The reach as a smooth function of everything: without a least step, and behind `from_m` where the hop across takes more than
+    /// there is. `None` where there is none at all.
+    pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
+        let ratio = self.sender.gain.ratio(target);
+        if !(ratio <= MOST_RATIO) {
+            return None;
+        }
+        let u = self.interferer_x_m - from_m;
+        let e = self.sender.gain.excess(target);
+        let h = self.base - e * self.across_squared;
+        let discriminant = ratio * square(u) + e * h;
+        if !(e > 0.0) {
+            let room = self.end_m - from_m;
+            let all = square(u - room) + self.aside_squared
+                >= ratio * (square(room) + self.across_squared);
+            if all || (discriminant < 0.0 && u >= 0.0) {
+                return Some(self.end_m.max(from_m));
+            }
+            if !(u >= 0.0 && square(u) + h >= 0.0) {
+                return None;
+            }
+        }
+        if discriminant < 0.0 {
+            return None;
+        }
+        let r = sqrt(discriminant);
+        let d = if u >= 0.0 {
+            (square(u) + h) / (u + r)
+        } else {
+            (r - u) / e
+        };
+        Some((from_m + d).min(self.end_m.max(from_m)))
+    }
+}
+
+/// The farthest a relay may be from the receiver, m along x, for the receiver to meet `target`: the paper's `d_max`.
+///
+/// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` where even a relay right above the receiver is too weak. Not cut at D: it
+/// stays smooth in the target for the search that looks for its root.
+pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
+    let across = square(relay.at.y_m) + square(relay.at.altitude_m);
+    let squared = mission.receiver_gain(relay.power_w) / target - across;
+    (squared >= 0.0).then(|| sqrt(squared).min(1e9))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Hop;
+    use crate::mission::tests::paper;
+    use crate::mission::{Interference, Interferer, Mission, MissionConfig};
+    use crate::place::CrossSection;
+    use crate::sir::Sender;
+
+    fn first_hop(x_m: f32, distance_m: f32, altitude_m: f32) -> Hop {
+        let interferer = Interferer {
+            power_w: 80.0,
+            x_m,
+            y_m: 0.0,
+        };
+        let config = MissionConfig {
+            distance_m,
+            interference: Interference::Source(interferer),
+            ..paper(1)
+        };
+        let mission = Mission::try_new(config).unwrap();
+        let sender = Sender::transmitter(&mission);
+        Hop::new(
+            &mission,
+            &interferer,
+            sender,
+            1,
+            CrossSection::on_line(altitude_m),
+            0.0,
+        )
+    }
+
+    /// Behind the transmitter an interferer makes SIR_1 rise at first: at 10 m behind, from 1.04 above Tx to 1.22 at 45 m.
+    #[test]
+    fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
+        // SIR_1 is at least 1.22 from 40.9 m to 50 m.
+        assert_eq!(
+            first_hop(-10.0, 35.0, 50.0).reach(1.22, 0.0),
+            None,
+            "it lies beyond the end"
+        );
+        assert_eq!(
+            first_hop(-10.0, 45.0, 50.0).reach(1.22, 0.0),
+            Some(45.0),
+            "the end lies in it"
+        );
+        let inside = first_hop(-10.0, 60.0, 50.0).reach(1.22, 0.0).unwrap();
+        assert!((inside - 50.0).abs() < 1e-3, "it ends at 50 m: {inside}");
+        assert_eq!(
+            first_hop(-10.0, 60.0, 50.0).reach(1.23, 0.0),
+            None,
+            "nothing meets that much"
+        );
+    }
+
+    #[test]
+    fn there_is_no_way_back() {
+        assert_eq!(first_hop(500.0, 1000.0, 20.0).reach(1.0, 1000.5), None);
+    }
+}

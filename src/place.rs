@@ -1,0 +1,75 @@
+//! Places in the air, and what stands there.
+
+/// A place in the air.
+///
+/// Frame: x along the ground from the transmitter toward the receiver, y to the right of x as seen from above, h up.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Placement {
+    /// Distance from the transmitter along the ground, m, in [0, D].
+    pub x_m: f32,
+    /// Distance from the line through transmitter and receiver, m: to its right above 0, to its left below.
+    pub y_m: f32,
+    /// Height above the ground, m.
+    pub altitude_m: f32,
+}
+
+impl Placement {
+    /// The place right above the line, where the paper has all relays.
+    pub const fn on_line(x_m: f32, altitude_m: f32) -> Self {
+        CrossSection::on_line(altitude_m).at(x_m)
+    }
+
+    /// Where it is across the line.
+    pub const fn cross_section(self) -> CrossSection {
+        CrossSection {
+            y_m: self.y_m,
+            altitude_m: self.altitude_m,
+        }
+    }
+}
+
+/// Where a relay flies across the line from transmitter to receiver, wherever along it.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CrossSection {
+    /// Distance from the line, m: to its right above 0.
+    pub y_m: f32,
+    /// Height above the ground, m.
+    pub altitude_m: f32,
+}
+
+impl CrossSection {
+    /// Right above the line.
+    pub const fn on_line(altitude_m: f32) -> Self {
+        Self {
+            y_m: 0.0,
+            altitude_m,
+        }
+    }
+
+    /// The place there at `x_m`.
+    pub const fn at(self, x_m: f32) -> Placement {
+        Placement {
+            x_m,
+            y_m: self.y_m,
+            altitude_m: self.altitude_m,
+        }
+    }
+
+    /// The squared distance from `other`, m^2.
+    pub(crate) fn apart_squared(self, other: Self) -> f32 {
+        let (y, h) = (self.y_m - other.y_m, self.altitude_m - other.altitude_m);
+        y * y + h * h
+    }
+}
+
+/// A relay as the hops beside it know it, wherever along the line it stands.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Station {
+    /// Where it flies across the line.
+    pub at: CrossSection,
+    /// Its transmit power, W.
+    pub power_w: f32,
+}

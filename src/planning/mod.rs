@@ -1,0 +1,9 @@
+//! The placement maths of before a flight: one relay alone, and how many relays a link needs. No message, and nothing that flies.
+//!
+//! | for | files |
+//! | --- | --- |
+//! | one relay alone | [`single`]: Theorems 1 to 3, Algorithm 3 |
+//! | how many relays | [`fleet`]: the fewest for a target, and the most any number can have |
+
+pub mod fleet;
+pub mod single;

@@ -1,0 +1,272 @@
+//! One relay that may also go aside: Theorems 1 and 3 with y free. Not in the paper.
+//!
+//! At a place (x, y, h), with c = SIR_1 / A, k = c - 1, q = X^2 + Y^2 and s the distance from Rx along the ground:
+//!
+//! ```text
+//! c     = ((X - x)^2 + (Y - y)^2 + h^2) / (x^2 + y^2 + h^2)    A = p_t / p_MSI
+//! SIR_2 = K / (s^2 + h^2)                                      s^2 = (D - x)^2 + y^2
+//! ```
+//!
+//! **Spheres.** SIR_1 is the same where k (x^2 + y^2 + h^2) + 2 X x + 2 Y y = q: on a sphere about the point -(X, Y) / k of the
+//! ground, for k = 0 on an upright plane. It is above that inside for k > 0, outside for k < 0. SIR_2 is the same on a sphere
+//! about Rx, and above that inside.
+//!
+//! **At one altitude, without limits.** The best place is one of three.
+//!
+//! 1. Above Rx, where SIR_2 has its top, if SIR_1 is no worse there.
+//! 2. On the hill of SIR_1, its only top: t = 2 h^2 / (sqrt(q) + sqrt(q + 4 h^2)) from Tx, straight away from the interferer; if
+//!    SIR_2 is no worse there.
+//! 3. Else where the two level circles through a place touch and their insides lie apart, with SIR_1 = SIR_2. No other place is
+//!    as good: of two such sets that touch, the point is all they share. This holds for two discs (k > 0) and for the disc of
+//!    SIR_2 within the disc that SIR_1 leaves out (k < 0).
+//!
+//! A place that is none of these can be improved: either one SIR is worse and can rise, or both can rise together.
+//!
+//! **The touching place** is the one on the circle of radius s about Rx at which SIR_1 is largest. With x = D - s cos w,
+//! y = s sin w that is the largest k for which k m - a = (b + k n) cos w + e sin w has a solution:
+//!
+//! ```text
+//! a = q - 2 X D    b = 2 X s    e = -2 Y s    m = D^2 + s^2 + h^2    n = 2 D s
+//! k = (a m + b n + sqrt((a n + b m)^2 + e^2 (m^2 - n^2))) / (m^2 - n^2)
+//! (cos w, sin w) ~ (b + k n, e)
+//! ```
+//!
+//! Up to the hill's s the largest SIR_1 on the circle is that on the whole disc, since the hill is its only top: it rises with s.
+//! SIR_2 falls. They are equal at one s, which halving finds. In c it is a root of the quartic that says that circles touch:
+//!
+//! ```text
+//! ((D^2 + 2 h^2) k c + (2 D X - q) c - G k)^2 = 4 c (q c - h^2 k^2) (G - h^2 c)    G = K / A
+//! ```
+//!
+//! **Limits.** If that place is in [0, D] x [left, right], it is the best. If not, the best is on an edge of that rectangle: within
+//! it, a place that cannot be improved would be one of the three. An edge is a problem of one dimension: `edge`.
+//!
+//! **With the altitude free** the lowest is the best wherever there is room. Turn a place about the line on the ground that joins
+//! the middles of its two spheres. Neither SIR changes, and the relay sinks to one side or the other. So no place above is better
+//! than the best of the lowest plane without limits; and if that is within the corridor, it is the best of all. In numbers: at the
+//! same distance r from the line, and so with the same signal at both ends, y = -r is further from the interferer than h = r, by
+//! 2 Y r in squared distance. For Y = 0 the two are equal.
+//!
+//! Altitude can pay only where that place is outside the corridor. Then the best is on one of the twelve edges of the box: any
+//! place higher up can be turned down until it is in the lowest plane or in an upright face, and in an upright face all level
+//! circles have their middles on the ground, so that they touch nowhere above it.
+//!
+//! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems.rs`: within 1e-4 relative of the best SIR.
+
+use super::Found;
+use super::edge::{Edge, Hops, narrow};
+use crate::mission::{Band, Interferer, Mission, Profile};
+use crate::place::Placement;
+
+pub use super::edge::Axis;
+
+/// Halvings of the distance from Rx, in f64: to far below an f32's own step.
+const HALVINGS: u8 = 48;
+
+/// Which case applied.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Case {
+    /// Where the level circles of both SIRs touch, at the lowest altitude.
+    Touching,
+    /// The first hop is the worse one even where it is best: there, at the lowest altitude.
+    Hilltop,
+    /// The first hop is the better one even right above Rx, as low as may be: there.
+    AboveRx,
+    /// That place is outside the corridor: the best of the box's edges, on which this is free.
+    Edge(Axis),
+    /// The interferer stands at Tx (X = Y = 0), SIR_1 is the same everywhere: above Rx.
+    Level,
+    /// The interferer stands at Rx (X = D, Y = 0), and no place helps: SIR_2 is 0; above Rx.
+    Drowned,
+}
+
+impl Case {
+    /// Its number: 1 to 3 as above, then the edges along x, y and upward, 7 and 8.
+    pub const fn number(self) -> u8 {
+        match self {
+            Self::Touching => 1,
+            Self::Hilltop => 2,
+            Self::AboveRx => 3,
+            Self::Edge(axis) => axis as u8,
+            Self::Level => 7,
+            Self::Drowned => 8,
+        }
+    }
+}
+
+/// Where a relay that holds `profile` does best in [0, D] and the mission's room to the side, and why; `None` in a field.
+///
+/// The mission's band of altitudes is not looked at. Work: 48 halvings in f64, and where they end outside the corridor at most
+/// 272 evaluations of both hops.
+pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, Case)> {
+    best_within(mission, Band::at(profile.altitude_m), profile.power_w)
+}
+
+/// Where a relay of `power_w` watts does best in [0, D], the mission's room to the side and its band, and why; `None` in a field.
+///
+/// Work: 48 halvings in f64, and where they end outside the corridor at most 736 evaluations of both hops.
+pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, Case)> {
+    best_within(mission, mission.config().band, power_w)
+}
+
+fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, Case)> {
+    let interferer = mission.interferer()?;
+    let hops = Hops { mission, power_w };
+    let (place, case) = without_limits(mission, interferer, band.least_m, power_w);
+    let config = mission.config();
+    let (along, across) = (
+        Band {
+            least_m: 0.0,
+            most_m: config.distance_m,
+        },
+        config.lateral,
+    );
+    if holds(along, place.x_m) && holds(across, place.y_m) {
+        return Some((hops.found(place), case));
+    }
+    // Above Rx is always within.
+    let above_rx = Placement::on_line(config.distance_m, band.least_m);
+    let mut best = (hops.found(above_rx), Case::AboveRx);
+    let mut weigh = |free: Axis, room: Band, through: Placement| {
+        let edge = Edge {
+            free,
+            through,
+            room,
+        };
+        let found = edge.best(&hops, interferer);
+        if found.sir > best.0.sir {
+            best = (found, Case::Edge(free));
+        }
+    };
+    let at = |x_m: f32, y_m: f32, altitude_m: f32| Placement {
+        x_m,
+        y_m,
+        altitude_m,
+    };
+    for h in both_ends(band) {
+        for y in both_ends(across) {
+            weigh(Axis::Along, along, at(0.0, y, h));
+        }
+        for x in both_ends(along) {
+            weigh(Axis::Across, across, at(x, 0.0, h));
+        }
+    }
+    if !band.is_single() {
+        for y in both_ends(across) {
+            for x in both_ends(along) {
+                weigh(Axis::Upward, band, at(x, y, band.least_m));
+            }
+        }
+    }
+    Some(best)
+}
+
+/// The ends of a band, one of them if they are the same.
+fn both_ends(band: Band) -> impl Iterator<Item = f32> {
+    let other = (!band.is_single()).then_some(band.most_m);
+    core::iter::once(band.least_m).chain(other)
+}
+
+fn holds(band: Band, value: f32) -> bool {
+    (band.least_m..=band.most_m).contains(&value)
+}
+
+/// The best place at one altitude, wherever on the plane.
+fn without_limits(
+    mission: &Mission,
+    interferer: &Interferer,
+    altitude_m: f32,
+    power_w: f32,
+) -> (Placement, Case) {
+    let scene = Plane {
+        d: f64::from(mission.config().distance_m),
+        x: f64::from(interferer.x_m),
+        y: f64::from(interferer.y_m),
+        h2: squared(f64::from(altitude_m)),
+        g: mission.last_to_first(power_w),
+    };
+    let (place, case) = scene.best();
+    let place = Placement {
+        x_m: narrow(place.0),
+        y_m: narrow(place.1),
+        altitude_m,
+    };
+    (place, case)
+}
+
+/// The plane at one altitude, in m and m^2: D, X, Y, h^2 and G = K / A.
+struct Plane {
+    d: f64,
+    x: f64,
+    y: f64,
+    h2: f64,
+    g: f64,
+}
+
+impl Plane {
+    fn best(&self) -> ((f64, f64), Case) {
+        let above_rx = (self.d, 0.0);
+        if !(self.g > 0.0) {
+            return (above_rx, Case::Drowned);
+        }
+        let q = squared(self.x) + squared(self.y);
+        if !(q > 0.0) {
+            return (above_rx, Case::Level);
+        }
+        if self.first(above_rx) >= self.second(0.0) {
+            return (above_rx, Case::AboveRx);
+        }
+        let away = libm::sqrt(q);
+        let t = 2.0 * self.h2 / (away + libm::sqrt(q + 4.0 * self.h2)) / away;
+        let hill = (-self.x * t, -self.y * t);
+        let far = libm::hypot(self.d - hill.0, hill.1);
+        if self.first(hill) <= self.second(far) {
+            return (hill, Case::Hilltop);
+        }
+        let (mut low, mut high) = (0.0, far);
+        for _ in 0..HALVINGS {
+            let s = 0.5 * (low + high);
+            if self.first(self.loudest(s)) < self.second(s) {
+                low = s;
+            } else {
+                high = s;
+            }
+        }
+        (self.loudest(high), Case::Touching)
+    }
+
+    /// SIR_1 / A.
+    fn first(&self, (x, y): (f64, f64)) -> f64 {
+        let heard = squared(self.x - x) + squared(self.y - y) + self.h2;
+        heard / (squared(x) + squared(y) + self.h2)
+    }
+
+    /// SIR_2 / A at the distance `s` from Rx along the ground.
+    fn second(&self, s: f64) -> f64 {
+        self.g / (squared(s) + self.h2)
+    }
+
+    /// Where SIR_1 is largest on the circle of radius `s` about Rx.
+    fn loudest(&self, s: f64) -> (f64, f64) {
+        let a = squared(self.x) + squared(self.y) - 2.0 * self.x * self.d;
+        let (b, e) = (2.0 * self.x * s, -2.0 * self.y * s);
+        let (m, n) = (squared(self.d) + squared(s) + self.h2, 2.0 * self.d * s);
+        // m^2 - n^2, without cancellation.
+        let spread = (squared(self.d - s) + self.h2) * (squared(self.d + s) + self.h2);
+        let root = libm::sqrt(squared(a * n + b * m) + squared(e) * spread);
+        let k = (a * m + b * n + root) / spread;
+        let (cos, sin) = (b + k * n, e);
+        let size = libm::hypot(cos, sin);
+        if size > 0.0 {
+            (self.d - s * (cos / size), s * (sin / size))
+        } else {
+            // The same all around.
+            (self.d - s, 0.0)
+        }
+    }
+}
+
+fn squared(x: f64) -> f64 {
+    x * x
+}

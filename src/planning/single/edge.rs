@@ -1,0 +1,168 @@
+//! One edge of the box that a single relay may fly in: x, y or the altitude is free there, the other two are given.
+//!
+//! With t for what is free, SIR_1 = A ((t - P)^2 + a) / (t^2 + b) and SIR_2 = K / ((t - E)^2 + d). SIR_2 turns at E alone.
+//! SIR_1 turns where P t^2 - (P^2 + a - b) t - P b = 0, at two places whose product is -b. Between these three both only rise
+//! or only fall: the worse of the two is best at an end of such a piece, or where they cross, which is once.
+//!
+//! | free | P | a | b | E |
+//! | --- | --- | --- | --- | --- |
+//! | x | X | (Y - y)^2 + h^2 | y^2 + h^2 | D |
+//! | y | Y | (X - x)^2 + h^2 | x^2 + h^2 | 0 |
+//! | h | 0 | (X - x)^2 + (Y - y)^2 | x^2 + y^2 | 0 |
+
+use super::{Found, HALVINGS};
+use crate::mission::{Band, Interferer, Mission};
+use crate::place::Placement;
+use crate::sir::{self, Sender};
+
+/// What is free on an edge.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Axis {
+    /// x, along the line from Tx to Rx.
+    Along = 4,
+    /// y, across it.
+    Across = 5,
+    /// The altitude.
+    Upward = 6,
+}
+
+/// The two hops of the only relay of a mission, wherever it is.
+#[derive(Clone, Copy)]
+pub(super) struct Hops<'a> {
+    pub(super) mission: &'a Mission,
+    pub(super) power_w: f32,
+}
+
+impl Hops<'_> {
+    /// SIR_1 and SIR_2.
+    fn both(&self, at: Placement) -> (f32, f32) {
+        let first = Sender::transmitter(self.mission).sir_at(self.mission, 0.0, at);
+        (first, sir::at_receiver(self.mission, at, self.power_w))
+    }
+
+    pub(super) fn found(&self, place: Placement) -> Found {
+        let (first, second) = self.both(place);
+        Found {
+            place,
+            sir: first.min(second),
+        }
+    }
+}
+
+/// An edge: `through` it, over `room`, m.
+#[derive(Clone, Copy)]
+pub(super) struct Edge {
+    pub(super) free: Axis,
+    pub(super) through: Placement,
+    pub(super) room: Band,
+}
+
+impl Edge {
+    fn place(&self, t: f32) -> Placement {
+        let mut place = self.through;
+        match self.free {
+            Axis::Along => place.x_m = t,
+            Axis::Across => place.y_m = t,
+            Axis::Upward => place.altitude_m = t,
+        }
+        place
+    }
+
+    /// Where SIR_1 turns, in f64, and where SIR_2 does; those that do not exist are no numbers, or far away.
+    fn turns(&self, mission: &Mission, interferer: &Interferer) -> [f32; 3] {
+        let wide = |x: f32| f64::from(x);
+        let squared = |x: f64| x * x;
+        let at = self.through;
+        let (x, y, h) = (wide(at.x_m), wide(at.y_m), wide(at.altitude_m));
+        let (past, beside) = (wide(interferer.x_m), wide(interferer.y_m));
+        let (p, a, b, end) = match self.free {
+            Axis::Along => (
+                past,
+                squared(beside - y) + squared(h),
+                squared(y) + squared(h),
+                mission.config().distance_m,
+            ),
+            Axis::Across => (
+                beside,
+                squared(past - x) + squared(h),
+                squared(x) + squared(h),
+                0.0,
+            ),
+            Axis::Upward => (
+                0.0,
+                squared(past - x) + squared(beside - y),
+                squared(x) + squared(y),
+                0.0,
+            ),
+        };
+        let half = 0.5 * (squared(p) + a - b);
+        // The root of the larger size first, the other from their product: neither cancels.
+        let root = libm::sqrt(squared(half) + squared(p) * b);
+        let sum = half + libm::copysign(root, half);
+        [narrow(sum / p), narrow(-p * b / sum), end]
+    }
+
+    /// The best place on it.
+    ///
+    /// Work: at most 8 evaluations of both hops, and 40 more for each piece on which one SIR rises, the other falls, and they
+    /// cross: one such piece for x and for the altitude, two for y.
+    pub(super) fn best(&self, hops: &Hops<'_>, interferer: &Interferer) -> Found {
+        let Band {
+            least_m: from,
+            most_m: to,
+        } = self.room;
+        let mut best = hops.found(self.place(from));
+        let mut low = from;
+        let turns = self.turns(hops.mission, interferer);
+        for turn in in_order(turns).into_iter().chain([to]) {
+            let high = turn.max(low).min(to);
+            if high > low {
+                best = best.or(self.best_of(hops, low, high));
+                low = high;
+            }
+        }
+        best
+    }
+
+    /// The best of the piece [`low`, `high`], on which each SIR only rises or only falls, but for its lower end.
+    fn best_of(&self, hops: &Hops<'_>, low: f32, high: f32) -> Found {
+        let both = |t: f32| hops.both(self.place(t));
+        let (at_low, at_high) = (both(low), both(high));
+        let end = hops.found(self.place(high));
+        let better = |(first, second): (f32, f32)| first > second;
+        let apart = (at_high.0 > at_low.0) != (at_high.1 > at_low.1);
+        if !apart || better(at_low) == better(at_high) {
+            return end;
+        }
+        let (mut low, mut high) = (low, high);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if !(middle > low && middle < high) {
+                break;
+            }
+            if better(both(middle)) == better(at_low) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let crossing = hops.found(self.place(low));
+        end.or(crossing).or(hops.found(self.place(high)))
+    }
+}
+
+fn in_order([a, b, c]: [f32; 3]) -> [f32; 3] {
+    let (a, b) = (a.min(b), a.max(b));
+    let (b, c) = (b.min(c), b.max(c));
+    [a.min(b), a.max(b), c]
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a place is given as an f32"
+)]
+pub(super) fn narrow(value: f64) -> f32 {
+    value as f32
+}

@@ -1,0 +1,242 @@
+//! Who a relay is and how it behaves, checked once when it is switched on.
+
+use crate::guard::confines::Confines;
+use crate::mission::{Mission, Profile};
+use crate::optimiser::local::Local;
+use crate::optimiser::search::Schedule;
+use crate::time::Duration;
+use crate::wire::auth::Auth;
+
+/// Which relay this is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Identity {
+    /// Number of the network; frames of any other are ignored.
+    pub network: u16,
+    /// Place in the chain, 1 (next to the transmitter) to N.
+    pub index: u16,
+}
+
+/// How the relay is connected to its neighbours.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Wiring {
+    /// A link of its own to each neighbour: two serial ports.
+    #[default]
+    Pair,
+    /// One channel that both neighbours, and perhaps others, hear: one radio.
+    Shared,
+}
+
+/// What the leader has the chain do.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Method {
+    /// The best places at the altitudes held: Algorithm 1, in a field Algorithm 4.
+    #[default]
+    Align,
+    /// The best places, sides and altitudes together, within the mission's corridor. Not in a field.
+    Joint,
+    /// Algorithm 1, and then Algorithm 2. Not in a field.
+    Adjust(Adjust),
+}
+
+/// How Algorithm 2 goes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Adjust {
+    /// Rounds at most: the paper's `Iter_max`. It ends sooner when a whole round moves nobody.
+    pub rounds: u16,
+    /// How far a relay may go up or down in one turn, m: 0 to 1e5; the paper's `epsilon_h`.
+    pub explore_m: f32,
+    /// How it looks for a better place.
+    pub local: Local,
+}
+
+impl Default for Adjust {
+    /// Five hundred rounds of 10 m, from coarse to fine.
+    fn default() -> Self {
+        Self {
+            rounds: 500,
+            explore_m: 10.0,
+            local: Local::Fine,
+        }
+    }
+}
+
+/// How a relay measures the interference, for a closed loop.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Measure {
+    /// The most interference power that may be received, W: 1e-30 to 1e6. Samples above it are left out.
+    pub i_max_w: f32,
+    /// Samples to take at a place before what they say is used, 100 to 1 000 000.
+    pub samples: u32,
+}
+
+/// What a firmware may choose.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Settings {
+    /// What this relay holds, if not what the mission has in common.
+    pub profile: Option<Profile>,
+    /// Whether it keeps to the altitude of that when altitudes are chosen.
+    pub hold_altitude: bool,
+    /// What the leader (relay 1; in a field relay N) has the chain do; the others follow.
+    pub method: Method,
+    /// In a field: whether and how this relay measures it, to use what it measured instead of what was agreed.
+    pub measure: Option<Measure>,
+    /// Which targets the leader tries; the others follow.
+    pub schedule: Schedule,
+    /// Whether the leader first solves the chain from the mission, with the bracketed schedule: one round trip if it is right.
+    pub predict: bool,
+    /// Two links or one channel.
+    pub wiring: Wiring,
+    /// Whether frames carry a tag, and only frames with the right one count. All relays of a network must agree on that.
+    pub auth: Option<Auth>,
+    /// The longest that a sweep (100 bytes) takes from one relay's `poll_transmit` to the next one's, its computing included;
+    /// above 0. For messages that take longer it is multiplied.
+    pub hop_time: Duration,
+    /// After this long without a frame from a neighbour it is asked for a sign of life; above 0.
+    pub quiet: Duration,
+    /// After this long without one it counts as lost; above `quiet`.
+    pub lost: Duration,
+    /// Whether a part of the chain goes on without the others only if it is the larger one: half of the last chain with its
+    /// leader, or more. Without that, the two parts of a chain that is split, but still flies, would get in each other's way.
+    pub quorum: bool,
+    /// Whether setpoints lead to the agreed place only as far as the neighbours have made room, and inside which box. The relay
+    /// then has to be told where it is: `Relay::handle_position`.
+    pub guard: Option<Confines>,
+}
+
+impl Default for Settings {
+    /// Bracketed with prediction, two links of 57 600 baud or faster, a silent neighbour lost after 15 s.
+    fn default() -> Self {
+        Self {
+            profile: None,
+            hold_altitude: false,
+            method: Method::Align,
+            measure: None,
+            schedule: Schedule::Bracketed,
+            predict: true,
+            wiring: Wiring::Pair,
+            auth: None,
+            hop_time: Duration::from_millis(30),
+            quiet: Duration::from_millis(5_000),
+            lost: Duration::from_millis(15_000),
+            quorum: true,
+            guard: None,
+        }
+    }
+}
+
+/// Which part of an [`Identity`] or of [`Settings`] was refused, and its range.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum SetupError {
+    /// `index` is not within 1 to the mission's N.
+    Index,
+    /// `profile.altitude_m` is not within 0.1 to 1e5, or `profile.power_w` not within 1e-6 to 1e6.
+    Profile,
+    /// The step of the fixed-step schedule is not a number above 0.
+    Step,
+    /// `method` chooses altitudes, which it can not in a field, or the crate was built without the feature for it.
+    Method,
+    /// `method.explore_m` is not within 0 to 1e5, or its grid has fewer than 2 columns or rows.
+    Adjust,
+    /// `measure.i_max_w` is not within 1e-30 to 1e6, or `measure.samples` not within 100 to 1 000 000.
+    Measure,
+    /// `hop_time` is zero.
+    HopTime,
+    /// `auth.epoch` is zero.
+    Epoch,
+    /// `quiet` is zero, or `lost` not above it.
+    Silence,
+    /// A number of `guard` is not within its range, or the crate was built without the feature for it.
+    Guard,
+}
+
+impl core::fmt::Display for SetupError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Index => "index must be within 1 to the mission's number of relays",
+            Self::Profile => {
+                "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6"
+            }
+            Self::Step => "the fixed step must be above 0",
+            Self::Method => "method must be Align in a field, or without the feature for it",
+            Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
+            Self::Measure => {
+                "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000"
+            }
+            Self::HopTime => "hop_time must be above 0",
+            Self::Epoch => "auth.epoch must be above 0, and above that of every start before",
+            Self::Silence => "quiet must be above 0 and lost above quiet",
+            Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, hover of 0 to 1e3, and its feature",
+        })
+    }
+}
+
+impl core::error::Error for SetupError {}
+
+/// Checks both against the mission.
+pub(crate) fn check(
+    mission: &Mission,
+    identity: Identity,
+    settings: &Settings,
+) -> Result<(), SetupError> {
+    if identity.index < 1 || identity.index > mission.relays() {
+        return Err(SetupError::Index);
+    }
+    if settings.profile.is_some_and(|profile| !profile.is_valid()) {
+        return Err(SetupError::Profile);
+    }
+    if let Schedule::FixedStep { step } = settings.schedule
+        && !(step > 0.0 && step.is_finite())
+    {
+        return Err(SetupError::Step);
+    }
+    let able = match settings.method {
+        Method::Align => true,
+        Method::Joint => cfg!(feature = "altitude") && mission.interferer().is_some(),
+        Method::Adjust(_) => cfg!(feature = "adjust") && mission.interferer().is_some(),
+    };
+    if !able {
+        return Err(SetupError::Method);
+    }
+    if let Method::Adjust(Adjust {
+        explore_m, local, ..
+    }) = settings.method
+    {
+        let grid = match local {
+            Local::Fine => true,
+            Local::Grid { columns, rows } => columns >= 2 && rows >= 2,
+        };
+        if !((0.0..=1e5).contains(&explore_m) && grid) {
+            return Err(SetupError::Adjust);
+        }
+    }
+    if let Some(Measure { i_max_w, samples }) = settings.measure
+        && !((1e-30..=1e6).contains(&i_max_w) && (100..=1_000_000).contains(&samples))
+    {
+        return Err(SetupError::Measure);
+    }
+    if settings.hop_time.as_micros() == 0 {
+        return Err(SetupError::HopTime);
+    }
+    #[cfg(feature = "auth")]
+    if settings.auth.is_some_and(|auth| auth.epoch == 0) {
+        return Err(SetupError::Epoch);
+    }
+    if settings.quiet.as_micros() == 0 || settings.lost <= settings.quiet {
+        return Err(SetupError::Silence);
+    }
+    if settings
+        .guard
+        .is_some_and(|confines| !cfg!(feature = "guard") || !confines.is_valid())
+    {
+        return Err(SetupError::Guard);
+    }
+    Ok(())
+}
