@@ -15,9 +15,9 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;
-use crate::wire::digest::{Stamp, digest};
+use crate::wire::digest::{MissionId, digest};
 use crate::wire::frame::{self, FrameBuf, Header};
-use crate::wire::message::{Hail, Message};
+use crate::wire::message::{Hello, Message};
 use crate::wire::session::{Checked, Session};
 use crate::wire::upload::{Upload, UploadError};
 
@@ -95,7 +95,7 @@ pub enum Progress {
 /// # })?;
 /// # let mut sent = 0;
 /// # assert_eq!(example(&loaded, |_| sent += 1, &[])?, Progress::Offering);
-/// # assert_eq!(sent, 1, "a hello, before anything else");
+/// # assert_eq!(sent, 1, "a handshake, before anything else");
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -112,7 +112,7 @@ pub struct Ground {
     distance: u16,
     unanswered: u8,
     /// What that relay holds, once it has said so.
-    holds: Option<Stamp>,
+    holds: Option<MissionId>,
     due: bool,
     again: Option<Instant>,
     deframer: Deframer,
@@ -205,12 +205,12 @@ impl Ground {
                 };
                 match checked {
                     Checked::Fresh { .. } => match Message::decode(frame.body) {
-                        Ok(Message::Hail(hail)) if hail.mission == self.base => {
-                            self.answered(sender, distance, hail);
+                        Ok(Message::Hello(hello)) if hello.mission == self.base => {
+                            self.answered(sender, distance, hello);
                         }
                         _ => self.refused = self.refused.saturating_add(1),
                     },
-                    Checked::Hello { first } => self.due |= first && self.is_under_way(),
+                    Checked::Handshake { first } => self.due |= first && self.is_under_way(),
                     Checked::Unproven => {}
                     _ => self.refused = self.refused.saturating_add(1),
                 }
@@ -219,22 +219,22 @@ impl Ground {
     }
 
     /// Relay `by` has said what it holds.
-    fn answered(&mut self, by: u16, distance: u16, hail: Hail) {
+    fn answered(&mut self, by: u16, distance: u16, hello: Hello) {
         let Some(upload) = &self.upload else { return };
-        let stamp = upload.stamp();
+        let mission_id = upload.id();
         self.unanswered = 0;
         self.distance = distance;
-        self.holds = Some(hail.holds);
-        self.progress = if hail.holds > stamp {
+        self.holds = Some(hello.holds);
+        self.progress = if hello.holds > mission_id {
             Progress::Outdated {
-                version: hail.holds.version,
+                version: hello.holds.version,
             }
-        } else if hail.holds < stamp {
+        } else if hello.holds < mission_id {
             Progress::Offering
-        } else if hail.flies {
+        } else if hello.flies {
             Progress::Flown {
                 by,
-                view: hail.newest,
+                view: hello.newest,
             }
         } else {
             Progress::Held { by }
@@ -309,8 +309,8 @@ impl Ground {
         }
         let upload = self.upload?;
         let to = self.to();
-        let message = if self.holds == Some(upload.stamp()) {
-            Message::Hail(Hail {
+        let message = if self.holds == Some(upload.id()) {
+            Message::Hello(Hello {
                 mission: self.base,
                 newest: 0,
                 neighbour: 0,
@@ -318,7 +318,7 @@ impl Ground {
                 form: false,
                 fresh: false,
                 ready: true,
-                holds: upload.stamp(),
+                holds: upload.id(),
                 flies: false,
             })
         } else {

@@ -5,7 +5,6 @@
 pub mod channel;
 pub mod event;
 pub mod field;
-pub mod gain;
 #[cfg(feature = "upload")]
 pub mod ground;
 pub mod guard;
@@ -15,6 +14,7 @@ pub mod optimiser;
 pub mod place;
 pub mod planning;
 pub mod pointing;
+pub mod power_ratio;
 pub mod relay;
 mod root;
 pub mod serial;

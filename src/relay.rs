@@ -8,7 +8,7 @@ mod uploads;
 
 use crate::event::Event;
 use crate::field::estimate::Estimate;
-use crate::guard::Hindrance;
+use crate::guard::HoldReason;
 use crate::mission::{Mission, Profile};
 use crate::node::Node;
 use crate::node::exchange::Phase;
@@ -263,8 +263,8 @@ impl Relay {
     }
 
     /// What keeps the drone from the agreed place at `side`, where `Settings::guard` is set.
-    pub fn hindrance(&self, side: Side) -> Option<Hindrance> {
-        self.node.hindrance(side)
+    pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
+        self.node.hold_reason(side)
     }
 
     /// The SIR (linear) that every hop of the agreed chain meets.

@@ -1,6 +1,6 @@
 //! Who a relay is and how it behaves, checked once when it is switched on.
 
-use crate::guard::confines::Confines;
+use crate::guard::config::GuardConfig;
 use crate::mission::{Mission, Profile};
 use crate::optimiser::local::Local;
 use crate::optimiser::search::Schedule;
@@ -106,7 +106,7 @@ pub struct Settings {
     pub quorum: bool,
     /// Whether setpoints lead to the agreed place only as far as the neighbours have made room, and inside which box. The relay
     /// then has to be told where it is: `Relay::handle_position`.
-    pub guard: Option<Confines>,
+    pub guard: Option<GuardConfig>,
 }
 
 impl Default for Settings {

@@ -4,9 +4,9 @@
 //! All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
 //! `host-tests/tests/placement.rs`.
 
-use crate::gain::Gain;
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
+use crate::power_ratio::PowerRatio;
 
 /// How little is heard of the interference at `at`, as a relay there sees it: the one term in which kinds of it differ.
 ///
@@ -30,7 +30,7 @@ pub fn quiet(mission: &Mission, at: Placement) -> f32 {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sender {
     pub(crate) at: CrossSection,
-    pub(crate) gain: Gain,
+    pub(crate) gain: PowerRatio,
 }
 
 impl Sender {

@@ -26,7 +26,7 @@ pub struct Stats {
     /// Intact frames of another version of the format.
     pub version: u32,
     /// Frames with the right tag by which a node makes itself known; of one that proves nothing else is made.
-    pub hellos: u32,
+    pub handshakes: u32,
     /// Intact frames without a tag, at a relay that asks for one; at one that does not, messages that are taken with a tag only.
     pub unsigned: u32,
     /// Intact frames whose tag is wrong: by no member, altered, or of another epoch.

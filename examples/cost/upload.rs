@@ -35,7 +35,7 @@ pub(crate) fn upload() {
     if ground.upload(now, upload).is_err() {
         return;
     }
-    // Hellos first; the offer is what is longer than they are.
+    // Handshakes first; the offer is what is longer than they are.
     loop {
         while let Some(len) = ground.poll_transmit(&mut frame) {
             let bytes = frame.get(..len).unwrap_or_default();

@@ -134,7 +134,7 @@ fn say(now: Instant, plan: &Plan, progress: Progress) -> Result<(), String> {
     let version = plan.upload.version();
     match progress {
         Progress::Offering => {
-            let digest = plan.upload.stamp().digest;
+            let digest = plan.upload.id().digest;
             line(
                 now,
                 format_args!("offering: version {version}, mission 0x{digest:04x}"),

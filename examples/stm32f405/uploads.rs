@@ -10,7 +10,7 @@
 
 use uav_relay::Upload;
 use uav_relay::wire::crc::Crc32c;
-use uav_relay::wire::digest::Stamp;
+use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::upload::LENGTH;
 
 /// Where the two sectors begin: sectors 7 and 8 of an STM32F405.
@@ -35,7 +35,7 @@ pub struct Place {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Newest {
     /// By which it is told from others.
-    pub stamp: Stamp,
+    pub mission_id: MissionId,
     /// Number of its record.
     pub record: usize,
 }
@@ -102,7 +102,7 @@ impl Found {
         let mut back = records.iter().enumerate().take(used).rev();
         let newest = back.find_map(|(at, record)| {
             upload(record, block).map(|upload| Newest {
-                stamp: upload.stamp(),
+                mission_id: upload.id(),
                 record: at,
             })
         });
@@ -116,7 +116,7 @@ impl Found {
 
 /// Which of the two sectors is in use: the one with the newest upload, 0 where there is none.
 pub fn current(found: [Found; 2]) -> usize {
-    let [first, second] = found.map(|found| found.newest.map(|newest| newest.stamp));
+    let [first, second] = found.map(|found| found.newest.map(|newest| newest.mission_id));
     usize::from(second > first)
 }
 

@@ -13,8 +13,8 @@ use core::task::Poll;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::gain::Gain;
 use uav_relay::optimiser::local::{Beside, Hops, Search};
+use uav_relay::power_ratio::PowerRatio;
 use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_link;
@@ -163,7 +163,7 @@ fn the_grid_moves_where_a_separate_program_moves() {
     let mut history = vec![chain(&places)];
     for _ in 0..5 {
         for at in 0..4 {
-            let (before, gain): (Beside, Gain) = match at {
+            let (before, gain): (Beside, PowerRatio) = match at {
                 0 => (
                     Beside {
                         place: Placement::default(),

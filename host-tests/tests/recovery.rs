@@ -131,7 +131,7 @@ fn without_a_quorum_the_last_relay_goes_on() {
     assert_eq!(only(&report, 2, 1).view, 1);
 }
 
-/// With tags it is the same chain, after a hello more.
+/// With tags it is the same chain, after a handshake more.
 #[test]
 fn tags_change_nothing_but_the_time() {
     let (bare, _) = recovered(losing(8, 4));

@@ -6,12 +6,12 @@
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fence {
     /// Number of the sender's present talk with this neighbour, never 0.
-    pub tie: u16,
+    pub association: u16,
     /// The number of the receiver's as the sender has heard it, 0 for none.
     pub echo: u16,
-    /// From the keeper: number of the fence, 0 before the first. From the kept relay: of the newest fence it has heard of.
+    /// From the owner: number of the fence, 0 before the first. From the follower relay: of the newest fence it has heard of.
     pub number: u16,
-    /// From the keeper: where the fence is. From the kept relay: the low end of its own stretch. m along x, -1e7 to 1e7.
+    /// From the owner: where the fence is. From the follower relay: the low end of its own stretch. m along x, -1e7 to 1e7.
     pub x_m: f32,
     /// Where the sender is to be in the end, m along x, -1e7 to 1e7.
     pub target_m: f32,
@@ -23,14 +23,14 @@ const FARTHEST_M: f32 = 1e7;
 impl Fence {
     /// Whether its numbers are within their ranges.
     pub fn is_valid(&self) -> bool {
-        self.tie != 0 && is_place(self.x_m) && is_place(self.target_m)
+        self.association != 0 && is_place(self.x_m) && is_place(self.target_m)
     }
 }
 
 /// Why a relay may not get where it is to be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Hindrance {
+pub enum HoldReason {
     /// The neighbour has not agreed to a fence yet.
     Unheard,
     /// The neighbour stands on the wrong side of this relay: neither moves.

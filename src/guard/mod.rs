@@ -3,18 +3,18 @@
 //! Relays stand in order along x, so relays that are the separation apart *along x* from their neighbours are that far from
 //! every other relay, at whatever altitudes: that is what the guard keeps, and why it does not count height. Places that were
 //! agreed closer along x than that (methods that choose altitudes do so in dense chains) are approached as far as this
-//! allows, and [`Guard::hindrance`] says so.
+//! allows, and [`Guard::hold_reason`] says so.
 //!
-//! Between two neighbours there is a *fence*, a line across x. The relay upstream of it, its *keeper*, stays the separation
-//! before it; the other one, the *kept* relay, stays at it or beyond.
+//! Between two neighbours there is a *fence*, a line across x. The relay upstream of it, its *owner*, stays the separation
+//! before it; the other one, the *follower* relay, stays at it or beyond.
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`confines`] | the box that no setpoint leaves, and what else is set before flight |
-//! | `hull` | where the relay may be, by what was reported and what it was told to fly to |
-//! | `tie` | which life of the neighbour a message is from, so that late ones cannot be mistaken |
-//! | `keeper` | the fence downstream, which this relay places |
-//! | `kept` | the fence upstream, which the neighbour places |
+//! | [`config`] | the box that no setpoint leaves, and what else is set before flight |
+//! | `reachable` | where the relay may be, by what was reported and what it was told to fly to |
+//! | `association` | which life of the neighbour a message is from, so that late ones cannot be mistaken |
+//! | `owner` | the fence downstream, which this relay places |
+//! | `follower` | the fence upstream, which the neighbour places |
 //!
 //! # Rules
 //!
@@ -22,54 +22,54 @@
 //!
 //! | | rule | so that |
 //! | --- | --- | --- |
-//! | 1 | The kept relay never lowers its setpoint below the newest fence it has heard of, and flies up to it if it is below. | what it promises holds |
+//! | 1 | The follower relay never lowers its setpoint below the newest fence it has heard of, and flies up to it if it is below. | what it promises holds |
 //! | 2 | It tells the newest fence it has heard of, and the low end of its own stretch. | - |
-//! | 3 | The keeper counts on the lowest of: that low end, if told together with the newest fence; every fence announced since. | no message under way can make the kept relay come nearer than it is counted on |
-//! | 4 | The keeper never raises its setpoint to less than the separation before what it counts on. | the stretches of the two are the separation apart |
-//! | 5 | The keeper announces no fence nearer than the separation beyond the high end of its own stretch. | a fence it lowers is one it has cleared already |
+//! | 3 | The owner counts on the lowest of: that low end, if told together with the newest fence; every fence announced since. | no message under way can make the follower relay come nearer than it is counted on |
+//! | 4 | The owner never raises its setpoint to less than the separation before what it counts on. | the stretches of the two are the separation apart |
+//! | 5 | The owner announces no fence nearer than the separation beyond the high end of its own stretch. | a fence it lowers is one it has cleared already |
 //! | 6 | As far as 5 allows, the fence goes halfway between the two agreed places (and half the separation on). | both can get where they are to be |
-//! | 7 | The first fence is right at the keeper's own stretch; other fences, and changes of altitude, begin when the kept relay has cleared it. Relays in the wrong order stay where they are. | a start that is too close is opened first, and no relay sinks onto another |
+//! | 7 | The first fence is right at the owner's own stretch; other fences, and changes of altitude, begin when the follower relay has cleared it. Relays in the wrong order stay where they are. | a start that is too close is opened first, and no relay sinks onto another |
 //! | 8 | A setpoint goes no farther toward a neighbour that has not been talked to yet (switched on, rebooted, newly linked) than it is. | nothing is granted unheard; what was granted is flown to the end |
 //! | 9 | Nothing lapses with time: of a neighbour that is replaced or starts anew, the last limit stays until it speaks for itself, or [`Guard::forget`]; if it was never heard, this relay goes no farther toward it. | a silent relay that still hovers is not flown into |
 //!
 //! # Why everybody arrives
 //!
 //! Let the places agreed on be the separation apart; then so are the fences' goals. A fence that has to be lowered waits for
-//! its keeper to come down, and that relay waits only for the fence upstream, if that has to be lowered, too: the first of them
+//! its owner to come down, and that relay waits only for the fence upstream, if that has to be lowered, too: the first of them
 //! waits for nobody, and so, one after the other, all come down. In the same way all that have to be raised are, from the
 //! receiver's end. Then every relay finds its place between its fences. Fences go along with the flight, so that is one
 //! flight's time and a few messages a relay at the worst.
 //!
 //! # What is not promised
 //!
-//! - Hovering off the reported place by up to [`Confines::hover_m`] takes as much from the separation at either relay, and as
+//! - Hovering off the reported place by up to [`GuardConfig::hover_m`] takes as much from the separation at either relay, and as
 //!   much again each time that one is rebooted before a fence has opened what is missing.
 //! - A relay says nothing before it has both a place to go to and a report of where it is: until then nobody moves toward it.
 //! - A relay that is rebooted has forgotten whom it was linked to: it has to begin with the neighbours of the mission and be
 //!   linked around those that are silent, so that rule 9 holds it back.
-//! - The numbers of the ties are random: `seed` has to differ from one start to the next.
+//! - The numbers of the associations are random: `seed` has to differ from one start to the next.
 
-pub mod confines;
+mod association;
+pub mod config;
 mod fence;
-mod hull;
-mod keeper;
-mod kept;
+mod follower;
+mod owner;
+mod reachable;
 #[cfg(test)]
 mod tests;
-mod tie;
 
 use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
 
-use confines::Confines;
+use association::Random;
+use config::GuardConfig;
 use fence::is_place;
-pub use fence::{Fence, Hindrance};
-use hull::Hull;
-use keeper::Keeper;
-use kept::Kept;
-use tie::Random;
+pub use fence::{Fence, HoldReason};
+use follower::FenceFollower;
+use owner::FenceOwner;
+use reachable::ReachableInterval;
 
 /// One relay's guard: where it was agreed to be goes in, where it is safe to fly now comes out.
 ///
@@ -78,7 +78,7 @@ use tie::Random;
 /// operations, none depends on the length of the chain.
 #[derive(Clone, Copy, Debug)]
 pub struct Guard {
-    confines: Confines,
+    config: GuardConfig,
     random: Random,
     born: Instant,
     /// Where the relay was agreed to be, inside the box.
@@ -86,31 +86,31 @@ pub struct Guard {
     /// Before the first setpoint: where the relay was reported last.
     found: Option<Placement>,
     setpoint: Option<Placement>,
-    hull: Hull,
+    reachable: ReachableInterval,
     /// Where the relay was across the line when it was reported last.
     across: CrossSection,
-    kept: Kept,
-    keeper: Keeper,
+    follower: FenceFollower,
+    owner: FenceOwner,
     refused: u32,
 }
 
 impl Guard {
     /// A guard that starts at `now` between `neighbours`, toward Tx and toward Rx; `None` where the chain ends.
     ///
-    /// `confines` has to be valid ([`Confines::is_valid`]); `seed` has to differ from relay to relay and from start to start.
-    pub fn new(confines: Confines, neighbours: [Option<u16>; 2], seed: u32, now: Instant) -> Self {
+    /// `config` has to be valid ([`GuardConfig::is_valid`]); `seed` has to differ from relay to relay and from start to start.
+    pub fn new(config: GuardConfig, neighbours: [Option<u16>; 2], seed: u32, now: Instant) -> Self {
         let [upstream, downstream] = neighbours;
         let mut random = Random::new(seed);
         Self {
-            confines,
-            kept: Kept::new(upstream.unwrap_or(0), &mut random),
-            keeper: Keeper::new(downstream.unwrap_or(0), &mut random),
+            config,
+            follower: FenceFollower::new(upstream.unwrap_or(0), &mut random),
+            owner: FenceOwner::new(downstream.unwrap_or(0), &mut random),
             random,
             born: now,
             target: None,
             found: None,
             setpoint: None,
-            hull: Hull::unknown(now),
+            reachable: ReachableInterval::unknown(now),
             across: CrossSection::on_line(0.0),
             refused: 0,
         }
@@ -121,14 +121,14 @@ impl Guard {
         if !is_placement(place) {
             return bump(&mut self.refused);
         }
-        self.target = Some(self.confines.cut(place));
-        self.kept.tie.due = true;
-        self.keeper.tie.due = true;
+        self.target = Some(self.config.cut(place));
+        self.follower.association.due = true;
+        self.owner.association.due = true;
     }
 
     /// Whether `place` is where the relay is on its way to, or is.
     pub fn is_for(&self, place: Placement) -> bool {
-        self.target == Some(self.confines.cut(place))
+        self.target == Some(self.config.cut(place))
     }
 
     /// The flight controller has found that the relay was at `place` at time `at`: when that was measured, not when it was read.
@@ -140,9 +140,9 @@ impl Guard {
         }
         self.across = place.cross_section();
         if self.setpoint.is_some() {
-            self.hull.report(at, place.x_m, &self.confines);
-        } else if at >= self.born && self.confines.holds(place.x_m) {
-            self.found = Some(self.confines.cut(place));
+            self.reachable.report(at, place.x_m, &self.config);
+        } else if at >= self.born && self.config.holds(place.x_m) {
+            self.found = Some(self.config.cut(place));
         }
     }
 
@@ -152,12 +152,13 @@ impl Guard {
             return bump(&mut self.refused);
         }
         match side {
-            Side::Upstream if self.kept.tie.node == from => {
-                self.kept.hear(fence, &self.hull, &mut self.random);
+            Side::Upstream if self.follower.association.node == from => {
+                self.follower.hear(fence, &self.reachable, &mut self.random);
             }
-            Side::Downstream if self.keeper.tie.node == from => {
-                let apart = self.confines.separation_m;
-                self.keeper.hear(fence, &self.hull, apart, &mut self.random);
+            Side::Downstream if self.owner.association.node == from => {
+                let apart = self.config.separation_m;
+                self.owner
+                    .hear(fence, &self.reachable, apart, &mut self.random);
             }
             _ => {}
         }
@@ -170,12 +171,13 @@ impl Guard {
     pub fn link(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
-            Side::Upstream if self.kept.tie.node != node => {
-                self.kept.link(node, &self.hull, &mut self.random);
+            Side::Upstream if self.follower.association.node != node => {
+                self.follower.link(node, &self.reachable, &mut self.random);
             }
-            Side::Downstream if self.keeper.tie.node != node => {
-                let apart = self.confines.separation_m;
-                self.keeper.link(node, &self.hull, apart, &mut self.random);
+            Side::Downstream if self.owner.association.node != node => {
+                let apart = self.config.separation_m;
+                self.owner
+                    .link(node, &self.reachable, apart, &mut self.random);
             }
             _ => {}
         }
@@ -184,38 +186,38 @@ impl Guard {
     /// Relays that fell silent at `side` are no longer there: they have landed, or were taken away.
     pub fn forget(&mut self, side: Side) {
         match side {
-            Side::Upstream => self.kept.wall.clear(),
-            Side::Downstream => self.keeper.wall.clear(),
+            Side::Upstream => self.follower.keep_out.clear(),
+            Side::Downstream => self.owner.keep_out.clear(),
         }
     }
 
     /// Moves the setpoint as far as is granted by now, and gives it; `None` before there is a place to go to and a report.
     ///
-    /// `now` is when the setpoint is handed on: the flight controller has it [`Confines::lag`] later.
+    /// `now` is when the setpoint is handed on: the flight controller has it [`GuardConfig::lag`] later.
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
         let target = self.target?;
         let Some(before) = self.setpoint else {
             let found = self.found?;
-            self.hull = Hull::at(found.x_m, now);
-            self.kept.wall.begin(found.x_m);
-            self.keeper.wall.begin(found.x_m);
+            self.reachable = ReachableInterval::at(found.x_m, now);
+            self.follower.keep_out.begin(found.x_m);
+            self.owner.keep_out.begin(found.x_m);
             self.setpoint = Some(found);
             return self.setpoint;
         };
-        let apart = self.confines.separation_m;
-        self.kept.settle(&self.hull);
-        let least = self.kept.least(&self.hull);
-        let most = self.keeper.most(&self.hull, apart);
+        let apart = self.config.separation_m;
+        self.follower.settle(&self.reachable);
+        let least = self.follower.least(&self.reachable);
+        let most = self.owner.most(&self.reachable, apart);
         let x_m = target.x_m.max(least).min(most);
         // Whatever the limits ask for: toward a neighbour only as far as it has granted, back never beyond what was promised.
         let x_m = x_m.max(least.min(before.x_m)).min(most.max(before.x_m));
-        let clear = self.kept.is_clear() && self.keeper.is_clear();
+        let clear = self.follower.is_clear() && self.owner.is_clear();
         let across = if clear { target } else { before };
         let wanted = across.cross_section().at(x_m);
-        let next = self.confines.cut(wanted);
-        self.hull.go(next.x_m, now);
+        let next = self.config.cut(wanted);
+        self.reachable.go(next.x_m, now);
         self.setpoint = Some(next);
-        self.keeper.settle(&self.hull, target.x_m, apart);
+        self.owner.settle(&self.reachable, target.x_m, apart);
         self.setpoint
     }
 
@@ -226,33 +228,33 @@ impl Guard {
 
     /// The next thing to tell a neighbour: on which side, to which node, what.
     pub fn poll(&mut self) -> Option<(Side, u16, Fence)> {
-        let target = self.target.filter(|_| self.hull.is_known())?;
-        if let Some(fence) = self.kept.tell(&self.hull, target.x_m) {
-            return Some((Side::Upstream, self.kept.tie.node, fence));
+        let target = self.target.filter(|_| self.reachable.is_known())?;
+        if let Some(fence) = self.follower.tell(&self.reachable, target.x_m) {
+            return Some((Side::Upstream, self.follower.association.node, fence));
         }
-        let apart = self.confines.separation_m;
-        let fence = self.keeper.tell(&self.hull, target.x_m, apart)?;
-        Some((Side::Downstream, self.keeper.tie.node, fence))
+        let apart = self.config.separation_m;
+        let fence = self.owner.tell(&self.reachable, target.x_m, apart)?;
+        Some((Side::Downstream, self.owner.association.node, fence))
     }
 
     /// Has everything told again that may have been lost, and says whether there was anything. To be called every second or so.
     pub fn remind(&mut self) -> bool {
         let there = self.is_there();
-        let kept = self.kept.tie.node != 0 && !(there && self.kept.is_agreed());
-        let keeper = self.keeper.tie.node != 0 && !(there && self.keeper.is_agreed());
-        self.kept.tie.due |= kept;
-        self.keeper.tie.due |= keeper;
-        kept || keeper
+        let follower = self.follower.association.node != 0 && !(there && self.follower.is_agreed());
+        let owner = self.owner.association.node != 0 && !(there && self.owner.is_agreed());
+        self.follower.association.due |= follower;
+        self.owner.association.due |= owner;
+        follower || owner
     }
 
     /// Whether the setpoint is the agreed place, cut to the box, and the relay was reported to be there since.
     pub fn is_there(&self) -> bool {
-        let off = self.confines.rounding();
-        let near = |is: f32, to_be: f32| (to_be - is).abs() <= self.confines.hover_m + off;
+        let off = self.config.rounding();
+        let near = |is: f32, to_be: f32| (to_be - is).abs() <= self.config.hover_m + off;
         match (self.target, self.setpoint) {
             (Some(target), Some(setpoint)) => {
                 (target.x_m - setpoint.x_m).abs() <= off
-                    && self.hull.is_still()
+                    && self.reachable.is_still()
                     && near(self.across.y_m, target.y_m)
                     && near(self.across.altitude_m, target.altitude_m)
             }
@@ -263,12 +265,12 @@ impl Guard {
     /// What at `side` keeps this relay from its place, by what was heard so far; `None` if nothing does, or no place is agreed.
     ///
     /// While a new agreement spreads it may tell of places that are not to be.
-    pub fn hindrance(&self, side: Side) -> Option<Hindrance> {
+    pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         let target = self.target?.x_m;
-        let near = self.confines.separation_m - self.confines.rounding();
+        let near = self.config.separation_m - self.config.rounding();
         match side {
-            Side::Upstream => self.kept.hindrance(target, near),
-            Side::Downstream => self.keeper.hindrance(&self.hull, target, near),
+            Side::Upstream => self.follower.hold_reason(target, near),
+            Side::Downstream => self.owner.hold_reason(&self.reachable, target, near),
         }
     }
 

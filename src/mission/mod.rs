@@ -8,7 +8,7 @@ use parts::within;
 
 use crate::channel::Channel;
 use crate::field::Field;
-use crate::gain::Gain;
+use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
 
 /// The most relays a mission may have; addresses on the wire are 12 bits wide.
@@ -120,7 +120,7 @@ impl core::error::Error for MissionError {}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mission {
     config: MissionConfig,
-    tx_gain: Gain,
+    tx_gain: PowerRatio,
     /// What a relay's transmit power is worth on a drone-to-drone hop, 1/W: eta / (`mu_los` `p_MSI`), in a field m^2/W:
     /// `Upsilon_max` / `mu_los`.
     relay_gain_per_w: f64,
@@ -210,7 +210,7 @@ impl Mission {
         };
         Ok(Self {
             config,
-            tx_gain: Gain::new(tx_gain),
+            tx_gain: PowerRatio::new(tx_gain),
             relay_gain_per_w,
             receiver_gain_per_w,
         })
@@ -297,16 +297,16 @@ impl Mission {
         }
     }
 
-    /// What multiplies the quiet of a place (see [`crate::sir::quiet`]) on the first hop: `p_t` / `p_MSI`, in a field
+    /// What multiplies the quiet of a place (see [`crate::sir::inverse_interference`]) on the first hop: `p_t` / `p_MSI`, in a field
     /// `p_t` `Upsilon_max` / eta.
-    pub const fn tx_gain(&self) -> Gain {
+    pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
     /// What multiplies it on a hop that a relay of `power_w` watts feeds: (`p_u` / `p_MSI`)(eta / `mu_los`), in a field
     /// `p_u` `Upsilon_max` / `mu_los`.
-    pub const fn relay_gain(&self, power_w: f32) -> Gain {
-        Gain::new(power_w as f64 * self.relay_gain_per_w)
+    pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
+        PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }
 
     /// K of the last hop, m^2: SIR at the receiver = K / squared distance to the relay of `power_w` watts that feeds it.

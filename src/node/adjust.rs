@@ -5,10 +5,10 @@
 
 use core::task::Poll;
 
-use crate::gain::Gain;
 use crate::mission::{Interferer, Mission};
 use crate::optimiser::local::{Beside, Hops, Search};
 use crate::place::Placement;
+use crate::power_ratio::PowerRatio;
 use crate::wire::message::Turn;
 
 /// A token, as one relay sees it.
@@ -19,7 +19,7 @@ pub(crate) struct Turning {
     pub(crate) sir: f32,
     /// The node before this relay, and what its power is worth.
     pub(crate) before: Beside,
-    pub(crate) gain_in: Gain,
+    pub(crate) gain_in: PowerRatio,
     search: Option<Search>,
     /// Whether this relay or one after it has moved; the worst SIR from here on.
     pub(crate) any: bool,
@@ -27,7 +27,7 @@ pub(crate) struct Turning {
 }
 
 impl Turning {
-    pub(crate) const fn new(turn: Turn, sir: f32, before: Beside, gain_in: Gain) -> Self {
+    pub(crate) const fn new(turn: Turn, sir: f32, before: Beside, gain_in: PowerRatio) -> Self {
         Self {
             turn,
             sir,

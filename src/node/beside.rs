@@ -1,16 +1,16 @@
 //! One side of a relay: which node it takes for its neighbour there, and what it does about silence.
 //!
-//! | state | the node taken is silent for `lost` | it says that it takes another | a node not taken hails | time passes |
+//! | state | the node taken is silent for `lost` | it says that it takes another | a node not taken hellos | time passes |
 //! | --- | --- | --- | --- | --- |
 //! | `Linked` | `Seeking` on a shared channel, else it goes on asking | `Courting` | taken instead, if it is nearer, can hear a node beyond and was heard all through a probation | - |
 //! | `Courting` | `Seeking` | - | as above | after a span `Seeking` |
 //! | `Seeking` | - | - | taken, if it takes this relay or nobody | after a span `End` |
-//! | `End` | - | - | taken, if it takes this relay, or was heard all through a probation | the four nearest nodes are hailed every `lost`, and more often once one was heard |
+//! | `End` | - | - | taken, if it takes this relay, or was heard all through a probation | the four nearest nodes are sent a hello every `lost`, and more often once one was heard |
 //!
 //! A span is as long as a silent neighbour is asked for, `lost` less `quiet`. A node that has been taken is courted until it
 //! says that it has taken this relay, too.
 //!
-//! While it seeks, it hails the four nearest nodes there: as many as three relays in a row may be lost at once. The probation
+//! While it seeks, it hellos the four nearest nodes there: as many as three relays in a row may be lost at once. The probation
 //! is `lost`, and twice as long after every loss on that side up to sixteen times: a link that comes and goes disturbs the
 //! chain less and less. A node that has come back is counted `quiet` later: the other one beside it may be about to take it, too.
 
@@ -18,9 +18,9 @@ use super::MEMBERSHIP;
 use super::liveness::{Neighbour, Silence, tick};
 use crate::settings::Settings;
 use crate::time::Instant;
-use crate::wire::digest::Stamp;
+use crate::wire::digest::MissionId;
 
-/// Nodes on one side that are hailed.
+/// Nodes on one side that are sent a hello.
 pub(crate) const CANDIDATES: u16 = 4;
 
 /// Doublings of the probation.
@@ -87,15 +87,15 @@ pub(crate) struct Beside {
     losses: u8,
     pub(crate) signs: Signs,
     /// The newest mission that the node taken holds, as far as it has said.
-    pub(crate) holds: Option<Stamp>,
+    pub(crate) holds: Option<MissionId>,
     /// Whether a newer one is to be offered to it.
     #[cfg(feature = "upload")]
     pub(crate) offer: bool,
-    /// Whether the ground at this side is owed a hail.
+    /// Whether the ground at this side is owed a hello.
     #[cfg(feature = "upload")]
     pub(crate) ground: bool,
-    /// Candidates that are owed a hail, and those of them that are asked for one: bit 0 is the nearest node.
-    hails: u8,
+    /// Candidates that are owed a hello, and those of them that are asked for one: bit 0 is the nearest node.
+    hellos: u8,
     asks: u8,
 }
 
@@ -122,7 +122,7 @@ impl Beside {
             offer: false,
             #[cfg(feature = "upload")]
             ground: false,
-            hails: 0,
+            hellos: 0,
             asks: 0,
         }
     }
@@ -237,19 +237,19 @@ impl Beside {
             }
             State::Courting { since } => {
                 lost = self.neighbour.silent(now, settings).lost;
-                self.hail_all();
+                self.hello_all();
                 if lost || is_over(since) {
                     self.seek(now);
                 }
             }
             State::Seeking { since } => {
-                self.hail_all();
+                self.hello_all();
                 if is_over(since) {
                     self.state = State::End;
                 }
             }
             State::End => {
-                self.hail_all();
+                self.hello_all();
                 if !self.is_near(now, settings) {
                     look_again = now + settings.lost;
                 }
@@ -274,10 +274,10 @@ impl Beside {
         self.node = 0;
         self.state = State::Seeking { since: now };
         self.probation = None;
-        self.hail_all();
+        self.hello_all();
     }
 
-    /// A node that is not taken has hailed: whether it is taken from now on.
+    /// A node that is not taken has sent a hello: whether it is taken from now on.
     ///
     /// `courts` is whether it takes this relay for its neighbour (else nobody), `nearer` whether it is nearer than the one
     /// taken, `ready` whether it can hear a node beyond.
@@ -328,27 +328,27 @@ impl Beside {
         now.since(since) >= settings.lost.times(times)
     }
 
-    /// Owes a hail to the candidate `distance` nodes away, which may be one that asks.
+    /// Owes a hello to the candidate `distance` nodes away, which may be one that asks.
     pub(crate) const fn owe(&mut self, distance: u16, ask: bool) {
         if distance >= 1 && distance <= CANDIDATES {
             let bit = 1 << (distance - 1);
-            self.hails |= bit;
+            self.hellos |= bit;
             if ask {
                 self.asks |= bit;
             }
         }
     }
 
-    const fn hail_all(&mut self) {
-        self.hails = 0x0F;
+    const fn hello_all(&mut self) {
+        self.hellos = 0x0F;
         self.asks = 0x0F;
     }
 
-    /// The nearest candidate that is owed a hail: how many nodes away, and whether it is asked.
-    pub(crate) fn take_hail(&mut self) -> Option<(u16, bool)> {
-        let distance = (1..=CANDIDATES).find(|distance| self.hails >> (distance - 1) & 1 == 1)?;
+    /// The nearest candidate that is owed a hello: how many nodes away, and whether it is asked.
+    pub(crate) fn take_hello(&mut self) -> Option<(u16, bool)> {
+        let distance = (1..=CANDIDATES).find(|distance| self.hellos >> (distance - 1) & 1 == 1)?;
         let bit = 1 << (distance - 1);
-        self.hails &= !bit;
+        self.hellos &= !bit;
         let ask = self.asks & bit != 0;
         self.asks &= !bit;
         Some((distance, ask))

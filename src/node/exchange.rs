@@ -44,7 +44,7 @@ pub enum Phase {
 pub(crate) enum Next {
     /// Nothing at all.
     Nothing,
-    /// Count a message of a pass that is over.
+    /// Decision a message of a pass that is over.
     Stale,
     /// Call `work` after a pause.
     Work {

@@ -1,4 +1,4 @@
-//! How the chain forms anew: hails between nodes that might become neighbours, the call for a new view, and its coming.
+//! How the chain forms anew: hellos between nodes that might become neighbours, the call for a new view, and its coming.
 //!
 //! [`members`](super::members) has the rules; what a new view consists of is worked out by `share::roll`.
 
@@ -14,8 +14,8 @@ use crate::settings::Method;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
-use crate::wire::digest::Stamp;
-use crate::wire::message::Hail;
+use crate::wire::digest::MissionId;
+use crate::wire::message::Hello;
 
 impl Node {
     /// Whether this relay is to call for views: nobody is before it.
@@ -24,20 +24,20 @@ impl Node {
         self.beside(back).is_end()
     }
 
-    /// Owes node `to` at `side` a hail, which may ask for one in return.
-    pub(super) fn owe_hail(&mut self, side: Side, to: u16, ask: bool) {
+    /// Owes node `to` at `side` a hello, which may ask for one in return.
+    pub(super) fn owe_hello(&mut self, side: Side, to: u16, ask: bool) {
         if MEMBERSHIP {
             let distance = to.abs_diff(self.members.node);
             self.beside(side).owe(distance, ask);
         }
     }
 
-    /// The next hail that is owed: at which side, to which node.
-    pub(super) fn next_hail(&mut self) -> Option<(Side, u16, Hail)> {
+    /// The next hello that is owed: at which side, to which node.
+    pub(super) fn next_hello(&mut self) -> Option<(Side, u16, Hello)> {
         let (own, all) = (self.members.node, self.members.all);
         for side in [Side::Upstream, Side::Downstream] {
             for _ in 0..CANDIDATES {
-                let Some((distance, ask)) = self.beside(side).take_hail() else {
+                let Some((distance, ask)) = self.beside(side).take_hello() else {
                     break;
                 };
                 let to = match side {
@@ -45,20 +45,20 @@ impl Node {
                     Side::Downstream => own.saturating_add(distance),
                 };
                 if to >= 1 && to <= all && self.side_of(to).is_some() {
-                    return Some((side, to, self.hail(side, ask)));
+                    return Some((side, to, self.hello(side, ask)));
                 }
             }
         }
         None
     }
 
-    pub(super) fn hail(&mut self, side: Side, ask: bool) -> Hail {
+    pub(super) fn hello(&mut self, side: Side, ask: bool) -> Hello {
         let back = Side::back(self.mission.heading());
         let other = match side {
             Side::Upstream => Side::Downstream,
             Side::Downstream => Side::Upstream,
         };
-        Hail {
+        Hello {
             mission: self.members.digest,
             newest: self.members.newest,
             neighbour: self.beside(side).node(),
@@ -71,51 +71,51 @@ impl Node {
         }
     }
 
-    /// A hail from node `from` at `side`, of the same mission.
-    pub(super) fn on_hail(&mut self, now: Instant, side: Side, from: u16, hail: Hail) {
+    /// A hello from node `from` at `side`, of the same mission.
+    pub(super) fn on_hello(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.members.node;
         let known = self.members.newest;
-        self.members.heard_of(hail.newest);
-        if hail.ask {
-            self.owe_hail(side, from, false);
+        self.members.heard_of(hello.newest);
+        if hello.ask {
+            self.owe_hello(side, from, false);
         }
         let node = self.beside(side).node();
         if node == from {
             #[cfg(feature = "upload")]
-            self.compare(side, from, hail.holds);
-            self.beside(side).holds = Some(hail.holds);
+            self.compare(side, from, hello.holds);
+            self.beside(side).holds = Some(hello.holds);
             if self.seeks() {
-                self.told(now, side, hail.neighbour == own);
+                self.told(now, side, hello.neighbour == own);
             }
             let waits = self.share.called().is_some();
-            if hail.form && (hail.newest >= known || hail.fresh && !waits) {
+            if hello.form && (hello.newest >= known || hello.fresh && !waits) {
                 self.call(now);
             }
         } else if self.seeks() {
-            self.consider(now, side, from, hail);
+            self.consider(now, side, from, hello);
         }
         self.review(now);
     }
 
-    /// A hail from node `from` at `side`, which is not taken for the neighbour there.
-    fn consider(&mut self, now: Instant, side: Side, from: u16, hail: Hail) {
+    /// A hello from node `from` at `side`, which is not taken for the neighbour there.
+    fn consider(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let settings = self.settings;
         let own = self.members.node;
         if self.beside(side).notice(now, &settings) {
             self.timers.set(Timer::of(side), now + tick(&settings));
         }
-        if hail.neighbour == own || hail.neighbour == 0 {
+        if hello.neighbour == own || hello.neighbour == 0 {
             let node = self.beside(side).node();
-            let courts = hail.neighbour == own;
+            let courts = hello.neighbour == own;
             let nearer = from.abs_diff(own) < node.abs_diff(own);
             if self
                 .beside(side)
-                .consider(from, courts, nearer, hail.ready, now, &settings)
+                .consider(from, courts, nearer, hello.ready, now, &settings)
             {
-                self.beside(side).holds = Some(hail.holds);
+                self.beside(side).holds = Some(hello.holds);
                 self.pending.raise(Event::NeighbourBack(side));
                 self.timers.set(Timer::of(side), now + tick(&settings));
-                self.owe_hail(side, from, true);
+                self.owe_hello(side, from, true);
                 self.told(now, side, courts);
             }
         }
@@ -179,14 +179,14 @@ impl Node {
         if !self.leads() {
             let back = Side::back(self.mission.heading());
             let to = self.beside(back).node();
-            self.owe_hail(back, to, true);
+            self.owe_hello(back, to, true);
             return;
         }
         let Members { newest, held, .. } = self.members;
         let under_way = self
             .share
             .called()
-            .is_some_and(|(view, stamp)| view >= newest && stamp == held);
+            .is_some_and(|(view, mission_id)| view >= newest && mission_id == held);
         let Some(view) = newest.checked_add(1).filter(|_| !under_way) else {
             return;
         };
@@ -198,13 +198,13 @@ impl Node {
         self.proceed(now, next);
     }
 
-    /// The mission of stamp `stamp`, if it is the one flown or the one held.
-    fn mission_of(&self, stamp: Stamp) -> Option<Mission> {
+    /// The mission of mission_id `mission_id`, if it is the one flown or the one held.
+    fn mission_of(&self, mission_id: MissionId) -> Option<Mission> {
         #[cfg(feature = "upload")]
-        if stamp != self.members.flown {
-            return self.uploaded(stamp);
+        if mission_id != self.members.flown {
+            return self.uploaded(mission_id);
         }
-        (stamp == self.members.flown).then_some(self.mission)
+        (mission_id == self.members.flown).then_some(self.mission)
     }
 
     /// What came of a call is known: how many relays there are, or that they are too few.
@@ -218,8 +218,8 @@ impl Node {
         self.timers.stop(Timer::Work);
         self.stats.sweeps = self.share.sweeps();
         let view = self.share.number();
-        let stamp = self.share.stamp().unwrap_or(self.members.flown);
-        let mission = self.mission_of(stamp).zip(granted);
+        let mission_id = self.share.id().unwrap_or(self.members.flown);
+        let mission = self.mission_of(mission_id).zip(granted);
         let mission = mission.and_then(|(mission, relays)| mission.with_relays(relays).ok());
         let (Some(relays), Some(mission)) = (granted, mission) else {
             self.pending.raise(Event::Cut);
@@ -237,10 +237,10 @@ impl Node {
             Heading::TowardRx => place,
             Heading::TowardTx => relays.saturating_sub(place).saturating_add(1),
         };
-        if stamp == self.members.flown {
+        if mission_id == self.members.flown {
             self.mission = mission;
         } else {
-            self.fly(mission, stamp);
+            self.fly(mission, mission_id);
             self.pending.raise(Event::Adopted);
         }
         self.members.agree(view, index);
@@ -254,7 +254,7 @@ impl Node {
         self.timers.stop(Timer::Call);
         bump(&mut self.stats.views);
         self.pending.raise(Event::Reformed);
-        if stamp != self.members.held {
+        if mission_id != self.members.held {
             // A newer one has come in the meantime.
             self.call(now);
         }

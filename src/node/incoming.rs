@@ -26,7 +26,7 @@ impl Node {
         if self.beside(side).node() != from {
             if first {
                 // What was to be said to it before could not be read there.
-                self.owe_hail(side, from, true);
+                self.owe_hello(side, from, true);
             }
             return;
         }
@@ -57,9 +57,9 @@ impl Node {
         if taken {
             self.hear(now, side);
         }
-        if MEMBERSHIP && let Message::Hail(hail) = message {
-            if self.is_of_mission(side, hail.mission) {
-                self.on_hail(now, side, from, *hail);
+        if MEMBERSHIP && let Message::Hello(hello) = message {
+            if self.is_of_mission(side, hello.mission) {
+                self.on_hello(now, side, from, *hello);
                 self.steer(now);
             }
             return true;
@@ -69,14 +69,14 @@ impl Node {
             && !taken
             && self.takes_uploads()
         {
-            // It takes this relay for its neighbour: a hail alone would only make it say the same again.
+            // It takes this relay for its neighbour: a hello alone would only make it say the same again.
             if self.is_of_mission(side, upload.base()) {
                 self.on_offer(now, side, from, upload);
             }
             return true;
         }
         if !taken {
-            self.owe_hail(side, from, false);
+            self.owe_hello(side, from, false);
             return false;
         }
         if self.seeks() {
@@ -92,7 +92,7 @@ impl Node {
     }
 
     /// Whether `message` from the neighbour `from` is of the mission and, if it is of one, of the view that this relay is in.
-    /// What is not is counted, and answered by a hail if the two may have to come to one view.
+    /// What is not is counted, and answered by a hello if the two may have to come to one view.
     fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
         let Some(told) = message.mission() else {
             return true;
@@ -103,8 +103,8 @@ impl Node {
             return self.is_of_mission(side, told);
         }
         let known = match message {
-            Message::Roster(roster) => roster.stamp == held,
-            Message::Count(count) => count.stamp == held || count.stamp == flown,
+            Message::Proposal(proposal) => proposal.mission_id == held,
+            Message::Decision(count) => count.mission_id == held || count.mission_id == flown,
             _ => told == self.members.pass_digest(),
         };
         if known {
@@ -117,7 +117,7 @@ impl Node {
         if !(MEMBERSHIP && (near || kin)) {
             self.refuse_mission(side);
             if self.takes_uploads() {
-                self.owe_hail(side, from, false);
+                self.owe_hello(side, from, false);
             }
             return false;
         }
@@ -125,7 +125,7 @@ impl Node {
         if near && message.is_onward() {
             self.call(now);
         }
-        self.owe_hail(side, from, false);
+        self.owe_hello(side, from, false);
         false
     }
 
@@ -198,22 +198,22 @@ impl Node {
             Message::Token(token) if ADJUST => share.on_token(own, token),
             Message::Moved(moved) if ADJUST => share.on_moved(own, moved),
             // A chain has no more relays than its mission.
-            Message::Roster(roster) if MEMBERSHIP && roster.place >= all => Next::Stale,
-            Message::Count(count) if MEMBERSHIP && count.relays.is_some_and(|n| n > all) => {
+            Message::Proposal(proposal) if MEMBERSHIP && proposal.place >= all => Next::Stale,
+            Message::Decision(count) if MEMBERSHIP && count.relays.is_some_and(|n| n > all) => {
                 Next::Stale
             }
-            Message::Roster(roster) if MEMBERSHIP => {
-                self.members.heard_of(roster.view);
+            Message::Proposal(proposal) if MEMBERSHIP => {
+                self.members.heard_of(proposal.view);
                 self.beside(side).called(false);
                 let (share, own) = self.parts();
-                let next = share.on_roster(own, roster);
+                let next = share.on_proposal(own, proposal);
                 if next == Next::Foreign {
                     // Whoever calls has to take a higher number.
                     self.members.heard_of(self.members.newest.saturating_add(1));
                 }
                 next
             }
-            Message::Count(count) if MEMBERSHIP => share.on_count(own, count),
+            Message::Decision(count) if MEMBERSHIP => share.on_decision(own, count),
             Message::Busy { sweep } => {
                 if self.share.phase() == Phase::Waiting && *sweep == self.share.number() {
                     // It has arrived: what is missing is the answer, and that may take its time.

@@ -12,11 +12,11 @@
 //! | no pass for a while after it was switched on | calls for a view |
 //! | a call from a neighbour that knows as new a view, or has just been switched on | calls for a view |
 //! | a newer mission than the one it flies | calls for a view, which flies it if all hold it |
-//! | a roster, when it is the last | counts: more than half of the view before, or half with its leader, are a chain |
+//! | a proposal, when it is the last | counts: more than half of the view before, or half with its leader, are a chain |
 
 use crate::mission::Mission;
 use crate::time::Duration;
-use crate::wire::digest::{Stamp, digest};
+use crate::wire::digest::{MissionId, digest};
 
 use crate::settings::Settings;
 
@@ -30,9 +30,9 @@ pub(crate) struct Members {
     /// Digest of the mission as it was loaded.
     pub(crate) digest: u16,
     /// The mission that it flies.
-    pub(crate) flown: Stamp,
+    pub(crate) flown: MissionId,
     /// The newest mission that it holds.
-    pub(crate) held: Stamp,
+    pub(crate) held: MissionId,
     /// Number of the view agreed on.
     pub(crate) view: u16,
     /// The largest number of a view heard of.
@@ -48,7 +48,7 @@ pub(crate) struct Members {
 impl Members {
     pub(crate) fn new(mission: &Mission, node: u16) -> Self {
         let digest = digest(mission);
-        let flown = Stamp { version: 0, digest };
+        let flown = MissionId { version: 0, digest };
         Self {
             node,
             all: mission.relays(),

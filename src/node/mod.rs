@@ -13,7 +13,7 @@
 //! | [`beside`] | which node is taken for the neighbour on one side |
 //! | [`members`] | which view of the chain was agreed on, and when a new one is called for |
 //! | `incoming`, `outgoing` | what a message does; what there is to say |
-//! | `forming` | hails, calls and new views |
+//! | `forming` | hellos, calls and new views |
 //! | `uploads` | a newer mission, in flight |
 //! | [`timers`] | every timer, in one table |
 //! | `steering` | the setpoint on its way to the agreed place |
@@ -43,7 +43,7 @@ use crate::guard::Guard;
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
-use crate::wire::digest::Stamp;
+use crate::wire::digest::MissionId;
 #[cfg(feature = "upload")]
 use crate::wire::upload::Upload;
 
@@ -209,10 +209,10 @@ impl Node {
         (&mut self.share, own)
     }
 
-    /// Flies `mission` from now on, whose stamp is `stamp`.
-    fn fly(&mut self, mission: Mission, stamp: Stamp) {
+    /// Flies `mission` from now on, whose mission_id is `mission_id`.
+    fn fly(&mut self, mission: Mission, mission_id: MissionId) {
         self.mission = mission;
-        self.members.flown = stamp;
+        self.members.flown = mission_id;
         let common = mission.config().common;
         self.share.load(self.settings.profile.unwrap_or(common));
     }

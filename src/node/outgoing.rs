@@ -54,8 +54,8 @@ impl Node {
                 return Some((side, beside.node(), heartbeat));
             }
         }
-        if MEMBERSHIP && let Some((side, to, hail)) = self.next_hail() {
-            return Some((side, to, Message::Hail(hail)));
+        if MEMBERSHIP && let Some((side, to, hello)) = self.next_hello() {
+            return Some((side, to, Message::Hello(hello)));
         }
         #[cfg(feature = "upload")]
         for side in [Side::Upstream, Side::Downstream] {
@@ -66,8 +66,8 @@ impl Node {
             {
                 return Some((side, to, offer));
             }
-            if let Some((to, hail)) = self.next_report(side) {
-                return Some((side, to, Message::Hail(hail)));
+            if let Some((to, hello)) = self.next_report(side) {
+                return Some((side, to, Message::Hello(hello)));
             }
         }
         if GUARD && let Some(guard) = &mut self.guard {

@@ -3,7 +3,7 @@
 use super::timers::Timer;
 use super::{GUARD, Node};
 use crate::event::Event;
-use crate::guard::{Guard, Hindrance};
+use crate::guard::{Guard, HoldReason};
 use crate::place::Placement;
 use crate::settings::Settings;
 use crate::side::Side;
@@ -86,7 +86,7 @@ impl Node {
     }
 
     /// What keeps the relay from its place at `side`.
-    pub(crate) fn hindrance(&self, side: Side) -> Option<Hindrance> {
-        self.guard.as_ref().filter(|_| GUARD)?.hindrance(side)
+    pub(crate) fn hold_reason(&self, side: Side) -> Option<HoldReason> {
+        self.guard.as_ref().filter(|_| GUARD)?.hold_reason(side)
     }
 }

@@ -1,18 +1,18 @@
 //! A newer mission, in flight: who holds it, who is offered it, and when it is flown.
 //!
-//! Any relay next to the ground takes an offer. Neighbours tell each other in every hail which mission they hold; whoever holds
-//! a newer one offers it, and whoever holds a newer one than it flies calls for a view. A roster names the one mission that the
+//! Any relay next to the ground takes an offer. Neighbours tell each other in every hello which mission they hold; whoever holds
+//! a newer one offers it, and whoever holds a newer one than it flies calls for a view. A proposal names the one mission that the
 //! view is to fly, and only a relay that holds just that one hands it on. So a view that is granted is of relays that hold it
 //! all, durably or not: one that misses the count, or forgets what it held, can take part in nothing before it flies it, too.
 //!
 //! | between neighbours | what follows |
 //! | --- | --- |
-//! | a hail of a node that holds an older mission | it is offered the newer one |
-//! | a hail of a node that holds a newer mission | a hail, so that it is offered here |
-//! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hail; an offer to the relay before, toward the leader; a call for a view |
-//! | an offer of one that is not newer | a hail |
-//! | a roster is due, and the node after holds an older mission or has not said which | it is offered the newer one first |
-//! | a roster that does not name the mission held | a hail, and no part in it |
+//! | a hello of a node that holds an older mission | it is offered the newer one |
+//! | a hello of a node that holds a newer mission | a hello, so that it is offered here |
+//! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hello; an offer to the relay before, toward the leader; a call for a view |
+//! | an offer of one that is not newer | a hello |
+//! | a proposal is due, and the node after holds an older mission or has not said which | it is offered the newer one first |
+//! | a proposal that does not name the mission held | a hello, and no part in it |
 //! | a count of a view that was granted | its mission is flown: `Event::Adopted` |
 
 use super::Node;
@@ -23,8 +23,8 @@ use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
-use crate::wire::digest::Stamp;
-use crate::wire::message::{Hail, Message};
+use crate::wire::digest::MissionId;
+use crate::wire::message::{Hello, Message};
 use crate::wire::upload::{Upload, UploadError};
 
 impl Node {
@@ -47,21 +47,21 @@ impl Node {
     pub(super) fn on_ground(&mut self, now: Instant, side: Side, message: &Message) -> bool {
         let base = self.members.digest;
         match message {
-            Message::Offer(_) | Message::Hail(_) if message.mission() != Some(base) => {
+            Message::Offer(_) | Message::Hello(_) if message.mission() != Some(base) => {
                 self.refuse_mission(side);
             }
             Message::Offer(upload) => {
                 self.hold(now, *upload);
                 self.beside(side).ground = true;
             }
-            Message::Hail(hail) => self.beside(side).ground |= hail.ask,
+            Message::Hello(hello) => self.beside(side).ground |= hello.ask,
             _ => return false,
         }
         true
     }
 
     /// What the ground at `side` is told, once it is owed: to which node.
-    pub(super) fn next_report(&mut self, side: Side) -> Option<(u16, Hail)> {
+    pub(super) fn next_report(&mut self, side: Side) -> Option<(u16, Hello)> {
         if !core::mem::take(&mut self.beside(side).ground) {
             return None;
         }
@@ -69,12 +69,12 @@ impl Node {
             Side::Upstream => 0,
             Side::Downstream => self.members.all.saturating_add(1),
         };
-        let hail = Hail {
+        let hello = Hello {
             neighbour: 0,
             form: false,
-            ..self.hail(side, false)
+            ..self.hello(side, false)
         };
-        Some((to, hail))
+        Some((to, hello))
     }
 
     /// An offer from node `from` at `side`, for relays that were loaded with the same mission. Answered only by who holds as new
@@ -83,14 +83,14 @@ impl Node {
         if !self.takes_uploads() {
             return bump(&mut self.stats.unsigned);
         }
-        let stamp = upload.stamp();
+        let mission_id = upload.id();
         let beside = self.beside(side);
         if beside.node() == from {
-            beside.holds = beside.holds.max(Some(stamp));
+            beside.holds = beside.holds.max(Some(mission_id));
         }
         self.hold(now, *upload);
-        if self.members.held >= stamp {
-            self.owe_hail(side, from, false);
+        if self.members.held >= mission_id {
+            self.owe_hello(side, from, false);
         }
     }
 
@@ -103,13 +103,13 @@ impl Node {
 
     /// Holds `upload` from now on, if it is newer than what is held.
     fn hold(&mut self, now: Instant, upload: Upload) -> bool {
-        let stamp = upload.stamp();
-        let newer = stamp > self.members.held && self.fits(&upload);
+        let mission_id = upload.id();
+        let newer = mission_id > self.members.held && self.fits(&upload);
         if newer {
-            self.members.held = stamp;
+            self.members.held = mission_id;
             self.upload = Some(upload);
             self.pending.raise(Event::Uploaded);
-            // The leader has to hold it first; the others are offered it before the roster comes to them.
+            // The leader has to hold it first; the others are offered it before the proposal comes to them.
             self.beside(Side::back(self.mission.heading())).offer = true;
             self.call(now);
         }
@@ -144,7 +144,7 @@ impl Node {
             return Err(UploadError::Begun);
         }
         let mission = Mission::try_new(*upload.config()).map_err(UploadError::Mission)?;
-        self.members.held = upload.stamp();
+        self.members.held = upload.id();
         self.upload = Some(*upload);
         self.fly(mission, self.members.held);
         Ok(())
@@ -155,21 +155,24 @@ impl Node {
         self.upload.as_ref()
     }
 
-    /// The neighbour `from` at `side` says that it holds the mission of stamp `holds`.
-    pub(super) fn compare(&mut self, side: Side, from: u16, holds: Stamp) {
+    /// The neighbour `from` at `side` says that it holds the mission of mission_id `holds`.
+    pub(super) fn compare(&mut self, side: Side, from: u16, holds: MissionId) {
         if !self.takes_uploads() {
             return;
         }
         let held = self.members.held;
         if holds > held {
-            self.owe_hail(side, from, false);
+            self.owe_hello(side, from, false);
         } else if holds < held {
             self.beside(side).offer = true;
         } else if self.beside(side).holds != Some(held)
             && side == Side::onward(self.mission.heading())
-            && self.share.called().is_some_and(|(_, stamp)| stamp == held)
+            && self
+                .share
+                .called()
+                .is_some_and(|(_, mission_id)| mission_id == held)
         {
-            // The roster had to wait for that.
+            // The proposal had to wait for that.
             self.onward_due = true;
         }
     }
@@ -184,9 +187,9 @@ impl Node {
         self.upload.filter(|_| older).map(Message::Offer)
     }
 
-    /// The mission of stamp `stamp`, if it is the one held.
-    pub(super) fn uploaded(&self, stamp: Stamp) -> Option<Mission> {
-        let upload = self.upload.filter(|upload| upload.stamp() == stamp)?;
+    /// The mission of mission_id `mission_id`, if it is the one held.
+    pub(super) fn uploaded(&self, mission_id: MissionId) -> Option<Mission> {
+        let upload = self.upload.filter(|upload| upload.id() == mission_id)?;
         Mission::try_new(*upload.config()).ok()
     }
 }

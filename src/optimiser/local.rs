@@ -9,9 +9,9 @@
 
 use core::task::Poll;
 
-use crate::gain::Gain;
 use crate::mission::{Interferer, Mission};
 use crate::place::Placement;
+use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
 use crate::sir::square;
 
@@ -58,7 +58,7 @@ pub struct Hops {
     before: Beside,
     after: Beside,
     /// What the power of the node before is worth.
-    gain_in: Gain,
+    gain_in: PowerRatio,
     /// What the relay's own is worth: on a hop to a relay, or K in m^2 to Rx.
     gain_out: f32,
     to_rx: bool,
@@ -73,7 +73,7 @@ impl Hops {
         mission: &Mission,
         interferer: &Interferer,
         before: Beside,
-        gain_in: Gain,
+        gain_in: PowerRatio,
         power_w: f32,
         after: Option<Beside>,
     ) -> Self {
@@ -287,9 +287,9 @@ mod tests {
     use core::task::Poll;
 
     use super::{Beside, Hops, Local, Search};
-    use crate::gain::Gain;
     use crate::mission::Interferer;
     use crate::place::Placement;
+    use crate::power_ratio::PowerRatio;
 
     /// A relay at `altitude_m` in the middle of two that are 100 m apart at `beside_m`, who may go anywhere within the band.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> Search {
@@ -301,7 +301,7 @@ mod tests {
         let hops = Hops {
             before: beside(0.0),
             after: beside(100.0),
-            gain_in: Gain::new(1.0),
+            gain_in: PowerRatio::new(1.0),
             gain_out: 1.0,
             to_rx: false,
             interferer: Interferer {

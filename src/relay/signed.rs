@@ -22,18 +22,18 @@ pub(super) fn receive(
             node.meet(now, side, frame.header.sender, first);
             read(node, now, side, frame);
         }
-        Checked::Hello { first } => {
-            bump(&mut node.stats.hellos);
+        Checked::Handshake { first } => {
+            bump(&mut node.stats.handshakes);
             node.meet(now, side, frame.header.sender, first);
         }
-        Checked::Unproven => bump(&mut node.stats.hellos),
+        Checked::Unproven => bump(&mut node.stats.handshakes),
         Checked::Unsigned => bump(&mut node.stats.unsigned),
         Checked::Forged => bump(&mut node.stats.forged),
         Checked::Replayed => bump(&mut node.stats.replayed),
     }
 }
 
-/// Writes the next frame with a tag, a hello before anything else.
+/// Writes the next frame with a tag, a handshake before anything else.
 pub(super) fn next(
     node: &mut Node,
     session: &mut Session,
@@ -56,20 +56,20 @@ pub(super) fn next(
     Some((side, len))
 }
 
-/// Writes a hello that is owed to some node.
+/// Writes a handshake that is owed to some node.
 pub(crate) fn greeting(
     session: &mut Session,
     header: &mut Header,
     frame: &mut FrameBuf,
 ) -> Option<usize> {
-    let to = session.take_hello()?;
+    let to = session.take_handshake()?;
     header.destination = to;
-    let body = session.hello(to);
+    let body = session.handshake(to);
     let signer = session.signer(to);
-    Some(frame::encode_hello(*header, &body, signer, frame))
+    Some(frame::encode_handshake(*header, &body, signer, frame))
 }
 
-/// Writes `message` to node `to`, or a hello in its place if it could not be read there: it is said again once it can.
+/// Writes `message` to node `to`, or a handshake in its place if it could not be read there: it is said again once it can.
 pub(crate) fn say(
     session: &mut Session,
     to: u16,

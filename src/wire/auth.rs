@@ -68,7 +68,7 @@ pub enum Auth {}
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {
     pub(crate) sender: u64,
-    /// 0 in a hello whose sender does not know it yet.
+    /// 0 in a handshake whose sender does not know it yet.
     pub(crate) receiver: u64,
 }
 

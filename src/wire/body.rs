@@ -81,9 +81,9 @@ pub(super) enum Body {
         sir: f32,
     },
     Moved(Pass, At, bool, f32),
-    Hail(Forming),
-    Roster(Forming),
-    Count(Forming),
+    Hello(Forming),
+    Proposal(Forming),
+    Decision(Forming),
     /// The number is that of the talk; its echo, the number of the fence, where it is, where the sender is to be.
     Fence(Pass, [u8; 2], [u8; 2], f32, f32),
     #[cfg(feature = "upload")]
@@ -108,7 +108,7 @@ impl Body {
             Self::Worth(_, trial, ..) => 58 + usize::from(trial.is_some()),
             Self::Token { .. } => 28,
             Self::Moved(..) => 18,
-            Self::Hail(_) | Self::Roster(_) | Self::Count(_) => 14,
+            Self::Hello(_) | Self::Proposal(_) | Self::Decision(_) => 14,
             Self::Fence(..) => 17,
             #[cfg(feature = "upload")]
             Self::Offer(_) => LENGTH,
@@ -197,11 +197,11 @@ impl Message {
                 moved.any,
                 moved.worst,
             ),
-            Self::Hail(hail) => Body::Hail(Forming::of_hail(hail)),
-            Self::Roster(roster) => Body::Roster(Forming::of_roster(roster)),
-            Self::Count(count) => Body::Count(Forming::of_count(count)),
+            Self::Hello(hello) => Body::Hello(Forming::of_hello(hello)),
+            Self::Proposal(proposal) => Body::Proposal(Forming::of_proposal(proposal)),
+            Self::Decision(count) => Body::Decision(Forming::of_decision(count)),
             Self::Fence { mission, fence } => Body::Fence(
-                Pass::new(fence.tie, *mission),
+                Pass::new(fence.association, *mission),
                 fence.echo.to_le_bytes(),
                 fence.number.to_le_bytes(),
                 fence.x_m,

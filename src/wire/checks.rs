@@ -118,9 +118,13 @@ fn checked(body: Body) -> Option<Message> {
             any,
             worst: sir_in_range(worst)?,
         }),
-        Body::Hail(forming) if cfg!(feature = "membership") => Message::Hail(forming.hail()?),
-        Body::Roster(forming) if cfg!(feature = "membership") => Message::Roster(forming.roster()?),
-        Body::Count(forming) if cfg!(feature = "membership") => Message::Count(forming.count()?),
+        Body::Hello(forming) if cfg!(feature = "membership") => Message::Hello(forming.hello()?),
+        Body::Proposal(forming) if cfg!(feature = "membership") => {
+            Message::Proposal(forming.proposal()?)
+        }
+        Body::Decision(forming) if cfg!(feature = "membership") => {
+            Message::Decision(forming.count()?)
+        }
         Body::Fence(pass, echo, number, x_m, target_m) if cfg!(feature = "guard") => {
             Message::Fence {
                 mission: pass.mission(),
@@ -165,9 +169,15 @@ fn sweep(
 }
 
 /// The fence of these parts, if they are in range.
-fn fence(tie: u16, echo: [u8; 2], number: [u8; 2], x_m: f32, target_m: f32) -> Option<Fence> {
+fn fence(
+    association: u16,
+    echo: [u8; 2],
+    number: [u8; 2],
+    x_m: f32,
+    target_m: f32,
+) -> Option<Fence> {
     let fence = Fence {
-        tie,
+        association,
         echo: u16::from_le_bytes(echo),
         number: u16::from_le_bytes(number),
         x_m,

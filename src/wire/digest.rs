@@ -53,7 +53,7 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
 /// In the order of versions; of two missions with one version, the one with the larger digest counts as the newer one.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Stamp {
+pub struct MissionId {
     /// The operator's number of an uploaded mission, from 1; 0 is the mission that was loaded before flight.
     pub version: u16,
     /// [`digest`] of the mission, with all its relays.

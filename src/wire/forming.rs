@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::body::Pass;
-use super::digest::Stamp;
-use super::message::{Before, Count, Hail, Roster};
+use super::digest::MissionId;
+use super::message::{Decision, Hello, PriorView, Proposal};
 use crate::mission::MAX_RELAYS;
 
-/// What a hail, a roster and a count have in common; what the numbers mean depends, and those that mean nothing are 0.
+/// What a hello, a proposal and a count have in common; what the numbers mean depends, and those that mean nothing are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Forming {
     /// The number is that of a view.
@@ -40,32 +40,32 @@ impl Forming {
         (one <= MAX_RELAYS && other <= MAX_RELAYS).then_some((one, other, more, self.flags))
     }
 
-    const fn stamp(self, digest: u16) -> Stamp {
-        Stamp {
+    const fn mission_id(self, digest: u16) -> MissionId {
+        MissionId {
             version: u16::from_le_bytes(self.version),
             digest,
         }
     }
 
-    /// The neighbour; digest and version of what it holds; flags from bit 0: asks for a hail, asks for a new view, fresh, ready,
+    /// The neighbour; digest and version of what it holds; flags from bit 0: asks for a hello, asks for a new view, fresh, ready,
     /// flies what it holds.
-    pub(super) fn of_hail(hail: &Hail) -> Self {
-        let flags = [hail.ask, hail.form, hail.fresh, hail.ready, hail.flies]
+    pub(super) fn of_hello(hello: &Hello) -> Self {
+        let flags = [hello.ask, hello.form, hello.fresh, hello.ready, hello.flies]
             .into_iter()
             .rev()
             .fold(0, |flags, flag| flags << 1 | u8::from(flag));
         Self::new(
-            Pass::new(hail.newest, hail.mission),
-            [hail.neighbour, 0, hail.holds.digest, hail.holds.version],
+            Pass::new(hello.newest, hello.mission),
+            [hello.neighbour, 0, hello.holds.digest, hello.holds.version],
             flags,
         )
     }
 
-    pub(super) fn hail(self) -> Option<Hail> {
+    pub(super) fn hello(self) -> Option<Hello> {
         let (neighbour, 0, held, flags @ 0..=0x1F) = self.parts()? else {
             return None;
         };
-        Some(Hail {
+        Some(Hello {
             mission: self.pass.mission(),
             newest: self.pass.number(),
             neighbour,
@@ -74,34 +74,34 @@ impl Forming {
             fresh: flags & 4 != 0,
             ready: flags & 8 != 0,
             flies: flags & 16 != 0,
-            holds: self.stamp(held),
+            holds: self.mission_id(held),
         })
     }
 
     /// The sender's place; size and number of the view before; version of the mission; whether its leader is there.
-    pub(super) fn of_roster(roster: &Roster) -> Self {
-        let before = roster.before;
+    pub(super) fn of_proposal(proposal: &Proposal) -> Self {
+        let before = proposal.before;
         Self::new(
-            Pass::new(roster.view, roster.stamp.digest),
+            Pass::new(proposal.view, proposal.mission_id.digest),
             [
-                roster.place,
+                proposal.place,
                 before.relays,
                 before.view,
-                roster.stamp.version,
+                proposal.mission_id.version,
             ],
             u8::from(before.leader),
         )
     }
 
-    pub(super) fn roster(self) -> Option<Roster> {
+    pub(super) fn proposal(self) -> Option<Proposal> {
         let (place @ 1.., relays @ 1.., view, leader @ 0..=1) = self.parts()? else {
             return None;
         };
-        Some(Roster {
-            stamp: self.stamp(self.pass.mission()),
+        Some(Proposal {
+            mission_id: self.mission_id(self.pass.mission()),
             view: self.pass.number(),
             place,
-            before: Before {
+            before: PriorView {
                 view,
                 relays,
                 leader: leader == 1,
@@ -110,25 +110,25 @@ impl Forming {
     }
 
     /// The sender's place; how many relays, 0 for too few; version of the mission.
-    pub(super) fn of_count(count: &Count) -> Self {
+    pub(super) fn of_decision(count: &Decision) -> Self {
         Self::new(
-            Pass::new(count.view, count.stamp.digest),
+            Pass::new(count.view, count.mission_id.digest),
             [
                 count.place,
                 count.relays.unwrap_or(0),
                 0,
-                count.stamp.version,
+                count.mission_id.version,
             ],
             0,
         )
     }
 
-    pub(super) fn count(self) -> Option<Count> {
+    pub(super) fn count(self) -> Option<Decision> {
         let (place @ 1.., relays, 0, 0) = self.parts()? else {
             return None;
         };
-        Some(Count {
-            stamp: self.stamp(self.pass.mission()),
+        Some(Decision {
+            mission_id: self.mission_id(self.pass.mission()),
             view: self.pass.number(),
             place,
             relays: (relays > 0).then_some(relays),

@@ -25,7 +25,7 @@ pub const MAX_SWEEP: usize = 100 + TAG;
 /// Flag: a tag follows the body.
 const SIGNED: u16 = 0x1000;
 
-/// Flag: the body is a hello. Only with a tag.
+/// Flag: the body is a handshake. Only with a tag.
 const HELLO: u16 = 0x2000;
 
 /// The largest node number an address can hold; 4095 is kept for a broadcast.
@@ -96,18 +96,18 @@ pub(crate) fn encode_signed(
     close(header, SIGNED, len, Some(signer), out)
 }
 
-/// The frame of a hello, with its tag.
+/// The frame of a handshake, with its tag.
 #[cfg(feature = "auth")]
-pub(crate) fn encode_hello(
+pub(crate) fn encode_handshake(
     header: Header,
-    hello: &[u8],
+    handshake: &[u8],
     signer: Signer<'_>,
     out: &mut FrameBuf,
 ) -> usize {
-    let place = body(out).and_then(|body| body.get_mut(..hello.len()));
+    let place = body(out).and_then(|body| body.get_mut(..handshake.len()));
     let len = place.map(|place| {
-        place.copy_from_slice(hello);
-        hello.len()
+        place.copy_from_slice(handshake);
+        handshake.len()
     });
     close(header, SIGNED | HELLO, len, Some(signer), out)
 }
@@ -164,14 +164,14 @@ fn put<const N: usize>(plain: &mut [u8], at: usize, bytes: [u8; N]) -> usize {
 pub struct Opened<'a> {
     /// Who sends it to whom.
     pub header: Header,
-    /// The body, which is a message unless the frame is a hello.
+    /// The body, which is a message unless the frame is a handshake.
     pub body: &'a [u8],
     /// Header and body: what the tag is of.
     pub signed: &'a [u8],
     /// The tag, if there is one. Whether it is right is not known yet.
     pub tag: Option<[u8; TAG]>,
-    /// Whether the body is a hello.
-    pub hello: bool,
+    /// Whether the body is a handshake.
+    pub handshake: bool,
 }
 
 /// Takes apart `plain`, a frame without COBS and delimiter.
@@ -216,22 +216,22 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
         body,
         signed,
         tag,
-        hello: flags & HELLO != 0,
+        handshake: flags & HELLO != 0,
     })
 }
 
 /// The header and the message in `plain`: [`open`], then [`Message::decode`]. Of a tag it says nothing.
 ///
 /// # Errors
-/// [`FrameError`] says what is wrong; a hello is no message.
+/// [`FrameError`] says what is wrong; a handshake is no message.
 pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     let Opened {
         header,
         body,
-        hello,
+        handshake,
         ..
     } = open(plain)?;
-    if hello {
+    if handshake {
         return Err(FrameError::Message(MessageError::Encoding));
     }
     let message = Message::decode(body).map_err(FrameError::Message)?;

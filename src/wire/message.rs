@@ -1,6 +1,6 @@
 //! What neighbours say to each other. `body` has how they say it, `FORMAT.md` the byte tables.
 
-use super::digest::Stamp;
+use super::digest::MissionId;
 #[cfg(feature = "upload")]
 use super::upload::Upload;
 use crate::guard::Fence;
@@ -43,11 +43,11 @@ pub enum Message {
     /// Back: who has moved where.
     Moved(Moved),
     /// Either way, also to nodes that are no neighbours: who the sender takes for its neighbour, and which view it holds.
-    Hail(Hail),
+    Hello(Hello),
     /// Onward: who is there, for a new view of the chain.
-    Roster(Roster),
+    Proposal(Proposal),
     /// Back: how many there are.
-    Count(Count),
+    Decision(Decision),
     /// Either way: the fence between two neighbours.
     Fence {
         /// [`super::digest::digest`] of the sender's mission, as it was loaded.
@@ -72,9 +72,9 @@ impl Message {
             Self::Worth(worth) => Some(worth.mission),
             Self::Token(token) => Some(token.mission),
             Self::Moved(moved) => Some(moved.mission),
-            Self::Hail(hail) => Some(hail.mission),
-            Self::Roster(roster) => Some(roster.stamp.digest),
-            Self::Count(count) => Some(count.stamp.digest),
+            Self::Hello(hello) => Some(hello.mission),
+            Self::Proposal(proposal) => Some(proposal.mission_id.digest),
+            Self::Decision(count) => Some(count.mission_id.digest),
             #[cfg(feature = "upload")]
             Self::Offer(upload) => Some(upload.base()),
         }
@@ -95,14 +95,14 @@ impl Message {
 
     /// Whether it is said of the call for a view: then its digest is that of the mission to be flown in it.
     pub(crate) const fn is_of_a_call(&self) -> bool {
-        matches!(self, Self::Roster(_) | Self::Count(_))
+        matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
     /// Whether it is a pass, which goes onward.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,
-            Self::Sweep(_) | Self::Course(_) | Self::Token(_) | Self::Roster(_)
+            Self::Sweep(_) | Self::Course(_) | Self::Token(_) | Self::Proposal(_)
         )
     }
 }
@@ -227,14 +227,14 @@ pub struct Moved {
 )]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Hail {
+pub struct Hello {
     /// [`super::digest::digest`] of the sender's mission, as it was loaded.
     pub mission: u16,
     /// The largest number of a view that the sender has heard of.
     pub newest: u16,
     /// The node that it takes for its neighbour on this side; 0 for none.
     pub neighbour: u16,
-    /// Whether it asks for a hail in return.
+    /// Whether it asks for a hello in return.
     pub ask: bool,
     /// Whether it asks for a new view.
     pub form: bool,
@@ -243,7 +243,7 @@ pub struct Hail {
     /// Whether it can hear a node on its other side, or needs none there.
     pub ready: bool,
     /// The newest mission that it holds.
-    pub holds: Stamp,
+    pub holds: MissionId,
     /// Whether that is the one it flies.
     pub flies: bool,
 }
@@ -251,21 +251,21 @@ pub struct Hail {
 /// The call for a new view, as one relay hands it to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Roster {
+pub struct Proposal {
     /// The mission that the view is to fly: the one that every relay up to the sender holds.
-    pub stamp: Stamp,
+    pub mission_id: MissionId,
     /// The number of the new view, above that of every agreed one.
     pub view: u16,
     /// How many relays it has come through, the sender included: 1 to 1000.
     pub place: u16,
     /// The newest view that any of them has agreed to.
-    pub before: Before,
+    pub before: PriorView,
 }
 
 /// A view of the chain that a new one follows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Before {
+pub struct PriorView {
     /// Its number; 0 is the chain as the mission has it.
     pub view: u16,
     /// How many relays were in it, 1 to 1000.
@@ -277,9 +277,9 @@ pub struct Before {
 /// What came of the call for a new view, as it travels back.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Count {
+pub struct Decision {
     /// The mission that the view flies.
-    pub stamp: Stamp,
+    pub mission_id: MissionId,
     /// The number of the view.
     pub view: u16,
     /// The sender's place, from 1 at the one that has called: 1 to 1000.

@@ -3,10 +3,10 @@
 //! For each node it talks to, a relay has a *nonce*: its epoch, and how many such entries it has made since it was switched
 //! on. A frame's tag covers the sender's nonce toward the receiver and the receiver's toward the sender, so a frame that was
 //! recorded before either of them was switched on, or had forgotten the other, is worth nothing. What a relay has to know
-//! for that, the other's nonce, comes in a *hello*: a frame whose body is the sender's nonce, the receiver's as far as the
+//! for that, the other's nonce, comes in a *handshake*: a frame whose body is the sender's nonce, the receiver's as far as the
 //! sender knows it, and whether the sender still lacks the proof that the receiver is there.
 //!
-//! | a hello with the right tag and | does |
+//! | a handshake with the right tag and | does |
 //! | --- | --- |
 //! | a nonce below the one known, or a counter that has been taken | nothing; it is counted as a replay |
 //! | a nonce above the one known | the node has been switched on since: a new session begins |
@@ -14,18 +14,18 @@
 //! | a question, and none of that to learn by it here | nothing but the answer |
 //!
 //! A question that begins a session, that has not this relay's nonce, or that comes from a node already proven to be there is
-//! answered by one hello; nothing else is. So whatever is played at a relay, it says at most one hello for each frame that
+//! answered by one handshake; nothing else is. So whatever is played at a relay, it says at most one handshake for each frame that
 //! comes in, and with something else to say one in place of that.
 //!
-//! A recorded hello can be new to a relay only where the relay has just been switched on or had forgotten its sender. What
+//! A recorded handshake can be new to a relay only where the relay has just been switched on or had forgotten its sender. What
 //! it brings is no proof, as a recorded one can not have this relay's new nonce: it is no sign of life, nothing is sent on
-//! its account but a hello, and a nonce of the past is overtaken by the true one, which is larger. So it does no lasting
-//! harm: until the true hello comes there was nothing to be said to that node anyway.
+//! its account but a handshake, and a nonce of the past is overtaken by the true one, which is larger. So it does no lasting
+//! harm: until the true handshake comes there was nothing to be said to that node anyway.
 
 use super::auth::{Auth, Nonces, Signer, TAG, Window, is_same};
 use super::frame::Opened;
 
-/// Bytes of the body of a hello.
+/// Bytes of the body of a handshake.
 pub(crate) const HELLO: usize = 17;
 
 /// Nodes that a relay remembers at once.
@@ -35,8 +35,8 @@ const PEERS: usize = 8;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
     node: u16,
-    /// Whether a hello is to be sent.
-    hello: bool,
+    /// Whether a handshake is to be sent.
+    handshake: bool,
     /// Whether it has shown this relay's nonce: it is there, and both know each other.
     proven: bool,
     /// When it was last used, on the session's own clock.
@@ -76,9 +76,9 @@ pub(crate) struct Session {
 pub(crate) enum Checked {
     /// A member's, and new: its body counts. Whether it is the first proof that the node is there.
     Fresh { first: bool },
-    /// A hello, new, and proof that the node is there; whether it is the first.
-    Hello { first: bool },
-    /// A hello with the right tag that proves nothing: it may have been recorded.
+    /// A handshake, new, and proof that the node is there; whether it is the first.
+    Handshake { first: bool },
+    /// A handshake with the right tag that proves nothing: it may have been recorded.
     Unproven,
     /// Without a tag.
     Unsigned,
@@ -110,19 +110,19 @@ impl Session {
         }
     }
 
-    /// Owes a hello to node `to`, with a new entry if there is none, and takes it for unproven until it has answered.
+    /// Owes a handshake to node `to`, with a new entry if there is none, and takes it for unproven until it has answered.
     pub(crate) fn greet(&mut self, to: u16) {
         self.make(to);
         if let Some(peer) = self.touch(to) {
-            peer.hello = true;
+            peer.handshake = true;
             peer.proven = false;
         }
     }
 
-    /// A node that a hello is to be sent to: it then has been.
-    pub(crate) fn take_hello(&mut self) -> Option<u16> {
-        let peer = self.peers.iter_mut().find(|peer| peer.hello)?;
-        peer.hello = false;
+    /// A node that a handshake is to be sent to: it then has been.
+    pub(crate) fn take_handshake(&mut self) -> Option<u16> {
+        let peer = self.peers.iter_mut().find(|peer| peer.handshake)?;
+        peer.handshake = false;
         Some(peer.node)
     }
 
@@ -131,8 +131,8 @@ impl Session {
         self.find(to).is_some_and(|peer| peer.proven)
     }
 
-    /// The body of a hello to node `to`.
-    pub(crate) fn hello(&self, to: u16) -> [u8; HELLO] {
+    /// The body of a handshake to node `to`.
+    pub(crate) fn handshake(&self, to: u16) -> [u8; HELLO] {
         let mut body = [0; HELLO];
         if let Some(peer) = self.find(to) {
             let Nonces { sender, receiver } = peer.nonces(self.auth.epoch);
@@ -167,7 +167,7 @@ impl Session {
         let Some(told) = frame.tag else {
             return Checked::Unsigned;
         };
-        if frame.hello {
+        if frame.handshake {
             return self.meet(sender, frame, told).unwrap_or(Checked::Forged);
         }
         let epoch = self.auth.epoch;
@@ -188,7 +188,7 @@ impl Session {
         Checked::Fresh { first }
     }
 
-    /// A hello; `None` if its tag is wrong.
+    /// A handshake; `None` if its tag is wrong.
     fn meet(&mut self, sender: u16, frame: &Opened<'_>, told: [u8; TAG]) -> Option<Checked> {
         let (other, rest) = frame.body.split_first_chunk::<8>()?;
         let (known, &[asks @ (0 | 1)]) = rest.split_first_chunk::<8>()? else {
@@ -216,13 +216,13 @@ impl Session {
         if old || !peer.taken.take(frame.header.counter) {
             return Some(Checked::Replayed);
         }
-        peer.hello |= asks == 1 && (begins || !proof || peer.proven);
+        peer.handshake |= asks == 1 && (begins || !proof || peer.proven);
         if !proof {
             return Some(Checked::Unproven);
         }
         let first = !peer.proven;
         peer.proven = true;
-        Some(Checked::Hello { first })
+        Some(Checked::Handshake { first })
     }
 
     fn find(&self, node: u16) -> Option<&Peer> {
@@ -250,7 +250,7 @@ impl Session {
         self.made = made;
         let peer = Peer {
             node,
-            hello: false,
+            handshake: false,
             proven: false,
             used: self.clock,
             own: made,

@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::body::Pass;
-use super::digest::{Stamp, digest, of};
+use super::digest::{MissionId, digest, of};
 use super::message::Message;
 use crate::channel::Channel;
 use crate::mission::{
@@ -117,8 +117,8 @@ impl Upload {
     }
 
     /// By what relays tell which mission they hold.
-    pub fn stamp(&self) -> Stamp {
-        Stamp {
+    pub fn id(&self) -> MissionId {
+        MissionId {
             version: self.version,
             digest: of(&self.config),
         }

@@ -9,7 +9,7 @@ pub const fn intact(stats: &Stats, key: bool) -> u32 {
     stats.received
         + stats.overheard
         + stats.version
-        + stats.hellos
+        + stats.handshakes
         + stats.malformed
         + stats.foreign
         + stats.misaddressed
@@ -31,7 +31,7 @@ pub const fn all(stats: &Stats) -> [u32; 23] {
         truncated,
         crc,
         version,
-        hellos,
+        handshakes,
         unsigned,
         forged,
         replayed,
@@ -56,7 +56,7 @@ pub const fn all(stats: &Stats) -> [u32; 23] {
         truncated,
         crc,
         version,
-        hellos,
+        handshakes,
         unsigned,
         forged,
         replayed,

@@ -84,7 +84,7 @@ fn taken_apart(plain: &[u8]) {
     assert_eq!(Some(opened.signed), plain.get(..ends));
     let told = plain.get(ends..checked).filter(|_| tag > 0);
     assert_eq!(opened.tag.as_ref().map(|tag| &tag[..]), told);
-    assert_eq!(opened.hello, flags == 3);
+    assert_eq!(opened.handshake, flags == 3);
 }
 
 /// The body behind the right addresses and the right tag counts as what it is, at a relay that asks for tags, and once; a
@@ -166,15 +166,15 @@ fn meet() -> Option<Met> {
     };
     let now = Instant::ZERO;
     let mut relay = Relay::new(mission, identity, settings, 1, now).ok()?;
-    let mut hello = [0; MAX_FRAME];
-    let transmit = relay.poll_transmit(now, &mut hello)?;
-    let mut member = Member::greeted(hello.get(..transmit.len)?)?;
+    let mut handshake = [0; MAX_FRAME];
+    let transmit = relay.poll_transmit(now, &mut handshake)?;
+    let mut member = Member::greeted(handshake.get(..transmit.len)?)?;
     let header = Header {
         network: NETWORK,
         sender: 1,
         destination: 2,
     };
-    relay.handle_bytes(now, Port::Upstream, &stuffed(&member.hello(header)));
+    relay.handle_bytes(now, Port::Upstream, &stuffed(&member.handshake(header)));
     assert_eq!(relay.stats().rejected(), 0);
     Some(Met { relay, member })
 }
@@ -262,19 +262,21 @@ fn look_at(message: &Message) {
             assert!(answer.verdict.slacks.iter().all(|slack| slack.is_finite()));
             assert!(answer.stand.is_none_or(|x_m| (0.0..=1e6).contains(&x_m)));
         }
-        Message::Hail(hail) => assert!(hail.neighbour <= MAX_RELAYS, "{hail:?}"),
-        Message::Roster(roster) => {
+        Message::Hello(hello) => assert!(hello.neighbour <= MAX_RELAYS, "{hello:?}"),
+        Message::Proposal(proposal) => {
             let there = 1..=MAX_RELAYS;
-            assert!(there.contains(&roster.place), "{roster:?}");
-            assert!(there.contains(&roster.before.relays), "{roster:?}");
+            assert!(there.contains(&proposal.place), "{proposal:?}");
+            assert!(there.contains(&proposal.before.relays), "{proposal:?}");
         }
-        Message::Count(count) => {
+        Message::Decision(count) => {
             let there = 1..=MAX_RELAYS;
             assert!(there.contains(&count.place), "{count:?}");
             assert!(count.relays.is_none_or(|relays| there.contains(&relays)));
         }
         Message::Fence { fence, .. } => {
-            assert!(fence.tie != 0 && fence.x_m.abs() <= 1e7 && fence.target_m.abs() <= 1e7);
+            assert!(
+                fence.association != 0 && fence.x_m.abs() <= 1e7 && fence.target_m.abs() <= 1e7
+            );
         }
         Message::Offer(upload) => {
             let same = Mission::try_new(*upload.config()).is_ok();

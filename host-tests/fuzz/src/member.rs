@@ -1,6 +1,6 @@
-//! A neighbour that has the network's key: it says hello, and signs whatever it is to say, however mad.
+//! A neighbour that has the network's key: it says handshake, and signs whatever it is to say, however mad.
 //!
-//! Written from the format, not by the crate. A hello holds the relay's nonce and its neighbour's as far as it knows that, 8
+//! Written from the format, not by the crate. A handshake holds the relay's nonce and its neighbour's as far as it knows that, 8
 //! bytes each, the low byte first, and whether it asks for an answer.
 
 use blake2::Blake2sMac;
@@ -15,13 +15,13 @@ use super::setting::KEY;
 /// Flag: a tag follows the body.
 const SIGNED: u16 = 0x1000;
 
-/// Flag: the body is a hello.
+/// Flag: the body is a handshake.
 const HELLO: u16 = 0x2000;
 
 /// Bytes of a nonce.
 const NONCE: usize = 8;
 
-/// Bytes of a hello's body.
+/// Bytes of a handshake's body.
 const TOLD: usize = 2 * NONCE + 1;
 
 /// One neighbour of one relay.
@@ -36,13 +36,13 @@ pub struct Member {
 }
 
 impl Member {
-    /// A neighbour that has heard the relay's hello, if `frame`, as it was sent, is one.
+    /// A neighbour that has heard the relay's handshake, if `frame`, as it was sent, is one.
     pub fn greeted(frame: &[u8]) -> Option<Self> {
         let mut deframer = Deframer::new();
         let mut ended = None;
         for &byte in frame {
             if let Some(Ok(plain)) = deframer.push(byte) {
-                ended = hello_in(plain);
+                ended = handshake_in(plain);
             }
         }
         let body = ended.filter(|body| body.len() == TOLD)?;
@@ -88,8 +88,8 @@ impl Member {
         self.frame(header, SIGNED, &relay, body)
     }
 
-    /// Its hello, before COBS. It asks for nothing but the relay's, if it has not heard that yet.
-    pub fn hello(&mut self, header: Header) -> Vec<u8> {
+    /// Its handshake, before COBS. It asks for nothing but the relay's, if it has not heard that yet.
+    pub fn handshake(&mut self, header: Header) -> Vec<u8> {
         let asks = u8::from(self.relay.iter().all(|&byte| byte == 0));
         let body = [&*self.own, &*self.relay, &[asks]].concat();
         let to = self.relay.clone();
@@ -117,10 +117,12 @@ impl Member {
     }
 }
 
-/// The body of `plain`, if that is a hello.
-fn hello_in(plain: &[u8]) -> Option<Vec<u8>> {
-    let Opened { body, hello, .. } = frame::open(plain).ok()?;
-    hello.then(|| body.to_vec())
+/// The body of `plain`, if that is a handshake.
+fn handshake_in(plain: &[u8]) -> Option<Vec<u8>> {
+    let Opened {
+        body, handshake, ..
+    } = frame::open(plain).ok()?;
+    handshake.then(|| body.to_vec())
 }
 
 /// One more, the low byte first.

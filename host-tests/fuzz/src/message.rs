@@ -5,7 +5,7 @@
 mod offer;
 
 use uav_relay::wire::crc::Crc32c;
-use uav_relay::wire::digest::Stamp;
+use uav_relay::wire::digest::MissionId;
 
 use super::input::Input;
 
@@ -19,13 +19,13 @@ pub struct Known {
     /// Digest of the mission that it flies.
     pub flown: u16,
     /// The newest mission that it holds.
-    pub held: Stamp,
+    pub held: MissionId,
     /// Number of the view that it has agreed to.
     pub view: u16,
     /// Number of its current pass.
     pub number: u16,
     /// Number of the talk that its last fence was of, 0 for none.
-    pub tie: u16,
+    pub association: u16,
     /// D, m.
     pub distance_m: f32,
 }
@@ -94,8 +94,8 @@ pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
         7 => body.worth(),
         8 => body.token(),
         9 => body.moved(),
-        10 => body.hail(),
-        11 => body.roster(),
+        10 => body.hello(),
+        11 => body.proposal(),
         12 => body.count(),
         13 => body.fence(),
         14 => body.offer(),
@@ -328,20 +328,20 @@ impl Body<'_, '_> {
         self.sir();
     }
 
-    fn hail(&mut self) {
+    fn hello(&mut self) {
         self.view();
         self.digest();
         self.relay();
         self.word(0);
-        let Stamp { digest, version } = self.stamp();
+        let MissionId { digest, version } = self.mission_id();
         self.word(digest);
         self.word(version);
         self.small(0, 31);
     }
 
-    fn roster(&mut self) {
+    fn proposal(&mut self) {
         self.view();
-        let Stamp { digest, version } = self.stamp();
+        let MissionId { digest, version } = self.mission_id();
         self.word(digest);
         self.relay();
         self.relay();
@@ -352,7 +352,7 @@ impl Body<'_, '_> {
 
     fn count(&mut self) {
         self.view();
-        let Stamp { digest, version } = self.stamp();
+        let MissionId { digest, version } = self.mission_id();
         self.word(digest);
         self.relay();
         self.relay();
@@ -362,23 +362,23 @@ impl Body<'_, '_> {
     }
 
     /// The mission that the relay holds, the one that it was loaded with, one that is newer or older than the one held, or any.
-    fn stamp(&mut self) -> Stamp {
+    fn mission_id(&mut self) -> MissionId {
         let held = self.known.held;
         match self.input.byte() {
             0..128 => held,
-            128..192 => Stamp {
+            128..192 => MissionId {
                 version: 0,
                 digest: self.known.digest,
             },
-            192..216 => Stamp {
+            192..216 => MissionId {
                 version: held.version.wrapping_add(1),
                 ..held
             },
-            216..240 => Stamp {
+            216..240 => MissionId {
                 version: held.version.saturating_sub(1),
                 ..held
             },
-            _ => Stamp {
+            _ => MissionId {
                 version: self.input.word(),
                 digest: self.input.word(),
             },
@@ -386,9 +386,9 @@ impl Body<'_, '_> {
     }
 
     fn fence(&mut self) {
-        self.tie();
+        self.association();
         self.digest();
-        self.tie();
+        self.association();
         self.relay();
         let distance_m = self.known.distance_m;
         for _ in 0..2 {
@@ -397,10 +397,10 @@ impl Body<'_, '_> {
     }
 
     /// The number of the relay's own talk on that side, a small one, or any.
-    fn tie(&mut self) {
+    fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),
-            96..192 => self.known.tie,
+            96..192 => self.known.association,
             _ => self.input.word(),
         };
         self.word(word);

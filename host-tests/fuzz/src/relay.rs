@@ -2,7 +2,7 @@
 
 mod addresses;
 
-use uav_relay::wire::digest::{Stamp, digest};
+use uav_relay::wire::digest::{MissionId, digest};
 use uav_relay::wire::frame::MAX_DECODED;
 use uav_relay::{Duration, Instant, Mission, Placement, Port, Sample, Side, Stats, Upload, Wiring};
 
@@ -107,12 +107,12 @@ impl Bench {
         })
     }
 
-    /// The neighbours of a relay that asks for tags take its hellos, and greet it.
+    /// The neighbours of a relay that asks for tags take its handshakes, and greet it.
     fn greet(&mut self) {
         let (sent, _) = self.watched.settle(self.now);
         for side in [0, 1] {
             let there = [self.index > 1, self.index < self.mission.relays()];
-            // Hellos come first, to upstream before downstream.
+            // Handshakes come first, to upstream before downstream.
             let place = usize::from(side == 1 && there == [true; 2]);
             let heard = sent.get(place).filter(|_| there.get(side) == Some(&true));
             let member = heard.and_then(|frame| Member::greeted(&frame.bytes));
@@ -128,15 +128,15 @@ impl Bench {
         if !signs || (1..=self.mission.relays()).contains(&header.sender) {
             return None;
         }
-        let hello = stuffed(&Member::unknown().hello(header));
-        self.watched.bytes(self.now, port, &hello);
+        let handshake = stuffed(&Member::unknown().handshake(header));
+        self.watched.bytes(self.now, port, &handshake);
         let (sent, _) = self.watched.settle(self.now);
         let heard = sent.last().and_then(|frame| Member::greeted(&frame.bytes));
         // What it has said was of another life.
         heard.map(|member| member.restarted())
     }
 
-    /// `member` is the neighbour at `side` from now on, and says hello.
+    /// `member` is the neighbour at `side` from now on, and says handshake.
     fn introduce(&mut self, side: usize, member: Option<Member>) {
         let Some(place) = self.members.get_mut(side) else {
             return;
@@ -144,12 +144,12 @@ impl Bench {
         *place = member;
         if let Some(member) = place {
             let (header, port) = from(self.index, side, self.wiring);
-            let hello = stuffed(&member.hello(header));
+            let handshake = stuffed(&member.handshake(header));
             let refused = refusals(self.watched.relay().stats());
             self.watched.bytes(self.now, port, &[0]);
-            self.watched.bytes(self.now, port, &hello);
+            self.watched.bytes(self.now, port, &handshake);
             let stats = self.watched.relay().stats();
-            assert_eq!(refusals(stats), refused, "a hello that is refused");
+            assert_eq!(refusals(stats), refused, "a handshake that is refused");
             self.settle();
         }
     }
@@ -179,12 +179,12 @@ impl Bench {
         }
     }
 
-    /// Any bytes. There may be a recorded hello among them, of neighbours in another life: those that there were are strangers
+    /// Any bytes. There may be a recorded handshake among them, of neighbours in another life: those that there were are strangers
     /// from then on.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
-        let before = self.watched.relay().stats().hellos;
+        let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);
-        if self.watched.relay().stats().hellos > before {
+        if self.watched.relay().stats().handshakes > before {
             self.members = [None, None];
         }
     }
@@ -263,7 +263,7 @@ impl Bench {
             held: self.held(),
             view: self.watched.relay().view(),
             number: self.watched.number(),
-            tie: self.watched.tie(),
+            association: self.watched.association(),
             distance_m: self.mission.config().distance_m,
         };
         let body = body(input, &known);
@@ -296,12 +296,12 @@ impl Bench {
     }
 
     /// The newest mission that it holds.
-    fn held(&self) -> Stamp {
-        let loaded = Stamp {
+    fn held(&self) -> MissionId {
+        let loaded = MissionId {
             version: 0,
             digest: digest(&self.mission),
         };
-        self.watched.relay().upload().map_or(loaded, Upload::stamp)
+        self.watched.relay().upload().map_or(loaded, Upload::id)
     }
 
     /// A frame arrives; `None` where nobody listens.
@@ -348,7 +348,7 @@ impl Bench {
             }
             11 => (header.unsigned(body), Fate::Unsigned),
             12 => (member.stranger().signed(header, body), Fate::Forged),
-            // Switched on anew, and without a hello since.
+            // Switched on anew, and without a handshake since.
             13 => (member.restarted().signed(header, body), Fate::Forged),
             14 => {
                 let mut member = member.restarted();

@@ -1,7 +1,7 @@
 //! A mission and the settings of a relay, from a fuzzer's bytes: within the ranges the crate takes, up to their ends.
 
 use uav_relay::channel::AirGround;
-use uav_relay::guard::confines::Confines;
+use uav_relay::guard::config::GuardConfig;
 use uav_relay::wire::auth::{Auth, Key};
 use uav_relay::{
     Adjust, Band, Channel, Duration, Field, FieldPoint, Interference, Interferer, Local, Measure,
@@ -194,10 +194,10 @@ pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Se
         power_w: input.scaled(1e-6, 1e6),
     });
     let measures = own / 16 % 2 == 1 && mission.field().is_some();
-    let guard = (own / 32 == 1).then(|| Confines {
+    let guard = (own / 32 == 1).then(|| GuardConfig {
         hover_m: f32::from(input.below(4)),
         lag: Duration::from_millis(u64::from(input.byte())),
-        ..Confines::of(mission, profile.unwrap_or(mission.config().common))
+        ..GuardConfig::of(mission, profile.unwrap_or(mission.config().common))
     });
     Settings {
         profile,

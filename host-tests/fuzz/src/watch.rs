@@ -3,7 +3,7 @@
 
 mod number;
 
-use uav_relay::guard::confines::Confines;
+use uav_relay::guard::config::GuardConfig;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, MAX_FRAME};
 use uav_relay::wire::message::Message;
@@ -18,7 +18,7 @@ use super::heap;
 use number::number_of;
 
 /// Frames that a relay can owe at once: a pass or what came of one, a sign that it is busy; to either side a heartbeat, four
-/// hails, a fence, an offer and a hail to the ground; a hello to each of the eight nodes that it remembers.
+/// hellos, a fence, an offer and a hello to the ground; a handshake to each of the eight nodes that it remembers.
 const MOST_FRAMES: usize = 2 + 2 * (1 + 4 + 1 + 2) + 8;
 
 /// Events that can be pending at once.
@@ -65,7 +65,7 @@ pub struct Watched {
     /// Number of the last pass it has said anything of.
     number: u16,
     /// Number of the talk that its last fence was of.
-    tie: u16,
+    association: u16,
     /// View and number of the pass that its place is from, as far as that is known.
     held: Option<(u16, u16)>,
     /// What it flew when it was looked at last.
@@ -98,7 +98,7 @@ impl Watched {
             sent: 0,
             begun: [0; 3],
             number: 0,
-            tie: 0,
+            association: 0,
             held: None,
             flown: *mission.config(),
         })
@@ -120,8 +120,8 @@ impl Watched {
     }
 
     /// Number of the talk that its last fence was of, 0 for none.
-    pub const fn tie(&self) -> u16 {
-        self.tie
+    pub const fn association(&self) -> u16 {
+        self.association
     }
 
     /// View and number of the pass that the place it has agreed to is from; `None` where a guard leads it there, too.
@@ -266,7 +266,7 @@ impl Watched {
             };
             let there = all.contains(&header.destination);
             assert!(there, "{header:?} to nobody");
-            if opened.hello {
+            if opened.handshake {
                 continue;
             }
             let Ok(message) = Message::decode(opened.body) else {
@@ -278,7 +278,7 @@ impl Watched {
             }
             self.number = number_of(&message).unwrap_or(self.number);
             if let Message::Fence { fence, .. } = &message {
-                self.tie = fence.tie;
+                self.association = fence.association;
             }
         }
         assert_eq!(frames, 1, "{bytes:?}");
@@ -325,7 +325,7 @@ impl Watched {
             assert!(!told, "told to fly nowhere");
             return;
         };
-        if let Some(Confines { fence, .. }) = self.settings.guard {
+        if let Some(GuardConfig { fence, .. }) = self.settings.guard {
             let x = fence.least_x_m..=fence.most_x_m;
             let y = fence.least_y_m..=fence.most_y_m;
             let altitude = fence.least_altitude_m..=fence.most_altitude_m;

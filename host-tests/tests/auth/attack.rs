@@ -118,8 +118,8 @@ fn under_attack(wiring: Wiring, count: u64) {
         let (stats, calm) = (net.stats(index), calm.stats(index));
         assert_eq!(stats.received, net.genuine[usize::from(index) - 1]);
         assert_eq!(
-            (stats.received, stats.hellos, stats.sent),
-            (calm.received, calm.hellos, calm.sent)
+            (stats.received, stats.handshakes, stats.sent),
+            (calm.received, calm.handshakes, calm.sent)
         );
         assert_eq!(stats.malformed, 0, "only what is authentic is read");
     }

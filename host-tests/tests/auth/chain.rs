@@ -29,7 +29,7 @@ fn signed(mut setup: Setup) -> Setup {
 }
 
 #[test]
-fn places_are_the_same_and_only_hellos_are_added() {
+fn places_are_the_same_and_only_handshakes_are_added() {
     for relays in [1, 2, 3, 8, 50, 200] {
         for setup in [
             Setup::new(mission(relays)),
@@ -51,14 +51,14 @@ fn places_are_the_same_and_only_hellos_are_added() {
                 sum(|stats| stats.forged + stats.replayed + stats.unsigned),
                 0
             );
-            let hellos = outcome.messages - 2 * links;
+            let handshakes = outcome.messages - 2 * links;
             println!(
-                "N = {relays}: {hellos} hellos, {} bytes after {}",
+                "N = {relays}: {handshakes} handshakes, {} bytes after {}",
                 outcome.bytes, plain.bytes
             );
-            assert!(sum(|stats| stats.hellos) <= hellos);
+            assert!(sum(|stats| stats.handshakes) <= handshakes);
             // Three make a link known at both ends; two that cross take four, and the head has something to say before that.
-            assert!((3 * links..=4 * links + 3).contains(&hellos));
+            assert!((3 * links..=4 * links + 3).contains(&handshakes));
         }
     }
 }

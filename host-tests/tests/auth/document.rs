@@ -2,7 +2,7 @@
 
 use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings};
 
-use super::frames::{Plain, SIGNED, hello, nonce, plain};
+use super::frames::{Plain, SIGNED, handshake, nonce, plain};
 use super::net::{NETWORK, mission};
 
 const DOCUMENT: &str = include_str!("../../../src/wire/FORMAT.md");
@@ -44,12 +44,12 @@ fn the_worked_frames_are_what_the_rules_say() {
     heartbeat.0.extend([3, 0x3C, 0x5A, 1]);
     let frames = [
         (
-            "a hello",
-            hello((NETWORK, 1, 2), 0, [a, 0], true).signed(&key(), [a, 0]),
+            "a handshake",
+            handshake((NETWORK, 1, 2), 0, [a, 0], true).signed(&key(), [a, 0]),
         ),
         (
             "its answer",
-            hello((NETWORK, 2, 1), 0, [b, a], true).signed(&key(), [b, a]),
+            handshake((NETWORK, 2, 1), 0, [b, a], true).signed(&key(), [b, a]),
         ),
         ("a heartbeat with a tag", heartbeat.signed(&key(), [a, b])),
     ];
@@ -63,7 +63,7 @@ fn the_worked_frames_are_what_the_rules_say() {
 
 /// And they are what relays take: relay 2 of 3, which greets relay 1 first, has its first nonce there and not its second.
 #[test]
-fn the_worked_hello_is_taken_and_the_crate_makes_the_same_tags() {
+fn the_worked_handshake_is_taken_and_the_crate_makes_the_same_tags() {
     let settings = Settings {
         auth: Some(Auth {
             key: Key::new(key()),
@@ -76,9 +76,9 @@ fn the_worked_hello_is_taken_and_the_crate_makes_the_same_tags() {
         index: 2,
     };
     let mut relay = Relay::new(mission(3), identity, settings, 1, Instant::ZERO).unwrap();
-    let (_, wire) = worked("a hello");
+    let (_, wire) = worked("a handshake");
     relay.handle_bytes(Instant::ZERO, Port::Upstream, &wire);
-    assert_eq!(relay.stats().hellos, 1);
+    assert_eq!(relay.stats().handshakes, 1);
     let (table, _) = worked("a heartbeat with a tag");
     let (signed, tag) = table.split_at(table.len() - 8);
     assert_eq!(Key::new(key()).tag(nonce(5, 1), nonce(9, 2), signed), tag);
@@ -87,7 +87,7 @@ fn the_worked_hello_is_taken_and_the_crate_makes_the_same_tags() {
 /// The lengths that the document names.
 #[test]
 fn the_lengths_of_the_document_are_those_of_the_crate() {
-    let (table, wire) = worked("a hello");
+    let (table, wire) = worked("a handshake");
     assert_eq!((table.len(), wire.len()), (10 + 17 + 8, 41));
     assert_eq!(uav_relay::wire::frame::MAX_DECODED, 110);
     assert_eq!(uav_relay::wire::frame::MAX_FRAME, 112);

@@ -4,7 +4,7 @@ use uav_relay::settings::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings, Stats, Wiring};
 
-use super::frames::{Plain, SIGNED, hello, nonce, plain};
+use super::frames::{Plain, SIGNED, handshake, nonce, plain};
 use super::kinds::raised;
 use super::net::{KEY, NETWORK, mission, relay};
 
@@ -30,7 +30,7 @@ impl Link {
         let nonces = [nonce(9, 1), own.unwrap()];
         assert_eq!(nonces[1], nonce(4, 1), "the first link of epoch 4");
         let mut link = Self { relay, nonces };
-        assert_eq!(link.hello(0, nonces), Some("hellos"));
+        assert_eq!(link.handshake(0, nonces), Some("handshakes"));
         link
     }
 
@@ -40,9 +40,9 @@ impl Link {
         raised(&before, self.relay.stats())
     }
 
-    fn hello(&mut self, counter: u32, nonces: [u64; 2]) -> Option<&'static str> {
-        let hello = hello((NETWORK, 1, 2), counter, nonces, false);
-        self.give(&hello.signed(&KEY, nonces))
+    fn handshake(&mut self, counter: u32, nonces: [u64; 2]) -> Option<&'static str> {
+        let handshake = handshake((NETWORK, 1, 2), counter, nonces, false);
+        self.give(&handshake.signed(&KEY, nonces))
     }
 
     /// A heartbeat with this counter.
@@ -82,17 +82,17 @@ fn the_last_counter_is_never_taken_and_nothing_comes_after() {
     assert_eq!(link.say(0), Some("replayed"));
     // A new session begins from 0.
     link.nonces[0] = nonce(10, 1);
-    assert_eq!(link.hello(0, link.nonces), Some("hellos"));
+    assert_eq!(link.handshake(0, link.nonces), Some("handshakes"));
     assert_eq!(link.say(1), Some("received"));
 }
 
 #[test]
-fn a_hello_counts_its_counter_too() {
+fn a_handshake_counts_its_counter_too() {
     let mut link = Link::new();
     assert_eq!(link.say(0), Some("replayed"));
     assert_eq!(link.say(7), Some("received"));
-    assert_eq!(link.hello(7, link.nonces), Some("replayed"));
-    assert_eq!(link.hello(8, link.nonces), Some("hellos"));
+    assert_eq!(link.handshake(7, link.nonces), Some("replayed"));
+    assert_eq!(link.handshake(8, link.nonces), Some("handshakes"));
 }
 
 #[test]
@@ -100,16 +100,20 @@ fn nonces_only_rise() {
     let mut link = Link::new();
     let own = link.nonces[1];
     for (theirs, raises) in [
-        (nonce(9, 2), "hellos"),
+        (nonce(9, 2), "handshakes"),
         (nonce(9, 1), "replayed"),
         (nonce(8, u32::MAX), "replayed"),
-        (nonce(10, 0), "hellos"),
+        (nonce(10, 0), "handshakes"),
         (nonce(9, u32::MAX), "replayed"),
-        (nonce(u32::MAX, u32::MAX), "hellos"),
+        (nonce(u32::MAX, u32::MAX), "handshakes"),
     ] {
-        assert_eq!(link.hello(3, [theirs, own]), Some(raises), "{theirs:#x}");
+        assert_eq!(
+            link.handshake(3, [theirs, own]),
+            Some(raises),
+            "{theirs:#x}"
+        );
     }
-    assert_eq!(link.hello(4, [0, own]), Some("forged"), "0 is nobody's");
+    assert_eq!(link.handshake(4, [0, own]), Some("forged"), "0 is nobody's");
 }
 
 #[test]
@@ -139,7 +143,7 @@ fn an_epoch_used_twice_is_no_fresh_start() {
         assert_eq!(link.say(counter), Some("received"));
     }
     // The same epoch, and so the same nonce: the counter begins again.
-    assert_eq!(link.hello(0, link.nonces), Some("replayed"));
+    assert_eq!(link.handshake(0, link.nonces), Some("replayed"));
     assert_eq!(link.say(1), Some("replayed"));
     assert_eq!(link.say(101), Some("received"));
     // Relay 2 is switched on again with the epoch it had: frame 50 was taken, and is again.

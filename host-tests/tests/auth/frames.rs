@@ -67,11 +67,11 @@ impl Plain {
         u32::from_le_bytes(self.0[6..10].try_into().unwrap())
     }
 
-    pub(crate) fn is_hello(&self) -> bool {
+    pub(crate) fn is_handshake(&self) -> bool {
         self.flags() == SIGNED | HELLO
     }
 
-    /// The nonces in a hello: its sender's, its receiver's.
+    /// The nonces in a handshake: its sender's, its receiver's.
     pub(crate) fn nonces(&self) -> [u64; 2] {
         [10, 18].map(|at| u64::from_le_bytes(self.0[at..at + 8].try_into().unwrap()))
     }
@@ -102,20 +102,20 @@ pub(crate) fn tag(key: &[u8; 32], nonces: [u64; 2], signed: &[u8]) -> [u8; TAG] 
     mac.finalize_fixed().into()
 }
 
-/// A hello as a relay would write it.
-pub(crate) fn hello(
+/// A handshake as a relay would write it.
+pub(crate) fn handshake(
     addresses: (u16, u16, u16),
     counter: u32,
     nonces: [u64; 2],
     asks: bool,
 ) -> Plain {
     let (network, from, to) = addresses;
-    let mut hello = Plain::new(network, from, to, SIGNED | HELLO, counter);
+    let mut handshake = Plain::new(network, from, to, SIGNED | HELLO, counter);
     for nonce in nonces {
-        hello.0.extend(nonce.to_le_bytes());
+        handshake.0.extend(nonce.to_le_bytes());
     }
-    hello.0.push(asks.into());
-    hello
+    handshake.0.push(asks.into());
+    handshake
 }
 
 /// The epoch of a nonce in the upper half, how many links were begun before in the lower.

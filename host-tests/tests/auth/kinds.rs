@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::{Port, Stats};
 use uav_relay_oracle::random::seed;
 
-use super::frames::{HEADER, HELLO, Plain, SIGNED, TAG, hello, nonce, plain};
+use super::frames::{HEADER, HELLO, Plain, SIGNED, TAG, handshake, nonce, plain};
 use super::net::{Heard, NETWORK, Net};
 
 /// A way to get a frame taken.
@@ -27,9 +27,9 @@ pub(crate) enum Kind {
     RandomTag,
     /// Signed properly, by another key.
     OtherKey,
-    /// A hello by another key, with a larger epoch.
-    ForgedHello,
-    RecordedHello,
+    /// A handshake by another key, with a larger epoch.
+    ForgedHandshake,
+    RecordedHandshake,
     /// Random bytes.
     Noise,
     /// A valid message of any kind, without a tag.
@@ -57,8 +57,8 @@ pub(crate) const KINDS: [Kind; 18] = [
     Kind::Truncated,
     Kind::RandomTag,
     Kind::OtherKey,
-    Kind::ForgedHello,
-    Kind::RecordedHello,
+    Kind::ForgedHandshake,
+    Kind::RecordedHandshake,
     Kind::Noise,
     Kind::Bare,
     Kind::Dressed,
@@ -91,7 +91,7 @@ pub(crate) struct Attack {
 pub(crate) fn counters(stats: &Stats) -> [(&'static str, u32); 12] {
     [
         ("received", stats.received),
-        ("hellos", stats.hellos),
+        ("handshakes", stats.handshakes),
         ("overheard", stats.overheard),
         ("oversized", stats.oversized),
         ("truncated", stats.truncated),
@@ -231,13 +231,13 @@ impl Attacker {
         let (from, to) = (*from, *to);
         let now = (net.life(from), net.life(to));
         let recorded = plain(wire);
-        let is_hello = recorded.is_hello();
+        let is_handshake = recorded.is_handshake();
         let frame = match kind {
             Kind::Replayed | Kind::FromBefore | Kind::OfferReplayed | Kind::OfferFromBefore => {
                 let since = matches!(kind, Kind::Replayed | Kind::OfferReplayed);
                 let fits = since == (*lives == now);
                 // What is still under way has not been taken there.
-                let usable = fits && !is_hello && net.has_arrived(heard);
+                let usable = fits && !is_handshake && net.has_arrived(heard);
                 let raises = if net.is_of_now(heard) {
                     "replayed"
                 } else {
@@ -245,8 +245,8 @@ impl Attacker {
                 };
                 return usable.then_some((recorded, raises));
             }
-            Kind::RecordedHello => {
-                let usable = is_hello && net.is_proven(from, to) && net.has_arrived(heard);
+            Kind::RecordedHandshake => {
+                let usable = is_handshake && net.is_proven(from, to) && net.has_arrived(heard);
                 return usable.then_some((recorded, "replayed"));
             }
             Kind::Flipped => self.flipped(recorded),
@@ -275,11 +275,11 @@ impl Attacker {
                 frame.0.extend(body);
                 frame.signed(&self.rng.random(), [nonce(now.0, 1), nonce(now.1, 1)])
             }
-            Kind::ForgedHello => {
+            Kind::ForgedHandshake => {
                 let epoch = now.0 + self.rng.random_range(0..3);
                 let nonces = [nonce(epoch, self.rng.random_range(0..9)), nonce(now.1, 1)];
                 let asks = self.rng.random();
-                hello((NETWORK, from, to), self.counter(&recorded), nonces, asks)
+                handshake((NETWORK, from, to), self.counter(&recorded), nonces, asks)
                     .signed(&self.rng.random(), nonces)
             }
             Kind::Bare | Kind::Dressed => {

@@ -16,7 +16,7 @@ mod chain;
 mod document;
 mod edges;
 mod frames;
-mod hellos;
+mod handshakes;
 mod kinds;
 mod net;
 mod offers;

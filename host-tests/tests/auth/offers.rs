@@ -14,7 +14,7 @@ use super::net::{Deed, Heard, NETWORK, Net, mission, newer};
 const OFFER: u8 = 14;
 
 pub(crate) fn is_offer(frame: &Plain) -> bool {
-    !frame.is_hello() && frame.0.get(HEADER) == Some(&OFFER)
+    !frame.is_handshake() && frame.0.get(HEADER) == Some(&OFFER)
 }
 
 /// The body of an offer of a mission that is none of those that were uploaded.

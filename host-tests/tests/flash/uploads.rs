@@ -37,7 +37,7 @@ impl Flash {
         let at = current(found);
         let newest = found[at].newest?;
         let held = upload(&self.0[at][newest.record], block).unwrap();
-        assert_eq!(held.stamp(), newest.stamp);
+        assert_eq!(held.id(), newest.mission_id);
         Some(held.version())
     }
 

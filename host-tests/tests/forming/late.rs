@@ -43,13 +43,13 @@ fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
 
 /// A call for a view that is held up until a newer one is in force changes nothing.
 #[test]
-fn a_roster_of_an_old_view_changes_nothing() {
+fn a_proposal_of_an_old_view_changes_nothing() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
     chain.until(5_000, Chain::holds).unwrap();
     chain.reboot(1, 3);
     let calls = |chain: &Chain| {
         let mut flying = chain.flying.iter();
-        flying.any(|frame| frame.to == 2 && frame.is(|m| matches!(m, Message::Roster(_))))
+        flying.any(|frame| frame.to == 2 && frame.is(|m| matches!(m, Message::Proposal(_))))
     };
     chain.until(10_000, calls).unwrap();
     // Lost on its way, it is sent again; and the relay before is rebooted once more, for a second view.

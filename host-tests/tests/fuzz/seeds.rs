@@ -170,12 +170,20 @@ fn offer(side: u8) -> Vec<u8> {
 /// it, too, and they are counted in a view that flies it.
 fn uploaded(how: u8) -> Vec<u8> {
     let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
-    let hail = [9, 1, 10, 0, 0, 2, 0, 0, 0];
+    let hello = [9, 1, 10, 0, 0, 2, 0, 0, 0];
     // The next view, of the mission held: from the first place, after view 0 of four with its leader; back from the third.
-    let roster = [9, 0, 11, 1, 0, 1, 4, 0, 1, 0];
+    let proposal = [9, 0, 11, 1, 0, 1, 4, 0, 1, 0];
     let count = [9, 1, 12, 1, 0, 3, 4, 0];
     let wake = [3, 3];
-    let parts = [&head[..], &offer(0), &wake, &hail, &roster, &count, &wake];
+    let parts = [
+        &head[..],
+        &offer(0),
+        &wake,
+        &hello,
+        &proposal,
+        &count,
+        &wake,
+    ];
     parts.concat()
 }
 
@@ -194,12 +202,12 @@ fn formed(wiring: u8) -> Vec<u8> {
     let head = [0, 3, 0, 3, wiring, 32, 0, 0, 0, 0, 0, 1, 0];
     let position = [15, 0, 0, 0, 100, 0, 0, 20];
     // The view after its own, a good digest, the third place of four in view 0, whose leader is there.
-    let roster = [9, 0, 11, 1, 0, 3, 4, 224, 0, 1];
-    let hail = [9, 0, 10, 1, 0, 3, 0, 5];
+    let proposal = [9, 0, 11, 1, 0, 3, 4, 224, 0, 1];
+    let hello = [9, 0, 10, 1, 0, 3, 0, 5];
     let fence = [9, 0, 13, 7, 0, 100, 0, 0, 0, 128, 0, 0, 128];
     let late = [9, 0, 0, 0, 241, 0, 0, 64, 0, 128, 0, 0, 0, 0, 0];
     let far = [9, 46, 10, 1, 0, 4, 0, 9, 3, 8, 9, 46, 10, 1, 0, 4, 0, 9];
-    let parts = [&head[..], &position, &roster, &hail, &roster, &fence];
+    let parts = [&head[..], &position, &proposal, &hello, &proposal, &fence];
     [&parts.concat()[..], &position, &late, &far, &[3, 60]].concat()
 }
 

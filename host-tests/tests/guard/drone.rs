@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::guard::Guard;
-use uav_relay::guard::confines::Confines;
+use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Instant, Placement, Side};
 
 pub(crate) fn instant(at_s: f64) -> Instant {
@@ -86,7 +86,7 @@ impl Drone {
     /// Switches the guard on: it begins with the neighbours of the mission and hears at once who is linked to it now.
     pub(crate) fn boot(
         &mut self,
-        confines: Confines,
+        confines: GuardConfig,
         mission: [Option<usize>; 2],
         seed: u32,
         now_s: f64,
@@ -139,7 +139,7 @@ impl Drone {
     }
 
     /// Has the guard move the setpoint, and the flight controller hear of it soon.
-    pub(crate) fn steer(&mut self, rng: &mut ChaCha8Rng, confines: &Confines, now_s: f64) {
+    pub(crate) fn steer(&mut self, rng: &mut ChaCha8Rng, confines: &GuardConfig, now_s: f64) {
         let Some(guard) = &mut self.guard else {
             return;
         };

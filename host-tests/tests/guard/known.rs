@@ -1,7 +1,7 @@
 //! A chain that is as tight as it can be shifts at once, and how long that takes.
 
-use uav_relay::guard::Hindrance;
-use uav_relay::guard::confines::{Confines, Geofence};
+use uav_relay::guard::HoldReason;
+use uav_relay::guard::config::{Geofence, GuardConfig};
 use uav_relay::{Duration, Side};
 
 use crate::drone::{Point, place, way};
@@ -10,7 +10,7 @@ use crate::world::World;
 const SPEED: f64 = 10.0;
 
 fn world(relays: usize, from_m: f64, step_m: f64) -> World {
-    let confines = Confines {
+    let confines = GuardConfig {
         fence: Geofence {
             least_x_m: 0.0,
             most_x_m: 1000.0,
@@ -106,7 +106,7 @@ fn places_too_close_are_approached() {
         assert!(dy.hypot(dh) < 0.1, "across the line is free: {ends:?}");
     }
     let close = |k: usize, side| {
-        world.drones[k].guard.as_ref().unwrap().hindrance(side) == Some(Hindrance::Close)
+        world.drones[k].guard.as_ref().unwrap().hold_reason(side) == Some(HoldReason::Close)
     };
     let seen: Vec<[bool; 2]> = (0..5)
         .map(|k| [close(k, Side::Upstream), close(k, Side::Downstream)])

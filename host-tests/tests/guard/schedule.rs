@@ -17,7 +17,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::guard::confines::{Confines, Geofence};
+use uav_relay::guard::config::{Geofence, GuardConfig};
 use uav_relay::{Duration, Side};
 
 use crate::drone::{Board, Point, length, place, way};
@@ -70,7 +70,7 @@ pub(crate) fn fly(seed: u64) -> Report {
     report
 }
 
-fn confines(rng: &mut ChaCha8Rng) -> Confines {
+fn confines(rng: &mut ChaCha8Rng) -> GuardConfig {
     let separation = if rng.random_bool(0.05) {
         0.0
     } else {
@@ -81,7 +81,7 @@ fn confines(rng: &mut ChaCha8Rng) -> Confines {
     } else {
         separation * rng.random_range(0.0..=0.05)
     };
-    Confines {
+    GuardConfig {
         fence: Geofence {
             least_x_m: 0.0,
             most_x_m: 0.0,
@@ -97,7 +97,11 @@ fn confines(rng: &mut ChaCha8Rng) -> Confines {
 }
 
 /// How long the line is, and where everybody begins.
-fn line(rng: &mut ChaCha8Rng, mut confines: Confines, relays: usize) -> (Confines, Vec<Point>) {
+fn line(
+    rng: &mut ChaCha8Rng,
+    mut confines: GuardConfig,
+    relays: usize,
+) -> (GuardConfig, Vec<Point>) {
     let taken = f64::from(confines.separation_m) * relays as f64;
     let distance = if rng.random_bool(0.4) {
         taken * rng.random_range(1.001..=1.5)
@@ -110,7 +114,7 @@ fn line(rng: &mut ChaCha8Rng, mut confines: Confines, relays: usize) -> (Confine
 }
 
 /// Places in order, the separation apart.
-fn places(rng: &mut ChaCha8Rng, confines: &Confines, relays: usize) -> Vec<Point> {
+fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize) -> Vec<Point> {
     let distance = f64::from(confines.fence.most_x_m);
     let step = f64::from(confines.separation_m) + 5e-7 * distance;
     let slack = distance - step * (relays - 1) as f64;

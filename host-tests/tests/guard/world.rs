@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Side;
-use uav_relay::guard::confines::Confines;
+use uav_relay::guard::config::GuardConfig;
 
 use crate::drone::{Board, Drone, Point, along, length, node, way};
 use crate::medium::{Faults, Medium};
@@ -16,7 +16,7 @@ pub(crate) struct World {
     pub(crate) seed: u64,
     pub(crate) rng: ChaCha8Rng,
     pub(crate) now_s: f64,
-    pub(crate) confines: Confines,
+    pub(crate) confines: GuardConfig,
     pub(crate) drones: Vec<Drone>,
     medium: Medium,
     pub(crate) faults: Faults,
@@ -27,7 +27,7 @@ pub(crate) struct World {
 }
 
 impl World {
-    pub(crate) fn new(seed: u64, confines: Confines, starts: &[Point]) -> Self {
+    pub(crate) fn new(seed: u64, confines: GuardConfig, starts: &[Point]) -> Self {
         let links = |k| beside(k, starts.len());
         let mut world = Self {
             seed,

@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::guard::confines::Confines;
+use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Duration, MissionConfig};
 use uav_relay_sim::simulator::chain::FlightSpec;
 use uav_relay_sim::simulator::faults::Faults;
@@ -38,7 +38,7 @@ fn guarded(rng: &mut ChaCha8Rng) -> Setup {
     };
     let mission = Mission::try_new(config).unwrap();
     let mut setup = Setup::on_shared_channel(mission);
-    setup.settings.guard = Some(Confines::of(&mission, config.common));
+    setup.settings.guard = Some(GuardConfig::of(&mission, config.common));
     setup.flight = Some(flight(rng));
     setup.seed = rng.random();
     setup

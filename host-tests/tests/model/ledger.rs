@@ -9,7 +9,7 @@ use super::scenario::Scenario;
 use super::seal::{Taken, refused, taken};
 use super::wires::{Ended, Flying};
 
-/// The most frames that one drain may give: a pass or what came of one, "busy", and to each side a sign of life and a hail.
+/// The most frames that one drain may give: a pass or what came of one, "busy", and to each side a sign of life and a hello.
 pub(crate) const MOST_FRAMES: u32 = 6;
 
 /// One relay, by what it has said since it was switched on.

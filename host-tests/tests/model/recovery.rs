@@ -58,7 +58,7 @@ impl World<'_> {
         let hop_us = self.scenario.settings[0].hop_time.as_micros();
         let hops = 1..self.relays.len() as u64;
         let waits: u64 = hops.map(|hops| (2 * hops + 2) * hop_us * 9 / 8).sum();
-        // Where hellos were lost too, they are said again when there has been silence for long enough.
+        // Where handshakes were lost too, they are said again when there has been silence for long enough.
         let greets = if self.scenario.signs() { 2 } else { 0 };
         let quiet_us = self.scenario.settings[0].quiet.as_micros();
         let silence_us = greets * quiet_us + 2 * self.a_call().as_micros();

@@ -28,7 +28,7 @@ pub(crate) struct Taken {
 
 /// Frames that have counted.
 pub(crate) fn taken(stats: &Stats) -> u32 {
-    stats.received + stats.hellos
+    stats.received + stats.handshakes
 }
 
 /// Frames that were no member's, or not new.
@@ -36,12 +36,12 @@ pub(crate) fn refused(stats: &Stats) -> u32 {
     stats.forged + stats.replayed
 }
 
-/// The epoch of the receiver that a hello tells, if `wire` is one: all of it, or the upper half of a nonce.
-fn hello(wire: &[u8]) -> Option<Vec<u8>> {
+/// The epoch of the receiver that a handshake tells, if `wire` is one: all of it, or the upper half of a nonce.
+fn handshake(wire: &[u8]) -> Option<Vec<u8>> {
     let mut deframer = Deframer::new();
     for &byte in wire {
         if let Some(Ok(plain)) = deframer.push(byte) {
-            let opened = frame::open(plain).ok().filter(|opened| opened.hello)?;
+            let opened = frame::open(plain).ok().filter(|opened| opened.handshake)?;
             return Some(opened.body.to_vec());
         }
     }
@@ -57,9 +57,9 @@ impl Taken {
         seal: Seal,
         epoch: u32,
     ) -> Checked<bool> {
-        let hello = hello(wire);
+        let handshake = handshake(wire);
         prop_assert!(
-            hello.is_some() || seal.to == epoch,
+            handshake.is_some() || seal.to == epoch,
             "a frame to epoch {} is taken in {epoch}",
             seal.to
         );
@@ -72,8 +72,8 @@ impl Taken {
         self.newest[side] = seal.from;
         let is_new = self.frames[side].insert((seal.from, wire.to_vec()));
         prop_assert!(is_new, "a frame is taken twice");
-        // A hello that shows another nonce, or none, may have been recorded.
-        let told = hello.as_ref().and_then(|body| body.get(12..16));
+        // A handshake that shows another nonce, or none, may have been recorded.
+        let told = handshake.as_ref().and_then(|body| body.get(12..16));
         Ok(told.is_none_or(|told| told == epoch.to_le_bytes()))
     }
 }

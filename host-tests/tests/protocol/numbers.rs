@@ -42,7 +42,8 @@ fn calls(relay: &mut Relay, now: Instant) -> bool {
     relay.handle_timeout(later);
     said.extend(drain(relay, later));
     said.iter().any(|(port, message, _)| {
-        *port == Port::Upstream && matches!(message, Message::Hail(hail) if hail.form && hail.ask)
+        *port == Port::Upstream
+            && matches!(message, Message::Hello(hello) if hello.form && hello.ask)
     })
 }
 

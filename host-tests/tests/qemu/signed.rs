@@ -31,7 +31,7 @@ fn five_that_sign_settle_where_the_simulated_chain_does() {
             for name in ["unsigned", "malformed"] {
                 assert_eq!(counters.counter(name), Some(0), "{}", counters.text);
             }
-            assert!(counters.counter("hellos").unwrap() > 0);
+            assert!(counters.counter("handshakes").unwrap() > 0);
             // The emulator has no flash that can be written, and the drone notices.
             let mut lines = fleet.of_drone(drone).skip(1);
             assert_eq!(
@@ -70,7 +70,7 @@ fn a_drone_without_the_key_takes_no_part() {
     let counters = [1, 2, 3, 4].map(|drone| fleet.counters(drone));
     let counter = |drone: usize, name| counters[drone - 1].counter(name).unwrap();
     assert_eq!(counter(1, "forged"), 0);
-    assert!(counter(1, "hellos") > 0);
+    assert!(counter(1, "handshakes") > 0);
     assert!(counter(2, "forged") > 0 && counter(3, "forged") > 0);
     assert!(counter(3, "unsigned") > 0);
     assert!(

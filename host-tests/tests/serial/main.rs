@@ -86,7 +86,7 @@ fn an_end_that_never_reads_neither_blocks_nor_starves_the_other_link() {
         assert!(frames.len() >= 2, "{kind:?}: {heard:?}");
         assert!(
             frames.iter().all(|frame| [20, 30].contains(&frame.len())),
-            "{kind:?}: heartbeats, and hails that call for a view"
+            "{kind:?}: heartbeats, and hellos that call for a view"
         );
         let before = nodes[0].driver.stats()[0].dropped;
         for _ in 0..3_000 {

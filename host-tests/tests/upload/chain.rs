@@ -37,7 +37,7 @@ fn a_new_place_of_the_interferer_is_flown_by_all_wherever_it_is_uploaded() {
                 let config = moved(&base, 700.0, -300.0);
                 let (took, bytes) = fly(signed(base, shared), end, config);
                 println!("{relays} relays, shared {shared}, {end:?}: {took} ms, {bytes} bytes");
-                // An offer, a hail, a roster, a count, a sweep and a verdict a hop, each within two of the links' hop times.
+                // An offer, a hello, a proposal, a count, a sweep and a verdict a hop, each within two of the links' hop times.
                 assert!(took < 200 * relays as u64 + 300, "{took} ms");
             }
         }
@@ -159,8 +159,12 @@ fn an_older_version_changes_nothing_and_of_one_version_all_fly_the_same() {
             upload(&base, Side::Downstream, at, 1, two),
         ];
         let outcome = run(setup.clone()).unwrap();
-        let stamp = |spec: &UploadSpec| spec.upload.stamp();
-        let newer = setup.uploads.iter().max_by_key(|spec| stamp(spec)).unwrap();
+        let mission_id = |spec: &UploadSpec| spec.upload.id();
+        let newer = setup
+            .uploads
+            .iter()
+            .max_by_key(|spec| mission_id(spec))
+            .unwrap();
         judge(&setup, &outcome, 1, *newer.upload.config()).unwrap();
     }
 }

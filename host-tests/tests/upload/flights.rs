@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Duration;
-use uav_relay::guard::confines::Confines;
+use uav_relay::guard::config::GuardConfig;
 use uav_relay_sim::simulator::chain::FlightSpec;
 
 use super::*;
@@ -22,7 +22,7 @@ fn flight(seed: u64) -> (Setup, MissionConfig) {
     };
     let base = Mission::try_new(config).unwrap();
     let mut setup = signed(base, true);
-    setup.settings.guard = Some(Confines::of(&base, config.common));
+    setup.settings.guard = Some(GuardConfig::of(&base, config.common));
     let mut x_m = 0.0;
     setup.flight = Some(FlightSpec {
         start: (0..8)

@@ -10,11 +10,11 @@ use uav_relay::optimiser::joint::trial::{Bar, Trial};
 use uav_relay::optimiser::ladder::Ladder;
 use uav_relay::optimiser::verdict::Verdict;
 use uav_relay::place::{CrossSection, Station};
-use uav_relay::wire::digest::Stamp;
+use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{
-    Answer, Before, Count, Course, Hail, Message, MessageError, Moved, Roster, Sweep, Token, Turn,
-    Worth,
+    Answer, Course, Decision, Hello, Message, MessageError, Moved, PriorView, Proposal, Sweep,
+    Token, Turn, Worth,
 };
 use uav_relay::{Local, Placement};
 
@@ -106,9 +106,9 @@ pub(crate) enum Said {
         any: bool,
         worst: f32,
     },
-    Hail(Forming),
-    Roster(Forming),
-    Count(Forming),
+    Hello(Forming),
+    Proposal(Forming),
+    Decision(Forming),
     Fence {
         number: u16,
         mission: u16,
@@ -145,8 +145,8 @@ impl Forming {
         self.flags >> bit & 1 == 1
     }
 
-    fn stamp(self, digest: u16) -> Stamp {
-        Stamp {
+    fn mission_id(self, digest: u16) -> MissionId {
+        MissionId {
             version: self.numbers[3],
             digest,
         }
@@ -289,9 +289,9 @@ impl Said {
                 out.push(u8::from(*any));
                 reals(&mut out, &[*worst]);
             }
-            Self::Hail(forming) => out = forming.body(10),
-            Self::Roster(forming) => out = forming.body(11),
-            Self::Count(forming) => out = forming.body(12),
+            Self::Hello(forming) => out = forming.body(10),
+            Self::Proposal(forming) => out = forming.body(11),
+            Self::Decision(forming) => out = forming.body(12),
             Self::Fence {
                 number,
                 mission,
@@ -465,7 +465,7 @@ impl Said {
                 any,
                 worst,
             }),
-            Self::Hail(forming) => Message::Hail(Hail {
+            Self::Hello(forming) => Message::Hello(Hello {
                 mission: forming.mission,
                 newest: forming.number,
                 neighbour: forming.numbers[0],
@@ -473,21 +473,21 @@ impl Said {
                 form: forming.flag(1),
                 fresh: forming.flag(2),
                 ready: forming.flag(3),
-                holds: forming.stamp(forming.numbers[2]),
+                holds: forming.mission_id(forming.numbers[2]),
                 flies: forming.flag(4),
             }),
-            Self::Roster(forming) => Message::Roster(Roster {
-                stamp: forming.stamp(forming.mission),
+            Self::Proposal(forming) => Message::Proposal(Proposal {
+                mission_id: forming.mission_id(forming.mission),
                 view: forming.number,
                 place: forming.numbers[0],
-                before: Before {
+                before: PriorView {
                     view: forming.numbers[2],
                     relays: forming.numbers[1],
                     leader: forming.flag(0),
                 },
             }),
-            Self::Count(forming) => Message::Count(Count {
-                stamp: forming.stamp(forming.mission),
+            Self::Decision(forming) => Message::Decision(Decision {
+                mission_id: forming.mission_id(forming.mission),
                 view: forming.number,
                 place: forming.numbers[0],
                 relays: Some(forming.numbers[1]).filter(|&relays| relays > 0),
@@ -502,7 +502,7 @@ impl Said {
             } => Message::Fence {
                 mission,
                 fence: Fence {
-                    tie: number,
+                    association: number,
                     echo,
                     number: fence,
                     x_m,
@@ -628,14 +628,14 @@ impl Said {
                 worst,
                 ..
             } => is_place(*x_m) && is_altitude(*altitude_m) && is_sir(*worst),
-            Self::Hail(Forming { numbers, flags, .. }) => {
+            Self::Hello(Forming { numbers, flags, .. }) => {
                 numbers[0] <= 1000 && numbers[1] == 0 && *flags <= 31
             }
-            Self::Roster(Forming { numbers, flags, .. }) => {
+            Self::Proposal(Forming { numbers, flags, .. }) => {
                 let counts = &numbers[..2];
                 counts.iter().all(|count| (1..=1000).contains(count)) && *flags <= 1
             }
-            Self::Count(Forming { numbers, flags, .. }) => {
+            Self::Decision(Forming { numbers, flags, .. }) => {
                 let [place, relays, unused, _] = *numbers;
                 (1..=1000).contains(&place) && relays <= 1000 && unused == 0 && *flags == 0
             }
@@ -899,9 +899,9 @@ impl Reader<'_> {
                 any: self.bool()?,
                 worst: self.real()?,
             },
-            10 => Said::Hail(self.forming()?),
-            11 => Said::Roster(self.forming()?),
-            12 => Said::Count(self.forming()?),
+            10 => Said::Hello(self.forming()?),
+            11 => Said::Proposal(self.forming()?),
+            12 => Said::Decision(self.forming()?),
             13 => Said::Fence {
                 number: self.word()?,
                 mission: self.word()?,

@@ -500,10 +500,10 @@ fn a_course_asks_a_relay_for_a_new_view_that_does_not_know_where_it_is_to_be() {
     assert_asks_for_a_view(&mut relay, Instant::ZERO);
 }
 
-/// All that it says before long are hails that call for a view, the second flag of five.
+/// All that it says before long are hellos that call for a view, the second flag of five.
 fn assert_asks_for_a_view(relay: &mut Relay, mut now: Instant) {
     let out = settle(relay, &mut now);
-    let calls = |said: &Said| matches!(said, Said::Hail(hail) if hail.flags & 2 > 0);
+    let calls = |said: &Said| matches!(said, Said::Hello(hello) if hello.flags & 2 > 0);
     assert!(out.iter().any(|(_, said)| calls(said)), "{out:?}");
 }
 

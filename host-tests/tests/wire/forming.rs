@@ -1,4 +1,4 @@
-//! How a chain forms anew, frame by frame: hails, a roster through three relays, the count back, and what is refused.
+//! How a chain forms anew, frame by frame: hellos, a proposal through three relays, the count back, and what is refused.
 
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::Header;
@@ -27,7 +27,7 @@ pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
     wire(&plain(header, &said.body()))
 }
 
-/// What a roster or a count says of a view that is to fly the mission that was loaded before flight.
+/// What a proposal or a count says of a view that is to fly the mission that was loaded before flight.
 pub(crate) fn forming(number: u16, mission: u16, numbers: [u16; 3], flags: u8) -> Forming {
     let [place, relays, before] = numbers;
     Forming {
@@ -38,9 +38,9 @@ pub(crate) fn forming(number: u16, mission: u16, numbers: [u16; 3], flags: u8) -
     }
 }
 
-/// The hail of a node that flies the mission that was loaded before flight, and has no other.
-pub(crate) fn hailing(newest: u16, mission: u16, neighbour: u16, flags: u8) -> Said {
-    Said::Hail(Forming {
+/// The hello of a node that flies the mission that was loaded before flight, and has no other.
+pub(crate) fn a_hello(newest: u16, mission: u16, neighbour: u16, flags: u8) -> Said {
+    Said::Hello(Forming {
         number: newest,
         mission,
         numbers: [neighbour, 0, mission, 0],
@@ -70,7 +70,7 @@ pub(crate) fn only(relay: &mut Relay, now: Instant) -> (Port, Said) {
 }
 
 #[test]
-fn a_roster_goes_through_three_relays_and_the_count_back() {
+fn a_proposal_goes_through_three_relays_and_the_count_back() {
     let mut chain: Vec<Relay> = (1..=3).map(|own| relay(own, 3, Wiring::Pair)).collect();
     let [head, middle, tail] = &mut chain[..] else {
         panic!("three relays");
@@ -78,26 +78,26 @@ fn a_roster_goes_through_three_relays_and_the_count_back() {
     let mission = digest(head.mission());
     let now = Instant::ZERO;
     // Somebody wants a view: the head, whom nobody is before, calls for the first one.
-    let hail = hailing(0, mission, 1, FORMS | READY);
-    head.handle_bytes(now, Port::Downstream, &framed(1, Port::Downstream, &hail));
-    let roster = |place| Said::Roster(forming(1, mission, [place, 3, 0], 1));
-    let count = |place| Said::Count(forming(1, mission, [place, 3, 0], 0));
-    assert_eq!(soon(head, now), [(Port::Downstream, roster(1))]);
-    middle.handle_bytes(now, Port::Upstream, &between(1, 2, &roster(1)));
-    assert_eq!(only(middle, now), (Port::Downstream, roster(2)));
+    let hello = a_hello(0, mission, 1, FORMS | READY);
+    head.handle_bytes(now, Port::Downstream, &framed(1, Port::Downstream, &hello));
+    let proposal = |place| Said::Proposal(forming(1, mission, [place, 3, 0], 1));
+    let count = |place| Said::Decision(forming(1, mission, [place, 3, 0], 0));
+    assert_eq!(soon(head, now), [(Port::Downstream, proposal(1))]);
+    middle.handle_bytes(now, Port::Upstream, &between(1, 2, &proposal(1)));
+    assert_eq!(only(middle, now), (Port::Downstream, proposal(2)));
     assert_eq!(middle.view(), 0, "not before it is counted");
     // It comes again: what has become of it is not known yet.
-    middle.handle_bytes(now, Port::Upstream, &between(1, 2, &roster(1)));
+    middle.handle_bytes(now, Port::Upstream, &between(1, 2, &proposal(1)));
     assert_eq!(
         only(middle, now),
         (Port::Upstream, Said::Busy { number: 1 })
     );
-    tail.handle_bytes(now, Port::Upstream, &between(2, 3, &roster(2)));
+    tail.handle_bytes(now, Port::Upstream, &between(2, 3, &proposal(2)));
     assert_eq!(only(tail, now), (Port::Upstream, count(3)));
     middle.handle_bytes(now, Port::Downstream, &between(3, 2, &count(3)));
     assert_eq!(only(middle, now), (Port::Upstream, count(2)));
     // The answer was lost: it is given again.
-    middle.handle_bytes(now, Port::Upstream, &between(1, 2, &roster(1)));
+    middle.handle_bytes(now, Port::Upstream, &between(1, 2, &proposal(1)));
     assert_eq!(only(middle, now), (Port::Upstream, count(2)));
     head.handle_bytes(now, Port::Downstream, &between(2, 1, &count(2)));
     for (relay, index) in [head, middle, tail].into_iter().zip(1..) {
@@ -113,8 +113,8 @@ fn a_count_that_is_not_awaited_is_stale() {
     let now = Instant::ZERO;
     let mut waiting = relay(4, 8, Wiring::Pair);
     let mission = digest(waiting.mission());
-    let roster = Said::Roster(forming(2, mission, [3, 8, 0], 1));
-    waiting.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &roster));
+    let proposal = Said::Proposal(forming(2, mission, [3, 8, 0], 1));
+    waiting.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
     sent(&mut waiting, now);
     for (number, place, relays) in [
         (2, 4, 8),
@@ -126,13 +126,13 @@ fn a_count_that_is_not_awaited_is_stale() {
         (2, 5, 1),
     ] {
         let mut after = waiting.clone();
-        let count = Said::Count(forming(number, mission, [place, relays, 0], 0));
+        let count = Said::Decision(forming(number, mission, [place, relays, 0], 0));
         after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &count));
         assert_eq!(counted(after.stats()), ["received", "stale"], "{count:?}");
         assert_eq!(after.view(), 0);
         assert_eq!(sent(&mut after, now), []);
     }
-    let count = Said::Count(forming(2, mission, [5, 5, 0], 0));
+    let count = Said::Decision(forming(2, mission, [5, 5, 0], 0));
     waiting.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &count));
     assert_eq!((waiting.view(), waiting.mission().relays()), (2, 5));
     // Once more.
@@ -140,7 +140,7 @@ fn a_count_that_is_not_awaited_is_stale() {
     assert_eq!(waiting.stats().stale, 1);
 }
 
-/// What relay 20 of 20, the last, makes of a roster from this place, after a view of so many with its leader there or not.
+/// What relay 20 of 20, the last, makes of a proposal from this place, after a view of so many with its leader there or not.
 fn counted_by_the_last(place: u16, relays: u16, leader: bool, quorum: bool) -> Option<u16> {
     let mission = Mission::try_new(paper(20)).unwrap();
     let identity = Identity {
@@ -155,9 +155,9 @@ fn counted_by_the_last(place: u16, relays: u16, leader: bool, quorum: bool) -> O
     let mut last = Relay::new(mission, identity, settings, 1, now).unwrap();
     let mission = digest(last.mission());
     // A view that is newer than the one that it knows itself.
-    let roster = Said::Roster(forming(9, mission, [place, relays, 8], u8::from(leader)));
-    last.handle_bytes(now, Port::Upstream, &framed(20, Port::Upstream, &roster));
-    let (port, Said::Count(count)) = only(&mut last, now) else {
+    let proposal = Said::Proposal(forming(9, mission, [place, relays, 8], u8::from(leader)));
+    last.handle_bytes(now, Port::Upstream, &framed(20, Port::Upstream, &proposal));
+    let (port, Said::Decision(count)) = only(&mut last, now) else {
         panic!("no count");
     };
     let said = count.numbers[1];
@@ -199,13 +199,13 @@ fn a_part_that_is_cut_off_stops_calling() {
     // It calls: it has missed a beginning.
     let sweep = &one_of_each(FIRST + 1, mission)[0];
     relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, sweep));
-    let calls = hailing(0, mission, 3, ASKS | FORMS | FRESH);
+    let calls = a_hello(0, mission, 3, ASKS | FORMS | FRESH);
     assert_eq!(soon(&mut relay, now), [(Port::Upstream, calls)]);
     now = now + Duration::from_millis(1);
-    let roster = Said::Roster(forming(1, mission, [1, 8, 0], 0));
-    relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &roster));
+    let proposal = Said::Proposal(forming(1, mission, [1, 8, 0], 0));
+    relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
     sent(&mut relay, now);
-    let too_few = |place| Said::Count(forming(1, mission, [place, 0, 0], 0));
+    let too_few = |place| Said::Decision(forming(1, mission, [place, 0, 0], 0));
     relay.handle_bytes(
         now,
         Port::Downstream,
@@ -229,14 +229,14 @@ fn a_leader_whose_part_is_cut_off_holds_until_it_is_asked_again() {
     let mut head = relay(1, 8, Wiring::Pair);
     let mission = digest(head.mission());
     let now = Instant::ZERO;
-    let hail = |newest| hailing(newest, mission, 1, FORMS | READY);
+    let hello = |newest| a_hello(newest, mission, 1, FORMS | READY);
     head.handle_bytes(
         now,
         Port::Downstream,
-        &framed(1, Port::Downstream, &hail(0)),
+        &framed(1, Port::Downstream, &hello(0)),
     );
     soon(&mut head, now);
-    let too_few = Said::Count(forming(1, mission, [2, 0, 0], 0));
+    let too_few = Said::Decision(forming(1, mission, [2, 0, 0], 0));
     head.handle_bytes(
         now,
         Port::Downstream,
@@ -250,23 +250,23 @@ fn a_leader_whose_part_is_cut_off_holds_until_it_is_asked_again() {
     head.handle_bytes(
         now,
         Port::Downstream,
-        &framed(1, Port::Downstream, &hail(1)),
+        &framed(1, Port::Downstream, &hello(1)),
     );
-    let roster = Said::Roster(forming(2, mission, [1, 8, 0], 1));
-    assert_eq!(soon(&mut head, now), [(Port::Downstream, roster)]);
+    let proposal = Said::Proposal(forming(2, mission, [1, 8, 0], 1));
+    assert_eq!(soon(&mut head, now), [(Port::Downstream, proposal)]);
 }
 
 #[test]
-fn a_hail_is_answered_by_a_hail_if_it_asks_for_one() {
+fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
     let now = Instant::ZERO;
     for (asks, newest) in [(false, 0), (true, 0), (true, 6)] {
         let mut relay = relay(4, 8, Wiring::Pair);
         let mission = digest(relay.mission());
         let flags = if asks { ASKS } else { 0 };
-        let hail = hailing(newest, mission, 4, flags);
-        relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &hail));
+        let hello = a_hello(newest, mission, 4, flags);
+        relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &hello));
         let out = soon(&mut relay, now);
-        let answer = hailing(newest, mission, 3, FRESH);
+        let answer = a_hello(newest, mission, 3, FRESH);
         let expected = asks.then_some((Port::Upstream, answer));
         assert_eq!(out, expected.into_iter().collect::<Vec<_>>());
         assert_eq!(counted(relay.stats()), ["received"]);
@@ -280,8 +280,8 @@ fn more_relays_than_the_mission_has_are_stale() {
     for place in [1, 7, 8, 9, 999, 1000] {
         let mut relay = relay(4, 8, Wiring::Pair);
         let mission = digest(relay.mission());
-        let roster = Said::Roster(forming(1, mission, [place, 8, 0], 1));
-        relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &roster));
+        let proposal = Said::Proposal(forming(1, mission, [place, 8, 0], 1));
+        relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
         if place > 7 {
             assert_eq!(counted(relay.stats()), ["received", "stale"], "{place}");
             assert_eq!(sent(&mut relay, now), []);
@@ -289,7 +289,7 @@ fn more_relays_than_the_mission_has_are_stale() {
         }
         assert_eq!(counted(relay.stats()), ["received"], "{place}");
         assert_eq!(sent(&mut relay, now).len(), 1);
-        let count = Said::Count(forming(1, mission, [place + 1, 9, 0], 0));
+        let count = Said::Decision(forming(1, mission, [place + 1, 9, 0], 0));
         relay.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &count));
         assert_eq!(counted(relay.stats()), ["received", "stale"], "{place}");
         assert_eq!(relay.mission().relays(), 8);

@@ -241,7 +241,7 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
 }
 
 #[test]
-fn the_vectors_hold_every_hail_roster_and_count() {
+fn the_vectors_hold_every_hello_proposal_and_count() {
     let frames = vectors().frames;
     let some = |what: fn(&Said) -> bool| {
         assert!(frames.iter().any(|vector| what(&vector.message)));
@@ -250,21 +250,27 @@ fn the_vectors_hold_every_hail_roster_and_count() {
         assert!(
             frames
                 .iter()
-                .any(|vector| matches!(vector.message, Said::Hail(hail) if hail.flags == flags))
+                .any(|vector| matches!(vector.message, Said::Hello(hello) if hello.flags == flags))
         );
     }
-    some(|said| matches!(said, Said::Hail(hail) if hail.numbers == [1000, 0, u16::MAX, u16::MAX]));
-    some(|said| matches!(said, Said::Hail(hail) if hail.numbers[3] == 0 && hail.flags & 16 != 0));
-    some(|said| matches!(said, Said::Hail(hail) if hail.numbers[3] > 0 && hail.flags & 16 == 0));
-    some(|said| matches!(said, Said::Roster(roster) if roster.flags == 0));
+    some(
+        |said| matches!(said, Said::Hello(hello) if hello.numbers == [1000, 0, u16::MAX, u16::MAX]),
+    );
+    some(
+        |said| matches!(said, Said::Hello(hello) if hello.numbers[3] == 0 && hello.flags & 16 != 0),
+    );
+    some(
+        |said| matches!(said, Said::Hello(hello) if hello.numbers[3] > 0 && hello.flags & 16 == 0),
+    );
+    some(|said| matches!(said, Said::Proposal(proposal) if proposal.flags == 0));
     some(|said| {
         let most = [1000, 1000, u16::MAX, u16::MAX];
-        matches!(said, Said::Roster(roster) if roster.numbers == most && roster.flags == 1)
+        matches!(said, Said::Proposal(proposal) if proposal.numbers == most && proposal.flags == 1)
     });
-    some(|said| matches!(said, Said::Count(count) if count.numbers[1] == 0));
+    some(|said| matches!(said, Said::Decision(count) if count.numbers[1] == 0));
     some(|said| {
         let most = [1000, 1000, 0, u16::MAX];
-        matches!(said, Said::Count(count) if count.numbers == most)
+        matches!(said, Said::Decision(count) if count.numbers == most)
     });
 }
 

@@ -8,7 +8,7 @@ use super::forming::{ASKS, FLIES, FORMS, FRESH, READY, between, events};
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, one_of_each};
 use super::signed::{Peer, said, with_key};
-use super::uploads::{NOW, hail, held, stamp, upload};
+use super::uploads::{NOW, held, hello, mission_id, upload};
 
 /// What Tx is told by relay 1, or Rx by relay 8.
 fn told(relay: &mut Relay, ground: u16) -> Vec<Said> {
@@ -37,17 +37,17 @@ fn tx_and_rx_offer_and_ask_and_are_told() {
         // On its other side all are silent yet; and a leader awaits no pass.
         let flags = if own == 1 { 0 } else { FRESH };
         assert_eq!(told(&mut relay, ground), [], "it has only become known");
-        let first = hail(base, 0, (base, 0), flags | FLIES);
-        ground_peer.says(&mut relay, NOW, &hail(base, 0, (1, 1), READY));
+        let first = hello(base, 0, (base, 0), flags | FLIES);
+        ground_peer.says(&mut relay, NOW, &hello(base, 0, (1, 1), READY));
         assert_eq!(told(&mut relay, ground), [], "it has not asked");
-        ground_peer.says(&mut relay, NOW, &hail(base, 0, (1, 1), ASKS | FORMS));
+        ground_peer.says(&mut relay, NOW, &hello(base, 0, (1, 1), ASKS | FORMS));
         assert_eq!(told(&mut relay, ground), [first], "{own}");
         assert_eq!(events(&mut relay), []);
         let newer = upload(1, base);
         ground_peer.says(&mut relay, NOW, &Said::Offer(newer));
-        assert_eq!(held(&relay), Some(stamp(&newer)));
+        assert_eq!(held(&relay), Some(mission_id(&newer)));
         assert_eq!(events(&mut relay), [Event::Uploaded]);
-        let holds = hail(base, 0, stamp(&newer), flags);
+        let holds = hello(base, 0, mission_id(&newer), flags);
         let taken = told(&mut relay, ground);
         assert_eq!(taken, std::slice::from_ref(&holds), "{own}");
         ground_peer.says(&mut relay, NOW, &Said::Offer(newer));
@@ -67,14 +67,14 @@ fn what_tx_and_rx_may_not_say_is_misaddressed() {
         let mut after = relay.clone();
         peer.clone().says(&mut after, NOW, &one);
         let expected = match one {
-            Said::Hail(_) | Said::Offer(_) => "received",
+            Said::Hello(_) | Said::Offer(_) => "received",
             _ => "misaddressed",
         };
         assert_eq!(counted(after.stats()), [expected], "{one:?}");
     }
     for one in [
         Said::Offer(upload(1, base ^ 1)),
-        hail(base ^ 1, 0, (1, 1), ASKS),
+        hello(base ^ 1, 0, (1, 1), ASKS),
     ] {
         let mut after = relay.clone();
         peer.clone().says(&mut after, NOW, &one);

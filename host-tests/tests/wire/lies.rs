@@ -46,9 +46,9 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         Said::Busy { number } => *number = as_number,
         // The number of a fence is that of a talk, never 0.
         Said::Heartbeat { mission, .. } | Said::Fence { mission, .. } => *mission = as_mission,
-        Said::Hail(hail) => (hail.number, hail.mission) = (as_number, as_mission),
+        Said::Hello(hello) => (hello.number, hello.mission) = (as_number, as_mission),
         // Of a view that flies the mission that was loaded.
-        Said::Roster(forming) | Said::Count(forming) => {
+        Said::Proposal(forming) | Said::Decision(forming) => {
             (forming.number, forming.mission) = (as_number, as_mission);
             forming.numbers[3] = 0;
         }

@@ -182,8 +182,11 @@ impl Offer {
         let factors = [channel.mu_los(), channel.mu_nlos(), channel.eta()];
         assert_eq!(factors, [self.mu_los, self.mu_nlos, self.eta]);
         assert_eq!((config.band, config.lateral), (band, lateral));
-        let stamp = upload.stamp();
-        assert_eq!((stamp.version, stamp.digest), (self.version, self.digest()));
+        let mission_id = upload.id();
+        assert_eq!(
+            (mission_id.version, mission_id.digest),
+            (self.version, self.digest())
+        );
         Message::Offer(upload)
     }
 }

@@ -49,7 +49,7 @@ proptest! {
             Said::Worth { .. } => 75,
             Said::Token { .. } => 44,
             Said::Moved { .. } => 34,
-            Said::Hail(_) | Said::Roster(_) | Said::Count(_) => 30,
+            Said::Hello(_) | Said::Proposal(_) | Said::Decision(_) => 30,
             Said::Fence { .. } => 33,
             Said::Offer(_) => 99,
         };
@@ -74,7 +74,7 @@ proptest! {
             Said::Worth { trial, .. } => 74 + usize::from(trial.is_some()),
             Said::Token { .. } => 44,
             Said::Moved { .. } => 34,
-            Said::Hail(_) | Said::Roster(_) | Said::Count(_) => 30,
+            Said::Hello(_) | Said::Proposal(_) | Said::Decision(_) => 30,
             Said::Fence { .. } => 33,
             Said::Offer(_) => 99,
         };

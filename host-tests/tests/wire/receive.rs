@@ -163,7 +163,7 @@ fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port
     }
     match Said::read(&checked[10..]) {
         Err(_) => "malformed",
-        Ok(Said::Hail(_)) => "received",
+        Ok(Said::Hello(_)) => "received",
         Ok(_) if neighbours.contains(&Some(sender)) => "received",
         Ok(_) => "misaddressed",
     }

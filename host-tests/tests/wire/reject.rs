@@ -102,7 +102,7 @@ fn moved() -> Said {
     }
 }
 
-/// In range as a hail and as a count.
+/// In range as a hello and as a count.
 const FORMING: Forming = Forming {
     number: 1,
     mission: 2,
@@ -117,7 +117,7 @@ fn other_versions_and_flags_are_refused_before_the_body_is_read() {
         for at in [1, 3] {
             let mut bad = good[..good.len() - 4].to_vec();
             bad[at] = bad[at] & 0x0F | nibble << 4;
-            // With a tag the last bytes are not the body's, and a hello is no message.
+            // With a tag the last bytes are not the body's, and a handshake is no message.
             let (read, short) = match (at, nibble) {
                 (1, 1) | (3, 0) => (Ok(()), ENCODING),
                 (3, 1 | 3) => (Err(ENCODING), FrameError::Short),
@@ -213,9 +213,9 @@ fn padded_varints_are_refused() {
         vec![3, 0, 0, 1],
         token(0, 0.0, 0, 0).body(),
         moved().body(),
-        Said::Hail(FORMING).body(),
-        Said::Roster(FORMING).body(),
-        Said::Count(FORMING).body(),
+        Said::Hello(FORMING).body(),
+        Said::Proposal(FORMING).body(),
+        Said::Decision(FORMING).body(),
         Said::Offer(offer()).body(),
     ] {
         let mut padded = body.clone();
@@ -410,18 +410,18 @@ fn taken(mut body: Vec<u8>, at: usize) -> Vec<u16> {
 
 #[test]
 fn a_chain_has_up_to_a_thousand_relays_and_what_a_message_does_not_use_is_zero() {
-    let hail = Said::Hail(FORMING).body();
-    let roster = Said::Roster(Forming {
+    let hello = Said::Hello(FORMING).body();
+    let proposal = Said::Proposal(Forming {
         numbers: [1, 1, 0, 0],
         ..FORMING
     });
-    let roster = roster.body();
-    let count = Said::Count(FORMING).body();
+    let proposal = proposal.body();
+    let count = Said::Decision(FORMING).body();
     let any: Vec<u16> = (0..=u16::MAX).collect();
     let (from_0, from_1) = (any[..=1000].to_vec(), any[1..=1000].to_vec());
     for (body, numbers, flags) in [
-        (&hail, [&from_0, &vec![0], &any, &any], 32),
-        (&roster, [&from_1, &from_1, &any, &any], 2),
+        (&hello, [&from_0, &vec![0], &any, &any], 32),
+        (&proposal, [&from_1, &from_1, &any, &any], 2),
         (&count, [&from_1, &from_0, &vec![0], &any], 1),
     ] {
         for (at, numbers) in [5, 7, 9, 11].into_iter().zip(numbers) {

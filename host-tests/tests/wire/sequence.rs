@@ -188,19 +188,19 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             any: true,
             worst: 1.0,
         },
-        Said::Hail(Forming {
+        Said::Hello(Forming {
             number,
             mission,
             numbers: [4, 0, mission, 0],
             flags: 16,
         }),
-        Said::Roster(Forming {
+        Said::Proposal(Forming {
             number,
             mission,
             numbers: [3, 8, 0, 0],
             flags: 1,
         }),
-        Said::Count(Forming {
+        Said::Decision(Forming {
             number,
             mission,
             numbers: [5, 8, 0, 0],
@@ -542,9 +542,9 @@ fn tamed(said: Said) -> Said {
                 trials,
             }
         }
-        Said::Roster(forming) => {
+        Said::Proposal(forming) => {
             let [_, relays, view, version] = forming.numbers;
-            Said::Roster(Forming {
+            Said::Proposal(Forming {
                 numbers: [3, relays.min(8), view, version],
                 ..forming
             })

@@ -4,23 +4,23 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Instant, Port, Relay, Wiring};
 
 use super::codec::Said;
-use super::forming::{ASKS, FORMS, FRESH, READY, between, hailing, soon};
+use super::forming::{ASKS, FORMS, FRESH, READY, a_hello, between, soon};
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, one_of_each, sent};
 
-/// On a channel that all hear, hails come from up to four nodes away; anything else from a node that is no neighbour is
-/// counted as misaddressed and answered by a hail, which says who the neighbours are.
+/// On a channel that all hear, hellos come from up to four nodes away; anything else from a node that is no neighbour is
+/// counted as misaddressed and answered by a hello, which says who the neighbours are.
 #[test]
 fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
     let now = Instant::ZERO;
     for sender in 0..=14_u16 {
         let mut near = relay_of_12(6);
         let mission = digest(near.mission());
-        let hail = hailing(0, mission, 0, ASKS);
-        near.handle_bytes(now, Port::Shared, &between(sender, 6, &hail));
+        let hello = a_hello(0, mission, 0, ASKS);
+        near.handle_bytes(now, Port::Shared, &between(sender, 6, &hello));
         let heard = (1..=12).contains(&sender) && (1..=4).contains(&sender.abs_diff(6));
         let neighbour = if sender < 6 { 5 } else { 7 };
-        let answer = |from| hailing(0, mission, from, FRESH);
+        let answer = |from| a_hello(0, mission, from, FRESH);
         if heard {
             assert_eq!(counted(near.stats()), ["received"], "{sender}");
         } else {
@@ -64,13 +64,13 @@ fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
     for (newest, calls) in [(0, false), (5, true)] {
         let mut relay = relay_of_12(6);
         let mission = digest(relay.mission());
-        let hail = |neighbour| hailing(newest, mission, neighbour, 0);
-        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hail(0)));
+        let hello = |neighbour| a_hello(newest, mission, neighbour, 0);
+        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(0)));
         assert!(soon(&mut relay, now).is_empty(), "{newest}");
-        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hail(6)));
+        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(6)));
         // Somebody is on its other side now.
         let flags = ASKS | FORMS | FRESH | READY;
-        let call = hailing(newest, mission, 5, flags);
+        let call = a_hello(newest, mission, 5, flags);
         let expected = calls.then_some((Port::Shared, call));
         assert_eq!(
             soon(&mut relay, now),
@@ -85,13 +85,13 @@ fn a_pass_waits_for_a_neighbour_that_takes_another() {
     let now = Instant::ZERO;
     let mut relay = relay_of_12(6);
     let mission = digest(relay.mission());
-    let hail = |neighbour| hailing(0, mission, neighbour, 0);
-    relay.handle_bytes(now, Port::Shared, &between(7, 6, &hail(5)));
+    let hello = |neighbour| a_hello(0, mission, neighbour, 0);
+    relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(5)));
     let sweep = &one_of_each(FIRST, mission)[0];
     relay.handle_bytes(now, Port::Shared, &between(5, 6, sweep));
     assert_eq!(counted(relay.stats()), ["received"]);
     assert_eq!(sent(&mut relay, now), []);
-    relay.handle_bytes(now, Port::Shared, &between(7, 6, &hail(6)));
+    relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(6)));
     let out = sent(&mut relay, now);
     assert!(
         matches!(

@@ -14,7 +14,7 @@ use uav_relay::wire::frame::Header;
 
 const KEY: [u8; 32] = *b"whoever reads this is not secret";
 
-/// Flags in byte 3: a tag follows, and the body is a hello.
+/// Flags in byte 3: a tag follows, and the body is a handshake.
 const SIGNED: u8 = 0x10;
 const HELLO: u8 = 0x20;
 
@@ -64,19 +64,19 @@ impl Peer {
             counter: 0,
         };
         // It asks, it is answered, it shows that it has heard that.
-        peer.hello(relay, true);
+        peer.handshake(relay, true);
         let answer = frames(relay, Instant::ZERO)
             .into_iter()
             .find(|(to, flags, _)| (*to, *flags) == (node, SIGNED | HELLO));
         let (_, _, body) = answer.unwrap();
         assert_eq!(body.len(), 17);
         peer.nonces[1] = u64::from_le_bytes(body[..8].try_into().unwrap());
-        peer.hello(relay, false);
+        peer.handshake(relay, false);
         assert_eq!(relay.stats().rejected(), 0);
         peer
     }
 
-    fn hello(&mut self, relay: &mut Relay, asks: bool) {
+    fn handshake(&mut self, relay: &mut Relay, asks: bool) {
         let mut body: Vec<u8> = self
             .nonces
             .iter()
@@ -128,7 +128,7 @@ fn frames(relay: &mut Relay, now: Instant) -> Vec<(u16, u8, Vec<u8>)> {
     out
 }
 
-/// What `relay` says at `now`, and to whom; hellos left out.
+/// What `relay` says at `now`, and to whom; handshakes left out.
 pub(crate) fn said(relay: &mut Relay, now: Instant) -> Vec<(u16, Said)> {
     frames(relay, now)
         .into_iter()

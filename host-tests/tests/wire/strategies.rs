@@ -322,13 +322,13 @@ fn counts(least: u16) -> BoxedStrategy<u16> {
     prop_oneof![4 => least..=9, 1 => least..=1000, 1 => Just(least), 1 => Just(1000)].boxed()
 }
 
-/// A hail, a roster, a count or a fence.
+/// A hello, a proposal, a count or a fence.
 fn formings() -> BoxedStrategy<Said> {
     let views = || prop_oneof![4 => 0..8_u16, 1 => any::<u16>()];
     let stamps = || (any::<u16>(), views());
-    let hail = (views(), any::<u16>(), counts(0), stamps(), 0..32_u8).prop_map(
+    let hello = (views(), any::<u16>(), counts(0), stamps(), 0..32_u8).prop_map(
         |(number, mission, neighbour, (digest, version), flags)| {
-            Said::Hail(Forming {
+            Said::Hello(Forming {
                 number,
                 mission,
                 numbers: [neighbour, 0, digest, version],
@@ -337,9 +337,9 @@ fn formings() -> BoxedStrategy<Said> {
         },
     );
     let places = (counts(1), counts(1), views());
-    let roster = (views(), stamps(), places, 0..2_u8).prop_map(
+    let proposal = (views(), stamps(), places, 0..2_u8).prop_map(
         |(number, (mission, version), (place, relays, before), flags)| {
-            Said::Roster(Forming {
+            Said::Proposal(Forming {
                 number,
                 mission,
                 numbers: [place, relays, before, version],
@@ -349,7 +349,7 @@ fn formings() -> BoxedStrategy<Said> {
     );
     let count = (views(), stamps(), counts(1), counts(0)).prop_map(
         |(number, (mission, version), place, relays)| {
-            Said::Count(Forming {
+            Said::Decision(Forming {
                 number,
                 mission,
                 numbers: [place, relays, 0, version],
@@ -373,7 +373,7 @@ fn formings() -> BoxedStrategy<Said> {
                 target_m,
             },
         );
-    prop_oneof![hail, roster, count, fence].boxed()
+    prop_oneof![hello, proposal, count, fence].boxed()
 }
 
 /// A message in range.

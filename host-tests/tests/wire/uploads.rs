@@ -1,4 +1,4 @@
-//! Uploads, message by message, as the document has them: who is offered what, what a roster of another mission leads to, and
+//! Uploads, message by message, as the document has them: who is offered what, what a proposal of another mission leads to, and
 //! what is left after a reboot. `ground` has what Tx and Rx say.
 
 use uav_relay::wire::digest::digest;
@@ -33,9 +33,9 @@ pub(crate) fn upload(version: u16, base: u16) -> Offer {
     }
 }
 
-/// A hail of a node that has heard of view 0 alone, and holds the mission of these: digest and version.
-pub(crate) fn hail(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
-    Said::Hail(Forming {
+/// A hello of a node that has heard of view 0 alone, and holds the mission of these: digest and version.
+pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
+    Said::Hello(Forming {
         number: 0,
         mission,
         numbers: [neighbour, 0, holds.0, holds.1],
@@ -43,7 +43,7 @@ pub(crate) fn hail(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -
     })
 }
 
-pub(crate) fn stamp(offer: &Offer) -> (u16, u16) {
+pub(crate) fn mission_id(offer: &Offer) -> (u16, u16) {
     (offer.digest(), offer.version)
 }
 
@@ -56,8 +56,8 @@ fn both(relay: &mut Relay) -> [Vec<(u16, Said)>; 2] {
 }
 
 pub(crate) fn held(relay: &Relay) -> Option<(u16, u16)> {
-    let stamp = relay.upload().map(Upload::stamp)?;
-    Some((stamp.digest, stamp.version))
+    let mission_id = relay.upload().map(Upload::id)?;
+    Some((mission_id.digest, mission_id.version))
 }
 
 #[test]
@@ -69,8 +69,8 @@ fn an_offer_at_a_node_without_a_key_is_counted_and_nothing_else() {
         relay.handle_bytes(NOW, port, &framed(4, port, &offer));
         assert_eq!(counted(relay.stats()), ["received", "unsigned"]);
         assert_eq!((sent(&mut relay, NOW), held(&relay)), (vec![], None));
-        // Nor is it told by a hail.
-        let newer = hail(base, 4, (1, 1), 0);
+        // Nor is it told by a hello.
+        let newer = hello(base, 4, (1, 1), 0);
         relay.handle_bytes(NOW, port, &framed(4, port, &newer));
         assert_eq!(sent(&mut relay, NOW), []);
         assert_eq!(events(&mut relay), []);
@@ -84,24 +84,24 @@ fn a_newer_mission_is_held_told_and_offered_on_and_a_view_called_for() {
         let newer = upload(2, base);
         let from = [3, 5][side];
         peers[side].says(&mut relay, NOW, &Said::Offer(newer));
-        assert_eq!(held(&relay), Some(stamp(&newer)));
+        assert_eq!(held(&relay), Some(mission_id(&newer)));
         assert_eq!(events(&mut relay), [Event::Uploaded]);
         assert_eq!(relay.version(), 0, "not flown before it is counted");
         let form = if side == 0 { FORMS } else { 0 };
-        let answer = hail(base, from, stamp(&newer), FRESH | READY | form);
+        let answer = hello(base, from, mission_id(&newer), FRESH | READY | form);
         let mut now = vec![(from, answer)];
         if side == 1 {
             // The one before has not said that it holds it.
             now.push((3, Said::Offer(newer)));
         }
-        let call = hail(base, 3, stamp(&newer), ASKS | FORMS | FRESH | READY);
+        let call = hello(base, 3, mission_id(&newer), ASKS | FORMS | FRESH | READY);
         assert_eq!(both(&mut relay), [now, vec![(3, call)]]);
         assert_eq!(relay.stats().rejected(), 0);
     }
 }
 
 #[test]
-fn an_offer_that_is_not_newer_is_answered_by_a_hail() {
+fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
     let (mut relay, mut peers, base) = relay_4();
     let newer = upload(2, base);
     peers[1].says(&mut relay, NOW, &Said::Offer(newer));
@@ -120,7 +120,7 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hail() {
         ..upload(3, base)
     };
     // What cannot be held is not answered: it would only be offered again.
-    let answer = || vec![(5, hail(base, 5, stamp(&newer), FRESH | READY))];
+    let answer = || vec![(5, hello(base, 5, mission_id(&newer), FRESH | READY))];
     for (other, answer) in [
         (newer, answer()),
         (rival, answer()),
@@ -130,7 +130,7 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hail() {
         let mut after = relay.clone();
         peers[1].clone().says(&mut after, NOW, &Said::Offer(other));
         assert_eq!(said(&mut after, NOW), answer, "{other:?}");
-        assert_eq!(held(&after), Some(stamp(&newer)));
+        assert_eq!(held(&after), Some(mission_id(&newer)));
         assert_eq!(events(&mut after), []);
         assert_eq!(after.stats().rejected(), 0);
     }
@@ -138,7 +138,7 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hail() {
     peers[1].says(&mut relay, NOW, &stranger);
     assert_eq!(counted(relay.stats()), ["mission", "received"]);
     assert_eq!(said(&mut relay, NOW), []);
-    assert_eq!(held(&relay), Some(stamp(&newer)));
+    assert_eq!(held(&relay), Some(mission_id(&newer)));
 }
 
 #[test]
@@ -154,20 +154,20 @@ fn of_two_missions_with_one_version_the_larger_digest_is_the_newer() {
         peers[0].says(&mut relay, NOW, &Said::Offer(*offer));
     }
     offers.sort_by_key(Offer::digest);
-    assert_eq!(held(&relay), Some(stamp(&offers[5])));
+    assert_eq!(held(&relay), Some(mission_id(&offers[5])));
     let next = upload(3, base);
     peers[0].says(&mut relay, NOW, &Said::Offer(next));
-    assert_eq!(held(&relay), Some(stamp(&next)), "whatever its digest");
+    assert_eq!(held(&relay), Some(mission_id(&next)), "whatever its digest");
 }
 
 #[test]
-fn a_hail_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_hail() {
+fn a_hello_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_hello() {
     let (mut relay, mut peers, base) = relay_4();
     let own = upload(2, base);
     peers[0].says(&mut relay, NOW, &Said::Offer(own));
     both(&mut relay);
-    let (digest, version) = stamp(&own);
-    let answer = hail(base, 5, stamp(&own), FRESH | READY);
+    let (digest, version) = mission_id(&own);
+    let answer = hello(base, 5, mission_id(&own), FRESH | READY);
     for (holds, expected) in [
         ((base, 0), Some(Said::Offer(own))),
         ((digest - 1, version), Some(Said::Offer(own))),
@@ -177,8 +177,8 @@ fn a_hail_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_ha
         ((0, version + 1), Some(answer)),
     ] {
         let mut after = relay.clone();
-        let hail = hail(base, 4, holds, 0);
-        peers[1].clone().says(&mut after, NOW, &hail);
+        let hello = hello(base, 4, holds, 0);
+        peers[1].clone().says(&mut after, NOW, &hello);
         let expected: Vec<_> = expected.map(|said| (5, said)).into_iter().collect();
         assert_eq!(said(&mut after, NOW), expected, "{holds:?}");
     }
@@ -187,12 +187,12 @@ fn a_hail_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_ha
     peers[1].says(
         &mut relay,
         NOW,
-        &hail(base, 4, (base.wrapping_sub(1), 0), 0),
+        &hello(base, 4, (base.wrapping_sub(1), 0), 0),
     );
     assert_eq!(said(&mut relay, NOW), []);
 }
 
-/// A roster to relay 4, or a count.
+/// A proposal to relay 4, or a count.
 fn forming(tag: u8, view: u16, of: (u16, u16), place: u16) -> Said {
     let relays = [place, 8, 0, of.1];
     let forming = Forming {
@@ -202,29 +202,29 @@ fn forming(tag: u8, view: u16, of: (u16, u16), place: u16) -> Said {
         flags: 12 - tag,
     };
     match tag {
-        11 => Said::Roster(forming),
-        _ => Said::Count(forming),
+        11 => Said::Proposal(forming),
+        _ => Said::Decision(forming),
     }
 }
 
 #[test]
-fn a_roster_of_another_mission_than_the_one_held_leads_to_a_hail() {
+fn a_proposal_of_another_mission_than_the_one_held_leads_to_a_hello() {
     for known in [false, true] {
         let (mut relay, mut peers, base) = relay_4();
         if known {
             // Then it is of the same relays, however foreign its mission may be.
-            peers[0].says(&mut relay, NOW, &hail(base, 4, (base, 0), 0));
+            peers[0].says(&mut relay, NOW, &hello(base, 4, (base, 0), 0));
         }
-        let newer = stamp(&upload(2, base));
+        let newer = mission_id(&upload(2, base));
         let before = *relay.stats();
-        for roster in [newer, (base, 2), (base.wrapping_add(1), 0)] {
+        for proposal in [newer, (base, 2), (base.wrapping_add(1), 0)] {
             let mut after = relay.clone();
             let mut peer = peers[0].clone();
-            peer.says(&mut after, NOW, &forming(11, 1, roster, 3));
+            peer.says(&mut after, NOW, &forming(11, 1, proposal, 3));
             let (was, is) = (before, after.stats());
             let raised = (is.view - was.view, is.mission - was.mission);
-            assert_eq!(raised, if known { (1, 0) } else { (0, 1) }, "{roster:?}");
-            let answer = hail(base, 3, (base, 0), FRESH | READY | FLIES);
+            assert_eq!(raised, if known { (1, 0) } else { (0, 1) }, "{proposal:?}");
+            let answer = hello(base, 3, (base, 0), FRESH | READY | FLIES);
             assert_eq!(said(&mut after, NOW), [(3, answer)]);
             assert_eq!(after.stats().received, before.received + 1);
         }
@@ -235,17 +235,17 @@ fn a_roster_of_another_mission_than_the_one_held_leads_to_a_hail() {
 }
 
 #[test]
-fn the_node_after_is_offered_the_mission_before_the_roster() {
+fn the_node_after_is_offered_the_mission_before_the_proposal() {
     let (mut relay, mut peers, base) = relay_4();
     let newer = upload(2, base);
     peers[0].says(&mut relay, NOW, &Said::Offer(newer));
     both(&mut relay);
-    let roster = |place| forming(11, 1, stamp(&newer), place);
-    peers[0].says(&mut relay, NOW, &roster(3));
+    let proposal = |place| forming(11, 1, mission_id(&newer), place);
+    peers[0].says(&mut relay, NOW, &proposal(3));
     assert_eq!(said(&mut relay, NOW), [(5, Said::Offer(newer))]);
-    // It is not repeated at once: a hail shows whether it has arrived.
-    peers[1].says(&mut relay, NOW, &hail(base, 4, stamp(&newer), 0));
-    assert_eq!(said(&mut relay, NOW), [(5, roster(4))]);
+    // It is not repeated at once: a hello shows whether it has arrived.
+    peers[1].says(&mut relay, NOW, &hello(base, 4, mission_id(&newer), 0));
+    assert_eq!(said(&mut relay, NOW), [(5, proposal(4))]);
 }
 
 /// A relay that flies version 2 in view 1 of all eight, which its neighbours have handed it.
@@ -253,24 +253,24 @@ fn adopted() -> (Relay, [Peer; 2], u16, Offer) {
     let (mut relay, mut peers, base) = relay_4();
     let newer = upload(2, base);
     peers[0].says(&mut relay, NOW, &Said::Offer(newer));
-    peers[1].says(&mut relay, NOW, &hail(base, 4, stamp(&newer), 0));
+    peers[1].says(&mut relay, NOW, &hello(base, 4, mission_id(&newer), 0));
     both(&mut relay);
-    peers[0].says(&mut relay, NOW, &forming(11, 1, stamp(&newer), 3));
+    peers[0].says(&mut relay, NOW, &forming(11, 1, mission_id(&newer), 3));
     assert_eq!(
         said(&mut relay, NOW),
-        [(5, forming(11, 1, stamp(&newer), 4))]
+        [(5, forming(11, 1, mission_id(&newer), 4))]
     );
     assert_eq!((relay.version(), relay.view()), (0, 0));
-    peers[1].says(&mut relay, NOW, &forming(12, 1, stamp(&newer), 5));
+    peers[1].says(&mut relay, NOW, &forming(12, 1, mission_id(&newer), 5));
     assert_eq!(
         said(&mut relay, NOW),
-        [(3, forming(12, 1, stamp(&newer), 4))]
+        [(3, forming(12, 1, mission_id(&newer), 4))]
     );
     (relay, peers, base, newer)
 }
 
 #[test]
-fn a_view_that_is_granted_flies_the_mission_of_its_roster() {
+fn a_view_that_is_granted_flies_the_mission_of_its_proposal() {
     let (mut relay, peers, base, newer) = adopted();
     assert_eq!((relay.version(), relay.view()), (2, 1));
     assert_eq!(digest(relay.mission()), newer.digest());
@@ -290,10 +290,10 @@ fn a_view_that_is_granted_flies_the_mission_of_its_roster() {
         peers[0].clone().says(&mut after, NOW, sweep);
         let stats = after.stats();
         assert_eq!([stats.view, stats.mission], expected, "{digest:04x}");
-        let hailed = said(&mut after, NOW).iter().any(|(to, said)| {
-            *to == 3 && matches!(said, Said::Hail(hail) if hail.flags & FLIES != 0)
+        let greeted = said(&mut after, NOW).iter().any(|(to, said)| {
+            *to == 3 && matches!(said, Said::Hello(hello) if hello.flags & FLIES != 0)
         });
-        assert_eq!(hailed, expected != [0, 0], "{digest:04x}");
+        assert_eq!(greeted, expected != [0, 0], "{digest:04x}");
     }
     // Signs of life are of the base for good.
     for (mission, expected) in [(base, 0), (newer.digest(), 1), (own, 1)] {
@@ -311,12 +311,16 @@ fn a_view_that_is_granted_flies_the_mission_of_its_roster() {
 fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_older_one_is_not() {
     let (mut relay, mut peers, base, flown) = adopted();
     events(&mut relay);
-    peers[0].says(&mut relay, NOW, &forming(11, 2, stamp(&flown), 3));
+    peers[0].says(&mut relay, NOW, &forming(11, 2, mission_id(&flown), 3));
     said(&mut relay, NOW);
     let next = upload(3, base);
     peers[0].says(&mut relay, NOW, &Said::Offer(next));
     both(&mut relay);
-    for (of, view) in [((base, 0), 1), (stamp(&next), 1), (stamp(&flown), 2)] {
+    for (of, view) in [
+        ((base, 0), 1),
+        (mission_id(&next), 1),
+        (mission_id(&flown), 2),
+    ] {
         let mut after = relay.clone();
         peers[1]
             .clone()
@@ -331,7 +335,7 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
                 numbers: [3, 0, next.digest(), 3],
                 flags: ASKS | FORMS | READY,
             };
-            assert_eq!(later, [(3, Said::Hail(call))]);
+            assert_eq!(later, [(3, Said::Hello(call))]);
         }
     }
 }
@@ -372,9 +376,13 @@ fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
         }
         let mut peer = Peer::meets(&mut relay, 4, 3, Port::Upstream);
         said(&mut relay, NOW);
-        peer.says(&mut relay, NOW, &hail(base, 4, stamp(&newer), ASKS));
-        let holds = if remembers { stamp(&newer) } else { (base, 0) };
-        let answer = hail(base, 3, holds, FRESH | FLIES);
+        peer.says(&mut relay, NOW, &hello(base, 4, mission_id(&newer), ASKS));
+        let holds = if remembers {
+            mission_id(&newer)
+        } else {
+            (base, 0)
+        };
+        let answer = hello(base, 3, holds, FRESH | FLIES);
         assert_eq!(said(&mut relay, NOW), [(3, answer)]);
         assert_eq!((relay.version(), relay.view()), (holds.1, 0));
         let sweep = &one_of_each(FIRST, newer.digest())[0];

@@ -4,7 +4,7 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Instant, Port, Relay, Wiring};
 
 use super::codec::Said;
-use super::forming::{ASKS, FORMS, FRESH, READY, events, forming, hailing, soon};
+use super::forming::{ASKS, FORMS, FRESH, READY, a_hello, events, forming, soon};
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, framed, one_of_each, sent};
 
@@ -12,9 +12,9 @@ use super::sequence::{FIRST, framed, one_of_each, sent};
 fn in_view(own: u16, view: u16) -> (Relay, u16) {
     let mut relay = relay(own, 8, Wiring::Pair);
     let mission = digest(relay.mission());
-    let roster = Said::Roster(forming(view, mission, [own - 1, 8, 0], 1));
-    let count = Said::Count(forming(view, mission, [own + 1, 8, 0], 0));
-    for (port, said) in [(Port::Upstream, &roster), (Port::Downstream, &count)] {
+    let proposal = Said::Proposal(forming(view, mission, [own - 1, 8, 0], 1));
+    let count = Said::Decision(forming(view, mission, [own + 1, 8, 0], 0));
+    for (port, said) in [(Port::Upstream, &proposal), (Port::Downstream, &count)] {
         relay.handle_bytes(Instant::ZERO, port, &framed(own, port, said));
         sent(&mut relay, Instant::ZERO);
     }
@@ -42,20 +42,20 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
             after.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, sweep));
             assert_eq!(counted(after.stats()), expected, "view {view}, {off}");
             let calls = after.stats().view == 1;
-            let hails = soon(&mut after, now);
-            let hails = hails.iter().filter(|(port, said)| {
-                let forms = matches!(said, Said::Hail(hail) if hail.flags & FORMS != 0);
+            let hellos = soon(&mut after, now);
+            let hellos = hellos.iter().filter(|(port, said)| {
+                let forms = matches!(said, Said::Hello(hello) if hello.flags & FORMS != 0);
                 *port == Port::Upstream && forms
             });
-            assert_eq!(hails.count() > 0, calls, "view {view}, {off}");
-            // An answer calls for nothing: whoever gave it gets a hail, and with that the number of the view.
+            assert_eq!(hellos.count() > 0, calls, "view {view}, {off}");
+            // An answer calls for nothing: whoever gave it gets a hello, and with that the number of the view.
             let mut after = relay.clone();
             let verdict = &one_of_each(FIRST, own.wrapping_add(off))[1];
             after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, verdict));
             let said = soon(&mut after, now);
             if calls {
-                let hail = hailing(view, mission, 5, READY);
-                assert_eq!(said, [(Port::Downstream, hail)]);
+                let hello = a_hello(view, mission, 5, READY);
+                assert_eq!(said, [(Port::Downstream, hello)]);
             } else {
                 assert_eq!(said, []);
             }
@@ -81,27 +81,27 @@ fn heartbeats_bear_the_digest_of_the_mission_in_every_view() {
 }
 
 #[test]
-fn a_late_roster_of_an_old_view_changes_nothing_and_a_leader_that_insists_hears_of_the_newest() {
+fn a_late_proposal_of_an_old_view_changes_nothing_and_a_leader_that_insists_hears_of_the_newest() {
     let (mut relay, mission) = in_view(4, 5);
     let now = Instant::ZERO;
     for (nth, number) in [(1, 5), (2, 3), (3, 4)] {
         // Number 5 from another place than the one it was agreed with.
-        let roster = Said::Roster(forming(number, mission, [2, 8, 0], 1));
-        relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &roster));
+        let proposal = Said::Proposal(forming(number, mission, [2, 8, 0], 1));
+        relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
         assert_eq!(soon(&mut relay, now), []);
         assert_eq!((relay.stats().stale, relay.view()), (nth, 5));
         assert_eq!((relay.index(), relay.mission().relays()), (4, 8));
         assert_eq!(events(&mut relay), []);
     }
-    let roster = Said::Roster(forming(4, mission, [3, 8, 0], 1));
-    relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &roster));
-    let hail = hailing(6, mission, 3, ASKS | FORMS | READY);
-    assert_eq!(soon(&mut relay, now), [(Port::Upstream, hail)]);
+    let proposal = Said::Proposal(forming(4, mission, [3, 8, 0], 1));
+    relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
+    let hello = a_hello(6, mission, 3, ASKS | FORMS | READY);
+    assert_eq!(soon(&mut relay, now), [(Port::Upstream, hello)]);
     assert_eq!((relay.stats().stale, relay.view()), (4, 5));
 }
 
 #[test]
-fn a_hail_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() {
+fn a_hello_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() {
     let now = Instant::ZERO;
     let (relay, mission) = in_view(4, 3);
     for (newest, fresh, calls) in [
@@ -113,10 +113,10 @@ fn a_hail_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() {
     ] {
         let mut after = relay.clone();
         let flags = FORMS | if fresh { FRESH } else { 0 };
-        let hail = hailing(newest, mission, 4, flags);
-        after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &hail));
+        let hello = a_hello(newest, mission, 4, flags);
+        after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &hello));
         let known = newest.max(3);
-        let on = hailing(known, mission, 3, ASKS | FORMS | READY);
+        let on = a_hello(known, mission, 3, ASKS | FORMS | READY);
         let expected = calls.then_some((Port::Upstream, on));
         assert_eq!(
             soon(&mut after, now),

@@ -2,16 +2,16 @@
 
 mod pairs;
 
-use super::confines::{Confines, Geofence};
-use super::{Fence, Guard, Hindrance};
+use super::config::{Geofence, GuardConfig};
+use super::{Fence, Guard, HoldReason};
 use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
 const APART: f32 = 10.0;
 
-fn confines() -> Confines {
-    Confines {
+fn config() -> GuardConfig {
+    GuardConfig {
         fence: Geofence {
             least_x_m: 0.0,
             most_x_m: 1000.0,
@@ -39,7 +39,7 @@ struct One {
 impl One {
     fn new(neighbours: [Option<u16>; 2], x_m: f32, target_m: f32) -> Self {
         let mut one = Self {
-            guard: Guard::new(confines(), neighbours, 7, Instant::ZERO),
+            guard: Guard::new(config(), neighbours, 7, Instant::ZERO),
             now: Instant::ZERO,
         };
         one.guard.commit(at(target_m));
@@ -62,8 +62,8 @@ impl One {
     /// What it has to say on `side`.
     fn says(&mut self, side: Side) -> Fence {
         self.guard.steer(self.now);
-        self.guard.kept.tie.due = true;
-        self.guard.keeper.tie.due = true;
+        self.guard.follower.association.due = true;
+        self.guard.owner.association.due = true;
         let mut said = None;
         while let Some((to, _, fence)) = self.guard.poll() {
             if to == side {
@@ -87,7 +87,7 @@ fn it_is_small() {
 
 #[test]
 fn there_is_no_setpoint_before_a_place_and_a_report() {
-    let mut guard = Guard::new(confines(), [None, None], 7, Instant::from_millis(1000));
+    let mut guard = Guard::new(config(), [None, None], 7, Instant::from_millis(1000));
     let now = Instant::from_millis(2000);
     assert_eq!(guard.steer(now), None);
     guard.commit(at(300.0));
@@ -119,7 +119,7 @@ fn nothing_leaves_the_box_and_nonsense_is_counted() {
     one.guard.commit(at(f32::NAN));
     one.guard.position(one.now, at(f32::INFINITY));
     let fence = Fence {
-        tie: 1,
+        association: 1,
         echo: 0,
         number: 0,
         x_m: 2e7,
@@ -135,21 +135,21 @@ fn nothing_leaves_the_box_and_nonsense_is_counted() {
 fn a_squeezed_relay_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
     for side in [Side::Upstream, Side::Downstream] {
-        let hello = Fence {
-            tie: 9,
+        let handshake = Fence {
+            association: 9,
             echo: 0,
             number: 0,
             x_m: 0.0,
             target_m: 0.0,
         };
         let from = if side == Side::Upstream { 1 } else { 3 };
-        one.hears(side, from, hello);
+        one.hears(side, from, handshake);
         let said = one.says(side);
         let answer = Fence {
-            echo: said.tie,
+            echo: said.association,
             number: u16::from(side == Side::Upstream),
             x_m: if side == Side::Upstream { 98.0 } else { 104.0 },
-            ..hello
+            ..handshake
         };
         one.hears(side, from, answer);
     }
@@ -172,7 +172,10 @@ fn a_lost_relay_is_kept_clear_of() {
     assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
     one.guard.link(Side::Downstream, None);
     assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
-    assert_eq!(one.guard.hindrance(Side::Downstream), Some(Hindrance::Lost));
+    assert_eq!(
+        one.guard.hold_reason(Side::Downstream),
+        Some(HoldReason::Lost)
+    );
     one.guard.forget(Side::Downstream);
     assert_eq!(one.setpoint().to_bits(), 400.0_f32.to_bits());
 
@@ -187,7 +190,7 @@ fn a_lost_relay_is_kept_clear_of() {
 
 #[test]
 fn one_that_was_never_heard_may_be_anywhere() {
-    let mut guard = Guard::new(confines(), [Some(1), Some(3)], 7, Instant::ZERO);
+    let mut guard = Guard::new(config(), [Some(1), Some(3)], 7, Instant::ZERO);
     guard.link(Side::Upstream, None);
     guard.link(Side::Downstream, Some(4));
     guard.link(Side::Downstream, None);

@@ -1,7 +1,7 @@
 //! Two relays and the fence between them.
 
-use super::{One, at, confines};
-use crate::guard::{Guard, Hindrance};
+use super::{One, at, config};
+use crate::guard::{Guard, HoldReason};
 use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
@@ -12,26 +12,26 @@ struct Both(f32, f32);
 
 /// Relay 1 toward Tx and relay 2 toward Rx, between them one fence.
 struct Pair {
-    keeper: One,
-    kept: One,
+    owner: One,
+    follower: One,
 }
 
 impl Pair {
-    fn new(keeper: [f32; 2], kept: [f32; 2]) -> Self {
+    fn new(owner: [f32; 2], follower: [f32; 2]) -> Self {
         Self {
-            keeper: One::new([None, Some(2)], keeper[0], keeper[1]),
-            kept: One::new([Some(1), None], kept[0], kept[1]),
+            owner: One::new([None, Some(2)], owner[0], owner[1]),
+            follower: One::new([Some(1), None], follower[0], follower[1]),
         }
     }
 
     fn ask(&mut self) {
-        let fence = self.keeper.says(Side::Downstream);
-        self.kept.hears(Side::Upstream, 1, fence);
+        let fence = self.owner.says(Side::Downstream);
+        self.follower.hears(Side::Upstream, 1, fence);
     }
 
     fn answer(&mut self) {
-        let fence = self.kept.says(Side::Upstream);
-        self.keeper.hears(Side::Downstream, 2, fence);
+        let fence = self.follower.says(Side::Upstream);
+        self.owner.hears(Side::Downstream, 2, fence);
     }
 
     /// Both hear what the other one has to say, until nothing is new.
@@ -43,7 +43,7 @@ impl Pair {
     }
 
     fn setpoints(&mut self) -> Both {
-        Both(self.keeper.setpoint(), self.kept.setpoint())
+        Both(self.owner.setpoint(), self.follower.setpoint())
     }
 }
 
@@ -55,12 +55,12 @@ fn nobody_moves_toward_one_who_was_not_heard() {
     pair.ask();
     assert_eq!(pair.setpoints(), Both(100.0, 300.0));
     assert_eq!(
-        pair.keeper.guard.hindrance(Side::Downstream),
-        Some(Hindrance::Unheard)
+        pair.owner.guard.hold_reason(Side::Downstream),
+        Some(HoldReason::Unheard)
     );
     // Away from it, it may.
-    pair.keeper.guard.commit(at(50.0));
-    pair.kept.guard.commit(at(400.0));
+    pair.owner.guard.commit(at(50.0));
+    pair.follower.guard.commit(at(400.0));
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
@@ -74,30 +74,30 @@ fn the_keeper_follows_the_kept_relay() {
         Both(110.0, 300.0),
         "half way: (200 + 300 + 10) / 2 is asked for"
     );
-    pair.kept.is_at(180.0);
+    pair.follower.is_at(180.0);
     pair.talk();
     assert_eq!(pair.setpoints(), Both(170.0, 300.0));
-    pair.kept.is_at(300.0);
+    pair.follower.is_at(300.0);
     pair.talk();
     assert_eq!(pair.setpoints(), Both(200.0, 300.0));
-    pair.keeper.is_at(200.0);
-    assert!(pair.keeper.guard.is_there() && pair.kept.guard.is_there());
+    pair.owner.is_at(200.0);
+    assert!(pair.owner.guard.is_there() && pair.follower.guard.is_there());
     assert!(
-        !pair.keeper.guard.remind() && !pair.kept.guard.remind(),
+        !pair.owner.guard.remind() && !pair.follower.guard.remind(),
         "nothing is left to say"
     );
 }
 
-/// Rules 1 and 5: a fence on the left is lowered as the keeper clears it.
+/// Rules 1 and 5: a fence on the left is lowered as the owner clears it.
 #[test]
 fn the_kept_relay_follows_the_keeper() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
     pair.talk();
     assert_eq!(pair.setpoints(), Both(100.0, 210.0));
-    pair.keeper.is_at(150.0);
+    pair.owner.is_at(150.0);
     pair.talk();
     assert_eq!(pair.setpoints(), Both(100.0, 160.0));
-    pair.keeper.is_at(100.0);
+    pair.owner.is_at(100.0);
     pair.talk();
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
@@ -107,29 +107,32 @@ fn the_kept_relay_follows_the_keeper() {
 fn late_messages_grant_nothing() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
     pair.talk();
-    let high = pair.kept.says(Side::Upstream);
-    // It is lowered to (20 + 120 + 10) / 2, but nobody has said so to the kept relay yet.
-    pair.keeper.guard.commit(at(20.0));
-    pair.kept.guard.commit(at(120.0));
+    let high = pair.follower.says(Side::Upstream);
+    // It is lowered to (20 + 120 + 10) / 2, but nobody has said so to the follower relay yet.
+    pair.owner.guard.commit(at(20.0));
+    pair.follower.guard.commit(at(120.0));
     pair.answer();
-    pair.keeper.is_at(20.0);
-    let low = pair.keeper.says(Side::Downstream);
+    pair.owner.is_at(20.0);
+    let low = pair.owner.says(Side::Downstream);
     assert_eq!(low.x_m.to_bits(), 75.0_f32.to_bits());
-    pair.keeper.guard.commit(at(290.0));
-    pair.keeper.hears(Side::Downstream, 2, high);
+    pair.owner.guard.commit(at(290.0));
+    pair.owner.hears(Side::Downstream, 2, high);
     assert_eq!(
-        pair.keeper.setpoint().to_bits(),
+        pair.owner.setpoint().to_bits(),
         65.0_f32.to_bits(),
         "the fence under way counts"
     );
-    pair.kept.hears(Side::Upstream, 1, low);
-    assert_eq!(pair.kept.setpoint().to_bits(), 120.0_f32.to_bits());
+    pair.follower.hears(Side::Upstream, 1, low);
+    assert_eq!(pair.follower.setpoint().to_bits(), 120.0_f32.to_bits());
     pair.talk();
-    let raised = pair.keeper.says(Side::Downstream);
+    let raised = pair.owner.says(Side::Downstream);
     assert!(raised.x_m > low.x_m);
-    pair.kept.guard.commit(at(80.0));
-    pair.kept.hears(Side::Upstream, 1, low);
-    assert!(pair.kept.setpoint() >= raised.x_m, "the old fence is over");
+    pair.follower.guard.commit(at(80.0));
+    pair.follower.hears(Side::Upstream, 1, low);
+    assert!(
+        pair.follower.setpoint() >= raised.x_m,
+        "the old fence is over"
+    );
 }
 
 /// A report that is older than the setpoint, or that the setpoint cannot have had an effect on, frees nothing.
@@ -137,14 +140,14 @@ fn late_messages_grant_nothing() {
 fn an_old_report_frees_nothing() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
     pair.talk();
-    let now = pair.keeper.now;
-    pair.keeper.guard.position(now, at(100.0));
-    pair.keeper
+    let now = pair.owner.now;
+    pair.owner.guard.position(now, at(100.0));
+    pair.owner
         .guard
         .position(now + Duration::from_millis(199), at(100.0));
     pair.talk();
     assert_eq!(pair.setpoints(), Both(100.0, 210.0));
-    pair.keeper
+    pair.owner
         .guard
         .position(now + Duration::from_millis(200), at(100.0));
     pair.talk();
@@ -159,57 +162,57 @@ fn a_start_too_close_is_opened_before_anything_else() {
         y_m: 30.0,
         ..Placement::on_line(x_m, 90.0)
     };
-    pair.kept.guard.commit(high(600.0));
-    pair.keeper.guard.commit(high(500.0));
+    pair.follower.guard.commit(high(600.0));
+    pair.owner.guard.commit(high(500.0));
     pair.talk();
     assert_eq!(pair.setpoints(), Both(94.0, 600.0));
     let low = |one: &One| one.guard.setpoint().unwrap().cross_section() == at(0.0).cross_section();
     assert!(
-        low(&pair.keeper) && low(&pair.kept),
+        low(&pair.owner) && low(&pair.follower),
         "both altitudes wait, and what is aside"
     );
-    pair.keeper.is_at(94.0);
-    pair.kept.is_at(200.0);
+    pair.owner.is_at(94.0);
+    pair.follower.is_at(200.0);
     pair.talk();
     assert_eq!(pair.setpoints(), Both(190.0, 600.0));
-    assert!(!low(&pair.keeper) && !low(&pair.kept));
+    assert!(!low(&pair.owner) && !low(&pair.follower));
 }
 
 #[test]
 fn relays_in_the_wrong_order_stay() {
     let mut pair = Pair::new([200.0, 100.0], [150.0, 300.0]);
-    pair.kept.guard.commit(at(300.0));
+    pair.follower.guard.commit(at(300.0));
     pair.talk();
     // Away from where the other one should be each could go by itself, but here that is where it is.
-    pair.keeper.guard.commit(at(250.0));
-    pair.kept.guard.commit(at(140.0));
+    pair.owner.guard.commit(at(250.0));
+    pair.follower.guard.commit(at(140.0));
     pair.talk();
-    let Both(keeper, kept) = pair.setpoints();
-    assert!(keeper <= 200.0 && kept >= 150.0, "{keeper} {kept}");
+    let Both(owner, follower) = pair.setpoints();
+    assert!(owner <= 200.0 && follower >= 150.0, "{owner} {follower}");
     assert_eq!(
-        pair.keeper.guard.hindrance(Side::Downstream),
-        Some(Hindrance::Order)
+        pair.owner.guard.hold_reason(Side::Downstream),
+        Some(HoldReason::Order)
     );
 }
 
-/// A keeper that starts again knows nothing of the fence it had announced: the kept relay goes by it until it has talked to the
+/// A owner that starts again knows nothing of the fence it had announced: the follower relay goes by it until it has talked to the
 /// new one, and by no old message after that.
 #[test]
 fn a_new_life_is_told_from_an_old_one() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
     pair.talk();
-    let old = pair.keeper.says(Side::Downstream);
-    let told = pair.kept.says(Side::Upstream);
-    pair.keeper = One::new([None, Some(2)], 100.0, 280.0);
+    let old = pair.owner.says(Side::Downstream);
+    let told = pair.follower.says(Side::Upstream);
+    pair.owner = One::new([None, Some(2)], 100.0, 280.0);
     // Another seed, as it has to be.
-    pair.keeper.guard = {
-        let mut guard = Guard::new(confines(), [None, Some(2)], 8, Instant::ZERO);
+    pair.owner.guard = {
+        let mut guard = Guard::new(config(), [None, Some(2)], 8, Instant::ZERO);
         guard.commit(at(280.0));
         guard
     };
-    pair.keeper.is_at(100.0);
-    pair.keeper.is_at(100.0);
-    pair.keeper.hears(Side::Downstream, 2, told);
+    pair.owner.is_at(100.0);
+    pair.owner.is_at(100.0);
+    pair.owner.hears(Side::Downstream, 2, told);
     assert_eq!(
         pair.setpoints(),
         Both(100.0, 300.0),
@@ -217,14 +220,14 @@ fn a_new_life_is_told_from_an_old_one() {
     );
     pair.talk();
     assert_eq!(pair.setpoints(), Both(280.0, 300.0));
-    pair.kept.guard.commit(at(110.0));
+    pair.follower.guard.commit(at(110.0));
     for _ in 0..2 {
-        pair.kept.hears(Side::Upstream, 1, old);
+        pair.follower.hears(Side::Upstream, 1, old);
     }
-    assert_eq!(pair.kept.setpoint().to_bits(), 295.0_f32.to_bits());
+    assert_eq!(pair.follower.setpoint().to_bits(), 295.0_f32.to_bits());
     // Three in a row look like a third life; but they grant nothing either.
-    pair.kept.hears(Side::Upstream, 1, old);
-    assert!(pair.kept.setpoint() >= 295.0);
+    pair.follower.hears(Side::Upstream, 1, old);
+    assert!(pair.follower.setpoint() >= 295.0);
     pair.talk();
     assert_eq!(
         pair.setpoints(),

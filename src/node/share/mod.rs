@@ -22,8 +22,10 @@ use crate::optimiser::ladder::Ladder;
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement, Station};
 use crate::settings::{Method, Settings};
-use crate::wire::digest::Stamp;
-use crate::wire::message::{Answer, Count, Course, Message, Moved, Roster, Sweep, Token, Worth};
+use crate::wire::digest::MissionId;
+use crate::wire::message::{
+    Answer, Course, Decision, Message, Moved, Proposal, Sweep, Token, Worth,
+};
 
 use roll::Rolling;
 
@@ -40,8 +42,8 @@ pub(crate) struct Own<'a> {
     pub(crate) mission: &'a Mission,
     pub(crate) settings: &'a Settings,
     /// The mission that it flies, and the newest that it holds.
-    pub(crate) flown: Stamp,
-    pub(crate) held: Stamp,
+    pub(crate) flown: MissionId,
+    pub(crate) held: MissionId,
     /// Number of the view that it has agreed to.
     pub(crate) view: u16,
     /// Its place among the relays of that view, 1 next to Tx.
@@ -58,9 +60,9 @@ impl Own<'_> {
         self.flown.digest.wrapping_add(self.view)
     }
 
-    /// Whether it can fly the mission of that stamp.
-    fn has(self, stamp: Stamp) -> bool {
-        stamp == self.held || stamp == self.flown
+    /// Whether it can fly the mission of that mission_id.
+    fn has(self, mission_id: MissionId) -> bool {
+        mission_id == self.held || mission_id == self.flown
     }
 
     /// Whether the joint method is asked for, and has something to choose.
@@ -234,8 +236,8 @@ impl Share {
                     sir: turning.sir,
                 })
             }),
-            Pass::Roll(rolling) if MEMBERSHIP => Some(Message::Roster(Roster {
-                stamp: rolling.stamp,
+            Pass::Roll(rolling) if MEMBERSHIP => Some(Message::Proposal(Proposal {
+                mission_id: rolling.mission_id,
                 view: rolling.view,
                 place: rolling.place,
                 before: rolling.before,
@@ -290,8 +292,8 @@ impl Share {
                     worst: turning.worst,
                 })
             }),
-            Pass::Roll(rolling) if MEMBERSHIP => Some(Message::Count(Count {
-                stamp: rolling.stamp,
+            Pass::Roll(rolling) if MEMBERSHIP => Some(Message::Decision(Decision {
+                mission_id: rolling.mission_id,
                 view: rolling.view,
                 place: rolling.place,
                 relays: rolling.relays,

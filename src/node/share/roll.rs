@@ -3,8 +3,8 @@
 use super::super::exchange::{Arrival, Next, Phase};
 use super::super::lead::Lead;
 use super::{Own, Pass, Share};
-use crate::wire::digest::Stamp;
-use crate::wire::message::{Before, Count, Roster};
+use crate::wire::digest::MissionId;
+use crate::wire::message::{Decision, PriorView, Proposal};
 
 /// A call, as one relay sees it.
 #[derive(Clone, Copy, Debug)]
@@ -12,11 +12,11 @@ pub(crate) struct Rolling {
     /// Number of the new view.
     pub(crate) view: u16,
     /// The mission that it is to fly.
-    pub(crate) stamp: Stamp,
+    pub(crate) mission_id: MissionId,
     /// This relay's place in it, from 1 at the leader.
     pub(crate) place: u16,
     /// The newest view that a relay up to this one has agreed to.
-    pub(crate) before: Before,
+    pub(crate) before: PriorView,
     /// How many relays there are, once that is known; `None` if too few.
     pub(crate) relays: Option<u16>,
 }
@@ -29,15 +29,15 @@ impl Share {
     }
 
     /// A call from the relay before, for a view that flies the mission that this relay holds.
-    pub(crate) fn on_roster(&mut self, own: Own<'_>, roster: &Roster) -> Next {
+    pub(crate) fn on_proposal(&mut self, own: Own<'_>, proposal: &Proposal) -> Next {
         let current = match &self.pass {
             Pass::Roll(rolling) => Some(*rolling),
             _ => None,
         };
         let again = current.is_some_and(|rolling| {
-            rolling.view == roster.view
-                && rolling.stamp == roster.stamp
-                && rolling.place == roster.place.saturating_add(1)
+            rolling.view == proposal.view
+                && rolling.mission_id == proposal.mission_id
+                && rolling.place == proposal.place.saturating_add(1)
         });
         if again {
             return self.exchange.again();
@@ -46,33 +46,39 @@ impl Share {
             Some(rolling) if self.exchange.phase == Phase::Waiting => rolling.view.max(own.view),
             _ => own.view,
         };
-        if roster.view <= newest {
+        if proposal.view <= newest {
             // Late, or from a leader that has missed something.
             return match self.exchange.straggler() {
                 Arrival::Foreign => Next::Foreign,
                 _ => Next::Stale,
             };
         }
-        let before = Some(roster.before);
-        self.roll(own, roster.view, roster.stamp, roster.place, before)
+        let before = Some(proposal.before);
+        self.roll(
+            own,
+            proposal.view,
+            proposal.mission_id,
+            proposal.place,
+            before,
+        )
     }
 
     fn roll(
         &mut self,
         own: Own<'_>,
         view: u16,
-        stamp: Stamp,
+        mission_id: MissionId,
         place: u16,
-        before: Option<Before>,
+        before: Option<PriorView>,
     ) -> Next {
-        let known = Before {
+        let known = PriorView {
             view: own.view,
             relays: own.mission.relays(),
             leader: own.index == own.mission.leader(),
         };
         let before = match before {
             Some(told) if told.view > known.view => told,
-            Some(told) if told.view == known.view => Before {
+            Some(told) if told.view == known.view => PriorView {
                 leader: told.leader || known.leader,
                 ..told
             },
@@ -82,7 +88,7 @@ impl Share {
         self.exchange.phase = Phase::Waiting;
         self.pass = Pass::Roll(Rolling {
             view,
-            stamp,
+            mission_id,
             place: place.saturating_add(1),
             before,
             relays: None,
@@ -109,11 +115,11 @@ impl Share {
     }
 
     /// What came of a call, from the relay after.
-    pub(crate) fn on_count(&mut self, own: Own<'_>, count: &Count) -> Next {
+    pub(crate) fn on_decision(&mut self, own: Own<'_>, count: &Decision) -> Next {
         if let Pass::Roll(rolling) = &self.pass
             && self.exchange.phase == Phase::Waiting
             && rolling.view == count.view
-            && rolling.stamp == count.stamp
+            && rolling.mission_id == count.mission_id
             && rolling.place.saturating_add(1) == count.place
             && count.relays.is_none_or(|relays| relays > rolling.place)
         {
@@ -126,7 +132,7 @@ impl Share {
         let Pass::Roll(rolling) = &mut self.pass else {
             return Next::Nothing;
         };
-        if !own.has(rolling.stamp) {
+        if !own.has(rolling.mission_id) {
             // A newer mission has taken its place since: the others come to hold that one, too.
             return Next::Foreign;
         }
@@ -166,19 +172,19 @@ impl Share {
     }
 
     /// The view that is being called for, its number and its mission, while the answer is awaited.
-    pub(crate) fn called(&self) -> Option<(u16, Stamp)> {
+    pub(crate) fn called(&self) -> Option<(u16, MissionId)> {
         match &self.pass {
             Pass::Roll(rolling) if self.exchange.phase == Phase::Waiting => {
-                Some((rolling.view, rolling.stamp))
+                Some((rolling.view, rolling.mission_id))
             }
             _ => None,
         }
     }
 
     /// The mission of the last call; `None` if the current pass is another.
-    pub(crate) const fn stamp(&self) -> Option<Stamp> {
+    pub(crate) const fn id(&self) -> Option<MissionId> {
         match &self.pass {
-            Pass::Roll(rolling) => Some(rolling.stamp),
+            Pass::Roll(rolling) => Some(rolling.mission_id),
             _ => None,
         }
     }
@@ -191,14 +197,14 @@ mod tests {
     use crate::mission::Mission;
     use crate::mission::tests::paper;
     use crate::settings::Settings;
-    use crate::wire::digest::{Stamp, digest};
-    use crate::wire::message::{Before, Count, Roster};
+    use crate::wire::digest::{MissionId, digest};
+    use crate::wire::message::{Decision, PriorView, Proposal};
 
     /// What relay 2 of 3 holds: mission 4; it flies the one it was loaded with.
     struct Held {
         mission: Mission,
         settings: Settings,
-        stamp: Stamp,
+        mission_id: MissionId,
     }
 
     impl Held {
@@ -206,7 +212,7 @@ mod tests {
             Self {
                 mission: Mission::try_new(paper(3)).unwrap(),
                 settings: Settings::default(),
-                stamp: Stamp {
+                mission_id: MissionId {
                     version: 4,
                     digest: 0x1234,
                 },
@@ -217,11 +223,11 @@ mod tests {
             Own {
                 mission: &self.mission,
                 settings: &self.settings,
-                flown: Stamp {
+                flown: MissionId {
                     version: 0,
                     digest: digest(&self.mission),
                 },
-                held: self.stamp,
+                held: self.mission_id,
                 view: 0,
                 index: 2,
                 end: false,
@@ -229,12 +235,12 @@ mod tests {
             }
         }
 
-        fn roster(&self, view: u16) -> Roster {
-            Roster {
-                stamp: self.stamp,
+        fn proposal(&self, view: u16) -> Proposal {
+            Proposal {
+                mission_id: self.mission_id,
                 view,
                 place: 1,
-                before: Before {
+                before: PriorView {
                     view: 0,
                     relays: 3,
                     leader: true,
@@ -242,9 +248,9 @@ mod tests {
             }
         }
 
-        fn count(&self, view: u16) -> Count {
-            Count {
-                stamp: self.stamp,
+        fn count(&self, view: u16) -> Decision {
+            Decision {
+                mission_id: self.mission_id,
                 view,
                 place: 3,
                 relays: Some(3),
@@ -261,15 +267,15 @@ mod tests {
     fn a_call_for_the_same_view_with_another_mission_is_another_call() {
         let mut held = Held::new();
         let mut share = share(&held);
-        let first = held.roster(1);
+        let first = held.proposal(1);
         assert_eq!(
-            share.on_roster(held.own(), &first),
+            share.on_proposal(held.own(), &first),
             Next::Forward { moved: false }
         );
-        assert_eq!(share.on_roster(held.own(), &first), Next::Busy);
-        held.stamp.version = 5;
+        assert_eq!(share.on_proposal(held.own(), &first), Next::Busy);
+        held.mission_id.version = 5;
         assert_eq!(
-            share.on_roster(held.own(), &held.roster(1)),
+            share.on_proposal(held.own(), &held.proposal(1)),
             Next::Stale,
             "and not that it has arrived"
         );
@@ -279,12 +285,12 @@ mod tests {
     fn a_count_is_of_the_mission_that_was_called_for() {
         let held = Held::new();
         let mut share = share(&held);
-        share.on_roster(held.own(), &held.roster(1));
+        share.on_proposal(held.own(), &held.proposal(1));
         let mut count = held.count(1);
-        count.stamp.version = 5;
-        assert_eq!(share.on_count(held.own(), &count), Next::Stale);
+        count.mission_id.version = 5;
+        assert_eq!(share.on_decision(held.own(), &count), Next::Stale);
         assert_eq!(
-            share.on_count(held.own(), &held.count(1)),
+            share.on_decision(held.own(), &held.count(1)),
             Next::Formed { granted: Some(3) }
         );
     }
@@ -294,10 +300,10 @@ mod tests {
     fn who_has_lost_the_mission_has_no_part_in_its_view() {
         let mut held = Held::new();
         let mut share = share(&held);
-        share.on_roster(held.own(), &held.roster(1));
+        share.on_proposal(held.own(), &held.proposal(1));
         let count = held.count(1);
-        held.stamp.version = 5;
-        assert_eq!(share.on_count(held.own(), &count), Next::Foreign);
+        held.mission_id.version = 5;
+        assert_eq!(share.on_decision(held.own(), &count), Next::Foreign);
         assert_eq!(share.phase(), Phase::Waiting);
         assert!(matches!(
             share.pass,

@@ -1,12 +1,12 @@
-//! What one relay does with an offer and a roster, and says of them.
+//! What one relay does with an offer and a proposal, and says of them.
 
-use super::{Hail, Message, Node, Side, Stamp, Upload};
+use super::{Hello, Message, MissionId, Node, Side, Upload};
 use crate::mission::tests::paper;
 use crate::mission::{Interference, Interferer, Mission, MissionConfig};
 use crate::settings::{Identity, Settings, Wiring};
 use crate::time::Instant;
 use crate::wire::auth::{Auth, Key};
-use crate::wire::message::{Before, Roster};
+use crate::wire::message::{PriorView, Proposal};
 
 const NOW: Instant = Instant::from_millis(10_000);
 
@@ -57,8 +57,8 @@ fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
     let mut said = heapless::Vec::new();
     while let Some((_, to, message)) = node.poll_message(NOW) {
         let message = match message {
-            Message::Hail(hail) => Message::Hail(hail),
-            Message::Roster(roster) => Message::Roster(roster),
+            Message::Hello(hello) => Message::Hello(hello),
+            Message::Proposal(proposal) => Message::Proposal(proposal),
             Message::Offer(upload) => Message::Offer(upload),
             Message::Heartbeat { mission, answer } => Message::Heartbeat { mission, answer },
             _ => panic!("{message:?}"),
@@ -68,9 +68,9 @@ fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
     said
 }
 
-/// A hail of a neighbour that has taken relay 2.
-fn hail(node: &Node, holds: Stamp) -> Message {
-    Message::Hail(Hail {
+/// A hello of a neighbour that has taken relay 2.
+fn hello(node: &Node, holds: MissionId) -> Message {
+    Message::Hello(Hello {
         mission: node.members.digest,
         newest: 0,
         neighbour: 2,
@@ -83,12 +83,12 @@ fn hail(node: &Node, holds: Stamp) -> Message {
     })
 }
 
-fn roster(stamp: Stamp) -> Message {
-    Message::Roster(Roster {
-        stamp,
+fn proposal(mission_id: MissionId) -> Message {
+    Message::Proposal(Proposal {
+        mission_id,
         view: 1,
         place: 1,
-        before: Before {
+        before: PriorView {
             view: 0,
             relays: 3,
             leader: true,
@@ -97,41 +97,41 @@ fn roster(stamp: Stamp) -> Message {
 }
 
 #[test]
-fn who_does_not_hold_the_mission_hands_no_roster_on_and_says_what_it_holds() {
+fn who_does_not_hold_the_mission_hands_no_proposal_on_and_says_what_it_holds() {
     let mut node = relay(true);
     let held = node.members.held;
-    let known = hail(&node, held);
+    let known = hello(&node, held);
     node.handle_message(NOW, Side::Upstream, 1, &known);
     assert_eq!(said(&mut node), []);
-    node.handle_message(NOW, Side::Upstream, 1, &roster(upload(1).stamp()));
+    node.handle_message(NOW, Side::Upstream, 1, &proposal(upload(1).id()));
     assert_eq!((node.stats.view, node.stats.mission), (1, 0));
     let said = said(&mut node);
     assert!(
-        matches!(said[..], [(1, Message::Hail(Hail { holds, .. }))] if holds == held),
+        matches!(said[..], [(1, Message::Hello(Hello { holds, .. }))] if holds == held),
         "{said:?}"
     );
 }
 
 #[test]
-fn the_next_relay_is_offered_the_mission_before_the_roster_comes_to_it() {
+fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
     let mut node = relay(true);
     let new = upload(1);
     node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(new));
-    assert_eq!(node.members.held, new.stamp());
-    assert_ne!(node.members.flown, new.stamp());
+    assert_eq!(node.members.held, new.id());
+    assert_ne!(node.members.flown, new.id());
     let told = said(&mut node);
     assert!(
-        matches!(told[..], [(1, Message::Hail(Hail { holds, flies: false, .. }))] if holds == new.stamp()),
+        matches!(told[..], [(1, Message::Hello(Hello { holds, flies: false, .. }))] if holds == new.id()),
         "{told:?}"
     );
-    node.handle_message(NOW, Side::Upstream, 1, &roster(new.stamp()));
+    node.handle_message(NOW, Side::Upstream, 1, &proposal(new.id()));
     assert_eq!(said(&mut node), [(3, Message::Offer(new))]);
     // It says that it holds it.
-    let holds = hail(&node, new.stamp());
+    let holds = hello(&node, new.id());
     node.handle_message(NOW, Side::Downstream, 3, &holds);
     let told = said(&mut node);
     assert!(
-        matches!(told[..], [(3, Message::Roster(Roster { stamp, place: 2, .. }))] if stamp == new.stamp()),
+        matches!(told[..], [(3, Message::Proposal(Proposal { mission_id, place: 2, .. }))] if mission_id == new.id()),
         "{told:?}"
     );
 }
@@ -139,19 +139,19 @@ fn the_next_relay_is_offered_the_mission_before_the_roster_comes_to_it() {
 #[test]
 fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one_is_told() {
     let mut node = relay(true);
-    let (older, newer) = (node.members.held, upload(2).stamp());
-    let ahead = hail(&node, newer);
+    let (older, newer) = (node.members.held, upload(2).id());
+    let ahead = hello(&node, newer);
     node.handle_message(NOW, Side::Downstream, 3, &ahead);
     let told = said(&mut node);
     assert!(
-        matches!(told[..], [(3, Message::Hail(Hail { holds, .. }))] if holds == older),
+        matches!(told[..], [(3, Message::Hello(Hello { holds, .. }))] if holds == older),
         "{told:?}"
     );
     let new = upload(1);
     node.handle_upload(NOW, &new).unwrap();
     // The neighbour that the leader is beyond is offered it at once.
     assert_eq!(said(&mut node), [(1, Message::Offer(new))]);
-    let behind = hail(&node, older);
+    let behind = hello(&node, older);
     node.handle_message(NOW, Side::Downstream, 3, &behind);
     assert_eq!(said(&mut node), [(3, Message::Offer(new))]);
 }
@@ -186,22 +186,22 @@ fn an_offer_for_other_relays_is_refused() {
     assert_eq!((node.stats.mission, node.members.held), (2, held));
 }
 
-/// Two that do not take each other for neighbours, but one of them the other: offers and hails must come to an end.
+/// Two that do not take each other for neighbours, but one of them the other: offers and hellos must come to an end.
 #[test]
 fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     let five = Mission::try_new(paper(5)).unwrap();
     let mut node = relay_of(five, 3, true);
     let new = upload_to(&five, 1);
     assert!(node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(new)));
-    assert_eq!((node.members.held, node.upstream.node()), (new.stamp(), 2));
+    assert_eq!((node.members.held, node.upstream.node()), (new.id(), 2));
     let told = said(&mut node);
-    let hails = told.iter().filter(|(to, _)| *to == 1);
-    let hails: heapless::Vec<_, 8> = hails.collect();
+    let hellos = told.iter().filter(|(to, _)| *to == 1);
+    let hellos: heapless::Vec<_, 8> = hellos.collect();
     assert!(
-        matches!(hails[..], [(1, Message::Hail(Hail { holds, .. }))] if *holds == new.stamp()),
+        matches!(hellos[..], [(1, Message::Hello(Hello { holds, .. }))] if *holds == new.id()),
         "{told:?}"
     );
     let stray = upload_to(&base(), 2);
     node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(stray));
-    assert_eq!((node.stats.mission, node.members.held), (1, new.stamp()));
+    assert_eq!((node.stats.mission, node.members.held), (1, new.id()));
 }

@@ -31,7 +31,7 @@ pub(crate) struct Courser<'a> {
     pub(crate) mission: &'a Mission,
     /// What its power is worth, and that of the relay or of Tx before it; across the line the sender is where the trial has it.
     pub(crate) power_w: f32,
-    pub(crate) gain_in: crate::gain::Gain,
+    pub(crate) gain_in: crate::power_ratio::PowerRatio,
     pub(crate) first: bool,
     pub(crate) room: Room,
 }

@@ -1,4 +1,4 @@
-//! Two sessions that say hello to each other, and a table that is too small for all who do.
+//! Two sessions that say handshake to each other, and a table that is too small for all who do.
 
 use super::{Checked, HELLO, PEERS, Session};
 use crate::wire::auth::{Auth, Key};
@@ -30,8 +30,8 @@ fn plain(frame: &FrameBuf, len: usize) -> Plain {
     decoded.unwrap()
 }
 
-/// What `from`, of node `addresses.0`, sends to node `addresses.1`: a hello, or busy.
-fn frame(from: &mut Session, addresses: (u16, u16), hello: bool, counter: u32) -> Plain {
+/// What `from`, of node `addresses.0`, sends to node `addresses.1`: a handshake, or busy.
+fn frame(from: &mut Session, addresses: (u16, u16), handshake: bool, counter: u32) -> Plain {
     let (sender, destination) = addresses;
     let header = Header {
         network: 7,
@@ -40,10 +40,10 @@ fn frame(from: &mut Session, addresses: (u16, u16), hello: bool, counter: u32) -
         counter,
     };
     let mut out = [0; MAX_FRAME];
-    let body = from.hello(destination);
+    let body = from.handshake(destination);
     let signer = from.signer(destination);
-    let len = if hello {
-        frame::encode_hello(header, &body, signer, &mut out)
+    let len = if handshake {
+        frame::encode_handshake(header, &body, signer, &mut out)
     } else {
         frame::encode_signed(header, &Message::Busy { sweep: 1 }, signer, &mut out)
     };
@@ -55,12 +55,12 @@ fn check(session: &mut Session, plain: &[u8]) -> Checked {
     session.check(opened.header.sender, &opened)
 }
 
-/// Hands over the hellos that both owe each other, and how many those were; `counters` of `one` and `other`.
+/// Hands over the handshakes that both owe each other, and how many those were; `counters` of `one` and `other`.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
     let mut said = 0;
     loop {
-        let (first, second) = (one.take_hello(), other.take_hello());
+        let (first, second) = (one.take_handshake(), other.take_handshake());
         let frames = [
             first.map(|to| (to, frame(one, (a, to), true, counters[0]))),
             second.map(|to| (to, frame(other, (b, to), true, counters[1]))),
@@ -94,7 +94,7 @@ fn met(own: &mut Session, node: u16, epoch: u32, counters: &mut [u32; 2]) -> Ses
 }
 
 #[test]
-fn three_hellos_make_a_link_known_and_four_where_they_cross() {
+fn three_handshakes_make_a_link_known_and_four_where_they_cross() {
     for crossing in [false, true] {
         let (mut one, mut other) = (session(), session());
         one.greet(2);
@@ -105,13 +105,13 @@ fn three_hellos_make_a_link_known_and_four_where_they_cross() {
         assert_eq!(said, if crossing { 4 } else { 3 });
         assert!(one.knows(2) && other.knows(1));
         // Nothing is owed any more.
-        assert_eq!((one.take_hello(), other.take_hello()), (None, None));
+        assert_eq!((one.take_handshake(), other.take_handshake()), (None, None));
     }
 }
 
-/// Whichever hello is lost: whoever is left in doubt asks again, and is answered.
+/// Whichever handshake is lost: whoever is left in doubt asks again, and is answered.
 #[test]
-fn a_lost_hello_leaves_nobody_in_doubt_for_good() {
+fn a_lost_handshake_leaves_nobody_in_doubt_for_good() {
     for lost in 0..4 {
         let (mut one, mut other) = (session(), session());
         one.greet(2);
@@ -128,7 +128,7 @@ fn a_lost_hello_leaves_nobody_in_doubt_for_good() {
                 if from.find(ends.1).is_some() && !from.knows(ends.1) {
                     from.greet(ends.1);
                 }
-                if let Some(node) = from.take_hello() {
+                if let Some(node) = from.take_handshake() {
                     let plain = frame(from, (ends.0, node), true, *counter);
                     *counter += 1;
                     if number != lost {
@@ -138,28 +138,28 @@ fn a_lost_hello_leaves_nobody_in_doubt_for_good() {
                 }
             }
         }
-        assert!(one.knows(2) && other.knows(1), "without hello {lost}");
-        assert!(number < 8, "{number} hellos without {lost}");
+        assert!(one.knows(2) && other.knows(1), "without handshake {lost}");
+        assert!(number < 8, "{number} handshakes without {lost}");
     }
 }
 
 #[test]
-fn a_body_of_a_hello_says_who_is_known() {
+fn a_body_of_a_handshake_says_who_is_known() {
     let mut own = session();
-    assert_eq!(own.hello(2), [0; HELLO]);
+    assert_eq!(own.handshake(2), [0; HELLO]);
     own.greet(2);
     own.greet(3);
     assert_eq!(
-        own.hello(2)[..],
+        own.handshake(2)[..],
         [1, 0, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1]
     );
-    assert_eq!(own.hello(3)[..8], [2, 0, 0, 0, 5, 0, 0, 0]);
+    assert_eq!(own.handshake(3)[..8], [2, 0, 0, 0, 5, 0, 0, 0]);
     let mut counters = [0; 2];
-    own.take_hello();
-    own.take_hello();
+    own.take_handshake();
+    own.take_handshake();
     met(&mut own, 2, 9, &mut counters);
     assert_eq!(
-        own.hello(2)[..],
+        own.handshake(2)[..],
         [1, 0, 0, 0, 5, 0, 0, 0, 1, 0, 0, 0, 9, 0, 0, 0, 0]
     );
 }
@@ -178,7 +178,7 @@ fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
     assert_eq!(check(&mut own, &recorded), Checked::Replayed);
     let to_it = frame(&mut own, (1, 20), false, 1000);
     forgotten.greet(1);
-    let hello = frame(&mut forgotten, (20, 1), true, 51);
+    let handshake = frame(&mut forgotten, (20, 1), true, 51);
     for node in 30..30 + ROOM {
         met(&mut own, node, 1, &mut counters);
     }
@@ -187,15 +187,15 @@ fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
     assert!(own.knows(2) && own.knows(3) && !own.knows(20) && !own.knows(30));
     assert!(own.knows(29 + ROOM));
     assert_eq!(check(&mut own, &recorded), Checked::Forged);
-    // A recorded hello makes an entry, and is no proof: that has another nonce.
-    assert_eq!(check(&mut own, &hello), Checked::Unproven);
+    // A recorded handshake makes an entry, and is no proof: that has another nonce.
+    assert_eq!(check(&mut own, &handshake), Checked::Unproven);
     assert!(!own.knows(20));
     assert_eq!(check(&mut own, &recorded), Checked::Forged);
-    assert_eq!(own.take_hello(), Some(20));
+    assert_eq!(own.take_handshake(), Some(20));
     let asked = frame(&mut own, (1, 20), true, 2000);
     assert_eq!(
         check(&mut forgotten, &asked),
-        Checked::Hello { first: true }
+        Checked::Handshake { first: true }
     );
     assert_eq!(check(&mut forgotten, &to_it), Checked::Forged);
     let mut counters = [2001, 52];
@@ -208,14 +208,14 @@ fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
     assert_eq!(check(&mut own, &still), Checked::Fresh { first: false });
 }
 
-/// Hellos recorded of many nodes take the place of those only that have proven nothing.
+/// Handshakes recorded of many nodes take the place of those only that have proven nothing.
 #[test]
-fn recorded_hellos_do_not_drive_out_who_is_known() {
-    let mut hellos = Vec::new();
+fn recorded_handshakes_do_not_drive_out_who_is_known() {
+    let mut handshakes = Vec::new();
     for node in 100..200 {
         let mut stranger = Session::new(Auth { key: KEY, epoch: 1 });
         stranger.greet(1);
-        hellos.push(frame(&mut stranger, (node, 1), true, 0));
+        handshakes.push(frame(&mut stranger, (node, 1), true, 0));
     }
     let mut own = session();
     own.pin([Some(2), Some(3)]);
@@ -224,10 +224,10 @@ fn recorded_hellos_do_not_drive_out_who_is_known() {
         met(&mut own, node, 1, &mut counters);
     }
     for _ in 0..3 {
-        for hello in &hellos {
-            assert_eq!(check(&mut own, hello), Checked::Unproven);
-            assert!(own.take_hello().is_some());
-            assert_eq!(own.take_hello(), None, "one for one");
+        for handshake in &handshakes {
+            assert_eq!(check(&mut own, handshake), Checked::Unproven);
+            assert!(own.take_handshake().is_some());
+            assert_eq!(own.take_handshake(), None, "one for one");
         }
     }
     for node in 2..=ROOM {
@@ -254,7 +254,7 @@ fn a_greeting_mends_what_only_one_end_knows() {
 }
 
 #[test]
-fn a_hello_of_another_length_is_forged() {
+fn a_handshake_of_another_length_is_forged() {
     let mut own = session();
     own.greet(2);
     let header = Header {
@@ -266,10 +266,10 @@ fn a_hello_of_another_length_is_forged() {
     let mut other = session();
     other.greet(1);
     for len in [0, 8, 16, 18, 40] {
-        let mut body = other.hello(1).to_vec();
+        let mut body = other.handshake(1).to_vec();
         body.resize(len, 0);
         let mut out = [0; MAX_FRAME];
-        let len = frame::encode_hello(header, &body, other.signer(1), &mut out);
+        let len = frame::encode_handshake(header, &body, other.signer(1), &mut out);
         assert_eq!(check(&mut own, &plain(&out, len)), Checked::Forged);
     }
 }
@@ -281,7 +281,7 @@ fn after_the_last_nonce_nobody_new_is_met() {
     own.made = u32::MAX - 1;
     own.greet(2);
     own.greet(3);
-    assert_eq!(own.take_hello(), Some(2));
-    assert_eq!(own.take_hello(), None);
-    assert_eq!(own.hello(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
+    assert_eq!(own.take_handshake(), Some(2));
+    assert_eq!(own.take_handshake(), None);
+    assert_eq!(own.handshake(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
 }

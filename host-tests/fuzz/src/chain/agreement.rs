@@ -6,7 +6,7 @@ use super::{Chain, Member};
 
 /// Wake-ups and deliveries that a chain may take to agree once nothing is lost any more: 24 passes of 4 relays, each in 65
 /// portions, and before that a few minutes of probation, with a few dozen
-/// hails a second.
+/// hellos a second.
 const PATIENCE: usize = 40_000;
 
 impl Chain {

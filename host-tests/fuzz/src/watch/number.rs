@@ -13,9 +13,9 @@ pub(super) const fn number_of(message: &Message) -> Option<u16> {
         Message::Token(token) => token.number,
         Message::Moved(moved) => moved.number,
         Message::Heartbeat { .. }
-        | Message::Hail(_)
-        | Message::Roster(_)
-        | Message::Count(_)
+        | Message::Hello(_)
+        | Message::Proposal(_)
+        | Message::Decision(_)
         | Message::Fence { .. }
         | Message::Offer(_) => return None,
     })

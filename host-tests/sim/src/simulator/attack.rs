@@ -134,7 +134,7 @@ pub(super) fn fate(before: &Stats, after: &Stats) -> &'static str {
         ("forged", |stats| stats.forged),
         ("unsigned", |stats| stats.unsigned),
         ("replayed", |stats| stats.replayed),
-        ("hellos", |stats| stats.hellos),
+        ("handshakes", |stats| stats.handshakes),
         ("version", |stats| stats.version),
         ("malformed", |stats| stats.malformed),
         ("foreign", |stats| stats.foreign),

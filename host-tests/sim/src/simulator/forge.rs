@@ -6,9 +6,9 @@ use uav_relay::settings::SetupError;
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::crc::Crc32c;
 use uav_relay::wire::deframe::Deframer;
-use uav_relay::wire::digest::{Stamp, digest};
+use uav_relay::wire::digest::{MissionId, digest};
 use uav_relay::wire::frame::{self, HEADER, Header, MAX_FRAME};
-use uav_relay::wire::message::{Before, Count, Hail, Message, Roster};
+use uav_relay::wire::message::{Decision, Hello, Message, PriorView, Proposal};
 use uav_relay::{
     Auth, Identity, Instant, Interference, Interferer, Key, Mission, MissionConfig, Relay,
     Settings, Upload, Wiring,
@@ -17,14 +17,14 @@ use uav_relay::{
 /// The network that every simulated relay belongs to.
 pub(super) const NETWORK: u16 = 1;
 
-/// Flags in the second word of a frame: a tag follows, the body is a hello.
+/// Flags in the second word of a frame: a tag follows, the body is a handshake.
 const SIGNED: u8 = 0x10;
 const HELLO: u8 = 0x20;
 
 /// Bytes of the CRC.
 const CHECK: usize = 4;
 
-/// Bytes of the body of a hello.
+/// Bytes of the body of a handshake.
 const HELLO_BODY: usize = 17;
 
 /// Where a forged frame says it comes from, and where it goes.
@@ -35,7 +35,7 @@ pub(super) struct Way {
 }
 
 /// A frame of a kind drawn at random: a lie without a tag, one with a guessed tag, a recorded frame with one byte altered and
-/// its CRC made good, a hello with a guessed tag, or the hello of a relay that has another key.
+/// its CRC made good, a handshake with a guessed tag, or the handshake of a relay that has another key.
 pub(super) fn forge(
     mission: &Mission,
     way: Way,
@@ -56,8 +56,8 @@ pub(super) fn forge(
         (4, _) => stranger(mission, way, rng)
             .ok()
             .filter(|said| !said.is_empty())
-            .unwrap_or_else(|| guessed_hello(mission, way, rng)),
-        _ => guessed_hello(mission, way, rng),
+            .unwrap_or_else(|| guessed_handshake(mission, way, rng)),
+        _ => guessed_handshake(mission, way, rng),
     }
 }
 
@@ -122,7 +122,7 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
 /// A message that needs nothing to have been heard.
 fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let digest = digest(mission);
-    let stamp = Stamp { version: 0, digest };
+    let mission_id = MissionId { version: 0, digest };
     let view = rng.random_range(1..=40);
     let message = match (rng.random_range(0..6), better(mission, rng)) {
         (0, _) => Message::Heartbeat {
@@ -132,7 +132,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
         (1, _) => Message::Busy {
             sweep: rng.random(),
         },
-        (2, _) => Message::Hail(Hail {
+        (2, _) => Message::Hello(Hello {
             mission: digest,
             newest: view,
             neighbour: way.to,
@@ -140,22 +140,22 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
             form: true,
             fresh: rng.random(),
             ready: true,
-            holds: stamp,
+            holds: mission_id,
             flies: true,
         }),
-        (3, _) => Message::Roster(Roster {
-            stamp,
+        (3, _) => Message::Proposal(Proposal {
+            mission_id,
             view,
             place: rng.random_range(1..=mission.relays()),
-            before: Before {
+            before: PriorView {
                 view: 0,
                 relays: mission.relays(),
                 leader: true,
             },
         }),
         (4, Some(offer)) => Message::Offer(offer),
-        _ => Message::Count(Count {
-            stamp,
+        _ => Message::Decision(Decision {
+            mission_id,
             view,
             place: rng.random_range(1..=mission.relays()),
             relays: rng
@@ -184,8 +184,8 @@ fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
     Upload::new(mission, rng.random_range(1..=3), config).ok()
 }
 
-/// A hello whose nonces and tag are random.
-fn guessed_hello(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
+/// A handshake whose nonces and tag are random.
+fn guessed_handshake(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut plain = unsealed(&made_up(mission, way, rng)).unwrap_or_default();
     plain.truncate(HEADER);
     flag(&mut plain, SIGNED | HELLO);
@@ -198,7 +198,7 @@ fn guessed_hello(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     sealed(plain)
 }
 
-/// What a relay with another key says first: a hello with the right tag, for the wrong key. Empty if it is alone.
+/// What a relay with another key says first: a handshake with the right tag, for the wrong key. Empty if it is alone.
 fn stranger(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Result<Vec<u8>, SetupError> {
     let settings = Settings {
         wiring: Wiring::Shared,
@@ -215,7 +215,7 @@ fn stranger(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Result<Vec<u8>
     let mut relay = Relay::new(*mission, identity, settings, rng.random(), Instant::ZERO)?;
     let mut frame = [0; MAX_FRAME];
     let mut said = Vec::new();
-    // One hello to each neighbour; the last is as good as the first.
+    // One handshake to each neighbour; the last is as good as the first.
     while let Some(transmit) = relay.poll_transmit(Instant::ZERO, &mut frame) {
         said = frame.get(..transmit.len).unwrap_or_default().to_vec();
     }

@@ -50,7 +50,7 @@ pub struct Row {
 
 /// What side and altitude are worth under one interferer.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Gain {
+pub struct PowerRatio {
     /// Offset of the interferer, m.
     pub interferer_y_m: f64,
     /// SIR right above the line at the lowest altitude, linear.
@@ -110,17 +110,17 @@ pub fn data(step_m: u16) -> Result<Vec<Row>, Trouble> {
 ///
 /// # Errors
 /// [`Trouble`].
-pub fn gains(step_m: u16) -> Result<Vec<Gain>, Trouble> {
+pub fn gains(step_m: u16) -> Result<Vec<PowerRatio>, Trouble> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()
 }
 
-fn gain(offset: u16) -> Result<Gain, Trouble> {
+fn gain(offset: u16) -> Result<PowerRatio, Trouble> {
     let offset_m = f64::from(offset);
     let mission = mission(offset_m, ROOM_M)?;
     let common = mission.config().common;
     let both = some(aside::best_place(&mission, common.power_w))?;
-    Ok(Gain {
+    Ok(PowerRatio {
         interferer_y_m: offset_m,
         line_sir_linear: some(given_altitude::best_place(&mission, common))?.sir,
         altitude_sir_linear: some(free::best_place(&mission, common.power_w))?.sir,
@@ -197,7 +197,7 @@ pub fn places_sheet() -> Result<Sheet, Trouble> {
 /// Never in practice: see [`Trouble`].
 pub fn gains_sheet() -> Result<Sheet, Trouble> {
     let rows = gains(OFFSET_STEP_M)?;
-    let line = |name: &str, index: usize, sir: fn(&Gain) -> f32| {
+    let line = |name: &str, index: usize, sir: fn(&PowerRatio) -> f32| {
         let points = rows
             .iter()
             .map(|row| (row.interferer_y_m, f64::from(sir(row))));

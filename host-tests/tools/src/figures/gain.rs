@@ -32,11 +32,11 @@ pub struct Row {
     pub blind_sir_linear: f64,
     /// That of relays at equal distances, linear.
     pub equal_sir_linear: f64,
-    /// Gain over the random mean, percent.
+    /// PowerRatio over the random mean, percent.
     pub gain_over_random_percent: f64,
-    /// Gain over the blind chain, percent.
+    /// PowerRatio over the blind chain, percent.
     pub gain_over_blind_percent: f64,
-    /// Gain over equal distances, percent.
+    /// PowerRatio over equal distances, percent.
     pub gain_over_equal_percent: f64,
 }
 
@@ -99,7 +99,7 @@ pub fn sheet() -> Result<Sheet, Trouble> {
     };
     Ok(Sheet {
         name: "gain",
-        title: "Gain of Algorithm 1 over placements that do not know of the interferer",
+        title: "PowerRatio of Algorithm 1 over placements that do not know of the interferer",
         says: vec![[8, 50, 100].map(of).join("; ") + "."],
         taken: vec![
             "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, p_u = 1 W, interferer at (500, 400) \

@@ -40,9 +40,9 @@ pub struct Row {
     pub joint_passes: u32,
     /// Messages until they are.
     pub joint_messages: u64,
-    /// Gain of Algorithm 2 over the common altitude, percent.
+    /// PowerRatio of Algorithm 2 over the common altitude, percent.
     pub adjust_gain_percent: f64,
-    /// Gain of the joint choice over the common altitude, percent.
+    /// PowerRatio of the joint choice over the common altitude, percent.
     pub joint_gain_percent: f64,
 }
 

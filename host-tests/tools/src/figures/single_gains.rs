@@ -75,11 +75,11 @@ pub struct GainRow {
     pub relay_w: f64,
     /// What is averaged.
     pub reading: Reading,
-    /// Gain over a random place, percent; none where the mean in dB is not above 0.
+    /// PowerRatio over a random place, percent; none where the mean in dB is not above 0.
     pub over_random_percent: Option<f64>,
-    /// Gain over the place that the signal alone says, percent.
+    /// PowerRatio over the place that the signal alone says, percent.
     pub over_blind_percent: Option<f64>,
-    /// Gain over the middle, percent.
+    /// PowerRatio over the middle, percent.
     pub over_middle_percent: Option<f64>,
     /// Largest gain over random at one altitude, percent of linear SIR.
     pub largest_over_random_percent: f64,

@@ -1,8 +1,8 @@
 //! Which life of the neighbour a message is from.
 //!
 //! Each side numbers its talk with the other at random, and a message counts only if it bears the sender's number and echoes the
-//! receiver's. The keeper's number goes with the first number that echoes it; the kept relay takes a new number whenever it
-//! takes up another of the keeper's. So two numbers go together once, and what was said in an earlier talk cannot count in a
+//! receiver's. The owner's number goes with the first number that echoes it; the follower relay takes a new number whenever it
+//! takes up another of the owner's. So two numbers go together once, and what was said in an earlier talk cannot count in a
 //! later one, however late it comes.
 
 use crate::side::Side;
@@ -40,7 +40,7 @@ impl Random {
 
 /// A talk with the neighbour on one side.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tie {
+pub(super) struct Association {
     /// The neighbour, 0 for none.
     pub(super) node: u16,
     /// The number of this relay's talk.
@@ -53,7 +53,7 @@ pub(super) struct Tie {
     pub(super) due: bool,
 }
 
-impl Tie {
+impl Association {
     #[inline(never)] // called from several places
     pub(super) const fn new(node: u16, random: &mut Random) -> Self {
         Self {
@@ -66,8 +66,8 @@ impl Tie {
     }
 
     /// Whether a message is of this talk.
-    pub(super) const fn knows(&mut self, tie: u16, echo: u16) -> bool {
-        let known = tie == self.heard && echo == self.own;
+    pub(super) const fn knows(&mut self, association: u16, echo: u16) -> bool {
+        let known = association == self.heard && echo == self.own;
         if known {
             self.strays = 0;
         }
@@ -83,12 +83,12 @@ impl Tie {
 
 /// Where a relay that fell silent may still hover, as a limit of this relay's own x.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Wall {
+pub(super) struct KeepOut {
     /// Of the lost relays the nearest node, and the limit, m.
     lost: Option<(u16, f32)>,
 }
 
-impl Wall {
+impl KeepOut {
     /// Nothing there.
     pub(super) const fn none() -> Self {
         Self { lost: None }

@@ -2,11 +2,11 @@
 
 use crate::time::Instant;
 
-use super::confines::Confines;
+use super::config::GuardConfig;
 
 /// The relay's own stretch, m along x.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Hull {
+pub(super) struct ReachableInterval {
     /// The setpoint.
     pub(super) at_m: f32,
     /// The low end.
@@ -19,7 +19,7 @@ pub(super) struct Hull {
     known: bool,
 }
 
-impl Hull {
+impl ReachableInterval {
     /// Before the first setpoint.
     pub(super) const fn unknown(now: Instant) -> Self {
         Self::at(0.0, now)
@@ -47,10 +47,10 @@ impl Hull {
     }
 
     /// A report of time `at`. If the flight controller had the present setpoint by then, the relay is between here and there.
-    pub(super) fn report(&mut self, at: Instant, x_m: f32, confines: &Confines) {
-        let hovers = (x_m - self.at_m).abs() <= confines.hover_m + confines.rounding();
+    pub(super) fn report(&mut self, at: Instant, x_m: f32, config: &GuardConfig) {
+        let hovers = (x_m - self.at_m).abs() <= config.hover_m + config.rounding();
         let x_m = if hovers { self.at_m } else { x_m };
-        if at >= self.since + confines.lag {
+        if at >= self.since + config.lag {
             self.known = true;
             self.low_m = self.at_m;
             self.high_m = self.at_m;

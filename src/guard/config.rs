@@ -30,10 +30,10 @@ pub struct Geofence {
 /// What a guard is told before flight.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Confines {
+pub struct GuardConfig {
     /// The box that no setpoint leaves.
     pub fence: Geofence,
-    /// How far apart relays are kept along x, m: 0 to 1e5.
+    /// How far apart relays are follower along x, m: 0 to 1e5.
     pub separation_m: f32,
     /// How far off its setpoint a relay may be reported that hovers there, m: 0 to 1e3. This much is taken from the separation at
     /// each of two relays.
@@ -42,7 +42,7 @@ pub struct Confines {
     pub lag: Duration,
 }
 
-impl Confines {
+impl GuardConfig {
     /// Those of a mission: its separation, its distance, and its band of altitudes, widened to the one that this relay holds.
     ///
     /// `hover_m` is 0 and `lag` 0.2 s.

@@ -6,12 +6,12 @@
 /// by up to 6e-8 A, which is what makes the printed closed forms lose digits near gamma = A.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Gain {
+pub struct PowerRatio {
     hi: f32,
     lo: f32,
 }
 
-impl Gain {
+impl PowerRatio {
     #[expect(
         clippy::cast_possible_truncation,
         reason = "the remainder goes into `lo`"
@@ -47,12 +47,12 @@ impl Gain {
 
 #[cfg(test)]
 mod tests {
-    use super::Gain;
+    use super::PowerRatio;
 
     #[test]
     fn excess_keeps_its_digits_next_to_the_gain() {
         // 1/3 is not an f32: one f32 of gain would leave half the digits of the excess wrong.
-        let gain = Gain::new(1.0 / 3.0);
+        let gain = PowerRatio::new(1.0 / 3.0);
         let mut target = 1.0_f32 / 3.0;
         for _ in 0..40 {
             let exact = f64::from(target) * 3.0 - 1.0;

@@ -1,4 +1,4 @@
-//! What recorded hellos can do: at most delay a first contact until the true one comes.
+//! What recorded handshakes can do: at most delay a first contact until the true one comes.
 
 use rand::seq::IndexedRandom;
 use uav_relay::wire::frame::MAX_FRAME;
@@ -8,13 +8,13 @@ use super::frames::plain;
 use super::kinds::{Attacker, raised};
 use super::net::{Deed, Heard, Net, relay};
 
-fn is_hello(heard: &Heard) -> bool {
-    plain(&heard.wire).is_hello()
+fn is_handshake(heard: &Heard) -> bool {
+    plain(&heard.wire).is_handshake()
 }
 
 /// At every moment, and above all while relays get to know each other again.
 #[test]
-fn recorded_hellos_at_any_time_change_no_place() {
+fn recorded_handshakes_at_any_time_change_no_place() {
     let mut deeds = vec![(6_000, Deed::Reboot(4))];
     for second in 7..30 {
         let index = 1 + second * 5 % 8;
@@ -31,7 +31,7 @@ fn recorded_hellos_at_any_time_change_no_place() {
         while net.step(end) {
             for _ in 0..20 {
                 let heard = net.heard.choose(&mut attacker.rng).unwrap().clone();
-                if !is_hello(&heard) || !net.has_arrived(&heard) {
+                if !is_handshake(&heard) || !net.has_arrived(&heard) {
                     continue;
                 }
                 let Heard { from, to, wire, .. } = heard;
@@ -42,7 +42,7 @@ fn recorded_hellos_at_any_time_change_no_place() {
                         assert_eq!(sent, 0);
                         refused += 1;
                     }
-                    Some("hellos") => {
+                    Some("handshakes") => {
                         // One that has been taken is answered by one at most.
                         assert!(sent <= 1);
                         answered += sent;
@@ -65,9 +65,9 @@ fn recorded_hellos_at_any_time_change_no_place() {
     }
 }
 
-/// A relay that has just been switched on takes each recorded hello once, for what it may be; the true one overtakes them all.
+/// A relay that has just been switched on takes each recorded handshake once, for what it may be; the true one overtakes them all.
 #[test]
-fn a_flood_of_recorded_hellos_is_answered_once_each_and_overtaken() {
+fn a_flood_of_recorded_handshakes_is_answered_once_each_and_overtaken() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
     for life in 2..=9 {
         net.run(Instant::from_millis(u64::from(life) * 1_000));
@@ -77,7 +77,7 @@ fn a_flood_of_recorded_hellos_is_answered_once_each_and_overtaken() {
     let recorded: Vec<Vec<u8>> = net
         .heard
         .iter()
-        .filter(|heard| heard.to == 2 && is_hello(heard))
+        .filter(|heard| heard.to == 2 && is_handshake(heard))
         .map(|heard| heard.wire.clone())
         .collect();
     net.reboot(2, 2);
@@ -86,7 +86,7 @@ fn a_flood_of_recorded_hellos_is_answered_once_each_and_overtaken() {
         for wire in &recorded {
             let before = net.stats(2);
             let sent = net.give(2, Port::Upstream, wire);
-            let new = raised(&before, &net.stats(2)) == Some("hellos");
+            let new = raised(&before, &net.stats(2)) == Some("handshakes");
             assert!(!new || round == 0, "taken twice");
             assert!(sent <= usize::from(new));
             taken += usize::from(new);
@@ -107,15 +107,15 @@ fn a_flood_of_recorded_hellos_is_answered_once_each_and_overtaken() {
     assert!(net.stats(2).received > 0);
 }
 
-/// The true hello comes while the relay believes a recorded one, and the answer to that is lost.
+/// The true handshake comes while the relay believes a recorded one, and the answer to that is lost.
 #[test]
-fn a_relay_that_believes_a_recorded_hello_finds_out_by_itself() {
+fn a_relay_that_believes_a_recorded_handshake_finds_out_by_itself() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
     net.run(Instant::from_millis(1_000));
     let old = net
         .heard
         .iter()
-        .find(|heard| heard.to == 2 && is_hello(heard))
+        .find(|heard| heard.to == 2 && is_handshake(heard))
         .unwrap()
         .wire
         .clone();
@@ -129,13 +129,13 @@ fn a_relay_that_believes_a_recorded_hello_finds_out_by_itself() {
     *net.relay(2) = fresh;
     net.genuine[1] = 0;
     net.lives[1] = 2;
-    // Nobody has anything to say until somebody asks for a sign of life; that brings hellos, the next one an answer.
+    // Nobody has anything to say until somebody asks for a sign of life; that brings handshakes, the next one an answer.
     net.run(Instant::from_millis(14_000));
     assert!(net.is_proven(1, 2) && net.is_proven(2, 1));
     assert_eq!(net.stats(2).received, net.genuine[1]);
 }
 
-/// Recorded hellos keep nobody alive.
+/// Recorded handshakes keep nobody alive.
 #[test]
 fn a_silent_neighbour_is_lost_whatever_is_played_back() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
@@ -146,7 +146,7 @@ fn a_silent_neighbour_is_lost_whatever_is_played_back() {
     let mut recorded = net
         .heard
         .iter()
-        .filter(|heard| heard.to == 1 && is_hello(heard))
+        .filter(|heard| heard.to == 1 && is_handshake(heard))
         .map(|heard| heard.wire.clone());
     let mut lonely = relay(2, 1, Wiring::Pair, (2, Instant::ZERO));
     let mut frame = [0; MAX_FRAME];
@@ -167,6 +167,6 @@ fn a_silent_neighbour_is_lost_whatever_is_played_back() {
             assert!(!matches!(event, Event::NeighbourBack(_)));
         }
     }
-    assert!(lonely.stats().hellos > 40, "{:?}", lonely.stats());
+    assert!(lonely.stats().handshakes > 40, "{:?}", lonely.stats());
     assert_eq!(lost_after, Some(15_000));
 }
