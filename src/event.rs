@@ -22,7 +22,7 @@ pub enum Event {
     /// The chain has been counted anew: `Relay::index` and the relays of `Relay::mission` have new values, and new places follow.
     Reformed,
     /// Too few relays can be reached to go on without the others: this part of the chain holds its places.
-    Cut,
+    NoQuorum,
     /// A newer mission has come: `Relay::upload`. Store it, and hand it to `Relay::resume` when the relay is next switched on.
     Uploaded,
     /// The chain has agreed to fly it: `Relay::mission` and `Relay::version` have new values, and new places follow.
@@ -40,7 +40,7 @@ const ALL: [Event; 13] = [
     Event::MissionMismatch(Side::Upstream),
     Event::MissionMismatch(Side::Downstream),
     Event::Reformed,
-    Event::Cut,
+    Event::NoQuorum,
     Event::Uploaded,
     Event::Adopted,
 ];

@@ -8,6 +8,7 @@ pub mod field;
 #[cfg(feature = "upload")]
 pub mod ground;
 pub mod guard;
+mod jitter;
 pub mod mission;
 pub mod node;
 pub mod optimiser;
@@ -31,7 +32,7 @@ pub use field::{Field, FieldPoint};
 #[cfg(feature = "upload")]
 pub use ground::{Ground, Progress};
 pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfig, Profile};
-pub use node::exchange::Phase;
+pub use node::round::state::Phase;
 pub use node::sample::Sample;
 pub use optimiser::local::Local;
 pub use optimiser::search::Schedule;

@@ -11,7 +11,7 @@ use crate::field::estimate::Estimate;
 use crate::guard::HoldReason;
 use crate::mission::{Mission, Profile};
 use crate::node::Node;
-use crate::node::exchange::Phase;
+use crate::node::round::state::Phase;
 use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::settings::{Identity, Settings, SetupError, Wiring, check};
@@ -147,7 +147,7 @@ impl Relay {
             match deframer.push(byte) {
                 None => {}
                 Some(Err(error)) => {
-                    let stats = &mut self.node.stats;
+                    let stats = self.node.stats_mut();
                     let counter = match error {
                         DeframeError::Oversized => &mut stats.oversized,
                         DeframeError::Truncated => &mut stats.truncated,
@@ -194,8 +194,8 @@ impl Relay {
     }
 
     /// Relays that fell silent at `side` have landed, or were taken away: the guard need not keep clear of them any more.
-    pub fn forget(&mut self, now: Instant, side: Side) {
-        self.node.forget(now, side);
+    pub fn clear_lost(&mut self, now: Instant, side: Side) {
+        self.node.clear_lost(now, side);
     }
 
     /// Has the chain agree again, from the beginning of its method: in a closed loop, once it has measured where it stands.
@@ -208,7 +208,7 @@ impl Relay {
     /// Writes the next frame to be sent into `frame`, if there is one.
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
-        let sender = self.node.members().node;
+        let sender = self.node.chain().node;
         let mut header = Header {
             network: self.network,
             sender,
@@ -233,7 +233,7 @@ impl Relay {
     /// One more frame has gone out.
     fn sent(&mut self, side: Side, len: usize) -> Transmit {
         self.counter = self.counter.wrapping_add(1);
-        bump(&mut self.node.stats.sent);
+        bump(&mut self.node.stats_mut().sent);
         let port = match (self.wiring, side) {
             (Wiring::Shared, _) => Port::Shared,
             (Wiring::Pair, Side::Upstream) => Port::Upstream,
@@ -258,8 +258,8 @@ impl Relay {
     }
 
     /// Where to be in the end, once the chain has agreed.
-    pub fn agreed(&self) -> Option<Placement> {
-        self.node.agreed()
+    pub fn final_setpoint(&self) -> Option<Placement> {
+        self.node.final_setpoint()
     }
 
     /// What keeps the drone from the agreed place at `side`, where `Settings::guard` is set.
@@ -269,13 +269,13 @@ impl Relay {
 
     /// The SIR (linear) that every hop of the agreed chain meets.
     pub fn target(&self) -> Option<f32> {
-        self.node.target()
+        self.node.round().target()
     }
 
     /// At the leader, after Algorithm 1 or 4: at the altitudes held no chain has an SIR of this or more, linear. `None` elsewhere, and
     /// with the paper's fixed step, which leaves chains out.
     pub fn bound(&self) -> Option<f32> {
-        self.node.bound()
+        self.node.round().bound()
     }
 
     /// Where the relay is in the protocol.
@@ -285,17 +285,17 @@ impl Relay {
 
     /// What has been counted since the start.
     pub fn stats(&self) -> &Stats {
-        &self.node.stats
+        self.node.stats()
     }
 
     /// Its place in the chain as it was counted last, 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
     pub fn index(&self) -> u16 {
-        self.node.members().index
+        self.node.chain().index
     }
 
     /// The number of the view of the chain that it has agreed to, 0 before the chain has had to form anew.
     pub fn view(&self) -> u16 {
-        self.node.members().view
+        self.node.chain().view
     }
 
     /// The nodes it takes for its neighbours toward the transmitter and toward the receiver, by their place in the chain that
@@ -306,7 +306,7 @@ impl Relay {
 
     /// The mission the relay flies, with as many relays as are left of it.
     pub fn mission(&self) -> &Mission {
-        self.node.mission()
+        &self.node.chain().mission
     }
 
     /// What the measurements at this place say so far, and `None` before they say anything.
@@ -321,12 +321,12 @@ impl Relay {
 
     /// While Algorithm 2 goes on, at the leader: rounds that are over, and the SIR (linear) of the chain after the last.
     pub fn rounds(&self) -> Option<(u16, f32)> {
-        self.node.rounds()
+        self.node.round().rounds()
     }
 
     /// What the relay holds; its altitude is the one chosen last.
     pub fn profile(&self) -> Profile {
-        self.node.profile()
+        self.node.round().profile()
     }
 }
 

@@ -28,4 +28,12 @@ impl Side {
             Heading::TowardTx => Self::Downstream,
         }
     }
+
+    /// The one opposite.
+    pub(crate) const fn other(self) -> Self {
+        match self {
+            Self::Upstream => Self::Downstream,
+            Self::Downstream => Self::Upstream,
+        }
+    }
 }

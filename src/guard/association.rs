@@ -5,38 +5,11 @@
 //! takes up another of the owner's. So two numbers go together once, and what was said in an earlier talk cannot count in a
 //! later one, however late it comes.
 
+use crate::jitter::Jitter;
 use crate::side::Side;
 
 /// So many messages of another talk in a row are of a new one, not late ones of an old.
 const STRAYS: u8 = 3;
-
-/// Where relays' numbers come from: xorshift, never 0.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Random(u32);
-
-impl Random {
-    pub(super) const fn new(seed: u32) -> Self {
-        // Any odd multiplier keeps distinct seeds distinct; the generator must not start at zero.
-        match seed.wrapping_mul(0x9E37_79B1) {
-            0 => Self(1),
-            state => Self(state),
-        }
-    }
-
-    /// The next number, 1 to 65535.
-    pub(super) const fn next(&mut self) -> u16 {
-        let mut state = self.0;
-        state ^= state << 13;
-        state ^= state >> 17;
-        state ^= state << 5;
-        self.0 = state;
-        let [_, a, b, _] = state.to_le_bytes();
-        match u16::from_le_bytes([a, b]) {
-            0 => 1,
-            number => number,
-        }
-    }
-}
 
 /// A talk with the neighbour on one side.
 #[derive(Clone, Copy, Debug)]
@@ -55,10 +28,10 @@ pub(super) struct Association {
 
 impl Association {
     #[inline(never)] // called from several places
-    pub(super) const fn new(node: u16, random: &mut Random) -> Self {
+    pub(super) const fn new(node: u16, jitter: &mut Jitter) -> Self {
         Self {
             node,
-            own: random.next(),
+            own: jitter.number(),
             heard: 0,
             strays: 0,
             due: true,

@@ -1,8 +1,9 @@
 //! The fence upstream, which the neighbour places.
 
-use super::association::{Association, KeepOut, Random};
+use super::association::{Association, KeepOut};
 use super::fence::{Fence, HoldReason};
 use super::reachable::ReachableInterval;
+use crate::jitter::Jitter;
 use crate::side::Side;
 
 /// A fence is newer than another one if its number is less than this ahead.
@@ -26,9 +27,9 @@ pub(super) struct FenceFollower {
 }
 
 impl FenceFollower {
-    pub(super) const fn new(node: u16, random: &mut Random) -> Self {
+    pub(super) const fn new(node: u16, jitter: &mut Jitter) -> Self {
         Self {
-            association: Association::new(node, random),
+            association: Association::new(node, jitter),
             keep_out: KeepOut::none(),
             number: 0,
             fence_m: f32::NEG_INFINITY,
@@ -39,14 +40,14 @@ impl FenceFollower {
     }
 
     /// Another neighbour, 0 for none.
-    pub(super) fn link(&mut self, node: u16, reachable: &ReachableInterval, random: &mut Random) {
-        self.renew(reachable, random);
+    pub(super) fn link(&mut self, node: u16, reachable: &ReachableInterval, jitter: &mut Jitter) {
+        self.renew(reachable, jitter);
         self.association.node = node;
     }
 
     /// Begins anew; where this relay may go because of the neighbour so far stays as a keep_out, and that is nowhere if it was
     /// never heard.
-    fn renew(&mut self, reachable: &ReachableInterval, random: &mut Random) {
+    fn renew(&mut self, reachable: &ReachableInterval, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if self.association.node != 0 {
             // As far as this relay has come, not as far as it was asked to.
@@ -55,7 +56,7 @@ impl FenceFollower {
         }
         *self = Self {
             keep_out,
-            ..Self::new(self.association.node, random)
+            ..Self::new(self.association.node, jitter)
         };
     }
 
@@ -63,12 +64,12 @@ impl FenceFollower {
         &mut self,
         fence: &Fence,
         reachable: &ReachableInterval,
-        random: &mut Random,
+        jitter: &mut Jitter,
     ) {
         if self.association.heard == 0 {
             self.association.heard = fence.association;
         } else if fence.association != self.association.heard && self.association.stray() {
-            self.renew(reachable, random);
+            self.renew(reachable, jitter);
             self.association.heard = fence.association;
         }
         // It is answered in any case: it may have been said again because an answer was lost.

@@ -63,7 +63,7 @@ use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
 
-use association::Random;
+use crate::jitter::Jitter;
 use config::GuardConfig;
 use fence::is_place;
 pub use fence::{Fence, HoldReason};
@@ -79,7 +79,7 @@ use reachable::ReachableInterval;
 #[derive(Clone, Copy, Debug)]
 pub struct Guard {
     config: GuardConfig,
-    random: Random,
+    jitter: Jitter,
     born: Instant,
     /// Where the relay was agreed to be, inside the box.
     target: Option<Placement>,
@@ -100,12 +100,12 @@ impl Guard {
     /// `config` has to be valid ([`GuardConfig::is_valid`]); `seed` has to differ from relay to relay and from start to start.
     pub fn new(config: GuardConfig, neighbours: [Option<u16>; 2], seed: u32, now: Instant) -> Self {
         let [upstream, downstream] = neighbours;
-        let mut random = Random::new(seed);
+        let mut jitter = Jitter::new(seed);
         Self {
             config,
-            follower: FenceFollower::new(upstream.unwrap_or(0), &mut random),
-            owner: FenceOwner::new(downstream.unwrap_or(0), &mut random),
-            random,
+            follower: FenceFollower::new(upstream.unwrap_or(0), &mut jitter),
+            owner: FenceOwner::new(downstream.unwrap_or(0), &mut jitter),
+            jitter,
             born: now,
             target: None,
             found: None,
@@ -153,12 +153,12 @@ impl Guard {
         }
         match side {
             Side::Upstream if self.follower.association.node == from => {
-                self.follower.hear(fence, &self.reachable, &mut self.random);
+                self.follower.hear(fence, &self.reachable, &mut self.jitter);
             }
             Side::Downstream if self.owner.association.node == from => {
                 let apart = self.config.separation_m;
                 self.owner
-                    .hear(fence, &self.reachable, apart, &mut self.random);
+                    .hear(fence, &self.reachable, apart, &mut self.jitter);
             }
             _ => {}
         }
@@ -172,12 +172,12 @@ impl Guard {
         let node = neighbour.unwrap_or(0);
         match side {
             Side::Upstream if self.follower.association.node != node => {
-                self.follower.link(node, &self.reachable, &mut self.random);
+                self.follower.link(node, &self.reachable, &mut self.jitter);
             }
             Side::Downstream if self.owner.association.node != node => {
                 let apart = self.config.separation_m;
                 self.owner
-                    .link(node, &self.reachable, apart, &mut self.random);
+                    .link(node, &self.reachable, apart, &mut self.jitter);
             }
             _ => {}
         }

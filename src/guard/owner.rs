@@ -1,8 +1,9 @@
 //! The fence downstream, which this relay places.
 
-use super::association::{Association, KeepOut, Random};
+use super::association::{Association, KeepOut};
 use super::fence::{Fence, HoldReason};
 use super::reachable::ReachableInterval;
+use crate::jitter::Jitter;
 use crate::side::Side;
 
 /// This relay's side of the fence toward Rx.
@@ -25,9 +26,9 @@ pub(super) struct FenceOwner {
 }
 
 impl FenceOwner {
-    pub(super) const fn new(node: u16, random: &mut Random) -> Self {
+    pub(super) const fn new(node: u16, jitter: &mut Jitter) -> Self {
         Self {
-            association: Association::new(node, random),
+            association: Association::new(node, jitter),
             keep_out: KeepOut::none(),
             number: 0,
             fence_m: f32::INFINITY,
@@ -44,15 +45,15 @@ impl FenceOwner {
         node: u16,
         reachable: &ReachableInterval,
         apart: f32,
-        random: &mut Random,
+        jitter: &mut Jitter,
     ) {
-        self.renew(reachable, apart, random);
+        self.renew(reachable, apart, jitter);
         self.association.node = node;
     }
 
     /// Begins anew; where this relay may go because of the neighbour so far stays as a keep_out, and that is nowhere if it was
     /// never heard.
-    fn renew(&mut self, reachable: &ReachableInterval, apart: f32, random: &mut Random) {
+    fn renew(&mut self, reachable: &ReachableInterval, apart: f32, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if self.association.node != 0 {
             let limit_m = self.most(reachable, apart);
@@ -60,7 +61,7 @@ impl FenceOwner {
         }
         *self = Self {
             keep_out,
-            ..Self::new(self.association.node, random)
+            ..Self::new(self.association.node, jitter)
         };
     }
 
@@ -78,7 +79,7 @@ impl FenceOwner {
         fence: &Fence,
         reachable: &ReachableInterval,
         apart: f32,
-        random: &mut Random,
+        jitter: &mut Jitter,
     ) {
         if !self.is_heard() && fence.echo == self.association.own {
             self.association.heard = fence.association;
@@ -88,7 +89,7 @@ impl FenceOwner {
         }
         if !self.association.knows(fence.association, fence.echo) {
             if self.is_heard() && self.association.stray() {
-                self.renew(reachable, apart, random);
+                self.renew(reachable, apart, jitter);
             }
             return;
         }

@@ -1,98 +1,102 @@
-//! The protocol of one relay, on messages and without bytes: what it does with a sweep, a verdict, silence.
+//! The protocol of one relay, on messages and without bytes: what it does with a message, and with silence.
+//!
+//! Four layers, each a machine of its own beside its state table, with the same verbs: `handle` takes a message, `take_...` gives what
+//! there is to send, `handle_timeout` and `next_timeout` keep the time. None knows another: each is handed a [`context`] and gives back
+//! effects, which `Node` passes on.
+//!
+//! | layer | one idea |
+//! | --- | --- |
+//! | [`neighbour`] | which node is taken for the neighbour on each side, and when it counts as lost |
+//! | [`view`] | the view change: how the chain comes to a new view of who is in it |
+//! | [`mission_update`] | a newer mission, in flight |
+//! | [`round`] | a round of agreement: sweeps, courses of the joint method, turns |
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`exchange`] | the state table of a pass and what comes back of it |
-//! | `share` | a relay's share of every algorithm: sweeps, courses of the joint method, turns |
-//! | `lead` | what the leader has beyond that: which pass comes next |
-//! | `align` | a sweep of Algorithms 1 and 4 |
-//! | `adjust` | a turn of Algorithm 2 |
-//! | [`sample`] | the interference that a relay measures |
-//! | `repeats` | how long an answer is awaited, and when a pass is sent again |
-//! | [`liveness`] | when a neighbour counts as lost |
-//! | [`beside`] | which node is taken for the neighbour on one side |
-//! | [`members`] | which view of the chain was agreed on, and when a new one is called for |
-//! | `incoming`, `outgoing` | what a message does; what there is to say |
-//! | `forming` | hellos, calls and new views |
-//! | `uploads` | a newer mission, in flight |
-//! | [`timers`] | every timer, in one table |
+//! | [`context`] | what a relay is and flies, as every layer is handed it, and what a layer asks of the others |
+//! | `retransmit` | how long an answer is awaited, and when a message is sent again |
+//! | `numbering` | what a number that is not the expected one means |
 //! | `steering` | the setpoint on its way to the agreed place |
+//! | [`sample`] | the interference that a relay measures |
 //!
-//! `Node` connects them. It answers messages by setting flags, and builds what it sends from its state when asked to, so
-//! nothing queues up and a message sent twice is harmless.
+//! A message is answered by setting flags, and what is sent is built from the state when it is asked for, so nothing queues up and a
+//! message sent twice is harmless.
 
-mod adjust;
-mod align;
-pub mod beside;
-pub mod exchange;
-mod forming;
-mod incoming;
-mod lead;
-pub mod liveness;
-pub mod members;
-mod outgoing;
-mod repeats;
+pub(crate) mod context;
+pub(crate) mod mission_update;
+pub(crate) mod neighbour;
+mod numbering;
+mod retransmit;
+pub(crate) mod round;
 pub mod sample;
-mod share;
 mod steering;
-pub mod timers;
-#[cfg(feature = "upload")]
-mod uploads;
-
-use crate::guard::Guard;
-use crate::mission::{Mission, Profile};
-use crate::place::Placement;
-use crate::time::{Duration, Instant};
-use crate::wire::digest::MissionId;
-#[cfg(feature = "upload")]
-use crate::wire::upload::Upload;
+pub(crate) mod view;
 
 use crate::event::{Event, Pending};
+use crate::guard::HoldReason;
+use crate::mission::{Heading, Mission};
+use crate::place::Placement;
 use crate::settings::{Identity, Method, Settings, Wiring};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
-use beside::{Beside, CANDIDATES};
-use exchange::{Next, Phase};
-use members::Members;
-use repeats::Repeats;
+use crate::time::{Duration, Instant};
+use crate::wire::digest::MissionId;
+use crate::wire::message::{Hello, Message};
+#[cfg(feature = "upload")]
+use crate::wire::upload::{Upload, UploadError};
+
+use context::{Chain, Context, Effects};
+use mission_update::{MissionUpdate, takes_uploads};
+use neighbour::Neighbours;
+use neighbour::state::CANDIDATES;
+use round::Round;
+use round::state::Phase;
 use sample::{Meter, Sample};
-use share::{Own, Share};
-use steering::guard;
-use timers::{Timer, Timers};
+use steering::Steering;
+use view::ViewChange;
 
 /// How long a relay rests between two portions of a computation, so that a caller's loop gets its turn.
 const PAUSE: Duration = Duration::from_micros(250);
 
-/// Whether this crate was built to re-form the chain. Without it, none of its code is reached.
-pub(crate) const MEMBERSHIP: bool = cfg!(feature = "membership");
+/// A pass whose digest is so many views off is of the same mission.
+const VIEWS: u16 = 64;
 
-/// Whether it was built to take a newer mission in flight.
-pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
-
-/// Whether it was built to guard setpoints.
-pub(crate) const GUARD: bool = cfg!(feature = "guard");
+/// What the firmware is told.
+#[derive(Clone, Debug, Default)]
+struct Telemetry {
+    events: Pending,
+    stats: Stats,
+}
 
 /// A relay's share of the protocol.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
-    mission: Mission,
-    settings: Settings,
-    members: Members,
-    share: Share,
+    chain: Chain,
+    neighbours: Neighbours,
+    view: ViewChange,
+    update: MissionUpdate,
+    round: Round,
+    steering: Steering,
     meter: Meter,
-    /// The newest mission that was uploaded.
-    #[cfg(feature = "upload")]
-    upload: Option<Upload>,
-    guard: Option<Guard>,
-    timers: Timers,
-    upstream: Beside,
-    downstream: Beside,
-    onward_due: bool,
-    back_due: bool,
-    busy_due: bool,
-    repeats: Repeats,
-    pending: Pending,
-    pub(crate) stats: Stats,
+    telemetry: Telemetry,
+}
+
+/// What the layers are handed, of those that it is made of.
+fn of<'a>(
+    now: Instant,
+    chain: &'a Chain,
+    neighbours: &Neighbours,
+    update: &MissionUpdate,
+    meter: &Meter,
+) -> Context<'a> {
+    let onward = Side::onward(chain.mission.heading());
+    Context {
+        now,
+        chain,
+        latest: update.latest(),
+        end: neighbours.at(onward).has_no_peer(),
+        measured_per_w: meter.published(),
+    }
 }
 
 impl Node {
@@ -104,61 +108,58 @@ impl Node {
         seed: u32,
         now: Instant,
     ) -> Self {
-        let relays = mission.relays();
-        let after = if identity.index < relays {
-            identity.index.saturating_add(1)
-        } else {
-            0
-        };
-        let leader = identity.index == mission.leader();
+        let leads = identity.index == mission.leader();
         let profile = settings.profile.unwrap_or(mission.config().common);
-        // Any odd multiplier keeps distinct seeds distinct; the generator must not start at zero.
-        let random = seed
-            .wrapping_mul(0x9E37_79B1)
-            .wrapping_add(u32::from(identity.index))
-            | 1;
-        let [a, b, ..] = random.to_le_bytes();
-        let low = u16::from_le_bytes([a, b]);
+        let seed = seed.wrapping_add(u32::from(identity.index));
+        let [a, b, ..] = seed.wrapping_mul(0x9E37_79B1).to_le_bytes();
+        let number = u16::from_le_bytes([a, b]);
+        let chain = Chain::new(mission, settings, identity.index);
+        let neighbours = Neighbours::new(identity.index, chain.all, now, &settings);
         let mut node = Self {
-            members: Members::new(&mission, identity.index),
-            mission,
-            settings,
-            share: Share::new(leader, low, profile),
+            update: MissionUpdate::new(chain.active),
+            view: ViewChange::new(!seed),
+            round: Round::new(leads, number, profile, seed),
+            steering: Steering::new(&settings, neighbours.nodes(), seed, now),
             meter: Meter::new(settings.measure),
-            #[cfg(feature = "upload")]
-            upload: None,
-            guard: guard(&settings, identity.index, after, seed, now),
-            timers: Timers::new(),
-            upstream: Beside::new(identity.index.saturating_sub(1), now),
-            downstream: Beside::new(after, now),
-            onward_due: false,
-            back_due: false,
-            busy_due: false,
-            repeats: Repeats::new(random),
-            pending: Pending::default(),
-            stats: Stats::default(),
+            telemetry: Telemetry::default(),
+            chain,
+            neighbours,
         };
-        for side in [Side::Upstream, Side::Downstream] {
-            if node.beside(side).node() != 0 {
-                node.timers.set(Timer::of(side), now + settings.quiet);
-            }
+        if leads || settings.method == Method::Joint {
+            node.round.work_soon(now);
         }
-        if leader || settings.method == Method::Joint {
-            node.timers.set(Timer::Work, now + PAUSE);
-        }
-        if !leader && MEMBERSHIP {
-            // Until then the first pass should have come, were this the beginning.
-            let first = settings.hop_time.times(2 * u32::from(relays));
-            node.timers.set(Timer::Call, now + settings.quiet + first);
+        if !leads {
+            node.await_first(now);
         }
         node
     }
 
-    const fn beside(&mut self, side: Side) -> &mut Beside {
-        match side {
-            Side::Upstream => &mut self.upstream,
-            Side::Downstream => &mut self.downstream,
-        }
+    /// By when the first pass should have come, were this the beginning.
+    fn await_first(&mut self, now: Instant) {
+        let Settings {
+            hop_time, quiet, ..
+        } = self.chain.settings;
+        let first = hop_time.times(2 * u32::from(self.chain.all));
+        self.view.await_first(now + quiet + first);
+    }
+
+    fn context(&self, now: Instant) -> Context<'_> {
+        of(
+            now,
+            &self.chain,
+            &self.neighbours,
+            &self.update,
+            &self.meter,
+        )
+    }
+
+    /// Where passes go to, and where they come from.
+    const fn onward(&self) -> Side {
+        Side::onward(self.chain.mission.heading())
+    }
+
+    const fn back(&self) -> Side {
+        Side::back(self.chain.mission.heading())
     }
 
     /// On which side node `sender` is, if it may have something to say to this relay: a neighbour, or one that might become
@@ -168,9 +169,9 @@ impl Node {
         if let Some(side) = self.ground_side(sender) {
             return Some(side);
         }
-        let own = self.members.node;
-        let near = sender.abs_diff(own) <= if self.seeks() { CANDIDATES } else { 1 };
-        if !near || sender == own || sender < 1 || sender > self.members.all {
+        let own = self.chain.node;
+        let near = sender.abs_diff(own) <= if self.searches() { CANDIDATES } else { 1 };
+        if !near || sender == own || sender < 1 || sender > self.chain.all {
             return None;
         }
         Some(if sender < own {
@@ -181,210 +182,822 @@ impl Node {
     }
 
     /// Whether others than the neighbours of the mission can be heard.
-    fn seeks(&self) -> bool {
-        MEMBERSHIP && self.settings.wiring == Wiring::Shared
+    fn searches(&self) -> bool {
+        self.chain.settings.wiring == Wiring::Shared
     }
 
-    /// Whether newer missions are taken in flight: only where frames are signed.
-    const fn takes_uploads(&self) -> bool {
-        UPLOAD && self.settings.auth.is_some()
+    fn raise(&mut self, event: Event) {
+        self.telemetry.events.raise(event);
     }
 
-    /// The relay's share, and what it needs to know of the relay.
-    fn parts(&mut self) -> (&mut Share, Own<'_>) {
-        let onward = match Side::onward(self.mission.heading()) {
-            Side::Upstream => &self.upstream,
-            Side::Downstream => &self.downstream,
-        };
-        let own = Own {
-            mission: &self.mission,
-            settings: &self.settings,
-            flown: self.members.flown,
-            held: self.members.held,
-            view: self.members.view,
-            index: self.members.index,
-            end: onward.is_end(),
-            measured_per_w: self.meter.published(),
-        };
-        (&mut self.share, own)
-    }
-
-    /// Flies `mission` from now on, whose mission_id is `mission_id`.
-    fn fly(&mut self, mission: Mission, mission_id: MissionId) {
-        self.mission = mission;
-        self.members.flown = mission_id;
-        let common = mission.config().common;
-        self.share.load(self.settings.profile.unwrap_or(common));
-    }
-
-    /// Does what the relay's share asks for.
-    fn proceed(&mut self, now: Instant, next: Next) {
-        let mut moved = false;
-        match next {
-            Next::Nothing => return,
-            Next::Foreign if !MEMBERSHIP => bump(&mut self.stats.stale),
-            Next::Formed { .. } if !MEMBERSHIP => return,
-            Next::Foreign => {
-                bump(&mut self.stats.stale);
-                self.call(now);
-            }
-            Next::Formed { granted } => return self.formed(now, granted),
-            Next::Stale => bump(&mut self.stats.stale),
-            Next::Work { moved: to } => {
-                moved = to;
-                // What there was to say of the pass before would be stale.
-                self.onward_due = false;
-                self.back_due = false;
-                self.busy_due = false;
-                self.timers.stop(Timer::Repeat);
-                self.timers.set(Timer::Work, now + PAUSE);
-            }
-            Next::Think => return self.timers.set(Timer::Work, now + PAUSE),
-            Next::Forward { moved: to } => {
-                moved = to;
-                self.repeats.heard();
-                self.onward_due = true;
-                self.busy_due = false;
-                // An answer to the pass before would be stale.
-                self.back_due = false;
-                self.timers.stop(Timer::Repeat);
-                self.timers.stop(Timer::Work);
-            }
-            Next::Busy => {
-                bump(&mut self.stats.repeated);
-                self.busy_due = true;
-            }
-            Next::Repeat => {
-                bump(&mut self.stats.repeated);
-                self.back_due = true;
-            }
-            Next::Answer { moved: to, agreed } => {
-                moved = to;
-                self.onward_due = false;
-                self.busy_due = false;
-                self.timers.stop(Timer::Repeat);
-                self.timers.stop(Timer::Work);
-                let back = Side::back(self.mission.heading());
-                self.back_due = self.beside(back).node() != 0;
-                if agreed {
-                    self.pending.raise(Event::Converged);
-                }
-            }
-            Next::Infeasible => {
-                self.timers.stop(Timer::Repeat);
-                self.pending.raise(Event::Infeasible);
+    /// Has the other layers know what one of them came to.
+    fn apply(&mut self, now: Instant, effects: Effects) {
+        let stats = &mut self.telemetry.stats;
+        for (happened, counter) in [
+            (effects.stale, &mut stats.stale),
+            (effects.repeated, &mut stats.repeated),
+            (effects.resent, &mut stats.repeats),
+            (effects.began, &mut stats.sweeps),
+        ] {
+            if happened {
+                bump(counter);
             }
         }
-        if moved {
-            if self.guard.is_none() {
-                self.pending.raise(Event::SetpointChanged);
-            }
+        if let Some(proposer) = effects.proposed_by {
+            let back = self.back();
+            self.neighbours.at_mut(back).proposed_by(proposer);
+        }
+        if effects.view_proposed {
+            self.round.suspend();
+        }
+        if effects.view_needed {
+            self.view.ask(now);
+        }
+        if effects.ask {
+            let back = self.back();
+            let to = self.neighbours.at(back).node();
+            self.owe_hello(back, to, true);
+        }
+        if let Some(granted) = effects.decided {
+            self.decided(now, granted);
+        }
+        if effects.converged {
+            self.raise(Event::Converged);
+        }
+        if effects.infeasible {
+            self.raise(Event::Infeasible);
+        }
+        if effects.moved {
             // What is measured from now on is measured elsewhere.
             self.meter.restart();
         }
-        self.stats.sweeps = self.share.sweeps();
     }
 
-    /// Handles every timer that has run out by `now`. Each is stopped first and set again only to a later time, so six
-    /// rounds at most; the work is that of one portion of a computation.
+    /// Moves the setpoint as far as it may go by what is known now.
+    fn steer(&mut self, now: Instant) {
+        if self.steering.steer(now, self.round.setpoint()) {
+            self.raise(Event::SetpointChanged);
+        }
+    }
+
+    /// Node `from` at `side` has made itself known, for the first time if `first`: then what waits for an answer from there is
+    /// said again.
+    #[cfg(feature = "auth")]
+    pub(crate) fn meet(&mut self, now: Instant, side: Side, from: u16, first: bool) {
+        #[cfg(feature = "upload")]
+        if self.ground_side(from).is_some() {
+            return;
+        }
+        if self.neighbours.at(side).node() != from {
+            if first {
+                // What was to be said to it before could not be read there.
+                self.owe_hello(side, from, true);
+            }
+            return;
+        }
+        self.hear(now, side);
+        if first && side == self.onward() {
+            self.resend();
+        }
+    }
+
+    /// What could not be said to the neighbour after can be now.
+    fn resend(&mut self) {
+        self.view.resend();
+        self.round.resend();
+    }
+
+    /// A message from node `from` at `side`, intact and addressed to this relay; whether it was one to say to this relay.
+    /// Bounded by 16 reaches.
+    #[inline(never)]
+    pub(crate) fn handle_message(
+        &mut self,
+        now: Instant,
+        side: Side,
+        from: u16,
+        message: &Message,
+    ) -> bool {
+        #[cfg(feature = "upload")]
+        if self.ground_side(from).is_some() {
+            return self.on_ground(now, side, message);
+        }
+        let taken = self.neighbours.at(side).node() == from;
+        if taken {
+            self.hear(now, side);
+        }
+        if let Message::Hello(hello) = message {
+            if self.is_of_mission(side, hello.mission) {
+                self.on_hello(now, side, from, *hello);
+                self.steer(now);
+            }
+            return true;
+        }
+        #[cfg(feature = "upload")]
+        if let Message::Offer(upload) = message
+            && !taken
+            && takes_uploads(&self.chain)
+        {
+            // It takes this relay for its neighbour: a hello alone would only make it say the same again.
+            if self.is_of_mission(side, upload.base()) {
+                self.on_offer(now, side, from, upload);
+            }
+            return true;
+        }
+        if !taken {
+            self.owe_hello(side, from, false);
+            return false;
+        }
+        if self.searches() {
+            // Nobody says anything else to a node that it has not taken.
+            self.told(now, side, true);
+        }
+        if !self.is_of_this_view(now, side, from, message) {
+            return true;
+        }
+        self.dispatch(now, side, from, message);
+        self.steer(now);
+        true
+    }
+
+    /// Whether `message` from the neighbour `from` is of the mission and, if it is of one, of the view that this relay is in.
+    /// What is not is counted, and answered by a hello if the two may have to come to one view.
+    fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
+        let Some(digest) = message.mission() else {
+            return true;
+        };
+        let (active, latest) = (self.chain.active, self.update.latest());
+        let proposes = message.is_of_a_call();
+        if !proposes && !message.is_of_a_view() {
+            return self.is_of_mission(side, digest);
+        }
+        let known = match message {
+            Message::Proposal(proposal) => proposal.mission_id == latest,
+            Message::Decision(decision) => [active, latest].contains(&decision.mission_id),
+            _ => digest == self.chain.pass_digest(),
+        };
+        if known {
+            return true;
+        }
+        let off = digest.wrapping_sub(self.chain.pass_digest());
+        let near = !proposes && off.min(off.wrapping_neg()) <= VIEWS;
+        // It was loaded with the same mission, so it flies an older or a newer one.
+        let takes = takes_uploads(&self.chain);
+        let kin = takes && self.neighbours.at(side).holds.is_some();
+        if !(near || kin) {
+            self.refuse_mission(side);
+            if takes {
+                self.owe_hello(side, from, false);
+            }
+            return false;
+        }
+        bump(&mut self.telemetry.stats.view);
+        if near && message.is_onward() {
+            self.view.ask(now);
+        }
+        self.owe_hello(side, from, false);
+        false
+    }
+
+    fn is_of_mission(&mut self, side: Side, digest: u16) -> bool {
+        let same = digest == self.chain.digest;
+        if !same {
+            self.refuse_mission(side);
+        }
+        same
+    }
+
+    fn refuse_mission(&mut self, side: Side) {
+        bump(&mut self.telemetry.stats.mission);
+        self.raise(Event::MissionMismatch(side));
+    }
+
+    /// A sign of life from the neighbour at `side`.
+    fn hear(&mut self, now: Instant, side: Side) {
+        let Self {
+            chain, neighbours, ..
+        } = self;
+        if neighbours.at_mut(side).heard(now, &chain.settings) {
+            self.raise(Event::NeighbourBack(side));
+        }
+    }
+
+    /// A message of this mission, and of this view if it is of one, from the neighbour `from` at `side`.
+    fn dispatch(&mut self, now: Instant, side: Side, from: u16, message: &Message) {
+        match message {
+            Message::Heartbeat { answer, .. } => {
+                if *answer {
+                    self.neighbours.at_mut(side).owe_heartbeat();
+                }
+                return;
+            }
+            Message::Fence { fence, .. } => {
+                let effects = self.steering.handle(side, from, fence);
+                return self.apply(now, effects);
+            }
+            #[cfg(feature = "upload")]
+            Message::Offer(upload) => return self.on_offer(now, side, from, upload),
+            _ => {}
+        }
+        if message.is_of_a_view() && !self.neighbours.at(side).is_agreed() {
+            // It is in no view with this relay yet.
+            return bump(&mut self.telemetry.stats.stale);
+        }
+        let wanted = if message.is_onward() {
+            self.back()
+        } else {
+            self.onward()
+        };
+        if side != wanted {
+            return bump(&mut self.telemetry.stats.misdirected);
+        }
+        let context = of(
+            now,
+            &self.chain,
+            &self.neighbours,
+            &self.update,
+            &self.meter,
+        );
+        let effects = match message {
+            Message::Proposal(_) | Message::Decision(_) => self.view.handle(&context, message),
+            Message::Busy { sweep } if self.view.on_busy(&context, *sweep) => Effects::NONE,
+            // No pass goes on while a view is proposed.
+            _ if self.view.awaited().is_some() => Effects::STALE,
+            _ => self.round.handle(&context, message),
+        };
+        self.apply(now, effects);
+    }
+
+    /// Whether it is at the chain's solution, as every relay of its view is.
+    fn is_solving(&self, now: Instant) -> bool {
+        self.round.is_solving(&self.context(now))
+    }
+
+    /// Whether no pass has come yet, and it has not asked for a view.
+    fn awaits_first(&self) -> bool {
+        self.round.is_fresh() && !self.view.asks()
+    }
+
+    /// Handles what has run out by `now`, each layer once; the work is that of one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
-        while let Some(timer) = self.timers.expired(now) {
-            match timer {
-                Timer::Work => {
-                    let (share, own) = self.parts();
-                    let next = share.work(own);
-                    self.proceed(now, next);
-                }
-                Timer::Repeat => {
-                    if self.share.phase() == Phase::Waiting {
-                        bump(&mut self.stats.repeats);
-                        self.repeats.unheard();
-                        self.onward_due = true;
-                    }
-                }
-                Timer::Upstream => self.silence(now, Side::Upstream),
-                Timer::Downstream => self.silence(now, Side::Downstream),
-                Timer::Remind => self.remind(now),
-                Timer::Call if MEMBERSHIP => self.call_again(now),
-                Timer::Call => {}
+        let solved = self.is_solving(now);
+        let context = of(
+            now,
+            &self.chain,
+            &self.neighbours,
+            &self.update,
+            &self.meter,
+        );
+        let effects = self.round.handle_timeout(&context);
+        self.apply(now, effects);
+        if solved && !self.is_solving(now) {
+            self.solved(now);
+        }
+        for side in [Side::Upstream, Side::Downstream] {
+            if self.neighbours.at(side).is_due(now) {
+                self.silence(now, side);
             }
         }
+        if self.awaits_first() && self.is_solving(now) {
+            if self.view.is_due(now) {
+                self.await_first(now);
+            }
+        } else {
+            let leads = self.neighbours.at(self.back()).has_no_peer();
+            let fresh = self.round.is_fresh();
+            let context = of(
+                now,
+                &self.chain,
+                &self.neighbours,
+                &self.update,
+                &self.meter,
+            );
+            let effects = self.view.handle_timeout(&context, leads, fresh);
+            self.apply(now, effects);
+        }
+        self.steering.handle_timeout(now);
         self.steer(now);
+    }
+
+    /// It has just found out where it is to be: what it waits for it waits for from now on.
+    fn solved(&mut self, now: Instant) {
+        let Self {
+            chain, neighbours, ..
+        } = self;
+        for side in [Side::Upstream, Side::Downstream] {
+            neighbours.at_mut(side).excuse(now, &chain.settings);
+        }
+        if self.awaits_first() {
+            self.await_first(now);
+        }
+    }
+
+    fn silence(&mut self, now: Instant, side: Side) {
+        let (solving, searches) = (self.is_solving(now), self.searches());
+        let Self {
+            chain,
+            neighbours,
+            steering,
+            ..
+        } = self;
+        let settings = &chain.settings;
+        let neighbour = neighbours.at_mut(side);
+        if solving && neighbour.excuse(now, settings) {
+            return;
+        }
+        let lost = neighbour.handle_timeout(now, settings, searches);
+        steering.link(side, Some(neighbour.node()).filter(|node| *node != 0));
+        if lost {
+            self.raise(Event::NeighbourLost(side));
+        }
+        self.review(now);
+    }
+
+    /// Asks for a new view if the chain is another than the one agreed on.
+    fn review(&mut self, now: Instant) {
+        if self.neighbours.have_changed(now) {
+            self.view.ask(now);
+        }
+        if self.neighbours.at(self.onward()).has_no_peer() && self.view.awaited().is_some() {
+            // Whoever was to be counted next is not there any more.
+            let context = of(
+                now,
+                &self.chain,
+                &self.neighbours,
+                &self.update,
+                &self.meter,
+            );
+            let effects = self.view.decide(&context);
+            self.apply(now, effects);
+        }
+    }
+
+    /// Owes node `to` at `side` a hello, which may ask for one in return.
+    fn owe_hello(&mut self, side: Side, to: u16, ask: bool) {
+        let distance = to.abs_diff(self.chain.node);
+        self.neighbours.at_mut(side).owe(distance, ask);
+    }
+
+    /// The next hello that is owed: at which side, to which node.
+    fn next_hello(&mut self) -> Option<(Side, u16, Hello)> {
+        let (own, all) = (self.chain.node, self.chain.all);
+        for side in [Side::Upstream, Side::Downstream] {
+            for _ in 0..CANDIDATES {
+                let Some((distance, ask)) = self.neighbours.at_mut(side).take_hello() else {
+                    break;
+                };
+                let to = match side {
+                    Side::Upstream => own.saturating_sub(distance),
+                    Side::Downstream => own.saturating_add(distance),
+                };
+                if to >= 1 && to <= all && self.side_of(to).is_some() {
+                    return Some((side, to, self.hello(side, ask)));
+                }
+            }
+        }
+        None
+    }
+
+    fn hello(&self, side: Side, ask: bool) -> Hello {
+        let latest = self.update.latest();
+        Hello {
+            mission: self.chain.digest,
+            newest: self.view.newest(),
+            neighbour: self.neighbours.at(side).node(),
+            ask,
+            form: self.view.asks() && side == self.back(),
+            fresh: self.round.is_fresh(),
+            ready: self.neighbours.at(side.other()).is_ready(),
+            holds: latest,
+            flies: self.chain.active == latest,
+        }
+    }
+
+    /// A hello from node `from` at `side`, of the same mission.
+    fn on_hello(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
+        let own = self.chain.node;
+        let known = self.view.newest();
+        self.view.heard_of(hello.newest);
+        if hello.ask {
+            self.owe_hello(side, from, false);
+        }
+        if self.neighbours.at(side).node() == from {
+            #[cfg(feature = "upload")]
+            self.compare(side, from, hello.holds);
+            self.neighbours.at_mut(side).holds = Some(hello.holds);
+            if self.searches() {
+                self.told(now, side, hello.neighbour == own);
+            }
+            let waits = self.view.awaited().is_some();
+            if hello.form && (hello.newest >= known || hello.fresh && !waits) {
+                self.view.ask(now);
+            }
+        } else if self.searches() {
+            self.consider(now, side, from, hello);
+        }
+        self.review(now);
+    }
+
+    /// A hello from node `from` at `side`, which is not taken for the neighbour there.
+    fn consider(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
+        let own = self.chain.node;
+        let Self {
+            chain,
+            neighbours,
+            steering,
+            ..
+        } = self;
+        let neighbour = neighbours.at_mut(side);
+        neighbour.notice(now, &chain.settings);
+        if hello.neighbour != own && hello.neighbour != 0 {
+            return;
+        }
+        let pairs = hello.neighbour == own;
+        let nearer = from.abs_diff(own) < neighbour.node().abs_diff(own);
+        if neighbour.consider(from, pairs, nearer, hello.ready, now, &chain.settings) {
+            neighbour.holds = Some(hello.holds);
+            steering.link(side, Some(from));
+            self.raise(Event::NeighbourBack(side));
+            self.owe_hello(side, from, true);
+            self.told(now, side, pairs);
+        }
+    }
+
+    /// The neighbour at `side` has said, one way or the other, whether it takes this relay for its own.
+    fn told(&mut self, now: Instant, side: Side, mutual: bool) {
+        let Self {
+            chain, neighbours, ..
+        } = self;
+        if !neighbours.at_mut(side).told(mutual, now, &chain.settings) || !mutual {
+            return;
+        }
+        let newer = self.view.newest() > self.chain.view;
+        if newer && !self.neighbours.at(side).has_grace(now) {
+            // One of the two has missed something.
+            self.view.ask(now);
+        }
+        self.resend();
+    }
+
+    /// What came of a proposal is known: how many relays there are, or that they are too few.
+    fn decided(&mut self, now: Instant, granted: Option<u16>) {
+        let Some(proposed) = self.view.proposed() else {
+            return;
+        };
+        let (place, id) = (proposed.place, proposed.mission_id);
+        let leads = place == 1;
+        let mission = self.update.mission_of(&self.chain, id).zip(granted);
+        let mission = mission.and_then(|(mission, relays)| mission.with_relays(relays).ok());
+        let (Some(relays), Some(mission)) = (granted, mission) else {
+            self.raise(Event::NoQuorum);
+            return self.neighbours.refuse();
+        };
+        self.chain.index = match mission.heading() {
+            Heading::TowardRx => place,
+            Heading::TowardTx => relays.saturating_sub(place).saturating_add(1),
+        };
+        self.chain.view = proposed.view;
+        self.fly(mission, id);
+        self.view.heard_of(proposed.view);
+        let (back, onward) = (self.back(), self.onward());
+        self.neighbours.at_mut(back).agree_with_proposer();
+        self.neighbours.at_mut(onward).agree(place == relays);
+        let works = self.chain.settings.method == Method::Joint;
+        self.round.renew(now, leads, works);
+        bump(&mut self.telemetry.stats.views);
+        self.raise(Event::Reformed);
+        if id != self.update.latest() {
+            // A newer one has come in the meantime.
+            self.view.ask(now);
+        }
+    }
+
+    /// Flies `mission` from now on, which is that of `id`.
+    fn fly(&mut self, mission: Mission, id: MissionId) {
+        self.chain.mission = mission;
+        if id == self.chain.active {
+            return;
+        }
+        self.chain.active = id;
+        let common = mission.config().common;
+        self.round
+            .load(self.chain.settings.profile.unwrap_or(common));
+        self.raise(Event::Adopted);
     }
 
     /// One measurement, by a relay that measures.
     pub(crate) fn handle_sample(&mut self, sample: Sample) {
-        let at = self.share.setpoint().filter(|_| self.members.index == 1);
-        if !self.meter.take(&self.mission, at, sample) {
-            bump(&mut self.stats.samples_refused);
+        let at = self.round.setpoint().filter(|_| self.chain.index == 1);
+        if !self.meter.take(&self.chain.mission, at, sample) {
+            bump(&mut self.telemetry.stats.samples_refused);
         }
     }
 
     /// The leader begins again, at `now`; nobody else has anything to begin.
     pub(crate) fn restart(&mut self, now: Instant) {
-        if self.members.index == self.mission.leader() && self.share.phase() != Phase::Cut {
-            self.share.restart();
-            self.proceed(now, Next::Work { moved: false });
+        let leads = self.chain.index == self.chain.mission.leader();
+        if leads && !self.view.has_no_quorum() && self.view.awaited().is_none() {
+            let context = of(
+                now,
+                &self.chain,
+                &self.neighbours,
+                &self.update,
+                &self.meter,
+            );
+            let effects = self.round.restart(&context);
+            self.apply(now, effects);
         }
     }
 
-    fn silence(&mut self, now: Instant, side: Side) {
-        let (settings, seeks) = (self.settings, self.seeks());
-        let quiet = self.beside(side).silent(now, &settings, seeks);
-        self.timers.set(Timer::of(side), quiet.look_again);
-        if quiet.lost {
-            self.pending.raise(Event::NeighbourLost(side));
+    /// The drone was at `place` at time `at`.
+    pub(crate) fn handle_position(&mut self, now: Instant, at: Instant, place: Placement) {
+        self.steering.position(at, place);
+        self.steer(now);
+    }
+
+    /// Who fell silent at `side` is not in the air any more.
+    pub(crate) fn clear_lost(&mut self, now: Instant, side: Side) {
+        self.steering.clear_lost(side);
+        self.steer(now);
+    }
+
+    /// The next message to send, to which node at which side. Call until there is none.
+    pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
+        if let Some(message) = self.next_of_a_round(now) {
+            return Some(message);
         }
-        self.review(now);
+        let mission = self.chain.digest;
+        if let Some((side, to, answer)) = self.neighbours.take_heartbeat() {
+            return Some((side, to, Message::Heartbeat { mission, answer }));
+        }
+        if let Some((side, to, hello)) = self.next_hello() {
+            return Some((side, to, Message::Hello(hello)));
+        }
+        #[cfg(feature = "upload")]
+        for side in [Side::Upstream, Side::Downstream] {
+            if let Some((to, message)) = self.next_offer(side) {
+                return Some((side, to, message));
+            }
+            if let Some((to, hello)) = self.next_report(side) {
+                return Some((side, to, Message::Hello(hello)));
+            }
+        }
+        let (side, to, fence) = self.steering.poll_transmit()?;
+        Some((side, to, Message::Fence { mission, fence }))
+    }
+
+    /// The next message of a view change or of a round.
+    fn next_of_a_round(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
+        let (onward, back) = (self.onward(), self.back());
+        let peer = |side| {
+            let neighbour = self.neighbours.at(side);
+            neighbour
+                .is_mutual()
+                .then_some((neighbour.node(), neighbour.is_agreed()))
+        };
+        let (next, before) = (peer(onward), peer(back));
+        let context = of(
+            now,
+            &self.chain,
+            &self.neighbours,
+            &self.update,
+            &self.meter,
+        );
+        if let Some(message) = self.view.take_onward(&context)
+            && let Some((to, _)) = next
+        {
+            #[cfg(feature = "upload")]
+            if let Some(upload) = self.update.offer_to(self.neighbours.at(onward).holds) {
+                return Some((onward, to, Message::Offer(upload)));
+            }
+            return Some((onward, to, message));
+        }
+        if let Some((to, _)) = before
+            && let Some(message) = self.view.take_back()
+        {
+            return Some((back, to, message));
+        }
+        let agreed = |peer: Option<(u16, bool)>| peer.is_some_and(|(_, agreed)| agreed);
+        if let Some(message) = self.round.take_onward(&context, agreed(next))
+            && let Some((to, _)) = next
+        {
+            return Some((onward, to, message));
+        }
+        let message = self.round.take_back(&context, agreed(before))?;
+        let (to, _) = before?;
+        Some((back, to, message))
     }
 
     pub(crate) fn poll_event(&mut self) -> Option<Event> {
-        self.pending.take()
+        self.telemetry.events.take()
     }
 
     pub(crate) fn poll_timeout(&self) -> Option<Instant> {
-        self.timers.next()
+        [
+            self.neighbours.next_timeout(),
+            self.view.next_timeout(),
+            self.round.next_timeout(),
+            self.steering.next_timeout(),
+        ]
+        .into_iter()
+        .flatten()
+        .min()
     }
 
     /// Where to be in the end.
-    pub(crate) const fn agreed(&self) -> Option<Placement> {
-        self.share.setpoint()
+    pub(crate) const fn final_setpoint(&self) -> Option<Placement> {
+        self.round.setpoint()
     }
 
-    pub(crate) fn bound(&self) -> Option<f32> {
-        self.share.bound()
+    /// Where to fly now.
+    pub(crate) fn setpoint(&self) -> Option<Placement> {
+        self.steering.setpoint(self.round.setpoint())
     }
 
-    pub(crate) fn target(&self) -> Option<f32> {
-        self.share.target()
+    /// What keeps the relay from its place at `side`.
+    pub(crate) fn hold_reason(&self, side: Side) -> Option<HoldReason> {
+        self.steering.hold_reason(side)
     }
 
     pub(crate) fn phase(&self) -> Phase {
-        self.share.phase()
+        if self.view.has_no_quorum() {
+            Phase::NoQuorum
+        } else if self.view.awaited().is_some() {
+            Phase::Waiting
+        } else {
+            self.round.phase()
+        }
     }
 
-    pub(crate) fn mission(&self) -> &Mission {
-        &self.mission
-    }
-
-    pub(crate) const fn members(&self) -> &Members {
-        &self.members
+    pub(crate) const fn chain(&self) -> &Chain {
+        &self.chain
     }
 
     /// The neighbours toward Tx and toward Rx.
     pub(crate) fn neighbours(&self) -> [Option<u16>; 2] {
-        [&self.upstream, &self.downstream].map(|side| Some(side.node()).filter(|node| *node != 0))
+        self.neighbours.nodes()
     }
 
-    pub(crate) fn profile(&self) -> Profile {
-        self.share.profile()
+    pub(crate) const fn round(&self) -> &Round {
+        &self.round
     }
 
-    pub(crate) fn rounds(&self) -> Option<(u16, f32)> {
-        self.share.rounds()
-    }
-
-    pub(crate) fn meter(&self) -> &Meter {
+    pub(crate) const fn meter(&self) -> &Meter {
         &self.meter
     }
+
+    pub(crate) const fn stats(&self) -> &Stats {
+        &self.telemetry.stats
+    }
+
+    pub(crate) const fn stats_mut(&mut self) -> &mut Stats {
+        &mut self.telemetry.stats
+    }
 }
+
+#[cfg(feature = "upload")]
+impl Node {
+    /// On which side `node` is, if it is the ground transmitter or receiver and near enough to be heard.
+    fn ground_side(&self, node: u16) -> Option<Side> {
+        let (own, all) = (self.chain.node, self.chain.all);
+        let most = match self.chain.settings.wiring {
+            Wiring::Pair => 1,
+            Wiring::Shared => CANDIDATES,
+        };
+        let near = takes_uploads(&self.chain) && node.abs_diff(own) <= most;
+        match node {
+            0 if near => Some(Side::Upstream),
+            _ if near && node == all.saturating_add(1) => Some(Side::Downstream),
+            _ => None,
+        }
+    }
+
+    /// A message from the ground at `side`; whether it is one for the ground to say.
+    fn on_ground(&mut self, now: Instant, side: Side, message: &Message) -> bool {
+        let base = self.chain.digest;
+        match message {
+            Message::Offer(_) | Message::Hello(_) if message.mission() != Some(base) => {
+                self.refuse_mission(side);
+            }
+            Message::Offer(upload) => {
+                self.hold(now, *upload);
+                self.neighbours.at_mut(side).ground = true;
+            }
+            Message::Hello(hello) => self.neighbours.at_mut(side).ground |= hello.ask,
+            _ => return false,
+        }
+        true
+    }
+
+    /// What the ground at `side` is told, once it is owed: to which node.
+    fn next_report(&mut self, side: Side) -> Option<(u16, Hello)> {
+        if !core::mem::take(&mut self.neighbours.at_mut(side).ground) {
+            return None;
+        }
+        let to = match side {
+            Side::Upstream => 0,
+            Side::Downstream => self.chain.all.saturating_add(1),
+        };
+        let hello = Hello {
+            neighbour: 0,
+            form: false,
+            ..self.hello(side, false)
+        };
+        Some((to, hello))
+    }
+
+    /// An offer from node `from` at `side`, for relays that were loaded with the same mission. Answered only by who holds as new
+    /// a mission then: any other answer would be answered by the same offer.
+    fn on_offer(&mut self, now: Instant, side: Side, from: u16, upload: &Upload) {
+        if !takes_uploads(&self.chain) {
+            return bump(&mut self.telemetry.stats.unsigned);
+        }
+        let id = upload.id();
+        let neighbour = self.neighbours.at_mut(side);
+        if neighbour.node() == from {
+            neighbour.holds = neighbour.holds.max(Some(id));
+        }
+        self.hold(now, *upload);
+        if self.update.latest() >= id {
+            self.owe_hello(side, from, false);
+        }
+    }
+
+    /// Holds `upload` from now on, if it is newer than what is held.
+    fn hold(&mut self, now: Instant, upload: Upload) {
+        if self.update.hold(&self.chain, upload) {
+            self.held(now);
+        }
+    }
+
+    /// A newer mission is held.
+    fn held(&mut self, now: Instant) {
+        self.raise(Event::Uploaded);
+        // The leader has to hold it first; the others are offered it before the proposal comes to them.
+        let back = self.back();
+        self.neighbours.at_mut(back).offer = true;
+        self.view.ask(now);
+    }
+
+    /// The same by the relay's own firmware.
+    pub(crate) fn handle_upload(
+        &mut self,
+        now: Instant,
+        upload: &Upload,
+    ) -> Result<(), UploadError> {
+        self.update.hand_in(&self.chain, upload)?;
+        self.held(now);
+        Ok(())
+    }
+
+    /// A relay that has just been switched on flies `upload`, which it held before.
+    pub(crate) fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
+        let untouched = self.view.newest() == 0 && self.round.is_untouched();
+        let mission = self.update.resume(&self.chain, upload, untouched)?;
+        self.chain.mission = mission;
+        self.chain.active = upload.id();
+        let common = mission.config().common;
+        self.round
+            .load(self.chain.settings.profile.unwrap_or(common));
+        Ok(())
+    }
+
+    /// The newest mission held, if it was uploaded.
+    pub(crate) const fn upload(&self) -> Option<&Upload> {
+        self.update.upload()
+    }
+
+    /// The neighbour `from` at `side` says that it holds the mission of that number.
+    fn compare(&mut self, side: Side, from: u16, holds: MissionId) {
+        if !takes_uploads(&self.chain) {
+            return;
+        }
+        let latest = self.update.latest();
+        if holds > latest {
+            self.owe_hello(side, from, false);
+        } else if holds < latest {
+            self.neighbours.at_mut(side).offer = true;
+        } else if self.neighbours.at(side).holds != Some(latest)
+            && side == self.onward()
+            && self
+                .view
+                .awaited()
+                .is_some_and(|proposed| proposed.mission_id == latest)
+        {
+            // The proposal had to wait for that.
+            self.view.resend();
+        }
+    }
+
+    /// The offer that is owed to the neighbour at `side`.
+    fn next_offer(&mut self, side: Side) -> Option<(u16, Message)> {
+        let neighbour = self.neighbours.at_mut(side);
+        let due = core::mem::take(&mut neighbour.offer);
+        let (to, holds) = (neighbour.node(), neighbour.holds);
+        let upload = self.update.offer_to(holds)?;
+        (due && to != 0).then_some((to, Message::Offer(upload)))
+    }
+}
+
+#[cfg(feature = "upload")]
+#[cfg(test)]
+mod tests;

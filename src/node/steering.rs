@@ -1,9 +1,8 @@
-//! The setpoint on its way to the agreed place, where a [guard](crate::guard) is asked for.
+//! The setpoint on its way to the agreed place: with a [guard](crate::guard) as far as is safe by now, without one the place itself.
 
-use super::timers::Timer;
-use super::{GUARD, Node};
-use crate::event::Event;
-use crate::guard::{Guard, HoldReason};
+use super::context::Effects;
+use super::view::earliest;
+use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
 use crate::settings::Settings;
 use crate::side::Side;
@@ -12,81 +11,117 @@ use crate::time::{Duration, Instant};
 /// How long after the guard has said something it is said again, unless the neighbour is known to have heard it.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
-/// The guard that `settings` ask for, of relay `index`, whose neighbour toward Rx is `after`, 0 for none.
-pub(super) fn guard(
-    settings: &Settings,
-    index: u16,
-    after: u16,
-    seed: u32,
-    now: Instant,
-) -> Option<Guard> {
-    let confines = settings.guard.filter(|_| GUARD)?;
-    let neighbours = [index.saturating_sub(1), after].map(|node| Some(node).filter(|&n| n != 0));
-    Some(Guard::new(confines, neighbours, seed, now))
+/// Whether this crate was built to guard setpoints.
+const GUARD: bool = cfg!(feature = "guard");
+
+/// What moves the setpoint of one relay.
+#[derive(Clone, Debug)]
+pub(crate) struct Steering {
+    guard: Option<Guard>,
+    remind_at: Option<Instant>,
+    /// The setpoint that the firmware was told of last.
+    told: Option<Placement>,
 }
 
-impl Node {
-    /// Moves the setpoint as far as it may go by what is known now.
-    pub(super) fn steer(&mut self, now: Instant) {
-        if !GUARD {
-            return;
+impl Steering {
+    /// With the guard that `settings` ask for, of a relay with these neighbours.
+    pub(crate) fn new(
+        settings: &Settings,
+        neighbours: [Option<u16>; 2],
+        seed: u32,
+        now: Instant,
+    ) -> Self {
+        let config = settings.guard.filter(|_| GUARD);
+        Self {
+            guard: config.map(|config| Guard::new(config, neighbours, seed, now)),
+            remind_at: None,
+            told: None,
         }
-        let agreed = self.agreed();
-        let [before, after] = self.neighbours();
-        let Some(guard) = &mut self.guard else { return };
-        guard.link(Side::Upstream, before);
-        guard.link(Side::Downstream, after);
-        let Some(agreed) = agreed else { return };
-        if guard.is_for(agreed) {
-            return self.go(now);
-        }
-        guard.commit(agreed);
-        self.timers.set(Timer::Remind, now + REMINDER);
-        self.go(now);
     }
 
-    fn go(&mut self, now: Instant) {
-        let Some(guard) = &mut self.guard else { return };
-        let before = guard.setpoint();
-        if guard.steer(now) != before {
-            self.pending.raise(Event::SetpointChanged);
+    fn guard(&mut self) -> Option<&mut Guard> {
+        self.guard.as_mut().filter(|_| GUARD)
+    }
+
+    /// Moves the setpoint as far toward `agreed` as it may go by what is known at `now`; whether it has a new value.
+    pub(crate) fn steer(&mut self, now: Instant, agreed: Option<Placement>) -> bool {
+        if let Some(agreed) = agreed
+            && let Some(guard) = self.guard()
+        {
+            let known = guard.is_for(agreed);
+            if !known {
+                guard.commit(agreed);
+            }
+            guard.steer(now);
+            if !known {
+                self.remind_at = Some(now + REMINDER);
+            }
         }
+        let setpoint = self.setpoint(agreed);
+        let changed = setpoint != self.told;
+        self.told = setpoint;
+        changed
+    }
+
+    /// Where to fly now.
+    pub(crate) fn setpoint(&self, agreed: Option<Placement>) -> Option<Placement> {
+        match &self.guard {
+            Some(guard) if GUARD => guard.setpoint(),
+            _ => agreed,
+        }
+    }
+
+    /// Another node is taken for the neighbour at `side`.
+    pub(crate) fn link(&mut self, side: Side, neighbour: Option<u16>) {
+        if let Some(guard) = self.guard() {
+            guard.link(side, neighbour);
+        }
+    }
+
+    /// What the neighbour `from` at `side` says of the fence between the two.
+    pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) -> Effects {
+        if let Some(guard) = self.guard() {
+            guard.hear(side, from, fence);
+        }
+        Effects::NONE
     }
 
     /// Says again what may have been lost.
-    pub(super) fn remind(&mut self, now: Instant) {
-        if GUARD && let Some(guard) = &mut self.guard {
-            guard.remind();
-            self.timers.set(Timer::Remind, now + REMINDER);
+    pub(crate) fn handle_timeout(&mut self, now: Instant) {
+        if self.remind_at.is_some_and(|at| at <= now) {
+            self.remind_at = None;
+            if let Some(guard) = self.guard() {
+                guard.remind();
+                self.remind_at = Some(now + REMINDER);
+            }
         }
     }
 
     /// The drone was at `place` at time `at`.
-    pub(crate) fn handle_position(&mut self, now: Instant, at: Instant, place: Placement) {
-        if GUARD && let Some(guard) = &mut self.guard {
+    pub(crate) fn position(&mut self, at: Instant, place: Placement) {
+        if let Some(guard) = self.guard() {
             guard.position(at, place);
-            self.steer(now);
         }
     }
 
     /// Who fell silent at `side` is not in the air any more.
-    pub(crate) fn forget(&mut self, now: Instant, side: Side) {
-        if GUARD && let Some(guard) = &mut self.guard {
+    pub(crate) fn clear_lost(&mut self, side: Side) {
+        if let Some(guard) = self.guard() {
             guard.forget(side);
-            self.steer(now);
-        }
-    }
-
-    /// Where to fly now.
-    pub(crate) fn setpoint(&self) -> Option<Placement> {
-        match &self.guard {
-            Some(guard) if GUARD => guard.setpoint(),
-            _ => self.agreed(),
         }
     }
 
     /// What keeps the relay from its place at `side`.
     pub(crate) fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.guard.as_ref().filter(|_| GUARD)?.hold_reason(side)
+    }
+
+    /// What there is to say of a fence: at which side, to which node.
+    pub(crate) fn poll_transmit(&mut self) -> Option<(Side, u16, Fence)> {
+        self.guard()?.poll()
+    }
+
+    pub(crate) fn next_timeout(&self) -> Option<Instant> {
+        earliest(self.remind_at, None)
     }
 }

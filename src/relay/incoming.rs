@@ -15,8 +15,8 @@ pub(super) fn addressed<'a>(
     port: Port,
     plain: &'a [u8],
 ) -> Option<(Side, Opened<'a>)> {
-    let own = node.members().node;
-    let stats = &mut node.stats;
+    let own = node.chain().node;
+    let stats = node.stats_mut();
     let frame = match frame::open(plain) {
         Ok(opened) => opened,
         Err(error) => {
@@ -48,7 +48,7 @@ pub(super) fn addressed<'a>(
         .filter(|side| through.is_none_or(|through| through == *side))
         .filter(|_| header.destination == own);
     if side.is_none() {
-        bump(&mut node.stats.misaddressed);
+        bump(&mut node.stats_mut().misaddressed);
     }
     side.map(|side| (side, frame))
 }
@@ -56,7 +56,7 @@ pub(super) fn addressed<'a>(
 /// A frame from a neighbour, at a relay that asks for no tag.
 pub(super) fn receive(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
     if frame.tag.is_some() {
-        return bump(&mut node.stats.version);
+        return bump(&mut node.stats_mut().version);
     }
     read(node, now, side, frame);
 }
@@ -64,12 +64,12 @@ pub(super) fn receive(node: &mut Node, now: Instant, side: Side, frame: &Opened<
 /// A frame whose body counts, if it is one to say to this relay.
 pub(super) fn read(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
     let Ok(message) = Message::decode(frame.body) else {
-        return bump(&mut node.stats.malformed);
+        return bump(&mut node.stats_mut().malformed);
     };
     let counter = if node.handle_message(now, side, frame.header.sender, &message) {
-        &mut node.stats.received
+        &mut node.stats_mut().received
     } else {
-        &mut node.stats.misaddressed
+        &mut node.stats_mut().misaddressed
     };
     bump(counter);
 }

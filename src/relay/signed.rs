@@ -23,13 +23,13 @@ pub(super) fn receive(
             read(node, now, side, frame);
         }
         Checked::Handshake { first } => {
-            bump(&mut node.stats.handshakes);
+            bump(&mut node.stats_mut().handshakes);
             node.meet(now, side, frame.header.sender, first);
         }
-        Checked::Unproven => bump(&mut node.stats.handshakes),
-        Checked::Unsigned => bump(&mut node.stats.unsigned),
-        Checked::Forged => bump(&mut node.stats.forged),
-        Checked::Replayed => bump(&mut node.stats.replayed),
+        Checked::Unproven => bump(&mut node.stats_mut().handshakes),
+        Checked::Unsigned => bump(&mut node.stats_mut().unsigned),
+        Checked::Forged => bump(&mut node.stats_mut().forged),
+        Checked::Replayed => bump(&mut node.stats_mut().replayed),
     }
 }
 

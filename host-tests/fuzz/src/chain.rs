@@ -358,8 +358,8 @@ impl Chain {
             return;
         }
         let places = (
-            before.watched.relay().agreed(),
-            after.watched.relay().agreed(),
+            before.watched.relay().final_setpoint(),
+            after.watched.relay().final_setpoint(),
         );
         if let (Some(from), Some(to)) = places {
             let config = self.mission.config();

@@ -174,7 +174,7 @@ impl Watched {
 
     /// It is told that who fell silent at `side` has landed.
     pub fn forget(&mut self, now: Instant, side: Side) {
-        heap::without(|| self.relay.forget(now, side));
+        heap::without(|| self.relay.clear_lost(now, side));
     }
 
     /// Its firmware hands it a mission.
@@ -336,13 +336,13 @@ impl Watched {
                 "{place:?} outside of {fence:?}"
             );
         } else {
-            assert_eq!(setpoint, self.relay.agreed());
+            assert_eq!(setpoint, self.relay.final_setpoint());
         }
     }
 
     /// A place that was agreed on is finite, on the link or in the room beside it, at an altitude that this relay may hold.
     fn look_at_agreed(&mut self, events: &[Event]) {
-        let agreed = self.relay.agreed();
+        let agreed = self.relay.final_setpoint();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {
             self.held = Some((self.view, self.number));
         }

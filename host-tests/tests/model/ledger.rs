@@ -149,7 +149,7 @@ impl Ledger {
         let told = events.contains(&Event::Reformed);
         prop_assert_eq!(told, views > self.stats.views, "a view in silence");
         prop_assert!(u32::from(relay.view()) >= views);
-        prop_assert!(!events.contains(&Event::Cut), "everybody is there");
+        prop_assert!(!events.contains(&Event::NoQuorum), "everybody is there");
         Ok(())
     }
 

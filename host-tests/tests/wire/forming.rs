@@ -167,7 +167,7 @@ fn counted_by_the_last(place: u16, relays: u16, leader: bool, quorum: bool) -> O
     let event = if granted.is_some() {
         Event::Reformed
     } else {
-        Event::Cut
+        Event::NoQuorum
     };
     assert_eq!(events(&mut last), [event]);
     assert_eq!(last.view(), if granted.is_some() { 9 } else { 0 });
@@ -212,7 +212,7 @@ fn a_part_that_is_cut_off_stops_calling() {
         &framed(4, Port::Downstream, &too_few(3)),
     );
     assert_eq!(only(&mut relay, now), (Port::Upstream, too_few(2)));
-    assert_eq!(events(&mut relay), [Event::Cut]);
+    assert_eq!(events(&mut relay), [Event::NoQuorum]);
     assert_eq!((relay.view(), relay.setpoint()), (0, None));
     for _ in 0..200 {
         now = relay.poll_timeout().unwrap();
@@ -242,9 +242,12 @@ fn a_leader_whose_part_is_cut_off_holds_until_it_is_asked_again() {
         Port::Downstream,
         &framed(1, Port::Downstream, &too_few),
     );
-    assert_eq!(head.phase(), Phase::Cut);
+    assert_eq!(head.phase(), Phase::NoQuorum);
     head.restart(now);
-    assert_eq!((head.phase(), soon(&mut head, now)), (Phase::Cut, vec![]));
+    assert_eq!(
+        (head.phase(), soon(&mut head, now)),
+        (Phase::NoQuorum, vec![])
+    );
     // Somebody else is found there.
     let now = now + Duration::from_millis(5);
     head.handle_bytes(

@@ -42,7 +42,7 @@ impl Chain {
         let others = parts
             .iter()
             .filter(|part| !std::ptr::eq(*part, largest))
-            .all(|part| is_in(part, Phase::Cut));
+            .all(|part| is_in(part, Phase::NoQuorum));
         (settled && others).then_some(Ending::Settled)
     }
 
@@ -108,7 +108,9 @@ fn is_cut(parts: &[Vec<&Member>]) -> bool {
             .iter()
             .zip(before.zip(after))
             .all(|(member, (before, after))| member.relay.neighbours() == [before, after]);
-        let cut = part.iter().any(|member| member.relay.phase() == Phase::Cut);
+        let cut = part
+            .iter()
+            .any(|member| member.relay.phase() == Phase::NoQuorum);
         let newest = part.iter().max_by_key(|member| member.relay.view());
         let before = newest.map_or(0, |member| member.relay.mission().relays());
         closed && cut && 2 * part.len() <= usize::from(before)

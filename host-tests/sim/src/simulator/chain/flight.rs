@@ -120,7 +120,7 @@ impl Chain {
         living
             .filter(|(member, _)| member.killed.is_none())
             .all(|(member, drone)| {
-                let agreed = member.relay.agreed();
+                let agreed = member.relay.final_setpoint();
                 agreed.is_some_and(|place| apart(point(place), drone.at) < 1e-3)
             })
     }

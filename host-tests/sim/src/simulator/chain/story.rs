@@ -49,7 +49,7 @@ impl Chain {
                     (Turning::Uploaded(version), None)
                 }
                 Event::Adopted => (Turning::Adopted(member.relay.version()), None),
-                Event::Cut => (Turning::Cut, None),
+                Event::NoQuorum => (Turning::Cut, None),
                 Event::Infeasible => (Turning::Infeasible, None),
                 _ => continue,
             };

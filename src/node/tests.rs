@@ -71,7 +71,7 @@ fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
 /// A hello of a neighbour that has taken relay 2.
 fn hello(node: &Node, holds: MissionId) -> Message {
     Message::Hello(Hello {
-        mission: node.members.digest,
+        mission: node.chain.digest,
         newest: 0,
         neighbour: 2,
         ask: false,
@@ -99,12 +99,12 @@ fn proposal(mission_id: MissionId) -> Message {
 #[test]
 fn who_does_not_hold_the_mission_hands_no_proposal_on_and_says_what_it_holds() {
     let mut node = relay(true);
-    let held = node.members.held;
+    let held = node.update.latest();
     let known = hello(&node, held);
     node.handle_message(NOW, Side::Upstream, 1, &known);
     assert_eq!(said(&mut node), []);
     node.handle_message(NOW, Side::Upstream, 1, &proposal(upload(1).id()));
-    assert_eq!((node.stats.view, node.stats.mission), (1, 0));
+    assert_eq!((node.stats().view, node.stats().mission), (1, 0));
     let said = said(&mut node);
     assert!(
         matches!(said[..], [(1, Message::Hello(Hello { holds, .. }))] if holds == held),
@@ -117,8 +117,8 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
     let mut node = relay(true);
     let new = upload(1);
     node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(new));
-    assert_eq!(node.members.held, new.id());
-    assert_ne!(node.members.flown, new.id());
+    assert_eq!(node.update.latest(), new.id());
+    assert_ne!(node.chain.active, new.id());
     let told = said(&mut node);
     assert!(
         matches!(told[..], [(1, Message::Hello(Hello { holds, flies: false, .. }))] if holds == new.id()),
@@ -139,7 +139,7 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
 #[test]
 fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one_is_told() {
     let mut node = relay(true);
-    let (older, newer) = (node.members.held, upload(2).id());
+    let (older, newer) = (node.update.latest(), upload(2).id());
     let ahead = hello(&node, newer);
     node.handle_message(NOW, Side::Downstream, 3, &ahead);
     let told = said(&mut node);
@@ -159,9 +159,9 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
 #[test]
 fn without_a_key_nothing_is_taken() {
     let mut node = relay(false);
-    let held = node.members.held;
+    let held = node.update.latest();
     node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(upload(1)));
-    assert_eq!((node.stats.unsigned, node.members.held), (1, held));
+    assert_eq!((node.stats().unsigned, node.update.latest()), (1, held));
     assert_eq!(node.upload(), None);
     assert_eq!(said(&mut node), []);
     // Nor is the ground anybody to listen to.
@@ -174,16 +174,16 @@ fn without_a_key_nothing_is_taken() {
 #[test]
 fn an_offer_for_other_relays_is_refused() {
     let mut node = relay(true);
-    let held = node.members.held;
+    let held = node.update.latest();
     let other = Mission::try_new(MissionConfig {
         tx_power_w: 1.0,
         ..paper(3)
     });
     let stray = Upload::new(&other.unwrap(), 1, paper(3)).unwrap();
     node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(stray));
-    assert_eq!((node.stats.mission, node.members.held), (1, held));
+    assert_eq!((node.stats().mission, node.update.latest()), (1, held));
     node.on_ground(NOW, Side::Upstream, &Message::Offer(stray));
-    assert_eq!((node.stats.mission, node.members.held), (2, held));
+    assert_eq!((node.stats().mission, node.update.latest()), (2, held));
 }
 
 /// Two that do not take each other for neighbours, but one of them the other: offers and hellos must come to an end.
@@ -193,7 +193,7 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     let mut node = relay_of(five, 3, true);
     let new = upload_to(&five, 1);
     assert!(node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(new)));
-    assert_eq!((node.members.held, node.upstream.node()), (new.id(), 2));
+    assert_eq!((node.update.latest(), node.neighbours.at(Side::Upstream).node()), (new.id(), 2));
     let told = said(&mut node);
     let hellos = told.iter().filter(|(to, _)| *to == 1);
     let hellos: heapless::Vec<_, 8> = hellos.collect();
@@ -203,5 +203,5 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     );
     let stray = upload_to(&base(), 2);
     node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(stray));
-    assert_eq!((node.stats.mission, node.members.held), (1, new.id()));
+    assert_eq!((node.stats().mission, node.update.latest()), (1, new.id()));
 }

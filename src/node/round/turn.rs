@@ -2,10 +2,10 @@
 
 use core::task::Poll;
 
-use super::super::adjust::Turning;
-use super::super::exchange::{Next, Phase};
-use super::super::lead::Lead;
-use super::{Own, PLACES_AT_ONCE, Pass, Share};
+use super::core::{Own, PLACES_AT_ONCE, Pass, Share};
+use super::state::Next;
+use super::task::Lead;
+use super::turning::Turning;
 use crate::optimiser::local::Beside;
 use crate::wire::message::{Moved, Token, Turn};
 
@@ -36,7 +36,7 @@ impl Share {
 
     /// The token is here.
     pub(super) fn take_turn(&mut self, own: Own<'_>, mut turning: Turning) -> Next {
-        self.exchange.phase = Phase::Waiting;
+        self.exchange.wait();
         let mut searching = false;
         if let Some(at) = self.setpoint
             && let Some(interferer) = own.mission.interferer()
@@ -105,11 +105,11 @@ impl Share {
         if stop {
             self.target = Some(turning.sir);
         }
-        self.exchange.phase = if stop {
-            Phase::Holding
+        if stop {
+            self.exchange.hold();
         } else {
-            Phase::Answered
-        };
+            self.exchange.answer();
+        }
         if let Lead::Adjusting(rounds) = &mut self.lead {
             if !rounds.advance(turning.any, turning.worst.min(incoming)) {
                 return Next::Work { moved };

@@ -1,36 +1,21 @@
-//! A relay's share of every algorithm: what it does with a pass, and with what comes back of it.
-//!
-//! [`exchange`](super::exchange) has the state table. What a pass carries is one of three: targets (`sweeps`), trials of the joint
-//! method (`courses`), or a token (`turns`). The call for a new view (`roll`) is a pass like them. `leader` has what comes
-//! before a pass begins.
+//! What a relay holds while it does its share of an algorithm: the pass that is under way, its place, its targets.
 
-mod courses;
-mod leader;
-mod roll;
-mod sweeps;
-mod turns;
-
-use super::MEMBERSHIP;
-use super::adjust::Turning;
-use super::align::Sweeping;
-use super::exchange::{Exchange, Next, Phase};
-use super::lead::Lead;
+use super::state::{Exchange, Next, Phase};
+use super::sweeping::Sweeping;
+use super::task::Lead;
+use super::turning::Turning;
 use crate::mission::{Band, Mission, Profile};
+use crate::node::context::Context;
 use crate::optimiser::joint::Outlook;
 use crate::optimiser::joint::course::Coursing;
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement, Station};
 use crate::settings::{Method, Settings};
-use crate::wire::digest::MissionId;
-use crate::wire::message::{
-    Answer, Course, Decision, Message, Moved, Proposal, Sweep, Token, Worth,
-};
-
-use roll::Rolling;
+use crate::wire::message::{Answer, Course, Message, Moved, Sweep, Token, Worth};
 
 /// Places weighed in one call of `work` in Algorithm 2, and a row of 24 more at most.
-const PLACES_AT_ONCE: u16 = 600;
+pub(super) const PLACES_AT_ONCE: u16 = 600;
 
 /// Whether this crate was built with the methods beyond Algorithm 1. Without one, none of its code is reached.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
@@ -41,48 +26,45 @@ pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 pub(crate) struct Own<'a> {
     pub(crate) mission: &'a Mission,
     pub(crate) settings: &'a Settings,
-    /// The mission that it flies, and the newest that it holds.
-    pub(crate) flown: MissionId,
-    pub(crate) held: MissionId,
-    /// Number of the view that it has agreed to.
-    pub(crate) view: u16,
+    /// The digest that the passes of this view bear.
+    digest: u16,
     /// Its place among the relays of that view, 1 next to Tx.
     pub(crate) index: u16,
-    /// Whether nobody comes after it on a pass.
-    pub(crate) end: bool,
     /// Upsilon as it measures it where it stands, 1/W.
     pub(crate) measured_per_w: Option<f32>,
 }
 
+impl<'a> Own<'a> {
+    pub(crate) const fn new(context: &Context<'a>) -> Self {
+        Self {
+            mission: &context.chain.mission,
+            settings: &context.chain.settings,
+            digest: context.chain.pass_digest(),
+            index: context.chain.index,
+            measured_per_w: context.measured_per_w,
+        }
+    }
+}
+
 impl Own<'_> {
-    /// The digest that the passes of this view bear.
-    const fn digest(self) -> u16 {
-        self.flown.digest.wrapping_add(self.view)
-    }
-
-    /// Whether it can fly the mission of that mission_id.
-    fn has(self, mission_id: MissionId) -> bool {
-        mission_id == self.held || mission_id == self.flown
-    }
-
     /// Whether the joint method is asked for, and has something to choose.
-    fn joins(&self) -> bool {
+    pub(super) fn joins(&self) -> bool {
         let config = self.mission.config();
         let free = !(config.band.is_single() && config.lateral.is_single());
         ALTITUDE && self.settings.method == Method::Joint && free
     }
 
-    fn is_last(&self) -> bool {
+    pub(super) fn is_last(&self) -> bool {
         self.mission.after(self.index).is_none()
     }
 
     /// Whether a neighbour may stand at `place`.
-    fn is_between(&self, place: Placement) -> bool {
+    pub(super) fn is_between(&self, place: Placement) -> bool {
         (0.0..=self.mission.config().distance_m).contains(&place.x_m)
     }
 
     /// The altitudes that this relay may choose from, when it holds `altitude_m`.
-    fn band(&self, altitude_m: f32) -> Band {
+    pub(super) fn band(&self, altitude_m: f32) -> Band {
         if self.settings.hold_altitude {
             Band::at(altitude_m)
         } else {
@@ -93,43 +75,42 @@ impl Own<'_> {
 
 /// What the current pass carries.
 #[derive(Clone, Debug)]
-enum Pass {
+pub(super) enum Pass {
     Sweep(Sweeping),
     Course(Coursing),
     Turn(Turning),
-    Roll(Rolling),
 }
 
 /// Where the joint method has a relay.
 #[derive(Clone, Copy, Debug)]
-struct Chosen {
+pub(super) struct Chosen {
     /// Across the line.
-    at: CrossSection,
+    pub(super) at: CrossSection,
     /// And no farther along it, m.
-    end_m: f32,
+    pub(super) end_m: f32,
 }
 
 /// A relay's share of the algorithms.
 #[derive(Clone, Debug)]
 pub(crate) struct Share {
-    exchange: Exchange,
-    pass: Pass,
-    lead: Lead,
-    sweeps: u32,
+    pub(super) exchange: Exchange,
+    pub(super) pass: Pass,
+    pub(super) lead: Lead,
+    pub(super) sweeps: u32,
     /// What this relay was given.
-    profile: Profile,
+    pub(super) profile: Profile,
     /// Where the joint method has it in this view, once that is known.
-    chosen: Option<Chosen>,
+    pub(super) chosen: Option<Chosen>,
     /// Where it is to be across the line.
-    at: CrossSection,
+    pub(super) at: CrossSection,
     /// What came of the last course, as the relay before is to know it.
-    worth: Option<(Option<u8>, f32, Outlook)>,
+    pub(super) worth: Option<(Option<u8>, f32, Outlook)>,
     /// Where the neighbour toward Rx stands, as far as it has said.
-    after: Option<Placement>,
-    setpoint: Option<Placement>,
-    target: Option<f32>,
+    pub(super) after: Option<Placement>,
+    pub(super) setpoint: Option<Placement>,
+    pub(super) target: Option<f32>,
     /// At the leader, what no chain can have.
-    bound: Option<f32>,
+    pub(super) bound: Option<f32>,
 }
 
 impl Share {
@@ -154,7 +135,7 @@ impl Share {
     /// Whether it has just been made.
     #[cfg(feature = "upload")]
     pub(crate) const fn is_untouched(&self) -> bool {
-        let at_first = matches!(self.exchange.phase, Phase::Idle | Phase::Planning);
+        let at_first = matches!(self.exchange.phase(), Phase::Idle | Phase::Planning);
         at_first && matches!(self.lead, Lead::No) && self.setpoint.is_none()
     }
 
@@ -172,11 +153,26 @@ impl Share {
         self.lead = Lead::No;
         // Solved once more, the chain is tried at the same targets as the first time.
         self.chosen = None;
-        self.exchange.phase = Phase::Planning;
+        self.exchange.plan();
     }
 
-    fn give_up(&mut self) -> Next {
-        self.exchange.phase = Phase::Infeasible;
+    /// A view is proposed: what was under way is over.
+    pub(crate) fn suspend(&mut self) {
+        self.lead = Lead::No;
+        self.pass = Pass::Sweep(Sweeping::new(Ladder::single(1.0)));
+        self.exchange.answer();
+    }
+
+    /// The new view is in force: everybody's first pass in it is still to come.
+    pub(crate) fn renew(&mut self, leads: bool) {
+        self.lead = Lead::No;
+        self.after = None;
+        self.chosen = None;
+        self.exchange.renew(leads);
+    }
+
+    pub(super) fn give_up(&mut self) -> Next {
+        self.exchange.give_up();
         Next::Infeasible
     }
 
@@ -185,14 +181,14 @@ impl Share {
     /// Bounded by 16 hops of 16 reaches, 128 points of an uneven field (or all of them for one target), ten relays of the joint method,
     /// or 624 places of Algorithm 2.
     pub(crate) fn work(&mut self, own: Own<'_>) -> Next {
-        if self.exchange.phase == Phase::Waiting {
+        if self.exchange.phase() == Phase::Waiting {
             match &self.pass {
                 Pass::Sweep(sweeping) if !sweeping.is_done() => return self.go_on_with_sweep(own),
                 Pass::Turn(_) if ADJUST => return self.go_on_with_turn(own),
                 _ => {}
             }
         }
-        if own.index != own.mission.leader() || self.exchange.phase == Phase::Waiting {
+        if own.index != own.mission.leader() || self.exchange.phase() == Phase::Waiting {
             return self.think(own);
         }
         match self.plan(own) {
@@ -204,10 +200,10 @@ impl Share {
 
     /// What to hand onward, while an answer is awaited.
     pub(crate) fn onward(&self, own: Own<'_>) -> Option<Message> {
-        if self.exchange.phase != Phase::Waiting {
+        if self.exchange.phase() != Phase::Waiting {
             return None;
         }
-        let (number, mission) = (self.exchange.number, own.digest());
+        let (number, mission) = (self.exchange.number(), own.digest);
         match &self.pass {
             Pass::Sweep(sweeping) if !sweeping.is_done() => None,
             Pass::Sweep(sweeping) => Some(Message::Sweep(Sweep {
@@ -236,12 +232,6 @@ impl Share {
                     sir: turning.sir,
                 })
             }),
-            Pass::Roll(rolling) if MEMBERSHIP => Some(Message::Proposal(Proposal {
-                mission_id: rolling.mission_id,
-                view: rolling.view,
-                place: rolling.place,
-                before: rolling.before,
-            })),
             _ => None,
         }
     }
@@ -265,7 +255,7 @@ impl Share {
         if !self.exchange.is_answered() {
             return None;
         }
-        let (number, mission) = (self.exchange.number, own.digest());
+        let (number, mission) = (self.exchange.number(), own.digest);
         match &self.pass {
             Pass::Sweep(sweeping) => Some(Message::Verdict(Answer {
                 number,
@@ -292,47 +282,17 @@ impl Share {
                     worst: turning.worst,
                 })
             }),
-            Pass::Roll(rolling) if MEMBERSHIP => Some(Message::Decision(Decision {
-                mission_id: rolling.mission_id,
-                view: rolling.view,
-                place: rolling.place,
-                relays: rolling.relays,
-            })),
             _ => None,
         }
     }
 
     /// The number of the current pass.
     pub(crate) const fn number(&self) -> u16 {
-        match &self.pass {
-            Pass::Roll(rolling) => rolling.view,
-            _ => self.exchange.number,
-        }
-    }
-
-    /// Whether no pass and no view has been taken part in yet.
-    pub(crate) fn is_fresh(&self) -> bool {
-        self.exchange.phase == Phase::Idle
+        self.exchange.number()
     }
 
     pub(crate) const fn phase(&self) -> Phase {
-        self.exchange.phase
-    }
-
-    pub(crate) const fn sweeps(&self) -> u32 {
-        self.sweeps
-    }
-
-    pub(crate) const fn setpoint(&self) -> Option<Placement> {
-        self.setpoint
-    }
-
-    pub(crate) const fn target(&self) -> Option<f32> {
-        self.target
-    }
-
-    pub(crate) const fn bound(&self) -> Option<f32> {
-        self.bound
+        self.exchange.phase()
     }
 
     /// What this relay holds.
@@ -344,7 +304,7 @@ impl Share {
     }
 
     /// What it is on a sweep: of the joint method, or where it was given to be.
-    fn station_for(&self, chosen: bool) -> Station {
+    pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
             Some(Chosen { at, .. }) if chosen => Station { at, ..given },

@@ -3,9 +3,9 @@
 
 use core::task::Poll;
 
-use super::super::exchange::{Next, Phase};
-use super::super::lead::{Chain, Lead, MOST_SOLVED};
-use super::{Chosen, Own, Pass, Share};
+use super::core::{Chosen, Own, Pass, Share};
+use super::state::Next;
+use super::task::{Chain, Lead, MOST_SOLVED};
 use crate::optimiser::joint::ascent::{Ascent, Turn};
 use crate::optimiser::joint::course::{Courser, Coursing};
 use crate::optimiser::joint::trial::{Bar, Trials};
@@ -33,9 +33,14 @@ impl Share {
         Seat::of(own.mission, self.profile, own.settings.hold_altitude)
     }
 
+    /// Whether it has still to find out where it is to be.
+    pub(super) fn is_solving(&self, own: Own<'_>) -> bool {
+        own.joins() && self.chosen.is_none()
+    }
+
     /// Goes on with the chain's solution while there is nothing else to do.
     pub(super) fn think(&mut self, own: Own<'_>) -> Next {
-        if own.joins() && self.chosen.is_none() {
+        if self.is_solving(own) {
             _ = self.solve(own);
             return Next::Think;
         }
@@ -163,7 +168,7 @@ impl Share {
         let Pass::Course(coursing) = &mut self.pass else {
             return Next::Stale;
         };
-        self.exchange.phase = Phase::Waiting;
+        self.exchange.wait();
         coursing.power_in_w = power_in_w;
         coursing.take(relay, bar, told, wanted);
         if own.is_last() {
@@ -203,7 +208,7 @@ impl Share {
             chosen.at = at;
         }
         self.worth = Some((trial, slack_m, outlook));
-        self.exchange.phase = Phase::Answered;
+        self.exchange.answer();
         let Lead::Ascending(ascent) = &mut self.lead else {
             return Next::Answer {
                 moved: false,

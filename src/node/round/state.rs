@@ -17,7 +17,7 @@
 //! stale wherever it comes. Only an agreement, or a turn of Algorithm 2, moves the setpoint: a relay holds its place
 //! through everything else.
 
-use super::MEMBERSHIP;
+use crate::node::numbering::Stragglers;
 
 /// Where a relay is in the protocol.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -36,7 +36,7 @@ pub enum Phase {
     /// The leader has found that no target can be met.
     Infeasible,
     /// The leader has found that most of the chain cannot be reached: its part holds its places.
-    Cut,
+    NoQuorum,
 }
 
 /// What the node has to do now.
@@ -73,11 +73,6 @@ pub(crate) enum Next {
     Infeasible,
     /// Ask for a new view: this pass cannot be taken part in.
     Foreign,
-    /// What came of the call for a new view is known: hand it back, and go by it if it was granted.
-    Formed {
-        /// How many relays it has; `None` if they are too few.
-        granted: Option<u16>,
-    },
 }
 
 /// What a pass that has come in is to a relay.
@@ -103,24 +98,20 @@ impl Arrival {
 }
 
 /// A pass that is this many numbers or fewer behind the current one is a straggler; one that is farther off, or ahead but not
-/// next, is of another life of its leader, or the relay has missed something. Without views as many ahead are new.
+/// next, is of another incarnation of its leader, or the relay has missed something.
 const STRAGGLERS: u16 = 32;
 
 /// The first pass that a leader begins has a number divisible by this, and no later one has.
-const LIFE: u16 = 64;
-
-/// So many stragglers in a row are none: frames come late twice, a leader that was rebooted insists.
-const SUSPICIOUS: u8 = 4;
+const INCARNATION: u16 = 64;
 
 /// Which pass is under way, and how far.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Exchange {
-    pub(crate) phase: Phase,
-    pub(crate) number: u16,
+    phase: Phase,
+    number: u16,
     /// Whether a pass has come since the relay was switched on, or since the view.
     begun: bool,
-    /// Stragglers in a row.
-    stragglers: u8,
+    stragglers: Stragglers,
 }
 
 impl Exchange {
@@ -130,15 +121,52 @@ impl Exchange {
             phase,
             number,
             begun: false,
-            stragglers: 0,
+            stragglers: Stragglers::NONE,
         }
     }
 
-    /// Nothing has come yet in a new view.
-    pub(crate) const fn renew(&mut self, phase: Phase) {
-        self.phase = phase;
+    pub(crate) const fn phase(self) -> Phase {
+        self.phase
+    }
+
+    pub(crate) const fn number(self) -> u16 {
+        self.number
+    }
+
+    /// The leader has to compute what to begin with.
+    pub(crate) const fn plan(&mut self) {
+        self.phase = Phase::Planning;
+    }
+
+    /// A pass is under way onward.
+    pub(crate) const fn wait(&mut self) {
+        self.phase = Phase::Waiting;
+    }
+
+    /// What came of the pass was no agreement, or there is no pass any more.
+    pub(crate) const fn answer(&mut self) {
+        self.phase = Phase::Answered;
+    }
+
+    /// The chain has agreed.
+    pub(crate) const fn hold(&mut self) {
+        self.phase = Phase::Holding;
+    }
+
+    /// No target can be met.
+    pub(crate) const fn give_up(&mut self) {
+        self.phase = Phase::Infeasible;
+    }
+
+    /// Nothing has come yet in a new view, in which this relay `leads` or not.
+    pub(crate) const fn renew(&mut self, leads: bool) {
+        if leads {
+            self.plan();
+        } else {
+            self.answer();
+        }
         self.begun = false;
-        self.stragglers = 0;
+        self.stragglers = Stragglers::NONE;
     }
 
     /// The leader numbers its next pass.
@@ -147,7 +175,7 @@ impl Exchange {
             self.next()
         } else {
             // The next one that is a first one.
-            self.number.wrapping_add(LIFE) & !(LIFE - 1)
+            self.number.wrapping_add(INCARNATION) & !(INCARNATION - 1)
         };
         self.begun = true;
     }
@@ -155,7 +183,7 @@ impl Exchange {
     /// The number of the pass that its leader begins after the current one.
     const fn next(self) -> u16 {
         let next = self.number.wrapping_add(1);
-        if next.is_multiple_of(LIFE) {
+        if next.is_multiple_of(INCARNATION) {
             next.wrapping_add(1)
         } else {
             next
@@ -166,15 +194,14 @@ impl Exchange {
     pub(crate) const fn take(&mut self, number: u16) {
         self.number = number;
         self.begun = true;
-        self.stragglers = 0;
+        self.stragglers = Stragglers::NONE;
     }
 
     /// What a pass of `number` is; `same` tells whether it is the current one in everything else.
     pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
-        let first = number.is_multiple_of(LIFE);
         if !self.begun {
-            // What it missed it cannot take part in, where it can ask for another beginning.
-            return if first || !MEMBERSHIP {
+            // What it missed it cannot take part in: it can ask for another beginning.
+            return if number.is_multiple_of(INCARNATION) {
                 Arrival::New
             } else {
                 Arrival::Foreign
@@ -183,18 +210,15 @@ impl Exchange {
         let ahead = number.wrapping_sub(self.number);
         match (ahead, self.number.wrapping_sub(number)) {
             (0, _) if same => Arrival::Again,
-            (1..=STRAGGLERS, _) if !MEMBERSHIP || number == self.next() => Arrival::New,
+            _ if number == self.next() => Arrival::New,
             (_, 1..=STRAGGLERS) => self.straggler(),
-            _ if MEMBERSHIP => Arrival::Foreign,
-            _ => Arrival::New,
+            _ => Arrival::Foreign,
         }
     }
 
     /// One more pass that should be over.
-    pub(crate) const fn straggler(&mut self) -> Arrival {
-        self.stragglers = self.stragglers.saturating_add(1);
-        if MEMBERSHIP && self.stragglers >= SUSPICIOUS {
-            self.stragglers = 0;
+    const fn straggler(&mut self) -> Arrival {
+        if self.stragglers.one_more() {
             Arrival::Foreign
         } else {
             Arrival::Straggler
@@ -220,9 +244,10 @@ impl Exchange {
     }
 }
 
-#[cfg(all(test, feature = "membership"))]
+#[cfg(test)]
 mod tests {
-    use super::{Arrival, Exchange, LIFE, Phase, STRAGGLERS, SUSPICIOUS};
+    use super::{Arrival, Exchange, INCARNATION, Phase, STRAGGLERS};
+    use crate::node::numbering::SUSPICIOUS;
 
     /// One that has taken part in pass 200.
     fn begun() -> Exchange {
@@ -235,7 +260,7 @@ mod tests {
     fn who_has_missed_the_beginning_takes_up_a_first_pass_alone() {
         for number in 0..=u16::MAX {
             let mut exchange = Exchange::new(Phase::Idle, 7);
-            let expected = if number % LIFE == 0 {
+            let expected = if number % INCARNATION == 0 {
                 Arrival::New
             } else {
                 Arrival::Foreign
@@ -292,12 +317,12 @@ mod tests {
             for pass in 0..200 {
                 exchange.begin();
                 assert_eq!(
-                    exchange.number.is_multiple_of(LIFE),
+                    exchange.number.is_multiple_of(INCARNATION),
                     pass == 0,
                     "{view}, {pass}"
                 );
             }
-            exchange.renew(Phase::Planning);
+            exchange.renew(true);
         }
     }
 }

@@ -1,9 +1,9 @@
 //! What the leader works out before it begins a pass: its prediction, the targets or altitudes to try next.
 
-use super::super::adjust::Turning;
-use super::super::exchange::Next;
-use super::super::lead::Lead;
-use super::{ADJUST, ALTITUDE, Own, Share};
+use super::core::{ADJUST, ALTITUDE, Own, Share};
+use super::state::Next;
+use super::task::Lead;
+use super::turning::Turning;
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::local::Beside;
 use crate::optimiser::pass::origins;
@@ -20,7 +20,7 @@ const FIELD_HOPS_AT_ONCE: u16 = 8;
 impl Share {
     /// Goes on with the leader's computation; whether the next pass can begin.
     pub(super) fn plan(&mut self, own: Own<'_>) -> Result<bool, Infeasible> {
-        if own.joins() && self.chosen.is_none() {
+        if self.is_solving(own) {
             if let Some(target) = self.solve(own) {
                 self.search_chosen(own, target)?;
                 return Ok(true);

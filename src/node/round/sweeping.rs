@@ -1,6 +1,5 @@
 //! Algorithms 1 and 4 on board: a relay's share of a sweep of targets, and of its verdict.
 
-use super::MEMBERSHIP;
 use crate::mission::Heading;
 use crate::optimiser::PerTarget;
 use crate::optimiser::ladder::Ladder;
@@ -14,8 +13,8 @@ use crate::wire::message::Answer;
 #[derive(Clone, Debug)]
 pub(crate) struct Sweeping {
     pub(crate) ladder: Ladder,
-    /// What it came with, as [`told`] sums it up.
-    pub(crate) told: u32,
+    /// What it came with, as [`fingerprint`] sums it up.
+    pub(crate) fingerprint: u32,
     /// Whether it is of relays where the joint method has them across the line.
     pub(crate) chosen: bool,
     /// Whether a relay after this one differs from what the mission says of all.
@@ -38,7 +37,7 @@ impl Sweeping {
     pub(crate) const fn new(ladder: Ladder) -> Self {
         Self {
             ladder,
-            told: 0,
+            fingerprint: 0,
             chosen: false,
             own: false,
             behind: None,
@@ -56,7 +55,7 @@ impl Sweeping {
 
     /// A sweep has come from the relay before, or begins.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
-        self.told = told(behind, from);
+        self.fingerprint = fingerprint(behind, from);
         self.behind = behind;
         self.from.clone_from(from);
         self.reaches.clear();
@@ -166,11 +165,7 @@ impl Sweeping {
 }
 
 /// What the relay before says of itself, summed up: it says the same whenever it says the same pass, unless it was rebooted.
-/// 0 where nothing can be done about that.
-pub(crate) fn told(behind: Option<Behind>, from: &PerTarget) -> u32 {
-    if !MEMBERSHIP {
-        return 0;
-    }
+pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     let held = behind.map_or([0.0; 3], |behind| {
         let Station { at, power_w } = behind.relay;
         [at.y_m, at.altitude_m, power_w]

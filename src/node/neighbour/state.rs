@@ -1,21 +1,21 @@
 //! One side of a relay: which node it takes for its neighbour there, and what it does about silence.
 //!
-//! | state | the node taken is silent for `lost` | it says that it takes another | a node not taken hellos | time passes |
+//! | state | the node taken is silent for `dead_after` | it says that it takes another | a node not taken hellos | time passes |
 //! | --- | --- | --- | --- | --- |
-//! | `Linked` | `Seeking` on a shared channel, else it goes on asking | `Courting` | taken instead, if it is nearer, can hear a node beyond and was heard all through a probation | - |
-//! | `Courting` | `Seeking` | - | as above | after a span `Seeking` |
-//! | `Seeking` | - | - | taken, if it takes this relay or nobody | after a span `End` |
-//! | `End` | - | - | taken, if it takes this relay, or was heard all through a probation | the four nearest nodes are sent a hello every `lost`, and more often once one was heard |
+//! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead, if it is nearer, can hear a node beyond and was heard all through a hold-down | - |
+//! | `Pairing` | `Searching` | - | as above | after a span `Searching` |
+//! | `Searching` | - | - | taken, if it takes this relay or nobody | after a span `NoPeer` |
+//! | `NoPeer` | - | - | taken, if it takes this relay, or was heard all through a hold-down | the four nearest nodes are sent a hello every `dead_after`, and more often once one was heard |
 //!
-//! A span is as long as a silent neighbour is asked for, `lost` less `quiet`. A node that has been taken is courted until it
+//! A span is as long as a silent neighbour is asked for, `dead_after` less `probe_after`. A node that has been taken is paired with until it
 //! says that it has taken this relay, too.
 //!
-//! While it seeks, it hellos the four nearest nodes there: as many as three relays in a row may be lost at once. The probation
-//! is `lost`, and twice as long after every loss on that side up to sixteen times: a link that comes and goes disturbs the
-//! chain less and less. A node that has come back is counted `quiet` later: the other one beside it may be about to take it, too.
+//! While it searches, it hellos the four nearest nodes there: as many as three relays in a row may be lost at once. The hold-down
+//! is `dead_after`, and twice as long after every loss on that side up to sixteen times: a link that comes and goes disturbs the
+//! chain less and less. A node that has come back is counted `probe_after` later: the other one beside it may be about to take it, too.
 
-use super::MEMBERSHIP;
-use super::liveness::{Neighbour, Silence, tick};
+use super::liveness::{Liveness, tick};
+use crate::node::context::Proposer;
 use crate::settings::Settings;
 use crate::time::Instant;
 use crate::wire::digest::MissionId;
@@ -23,7 +23,7 @@ use crate::wire::digest::MissionId;
 /// Nodes on one side that are sent a hello.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// Doublings of the probation.
+/// Doublings of the hold-down.
 const DOUBLINGS: u8 = 4;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -31,18 +31,18 @@ enum State {
     /// The other node has taken this one, too, as far as it has said.
     Linked,
     /// It has not, or not any more.
-    Courting {
+    Pairing {
         since: Instant,
     },
-    Seeking {
+    Searching {
         since: Instant,
     },
-    End,
+    NoPeer,
 }
 
 /// A node that may be taken once it has been heard for long enough.
 #[derive(Clone, Copy, Debug)]
-struct Probation {
+struct HoldDown {
     node: u16,
     since: Instant,
     heard: Instant,
@@ -50,42 +50,33 @@ struct Probation {
 
 /// What waits to be sent to the neighbour, apart from passes and what comes back of them.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Signs {
+struct Signs {
     /// A heartbeat that asks for one in return.
-    pub(crate) ask: bool,
+    ask: bool,
     /// A heartbeat in return.
-    pub(crate) answer: bool,
-}
-
-/// What a silence has led to.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Quiet {
-    /// When to look again, later than now.
-    pub(crate) look_again: Instant,
-    /// Whether the neighbour counts as lost since this moment.
-    pub(crate) lost: bool,
+    answer: bool,
 }
 
 /// One side.
 #[derive(Clone, Debug)]
-pub(crate) struct Beside {
+pub(crate) struct Neighbour {
     /// The node taken, 0 for none.
     node: u16,
     /// The node that was there when the view was agreed on.
     agreed: u16,
-    /// The node that was there when a call was answered last, granted or not.
+    /// The node that was there when a proposal was decided last, granted or not.
     counted: u16,
     /// A node that has come back is not counted before: the other side may be about to take it, too.
     grace: Instant,
-    /// The node that the last call for a new view came from.
-    caller: u16,
+    /// The node that the last proposal came from.
+    proposer: u16,
     state: State,
-    neighbour: Neighbour,
-    probation: Option<Probation>,
+    liveness: Liveness,
+    hold_down: Option<HoldDown>,
     /// When a node that is not taken was heard last.
     near: Option<Instant>,
     losses: u8,
-    pub(crate) signs: Signs,
+    signs: Signs,
     /// The newest mission that the node taken holds, as far as it has said.
     pub(crate) holds: Option<MissionId>,
     /// Whether a newer one is to be offered to it.
@@ -94,23 +85,35 @@ pub(crate) struct Beside {
     /// Whether the ground at this side is owed a hello.
     #[cfg(feature = "upload")]
     pub(crate) ground: bool,
+    /// When to look for a sign of life again.
+    look_at: Option<Instant>,
     /// Candidates that are owed a hello, and those of them that are asked for one: bit 0 is the nearest node.
     hellos: u8,
     asks: u8,
 }
 
-impl Beside {
+impl Neighbour {
     /// The side where `node` is taken to be, 0 for none.
-    pub(crate) const fn new(node: u16, now: Instant) -> Self {
+    pub(crate) fn new(node: u16, now: Instant, settings: &Settings) -> Self {
+        let look_at = if node == 0 {
+            None
+        } else {
+            Some(now + settings.quiet)
+        };
         Self {
+            look_at,
             node,
             agreed: node,
             counted: node,
             grace: now,
-            caller: node,
-            state: if node == 0 { State::End } else { State::Linked },
-            neighbour: Neighbour::new(now),
-            probation: None,
+            proposer: node,
+            state: if node == 0 {
+                State::NoPeer
+            } else {
+                State::Linked
+            },
+            liveness: Liveness::new(now),
+            hold_down: None,
             near: None,
             losses: 0,
             signs: Signs {
@@ -133,25 +136,25 @@ impl Beside {
     }
 
     /// Whether nobody is there, and nobody is sought any more.
-    pub(crate) fn is_end(&self) -> bool {
-        self.state == State::End
+    pub(crate) fn has_no_peer(&self) -> bool {
+        self.state == State::NoPeer
     }
 
     /// Whether nobody is needed there, or somebody can be heard.
     pub(crate) fn is_ready(&self) -> bool {
         match self.state {
-            State::End => true,
-            State::Linked | State::Courting { .. } => self.neighbour.is_there(),
-            State::Seeking { .. } => false,
+            State::NoPeer => true,
+            State::Linked | State::Pairing { .. } => self.liveness.is_there(),
+            State::Searching { .. } => false,
         }
     }
 
-    /// Whether it is certain who is there, and somebody else than when a call was answered last.
+    /// Whether it is certain who is there, and somebody else than when a proposal was decided last.
     pub(crate) fn has_changed(&self, now: Instant) -> bool {
         match self.state {
             State::Linked => self.node != self.counted && now >= self.grace,
-            State::End => self.counted != 0,
-            State::Courting { .. } | State::Seeking { .. } => false,
+            State::NoPeer => self.counted != 0,
+            State::Pairing { .. } | State::Searching { .. } => false,
         }
     }
 
@@ -160,18 +163,21 @@ impl Beside {
         self.node == self.agreed
     }
 
-    /// The call for a new view has come from whoever is there, or begins here if nobody is to be before this relay.
-    pub(crate) const fn called(&mut self, begins: bool) {
-        self.caller = if begins { 0 } else { self.node };
+    /// A proposal has come from whoever is there, or begins here: then nobody is to be before this relay.
+    pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
+        self.proposer = match proposer {
+            Proposer::Itself => 0,
+            Proposer::Neighbour => self.node,
+        };
     }
 
-    /// The call that came from this side was granted.
-    pub(crate) const fn agree_with_caller(&mut self) {
-        self.agreed = self.caller;
-        self.counted = self.caller;
+    /// The proposal that came from this side was granted.
+    pub(crate) const fn agree_with_proposer(&mut self) {
+        self.agreed = self.proposer;
+        self.counted = self.proposer;
     }
 
-    /// The call was not granted: there is nothing to ask again until somebody else is there.
+    /// It was not granted: there is nothing to ask again until somebody else is there.
     pub(crate) const fn refuse(&mut self) {
         self.counted = self.node;
     }
@@ -181,15 +187,19 @@ impl Beside {
         now < self.grace
     }
 
-    /// The call that was granted goes on to whoever is there, or ends here.
+    /// The proposal that was granted goes on to whoever is there, or ends here.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed = if ends { 0 } else { self.node };
         self.counted = self.agreed;
     }
 
     /// A frame from the neighbour; whether it had been lost until then.
-    pub(crate) fn heard(&mut self, now: Instant) -> bool {
-        self.neighbour.heard(now)
+    pub(crate) fn heard(&mut self, now: Instant, settings: &Settings) -> bool {
+        let back = self.liveness.heard(now);
+        if self.is_mutual() {
+            self.look_at = Some(now + settings.quiet);
+        }
+        back
     }
 
     /// Whether somebody is there, and takes this relay for its neighbour, too, as far as it has said.
@@ -198,23 +208,43 @@ impl Beside {
     }
 
     /// The neighbour has said whether it takes this relay for its own; whether that is new.
-    pub(crate) fn told(&mut self, mutual: bool, now: Instant) -> bool {
-        let next = match (self.state, mutual) {
-            (State::Courting { .. }, true) => State::Linked,
-            (State::Linked, false) => State::Courting { since: now },
+    pub(crate) fn told(&mut self, mutual: bool, now: Instant, settings: &Settings) -> bool {
+        let (next, wait) = match (self.state, mutual) {
+            (State::Pairing { .. }, true) => (State::Linked, settings.quiet),
+            (State::Linked, false) => (State::Pairing { since: now }, tick(settings)),
             _ => return false,
         };
         self.state = next;
+        self.look_at = Some(now + wait);
         true
     }
 
-    /// Nothing has come for a while. `seeks` tells whether others could be heard here.
-    pub(crate) fn silent(&mut self, now: Instant, settings: &Settings, seeks: bool) -> Quiet {
-        if !MEMBERSHIP {
-            let Silence { lost, look_again } = self.neighbour.silent(now, settings);
-            self.signs.ask = true;
-            return Quiet { look_again, lost };
+    /// The silence so far of a neighbour of the same view is excused; whether there is one, and it is not lost.
+    pub(crate) fn excuse(&mut self, now: Instant, settings: &Settings) -> bool {
+        let excused = self.state == State::Linked && self.is_agreed() && self.liveness.excuse(now);
+        if excused {
+            self.look_at = Some(now + settings.quiet);
         }
+        excused
+    }
+
+    /// Whether it is time to look for a sign of life.
+    pub(crate) fn is_due(&self, now: Instant) -> bool {
+        self.look_at.is_some_and(|at| at <= now)
+    }
+
+    pub(crate) const fn next_timeout(&self) -> Option<Instant> {
+        self.look_at
+    }
+
+    /// Nothing has come for a while; whether the neighbour counts as lost since this moment. `searches` tells whether others could be
+    /// heard here.
+    pub(crate) fn handle_timeout(
+        &mut self,
+        now: Instant,
+        settings: &Settings,
+        searches: bool,
+    ) -> bool {
         let step = tick(settings);
         let span = settings
             .lost
@@ -225,37 +255,38 @@ impl Beside {
         let mut look_again = now + step;
         match self.state {
             State::Linked => {
-                let silence = self.neighbour.silent(now, settings);
+                let silence = self.liveness.silent(now, settings);
                 lost = silence.lost;
                 self.signs.ask = true;
-                if lost && seeks {
+                if lost && searches {
                     self.losses = self.losses.saturating_add(1);
-                    self.seek(now);
+                    self.search(now);
                 } else {
                     look_again = silence.look_again;
                 }
             }
-            State::Courting { since } => {
-                lost = self.neighbour.silent(now, settings).lost;
+            State::Pairing { since } => {
+                lost = self.liveness.silent(now, settings).lost;
                 self.hello_all();
                 if lost || is_over(since) {
-                    self.seek(now);
+                    self.search(now);
                 }
             }
-            State::Seeking { since } => {
+            State::Searching { since } => {
                 self.hello_all();
                 if is_over(since) {
-                    self.state = State::End;
+                    self.state = State::NoPeer;
                 }
             }
-            State::End => {
+            State::NoPeer => {
                 self.hello_all();
                 if !self.is_near(now, settings) {
                     look_again = now + settings.lost;
                 }
             }
         }
-        Quiet { look_again, lost }
+        self.look_at = Some(look_again);
+        lost
     }
 
     fn is_near(&self, now: Instant, settings: &Settings) -> bool {
@@ -263,17 +294,18 @@ impl Beside {
             .is_some_and(|near| now.since(near) <= settings.lost)
     }
 
-    /// A node that is not taken has been heard; whether the chain has ended here so far, and nobody was near.
-    pub(crate) fn notice(&mut self, now: Instant, settings: &Settings) -> bool {
-        let new = self.is_end() && !self.is_near(now, settings);
+    /// A node that is not taken has been heard: where the chain has ended here so far, and nobody was near, it is looked after.
+    pub(crate) fn notice(&mut self, now: Instant, settings: &Settings) {
+        if self.has_no_peer() && !self.is_near(now, settings) {
+            self.look_at = Some(now + tick(settings));
+        }
         self.near = Some(now);
-        new
     }
 
-    const fn seek(&mut self, now: Instant) {
+    const fn search(&mut self, now: Instant) {
         self.node = 0;
-        self.state = State::Seeking { since: now };
-        self.probation = None;
+        self.state = State::Searching { since: now };
+        self.hold_down = None;
         self.hello_all();
     }
 
@@ -291,41 +323,53 @@ impl Beside {
         settings: &Settings,
     ) -> bool {
         let takes = match self.state {
-            State::Seeking { .. } => true,
-            State::End => courts || self.passes(node, now, settings),
-            State::Linked | State::Courting { .. } => {
+            State::Searching { .. } => true,
+            State::NoPeer => courts || self.passes(node, now, settings),
+            State::Linked | State::Pairing { .. } => {
                 nearer && ready && self.passes(node, now, settings)
             }
         };
         if !takes {
             return false;
         }
-        if !matches!(self.state, State::Seeking { .. }) {
+        if !matches!(self.state, State::Searching { .. }) {
             self.grace = now + settings.quiet;
         }
         self.node = node;
-        self.state = State::Courting { since: now };
-        self.neighbour = Neighbour::new(now);
-        self.neighbour.heard(now);
-        self.probation = None;
+        self.state = State::Pairing { since: now };
+        self.liveness = Liveness::new(now);
+        self.liveness.heard(now);
+        self.hold_down = None;
+        self.look_at = Some(now + tick(settings));
         true
     }
 
-    /// Whether a node that is heard now has been for the whole of its probation.
+    /// Whether a node that is heard now has been for the whole of its hold-down.
     fn passes(&mut self, node: u16, now: Instant, settings: &Settings) -> bool {
-        let since = match self.probation {
+        let since = match self.hold_down {
             Some(known) if known.node == node && now.since(known.heard) <= settings.quiet => {
                 known.since
             }
             _ => now,
         };
-        self.probation = Some(Probation {
+        self.hold_down = Some(HoldDown {
             node,
             since,
             heard: now,
         });
         let times = 1 << self.losses.min(DOUBLINGS);
         now.since(since) >= settings.lost.times(times)
+    }
+
+    /// The neighbour has asked for a sign of life.
+    pub(crate) const fn owe_heartbeat(&mut self) {
+        self.signs.answer = true;
+    }
+
+    /// A heartbeat that is owed: to which node, and whether it asks for one in return.
+    pub(crate) fn take_heartbeat(&mut self) -> Option<(u16, bool)> {
+        let Signs { ask, answer } = core::mem::take(&mut self.signs);
+        ((ask || answer) && self.node != 0).then_some((self.node, ask))
     }
 
     /// Owes a hello to the candidate `distance` nodes away, which may be one that asks.

@@ -1,12 +1,16 @@
 //! When a neighbour counts as lost.
 //!
-//! Any intact frame from it is a sign of life. After `Settings::quiet` without one it is asked for a heartbeat, sixteen times
-//! over until `Settings::lost` has passed; then it is lost, and asked every `quiet` from there on.
+//! Any intact frame from it is a sign of life. After `Settings::probe_after` without one it is asked for a heartbeat, sixteen times
+//! over until `Settings::dead_after` has passed; then it is lost, and asked every `probe_after` from there on.
+//!
+//! Relays of one view that choose their places jointly solve the same chain at the same time, and have nothing to say until they
+//! are done. So while a relay solves, the silence of a neighbour that it is in one view with is excused: both times count from the end
+//! of its own solving.
 
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Questions between `quiet` and `lost`.
+/// Questions between `probe_after` and `dead_after`.
 const QUESTIONS: u64 = 16;
 
 /// How long after one question the next one is asked, while an answer is urgent.
@@ -20,7 +24,7 @@ pub(crate) fn tick(settings: &Settings) -> Duration {
 
 /// What is known of a neighbour's being alive.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Neighbour {
+pub(crate) struct Liveness {
     /// When it was heard last, or when this relay was switched on.
     heard: Instant,
     lost: bool,
@@ -37,7 +41,7 @@ pub(crate) struct Silence {
     pub(crate) look_again: Instant,
 }
 
-impl Neighbour {
+impl Liveness {
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             heard: now,
@@ -56,6 +60,14 @@ impl Neighbour {
         self.heard = now;
         self.met = true;
         core::mem::take(&mut self.lost)
+    }
+
+    /// Its silence so far says nothing; whether it is not lost already.
+    pub(crate) const fn excuse(&mut self, now: Instant) -> bool {
+        if !self.lost {
+            self.heard = now;
+        }
+        !self.lost
     }
 
     /// Nothing has come for a while.

@@ -1,9 +1,9 @@
 //! A relay's share of a sweep (Algorithms 1 and 4), and of its verdict.
 
-use super::super::align::{Sweeping, told};
-use super::super::exchange::{Next, Phase};
-use super::super::lead::{Lead, Rounds};
-use super::{ADJUST, ALTITUDE, Own, Pass, Share};
+use super::core::{ADJUST, ALTITUDE, Own, Pass, Share};
+use super::state::Next;
+use super::sweeping::{Sweeping, fingerprint};
+use super::task::{Lead, Rounds};
 use crate::optimiser::PerTarget;
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::pass::Behind;
@@ -17,11 +17,11 @@ impl Share {
             relay: sweep.relay,
             measured_per_w: sweep.measured_per_w,
         };
-        let told = told(Some(behind), &sweep.reaches);
+        let print = fingerprint(Some(behind), &sweep.reaches);
         let same = matches!(&self.pass, Pass::Sweep(sweeping)
             if sweeping.ladder == sweep.ladder
                 && sweeping.chosen == sweep.chosen
-                && sweeping.told == told);
+                && sweeping.fingerprint == print);
         let arrival = self.exchange.arrival(sweep.number, same);
         if let Some(next) = arrival.refused(self.exchange) {
             return next;
@@ -57,7 +57,7 @@ impl Share {
         sweeping.ladder = ladder;
         sweeping.chosen = chosen;
         sweeping.begin(behind, from);
-        self.exchange.phase = Phase::Waiting;
+        self.exchange.wait();
         self.go_on_with_sweep(own)
     }
 
@@ -113,12 +113,12 @@ impl Share {
             if let Lead::Searching { search, .. } = &mut self.lead
                 && !search.accept(target)
             {
-                self.exchange.phase = Phase::Answered;
+                self.exchange.answer();
                 return Next::Work { moved: true };
             }
             return self.agree(own);
         }
-        self.exchange.phase = Phase::Answered;
+        self.exchange.answer();
         let Lead::Searching { search, .. } = &mut self.lead else {
             return Next::Answer {
                 moved: false,
@@ -144,19 +144,19 @@ impl Share {
 
     /// The chain has agreed on a target. The leader may have more in mind.
     pub(super) fn agree(&mut self, own: Own<'_>) -> Next {
-        self.exchange.phase = Phase::Holding;
+        self.exchange.hold();
         if let Lead::Searching { last: false, .. } = self.lead
             && let Some(target) = self.target
         {
             match own.settings.method {
                 Method::Adjust(adjust) if ADJUST => {
                     self.lead = Lead::Adjusting(Rounds::new(adjust));
-                    self.exchange.phase = Phase::Answered;
+                    self.exchange.answer();
                     return Next::Work { moved: true };
                 }
                 Method::Joint if own.joins() && self.is_mixed(own) => {
                     self.begin_ascent(own, target);
-                    self.exchange.phase = Phase::Answered;
+                    self.exchange.answer();
                     return Next::Work { moved: true };
                 }
                 _ => {}

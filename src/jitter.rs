@@ -1,0 +1,35 @@
+//! The one source of jitter: numbers that only timing and the numbering of talks depend on, never a placement.
+
+/// A xorshift generator (Marsaglia 2003, 13-17-5).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Jitter(u32);
+
+impl Jitter {
+    /// Distinct seeds give distinct numbers.
+    pub(crate) const fn new(seed: u32) -> Self {
+        // Any odd multiplier keeps distinct seeds distinct; the generator must not start at zero.
+        match seed.wrapping_mul(0x9E37_79B1) {
+            0 => Self(1),
+            state => Self(state),
+        }
+    }
+
+    /// The next number, never 0.
+    pub(crate) const fn draw(&mut self) -> u32 {
+        let mut state = self.0;
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        self.0 = state;
+        state
+    }
+
+    /// The next number, 1 to 65535.
+    pub(crate) const fn number(&mut self) -> u16 {
+        let [_, a, b, _] = self.draw().to_le_bytes();
+        match u16::from_le_bytes([a, b]) {
+            0 => 1,
+            number => number,
+        }
+    }
+}

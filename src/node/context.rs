@@ -1,0 +1,134 @@
+//! What a relay is and flies, as every layer is handed it, and what a layer asks of the others.
+
+use crate::mission::Mission;
+use crate::settings::Settings;
+use crate::time::Instant;
+use crate::wire::digest::{MissionId, digest};
+
+/// The relay in its chain.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Chain {
+    /// The mission that it flies, with as many relays as are in the view.
+    pub(crate) mission: Mission,
+    pub(crate) settings: Settings,
+    /// Its own node number, from 1 next to Tx.
+    pub(crate) node: u16,
+    /// Relays of the mission as it was loaded.
+    pub(crate) all: u16,
+    /// The digest of that.
+    pub(crate) digest: u16,
+    /// The mission that it flies.
+    pub(crate) active: MissionId,
+    /// Number of the view agreed on.
+    pub(crate) view: u16,
+    /// Its place in the view, from 1 next to Tx.
+    pub(crate) index: u16,
+}
+
+impl Chain {
+    pub(crate) fn new(mission: Mission, settings: Settings, node: u16) -> Self {
+        let digest = digest(&mission);
+        Self {
+            settings,
+            node,
+            all: mission.relays(),
+            digest,
+            active: MissionId { version: 0, digest },
+            view: 0,
+            index: node,
+            mission,
+        }
+    }
+
+    /// The digest that passes bear in the view agreed on.
+    pub(crate) const fn pass_digest(&self) -> u16 {
+        self.active.digest.wrapping_add(self.view)
+    }
+}
+
+/// What every layer is handed.
+#[derive(Clone, Copy)]
+pub(crate) struct Context<'a> {
+    pub(crate) now: Instant,
+    pub(crate) chain: &'a Chain,
+    /// The newest mission that the relay holds.
+    pub(crate) latest: MissionId,
+    /// Whether nobody comes after it on a pass.
+    pub(crate) end: bool,
+    /// Upsilon as it measures it where it stands, 1/W.
+    pub(crate) measured_per_w: Option<f32>,
+}
+
+/// What a layer asks of the others, or has them know.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is one thing that happened or did not"
+)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) struct Effects {
+    /// A message was of something that is over.
+    pub(crate) stale: bool,
+    /// A message had come before.
+    pub(crate) repeated: bool,
+    /// A message is sent again for want of an answer.
+    pub(crate) resent: bool,
+    /// A pass, or a proposal, begins here.
+    pub(crate) began: bool,
+    /// The chain has agreed on a place for this relay.
+    pub(crate) moved: bool,
+    /// The chain has agreed on a target.
+    pub(crate) converged: bool,
+    /// No target can be met.
+    pub(crate) infeasible: bool,
+    /// A new view is needed.
+    pub(crate) view_needed: bool,
+    /// A proposal is under way: no pass goes on until it is decided.
+    pub(crate) view_proposed: bool,
+    /// It came from the neighbour before, or begins here.
+    pub(crate) proposed_by: Option<Proposer>,
+    /// The neighbour toward the leader is to be asked for a view.
+    pub(crate) ask: bool,
+    /// What came of a proposal: how many relays the view has, `None` for too few.
+    pub(crate) decided: Option<Option<u16>>,
+}
+
+/// Who hands a proposal to a relay.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Proposer {
+    Itself,
+    Neighbour,
+}
+
+impl Effects {
+    pub(crate) const NONE: Self = Self {
+        stale: false,
+        repeated: false,
+        resent: false,
+        began: false,
+        moved: false,
+        converged: false,
+        infeasible: false,
+        view_needed: false,
+        view_proposed: false,
+        proposed_by: None,
+        ask: false,
+        decided: None,
+    };
+
+    pub(crate) const STALE: Self = Self {
+        stale: true,
+        ..Self::NONE
+    };
+
+    /// It cannot be taken part in: a new view is needed.
+    pub(crate) const FOREIGN: Self = Self {
+        stale: true,
+        view_needed: true,
+        ..Self::NONE
+    };
+
+    pub(crate) const REPEATED: Self = Self {
+        repeated: true,
+        ..Self::NONE
+    };
+}

@@ -1,0 +1,131 @@
+//! A newer mission, in flight: who holds it, who is offered it, and when it is flown.
+//!
+//! Any relay next to the ground takes an offer. Neighbours tell each other in every hello which mission they hold; whoever holds
+//! a newer one offers it, and whoever holds a newer one than it flies asks for a view. A proposal names the one mission that the
+//! view is to fly, and only a relay that holds just that one hands it on. So a view that is granted is of relays that hold it
+//! all, durably or not: one that misses the decision, or forgets what it held, can take part in nothing before it flies it, too.
+//!
+//! | between neighbours | what follows |
+//! | --- | --- |
+//! | a hello of a node that holds an older mission | it is offered the newer one |
+//! | a hello of a node that holds a newer mission | a hello, so that it is offered here |
+//! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hello; an offer to the relay before, toward the leader; a request for a view |
+//! | an offer of one that is not newer | a hello |
+//! | a proposal is due, and the node after holds an older mission or has not said which | it is offered the newer one first |
+//! | a proposal that does not name the mission held | a hello, and no part in it |
+//! | a decision on a view that was granted | its mission is flown: `Event::Adopted` |
+
+use super::context::Chain;
+use crate::mission::Mission;
+use crate::wire::digest::MissionId;
+#[cfg(feature = "upload")]
+use crate::wire::upload::{Upload, UploadError};
+
+/// Whether this crate was built to take a newer mission in flight.
+const UPLOAD: bool = cfg!(feature = "upload");
+
+/// What one relay holds.
+#[derive(Clone, Debug)]
+pub(crate) struct MissionUpdate {
+    /// The newest mission that it holds.
+    latest: MissionId,
+    /// The same, if it was uploaded.
+    #[cfg(feature = "upload")]
+    upload: Option<Upload>,
+}
+
+/// Whether newer missions are taken in flight: only where frames are signed.
+pub(crate) const fn takes_uploads(chain: &Chain) -> bool {
+    UPLOAD && chain.settings.auth.is_some()
+}
+
+impl MissionUpdate {
+    /// A relay that holds the mission that it was loaded with.
+    pub(crate) const fn new(loaded: MissionId) -> Self {
+        Self {
+            latest: loaded,
+            #[cfg(feature = "upload")]
+            upload: None,
+        }
+    }
+
+    pub(crate) const fn latest(&self) -> MissionId {
+        self.latest
+    }
+
+    /// The mission of that number, if it is the one flown or the one held.
+    pub(crate) fn mission_of(&self, chain: &Chain, id: MissionId) -> Option<Mission> {
+        #[cfg(feature = "upload")]
+        if id != chain.active {
+            let upload = self.upload.filter(|upload| upload.id() == id)?;
+            return Mission::try_new(*upload.config()).ok();
+        }
+        (id == chain.active).then_some(chain.mission)
+    }
+}
+
+#[cfg(feature = "upload")]
+impl MissionUpdate {
+    /// Holds `upload` from now on, if it is for this relay and newer than what it holds; whether it is.
+    pub(crate) fn hold(&mut self, chain: &Chain, upload: Upload) -> bool {
+        let newer = upload.id() > self.latest && fits(chain, &upload);
+        if newer {
+            self.latest = upload.id();
+            self.upload = Some(upload);
+        }
+        newer
+    }
+
+    /// The same by the relay's own firmware.
+    pub(crate) fn hand_in(&mut self, chain: &Chain, upload: &Upload) -> Result<(), UploadError> {
+        if !takes_uploads(chain) {
+            return Err(UploadError::Unsigned);
+        }
+        if !fits(chain, upload) {
+            return Err(UploadError::Base);
+        }
+        if self.hold(chain, *upload) {
+            Ok(())
+        } else {
+            Err(UploadError::Old)
+        }
+    }
+
+    /// A relay that has just been switched on, `untouched` or not, flies `upload`, which it held before: the mission of it.
+    pub(crate) fn resume(
+        &mut self,
+        chain: &Chain,
+        upload: &Upload,
+        untouched: bool,
+    ) -> Result<Mission, UploadError> {
+        if !fits(chain, upload) {
+            return Err(UploadError::Base);
+        }
+        if self.upload.is_some() || !untouched {
+            return Err(UploadError::Begun);
+        }
+        let mission = Mission::try_new(*upload.config()).map_err(UploadError::Mission)?;
+        self.latest = upload.id();
+        self.upload = Some(*upload);
+        Ok(mission)
+    }
+
+    /// The newest mission held, if it was uploaded.
+    pub(crate) const fn upload(&self) -> Option<&Upload> {
+        self.upload.as_ref()
+    }
+
+    /// What a neighbour that `holds` a mission has to be offered, if it is an older one or it has not said which.
+    pub(crate) fn offer_to(&self, holds: Option<MissionId>) -> Option<Upload> {
+        let older = holds.is_none_or(|holds| holds < self.latest);
+        self.upload.filter(|_| older)
+    }
+}
+
+/// Whether `upload` is for this relay. None is for relays in a field, even if its base has the digest of their mission.
+#[cfg(feature = "upload")]
+fn fits(chain: &Chain, upload: &Upload) -> bool {
+    upload.base() == chain.digest
+        && upload.config().relays == chain.all
+        && chain.mission.field().is_none()
+}

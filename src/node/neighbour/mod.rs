@@ -1,0 +1,82 @@
+//! The neighbours of a relay: one on each side.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | [`state`] | which node is taken for the neighbour on one side: its state table |
+//! | [`liveness`] | when a neighbour counts as lost |
+
+pub(crate) mod liveness;
+pub(crate) mod state;
+
+use super::view::earliest;
+use crate::settings::Settings;
+use crate::side::Side;
+use crate::time::Instant;
+
+use state::Neighbour;
+
+/// Both sides.
+#[derive(Clone, Debug)]
+pub(crate) struct Neighbours {
+    upstream: Neighbour,
+    downstream: Neighbour,
+}
+
+impl Neighbours {
+    /// Of node `node` of a chain of `all`.
+    pub(crate) fn new(node: u16, all: u16, now: Instant, settings: &Settings) -> Self {
+        let after = if node < all {
+            node.saturating_add(1)
+        } else {
+            0
+        };
+        Self {
+            upstream: Neighbour::new(node.saturating_sub(1), now, settings),
+            downstream: Neighbour::new(after, now, settings),
+        }
+    }
+
+    pub(crate) const fn at(&self, side: Side) -> &Neighbour {
+        match side {
+            Side::Upstream => &self.upstream,
+            Side::Downstream => &self.downstream,
+        }
+    }
+
+    pub(crate) const fn at_mut(&mut self, side: Side) -> &mut Neighbour {
+        match side {
+            Side::Upstream => &mut self.upstream,
+            Side::Downstream => &mut self.downstream,
+        }
+    }
+
+    /// The nodes taken, toward Tx and toward Rx.
+    pub(crate) fn nodes(&self) -> [Option<u16>; 2] {
+        [&self.upstream, &self.downstream].map(|side| Some(side.node()).filter(|node| *node != 0))
+    }
+
+    /// Whether somebody else is there than when a view was decided on last.
+    pub(crate) fn have_changed(&self, now: Instant) -> bool {
+        self.upstream.has_changed(now) || self.downstream.has_changed(now)
+    }
+
+    /// A proposal was decided against.
+    pub(crate) const fn refuse(&mut self) {
+        self.upstream.refuse();
+        self.downstream.refuse();
+    }
+
+    /// The next heartbeat that is owed: at which side, to which node, and whether it asks for one in return.
+    pub(crate) fn take_heartbeat(&mut self) -> Option<(Side, u16, bool)> {
+        [Side::Upstream, Side::Downstream]
+            .into_iter()
+            .find_map(|side| {
+                let (to, asks) = self.at_mut(side).take_heartbeat()?;
+                Some((side, to, asks))
+            })
+    }
+
+    pub(crate) fn next_timeout(&self) -> Option<Instant> {
+        earliest(self.upstream.next_timeout(), self.downstream.next_timeout())
+    }
+}
