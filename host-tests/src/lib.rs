@@ -1,3 +1,4 @@
 //! What the tests of uav-relay share.
 
 pub mod firmware;
+pub mod fixtures;

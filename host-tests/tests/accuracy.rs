@@ -1,14 +1,6 @@
 //! What micromath and libm are worth in f32, function by function: why the one is used for bearings and the other for all
 //! the rest. `cargo test --test accuracy -- --nocapture` prints the table, and with `--release` and
 //! `--include-ignored` how long each takes on the host.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -113,10 +105,6 @@ const FUNCTIONS: [Function; 6] = [
 const POINTS: u32 = 400_000;
 
 /// The arguments of a function, as f32.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "the functions under test take f32"
-)]
 fn arguments(function: &Function) -> impl Iterator<Item = [f32; 2]> {
     let [low, high] = function.range;
     (0..=POINTS).map(move |i| {

@@ -1,13 +1,4 @@
 //! Algorithm 2: turn by turn, never worse, and what a coarse grid cannot do.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    clippy::cast_possible_truncation,
-    missing_docs
-)]
 
 use core::task::Poll;
 

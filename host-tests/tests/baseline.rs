@@ -1,12 +1,4 @@
 //! The placements that the crate is compared with: against values of a separate program, and against brute force.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,17 +1,10 @@
 //! The simulated chain: what it settles on, what that costs, and that no fault changes it.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
+use host_tests::fixtures::mission;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::plan;
-use uav_relay::{Duration, Instant, Mission, Profile, Schedule, Side};
+use uav_relay::{Duration, Instant, Profile, Schedule, Side};
 use uav_relay_oracle::cases::OPTIMA;
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain as Kind, Style};
@@ -20,10 +13,6 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
-
-fn paper(relays: u16) -> Mission {
-    of_link(&Link::paper(usize::from(relays)), 1e-4).unwrap().0
-}
 
 fn reached(link: &Link, outcome: &Outcome) -> f64 {
     let x: Vec<f64> = outcome
@@ -44,7 +33,7 @@ fn settle(setup: Setup) -> Outcome {
 #[test]
 fn the_optima_are_reached_in_one_round_trip() {
     for (relays, best) in OPTIMA {
-        let outcome = settle(Setup::new(paper(relays)));
+        let outcome = settle(Setup::new(mission(relays)));
         let sir = reached(&Link::paper(usize::from(relays)), &outcome);
         let short = 1.0 - sir / best;
         println!(
@@ -63,7 +52,7 @@ fn the_optima_are_reached_in_one_round_trip() {
 #[test]
 fn without_prediction_four_sweeps_are_enough() {
     for (relays, best) in OPTIMA {
-        let mut setup = Setup::new(paper(relays));
+        let mut setup = Setup::new(mission(relays));
         setup.settings.predict = false;
         let outcome = settle(setup);
         let short = 1.0 - reached(&Link::paper(usize::from(relays)), &outcome) / best;
@@ -127,7 +116,7 @@ fn the_fixed_step_takes_the_papers_ten_thousand_sweeps() {
         (8, 10_237, 2.4),
         (100, 9_857, 40.4),
     ] {
-        let mut setup = Setup::new(paper(relays));
+        let mut setup = Setup::new(mission(relays));
         setup.settings.schedule = Schedule::FixedStep { step: 0.1 };
         let outcome = settle(setup);
         assert_eq!(outcome.sweeps, targets, "N = {relays}");
@@ -166,10 +155,10 @@ fn silent_places_equal_those_by_messages() {
 /// 1 000 seeds of everything at once at N = 8: the very placement of the faultless run.
 #[test]
 fn faults_change_nothing_but_the_time_it_takes() {
-    let undisturbed = settle(Setup::new(paper(8)));
+    let undisturbed = settle(Setup::new(mission(8)));
     for predict in [true, false] {
         let quiet = {
-            let mut setup = Setup::new(paper(8));
+            let mut setup = Setup::new(mission(8));
             setup.settings.predict = predict;
             settle(setup)
         };
@@ -180,7 +169,7 @@ fn faults_change_nothing_but_the_time_it_takes() {
         let mut slowest = Instant::ZERO;
         let (mut injected, mut rejected) = ([0; 4], 0);
         for seed in first..first + 1_000 {
-            let mut setup = Setup::new(paper(8));
+            let mut setup = Setup::new(mission(8));
             setup.settings.predict = predict;
             setup.faults = Faults::BAD_DAY;
             setup.seed = seed;
@@ -219,7 +208,7 @@ fn faults_change_nothing_but_the_time_it_takes() {
 
 #[test]
 fn each_fault_alone_and_at_its_worst_changes_nothing() {
-    let quiet = settle(Setup::new(paper(5))).bits();
+    let quiet = settle(Setup::new(mission(5))).bits();
     let none = Faults::default();
     for faults in [
         Faults { loss: 0.9, ..none },
@@ -243,7 +232,7 @@ fn each_fault_alone_and_at_its_worst_changes_nothing() {
         },
     ] {
         for seed in 1..=20 {
-            let mut setup = Setup::new(paper(5));
+            let mut setup = Setup::new(mission(5));
             setup.faults = faults;
             setup.seed = seed;
             assert_eq!(settle(setup).bits(), quiet, "seed {seed} of {faults:?}");
@@ -254,7 +243,7 @@ fn each_fault_alone_and_at_its_worst_changes_nothing() {
 #[test]
 fn the_same_seed_gives_the_same_run() {
     let go = |seed| {
-        let mut setup = Setup::new(paper(6));
+        let mut setup = Setup::new(mission(6));
         setup.faults = Faults::BAD_DAY;
         setup.seed = seed;
         format!("{:?}", settle(setup))
@@ -265,8 +254,8 @@ fn the_same_seed_gives_the_same_run() {
 
 #[test]
 fn one_shared_channel_does_as_well_as_two_wires() {
-    let wires = settle(Setup::new(paper(8))).bits();
-    let outcome = settle(Setup::on_shared_channel(paper(8)));
+    let wires = settle(Setup::new(mission(8))).bits();
+    let outcome = settle(Setup::on_shared_channel(mission(8)));
     assert_eq!(outcome.bits(), wires);
     assert_eq!(outcome.messages, 14);
     assert!(
@@ -274,7 +263,7 @@ fn one_shared_channel_does_as_well_as_two_wires() {
         "nobody overheard anything"
     );
     for seed in 1..=50 {
-        let mut setup = Setup::on_shared_channel(paper(8));
+        let mut setup = Setup::on_shared_channel(mission(8));
         setup.faults = Faults::BAD_DAY;
         setup.seed = seed;
         assert_eq!(settle(setup).bits(), wires, "seed {seed}");
@@ -285,7 +274,7 @@ fn one_shared_channel_does_as_well_as_two_wires() {
 /// reference calls feasible for the farthest chain.
 #[test]
 fn a_mixed_chain_is_solved_as_it_is() {
-    let mission = paper(8);
+    let mission = mission(8);
     let profiles = vec![
         (
             3,
@@ -340,7 +329,7 @@ fn a_mixed_chain_is_solved_as_it_is() {
 fn a_silent_relay_is_noticed_by_both_neighbours_within_the_stated_time() {
     for at in [0, 20, 60_000] {
         let killed = Instant::from_millis(at);
-        let mut setup = Setup::new(paper(5));
+        let mut setup = Setup::new(mission(5));
         setup.kills = vec![(3, killed)];
         setup.deadline = Instant::from_millis(at + 60_000);
         let outcome = run(setup).unwrap();
@@ -363,7 +352,7 @@ fn a_silent_relay_is_noticed_by_both_neighbours_within_the_stated_time() {
 
 #[test]
 fn neighbours_that_live_are_not_lost_over_an_hour_of_bad_days() {
-    let mut setup = Setup::new(paper(4));
+    let mut setup = Setup::new(mission(4));
     setup.faults = Faults::BAD_DAY;
     // Nobody dies before the end of the hour, so the run goes on until then.
     setup.kills = vec![(4, Instant::from_millis(3_600_000))];

@@ -2,13 +2,6 @@
 //!
 //! Every chain is held against an f64 judge that knows the optimum, and so is the bound that the leader gives with it.
 //! `COUNT` and `SEED` in the environment take other scenes.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    missing_docs
-)]
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,13 +1,4 @@
 //! Places, sides and altitudes together: how near the true optimum the chain comes, in how many messages, whatever happens to frames.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    clippy::cast_possible_truncation,
-    missing_docs
-)]
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

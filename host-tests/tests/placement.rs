@@ -1,13 +1,4 @@
 //! The placement maths against the independent f64 reference, on random links and on every degenerate kind of them.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    clippy::cast_possible_truncation,
-    missing_docs
-)]
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,16 +1,9 @@
 //! How fast a chain recovers from the loss of one relay, by its length and by which one is lost.
 //!
 //! `cargo test --test recovery -- --nocapture` prints the table of the README.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
 
+use host_tests::fixtures::mission;
 use uav_relay::Instant;
-use uav_relay_oracle::mission::of_link;
-use uav_relay_oracle::reference::Link;
 use uav_relay_sim::report::ChainReport;
 use uav_relay_sim::report::recovery::RecoveryReport;
 use uav_relay_sim::simulator::chain::run;
@@ -22,8 +15,7 @@ const AT_S: u64 = 60;
 
 /// A chain of `relays` on one radio channel that loses relay `lost`.
 fn losing(relays: u16, lost: u16) -> Setup {
-    let (mission, _) = of_link(&Link::paper(usize::from(relays)), 1e-4).unwrap();
-    let mut setup = Setup::on_shared_channel(mission);
+    let mut setup = Setup::on_shared_channel(mission(relays));
     setup.kills = vec![(lost, Instant::from_millis(1_000 * AT_S))];
     setup.deadline = Instant::from_millis(1_000 * (AT_S + 600));
     setup

@@ -1,12 +1,4 @@
 //! Scenario files: what a good one means, and that every mistake in one is told in one line that helps.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,13 +1,4 @@
 //! Algorithm 4: places in a field of interference, by messages from Rx toward Tx, agreed or measured.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    clippy::cast_possible_truncation,
-    missing_docs
-)]
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -12,7 +12,7 @@
 //! | [`member`] | the same, signed with the network's key |
 //! | [`setting`] | a mission and settings from bytes |
 //! | [`input`] | numbers and choices from bytes |
-//! | [`cobs`] | COBS by its definition |
+//! | [`cobs`] | COBS by a published encoder, and back by its definition |
 //! | [`heap`] | that the crate never asks for memory |
 //!
 //! Every function takes any bytes, panics where something promised does not hold, and else gives nothing.

@@ -1,17 +1,18 @@
 //! Authenticated chains settle at the very places of others, through a bad day and reboots too.
 
+use host_tests::fixtures::mission;
 use uav_relay::{
     Adjust, Auth, Identity, Instant, Key, Method, Phase, Relay, Settings, Stats, Wiring,
 };
 use uav_relay_oracle::random::seed;
-use uav_relay_sim::mission;
+use uav_relay_sim::mission::mission as of_scenario;
 use uav_relay_sim::scenario::Scenario;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
 
-use super::net::{Deed, KEY, NETWORK, Net, mission};
+use super::net::{Deed, KEY, NETWORK, Net};
 
 fn settle(setup: Setup) -> Outcome {
     let outcome = run(setup).unwrap();
@@ -92,7 +93,7 @@ fn other_methods_choose_the_same() {
         altitude_max_m: 300.0,
         ..Scenario::default()
     };
-    let mut setup = Setup::new(mission::mission(&scenario, 5, 1e-4).unwrap().0);
+    let mut setup = Setup::new(of_scenario(&scenario, 5, 1e-4).unwrap().0);
     for method in [
         Method::Joint,
         Method::Adjust(Adjust {

@@ -1,9 +1,10 @@
 //! What `FORMAT.md` works out for frames with a tag, byte by byte.
 
+use host_tests::fixtures::mission;
 use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings};
 
 use super::frames::{Plain, SIGNED, handshake, nonce, plain};
-use super::net::{NETWORK, mission};
+use super::net::NETWORK;
 
 const DOCUMENT: &str = include_str!("../../../src/wire/FORMAT.md");
 

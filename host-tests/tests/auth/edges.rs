@@ -1,12 +1,13 @@
 //! Counters and epochs at their limits, with frames that only somebody who has the key can make.
 
+use host_tests::fixtures::mission;
 use uav_relay::settings::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings, Stats, Wiring};
 
 use super::frames::{Plain, SIGNED, handshake, nonce, plain};
 use super::kinds::raised;
-use super::net::{KEY, NETWORK, mission, relay};
+use super::net::{KEY, NETWORK, relay};
 
 const NOW: Instant = Instant::from_millis(5);
 

@@ -2,14 +2,6 @@
 //!
 //! Random tests draw from the environment variable `SEED` (1 if unset), which each of them prints; `COUNT` is the number of
 //! attacks.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 mod attack;
 mod chain;

@@ -3,13 +3,12 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use host_tests::fixtures::mission;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Auth, Duration, Event, Ground, Identity, Instant, Interference, Interferer, Key, Mission,
     MissionConfig, Port, Relay, Settings, Side, Stats, Upload, Wiring,
 };
-use uav_relay_oracle::mission::of_link;
-use uav_relay_oracle::reference::Link;
 
 pub(crate) const NETWORK: u16 = 7;
 pub(crate) const KEY: [u8; 32] = *b"the members of network 7 have it";
@@ -17,11 +16,7 @@ pub(crate) const KEY: [u8; 32] = *b"the members of network 7 have it";
 /// From one relay to the next.
 const ON_THE_WAY: Duration = Duration::from_millis(10);
 
-pub(crate) fn mission(relays: u16) -> Mission {
-    of_link(&Link::paper(usize::from(relays)), 1e-4).unwrap().0
-}
-
-/// Version `version` of it: the interferer is somewhere else in each.
+/// Version `version` of a mission: the interferer is somewhere else in each.
 pub(crate) fn newer(base: &Mission, version: u16) -> Upload {
     let config = MissionConfig {
         interference: Interference::Source(Interferer {

@@ -1,5 +1,6 @@
 //! Newer missions that nobody has uploaded, or that were uploaded before: who forges them, and what becomes of them.
 
+use host_tests::fixtures::mission;
 use rand::RngExt;
 use rand::seq::IndexedRandom;
 use uav_relay::ground::Progress;
@@ -8,7 +9,7 @@ use uav_relay::{Identity, Instant, Port, Relay, Settings, Side, Wiring};
 
 use super::frames::{HEADER, Plain, SIGNED, TAG, nonce, plain};
 use super::kinds::{Attacker, Kind, raised};
-use super::net::{Deed, Heard, NETWORK, Net, mission, newer};
+use super::net::{Deed, Heard, NETWORK, Net, newer};
 
 /// The first byte of the body of an offer.
 const OFFER: u8 = 14;

@@ -1,13 +1,5 @@
 //! `examples/linux_companion` and `examples/linux_ground` as processes on pseudo-terminals, against the simulated chain.
 #![cfg(target_os = "linux")]
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 mod binary;
 mod ending;

@@ -2,14 +2,6 @@
 //! its estimation from samples, and the f64 judge of whole chains against values of a separate program.
 //!
 //! Random tests draw from the environment variable `SEED` (1 if unset), which each of them prints.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 mod chains;
 mod closed_forms;

@@ -102,7 +102,6 @@ fn every_number_is_checked_at_both_ends_and_for_nan() {
 }
 
 #[test]
-#[expect(clippy::cast_possible_truncation, reason = "a field is made of f32")]
 fn interpolation_agrees_with_f64_and_stays_between_its_neighbours() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(1));
     let mut worst: f64 = 0.0;

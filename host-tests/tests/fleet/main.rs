@@ -1,14 +1,6 @@
 //! How many relays a target needs: against counts that know nothing of the crate's reaches and ranges.
 //!
 //! `COUNT` and `SEED` in the environment take other scenarios.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    missing_docs
-)]
 
 mod field;
 mod interferer;

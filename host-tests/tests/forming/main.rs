@@ -1,12 +1,5 @@
 //! A chain of two to six relays, passed their frames by hand, that loses its memory: a relay or the leader is switched on
 //! again in the midst of something, frames come late, and the chain agrees all the same, to what it can keep.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
 
 mod hand;
 mod late;

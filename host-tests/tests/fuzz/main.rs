@@ -2,14 +2,6 @@
 //!
 //! The same functions run in `host-tests/fuzz` under libFuzzer. Random tests draw from the environment variable `SEED` (1
 //! if unset), which each of them prints.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 use std::fs;
 use std::path::PathBuf;

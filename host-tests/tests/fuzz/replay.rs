@@ -1,6 +1,7 @@
 //! The corpora: every input again, and that they stay small.
 
 use uav_relay_fuzz::TARGETS;
+use uav_relay_xtask::FUZZ_TARGETS;
 
 use super::corpus;
 
@@ -43,4 +44,9 @@ fn the_corpora_are_small() {
     println!("{} inputs, {bytes} bytes", inputs.len());
     assert!(inputs.len() <= MOST.0, "{} files", inputs.len());
     assert!(bytes <= MOST.1, "{bytes} bytes");
+}
+
+#[test]
+fn all_targets_are_fuzzed() {
+    assert_eq!(TARGETS.map(|(name, _)| name), FUZZ_TARGETS);
 }

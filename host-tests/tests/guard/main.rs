@@ -1,14 +1,6 @@
 //! The motion guard: a line of simulated drones, a hostile medium, and agreements that come at all times and not to everybody.
 //!
 //! `COUNT` and `SEED` in the environment take other schedules; a failure names the seed of its one.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    missing_docs
-)]
 
 mod drone;
 mod known;

@@ -1,12 +1,5 @@
 //! The optimiser of the joint problem judged on its own, before it may judge anything: against known optima, against the exact
 //! reference at given altitudes, against brute force for one relay, and against itself from other seeds.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 use std::iter::successors;
 

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Duration, MissionConfig};
-use uav_relay_sim::simulator::chain::FlightSpec;
+use uav_relay_sim::simulator::drones::FlightSpec;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 

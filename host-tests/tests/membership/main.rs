@@ -1,33 +1,21 @@
 //! The chain loses relays and takes them in again: whoever is left ends in the places that a chain of just them would take.
 //!
 //! `COUNT` and `SEED` in the environment take other schedules.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
 
 mod flights;
 mod losses;
 mod parts;
 mod schedules;
 
+use host_tests::fixtures::mission;
 use uav_relay::{Duration, Instant, Mission};
-use uav_relay_oracle::mission::of_link;
-use uav_relay_oracle::reference::Link;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome, Turning};
 use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 /// The paper's chain of `relays` on one radio channel.
-fn paper(relays: usize) -> Setup {
+fn paper(relays: u16) -> Setup {
     Setup::on_shared_channel(mission(relays))
-}
-
-fn mission(relays: usize) -> Mission {
-    of_link(&Link::paper(relays), 1e-4).unwrap().0
 }
 
 const fn seconds(seconds: u64) -> Instant {

@@ -92,12 +92,6 @@ fn every_schedule_ends_in_the_optimum_of_the_relays_that_are_left() {
     }
     took.sort_unstable();
     let at = |part: f64| {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "a place in a list"
-        )]
         let at = ((took.len() - 1) as f64 * part) as usize;
         took[at]
     };

@@ -16,14 +16,6 @@
 //!
 //! `COUNT` (2 000) and `SEED` (1) in the environment say how many sequences are drawn, and which. A failure prints both, and
 //! the shortest sequence that still fails.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::cast_possible_truncation,
-    missing_docs
-)]
 
 use std::cell::RefCell;
 

@@ -3,14 +3,6 @@
 //! reference, the polishing against both, and what placing by the hypothetical interferer costs.
 //!
 //! Random tests draw from the environment variable `SEED`, which each of them prints.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 mod brute;
 mod fit;

@@ -1,13 +1,6 @@
 //! The state table of a relay, row by row, through the bytes of its public interface.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
+use host_tests::fixtures::{self, NETWORK, mission};
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
@@ -16,29 +9,11 @@ use uav_relay::{
     Duration, Event, FrameBuf, Identity, Instant, Interference, Interferer, Mission, MissionConfig,
     Phase, Port, Relay, Settings, Side,
 };
-use uav_relay_oracle::mission::of_link;
-use uav_relay_oracle::reference::Link;
 
 mod numbers;
 
-const NETWORK: u16 = 9;
-
-fn mission(relays: usize) -> Mission {
-    of_link(&Link::paper(relays), 1e-4).unwrap().0
-}
-
 fn relay(mission: Mission, index: u16) -> Relay {
-    Relay::new(
-        mission,
-        Identity {
-            network: NETWORK,
-            index,
-        },
-        Settings::default(),
-        u32::from(index),
-        Instant::ZERO,
-    )
-    .unwrap()
+    fixtures::relay(mission, index, Settings::default())
 }
 
 /// Frames a relay wants to send now: where to, the message, the bytes.

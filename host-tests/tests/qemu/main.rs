@@ -4,14 +4,6 @@
 //! Between them is a medium that paces bytes and may spoil them; each drone's log is decoded as `defmt-print` would. Without
 //! `qemu-system-arm` these tests fail and say what to type. A chain of 20: `-- --ignored`.
 #![cfg(unix)]
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 mod chain;
 mod fleet;

@@ -1,13 +1,5 @@
 //! The f64 reference judged on its own, before it may judge anything: against values of a separate program, against brute
 //! force over the places, and against itself where two of its methods must agree.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 use uav_relay_oracle::cases::{self, Case};
 use uav_relay_oracle::reference::{Link, Station};

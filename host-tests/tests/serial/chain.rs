@@ -1,48 +1,24 @@
 //! A chain of relays on mock ports, run on a virtual clock; and the same chain without any ports, to compare with.
 
-use uav_relay::channel::{AirGround, Channel};
+use host_tests::fixtures;
 use uav_relay::serial::{Io, Nb, Pair, SerialLink, SerialPort, SerialStats, Shared, byte_time};
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
-    Band, Duration, Event, FrameBuf, Identity, Instant, Interference, Interferer, Mission,
-    MissionConfig, Placement, Port, Profile, Relay, Settings, Side, Wiring,
+    Duration, Event, FrameBuf, Instant, Mission, Placement, Port, Relay, Settings, Side, Wiring,
 };
 
 use crate::pipe::{End, IoEnd, NbEnd, Trouble};
 
 pub(crate) const BYTE_TIME: Duration = byte_time(115_200);
 
-pub(crate) fn mission(relays: u16) -> Mission {
-    Mission::try_new(MissionConfig {
-        relays,
-        distance_m: 1000.0,
-        min_separation_m: 4.0,
-        tx_power_w: 80.0,
-        common: Profile {
-            altitude_m: 20.0,
-            power_w: 1.0,
-        },
-        channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
-        band: Band::at(20.0),
-        lateral: Band::NONE,
-        interference: Interference::Source(Interferer {
-            power_w: 80.0,
-            x_m: 500.0,
-            y_m: 400.0,
-        }),
-        tolerance: 1e-4,
-    })
-    .unwrap()
-}
-
+/// Relay `index` of `relays` in the paper's scenario.
 pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
-    let identity = Identity { network: 7, index };
+    let mission = Mission::try_new(fixtures::paper(relays)).unwrap();
     let settings = Settings {
         wiring,
         ..Settings::default()
     };
-    let seed = u32::from(index) * 77;
-    Relay::new(mission(relays), identity, settings, seed, Instant::ZERO).unwrap()
+    fixtures::relay(mission, index, settings)
 }
 
 /// A driver of either wiring over ports of either kind.

@@ -1,12 +1,4 @@
 //! The facade over serial ports, on ports that hold a byte or three, fail, or are never read.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 mod chain;
 mod driver_enable;

@@ -1,12 +1,4 @@
 //! Pictures of chains: well-formed, complete, and readable at every size, as far as a program can tell.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 mod above;
 mod lost;

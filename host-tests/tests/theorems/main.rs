@@ -1,13 +1,6 @@
 //! One relay and one interferer: Lemmas 1 and 2, Corollary 1, Theorems 1 to 3 and one relay aside against brute force in f64.
 //!
 //! `COUNT` and `SEED` in the environment take other scenarios.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::cast_possible_truncation,
-    missing_docs
-)]
 
 mod aside;
 mod brute;

@@ -38,7 +38,7 @@ fn a_new_place_of_the_interferer_is_flown_by_all_wherever_it_is_uploaded() {
                 let (took, bytes) = fly(signed(base, shared), end, config);
                 println!("{relays} relays, shared {shared}, {end:?}: {took} ms, {bytes} bytes");
                 // An offer, a hello, a proposal, a count, a sweep and a verdict a hop, each within two of the links' hop times.
-                assert!(took < 200 * relays as u64 + 300, "{took} ms");
+                assert!(took < 200 * u64::from(relays) + 300, "{took} ms");
             }
         }
     }

@@ -1,13 +1,6 @@
 //! A new mission in flight: from the ground at either end to all relays, or to none.
 //!
 //! `COUNT` and `SEED` in the environment take other schedules.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::indexing_slicing,
-    clippy::panic,
-    missing_docs
-)]
 
 mod chain;
 mod flights;
@@ -17,19 +10,13 @@ mod schedules;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use host_tests::fixtures::mission;
 use uav_relay::{Instant, Interference, Interferer, Mission, MissionConfig, Side, Upload};
-use uav_relay_oracle::mission::of_link;
-use uav_relay_oracle::reference::Link;
-use uav_relay_sim::simulator::chain::{UploadSpec, run};
+use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, Turning};
-use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_sim::simulator::setup::{Setup, UploadSpec};
 
-/// The paper's chain of `relays`.
-fn mission(relays: usize) -> Mission {
-    of_link(&Link::paper(relays), 1e-4).unwrap().0
-}
-
-/// The same with the interferer somewhere else.
+/// `base` with the interferer somewhere else.
 fn moved(base: &Mission, x_m: f32, y_m: f32) -> MissionConfig {
     MissionConfig {
         interference: Interference::Source(Interferer {

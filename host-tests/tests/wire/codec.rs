@@ -23,16 +23,7 @@ use super::offer::Offer;
 /// What a body says, field by field.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub(crate) enum Said {
-    Sweep {
-        number: u16,
-        mission: u16,
-        anchor: f32,
-        gap: u8,
-        growth: u8,
-        altitude_m: f32,
-        power_w: f32,
-        reaches: Vec<f32>,
-    },
+    Sweep(Swept),
     Verdict {
         number: u16,
         mission: u16,
@@ -49,26 +40,12 @@ pub(crate) enum Said {
         answer: bool,
     },
     Measured {
-        number: u16,
-        mission: u16,
-        anchor: f32,
-        gap: u8,
-        growth: u8,
-        altitude_m: f32,
-        power_w: f32,
+        sweep: Swept,
         upsilon_per_w: f32,
-        reaches: Vec<f32>,
     },
     Aside {
-        number: u16,
-        mission: u16,
-        anchor: f32,
-        gap: u8,
-        growth: u8,
-        altitude_m: f32,
-        power_w: f32,
+        sweep: Swept,
         y_m: f32,
-        reaches: Vec<f32>,
     },
     Course {
         number: u16,
@@ -120,6 +97,65 @@ pub(crate) enum Said {
     Offer(Offer),
 }
 
+/// What every sweep says.
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+pub(crate) struct Swept {
+    pub(crate) number: u16,
+    pub(crate) mission: u16,
+    /// Below zero in a plain pass.
+    pub(crate) anchor: f32,
+    pub(crate) gap: u8,
+    pub(crate) growth: u8,
+    pub(crate) altitude_m: f32,
+    pub(crate) power_w: f32,
+    pub(crate) reaches: Vec<f32>,
+}
+
+impl Swept {
+    /// The body; what some sweeps say more stands before the reaches.
+    fn body(&self, tag: u8, more: &[f32]) -> Vec<u8> {
+        let mut out = pass(tag, [self.number, self.mission]);
+        reals(&mut out, &[self.anchor]);
+        out.extend([self.gap, self.growth]);
+        reals(&mut out, &[self.altitude_m, self.power_w]);
+        reals(&mut out, more);
+        list(&mut out, &self.reaches);
+        out
+    }
+
+    /// The message: from beside the line, where that is chosen; with what is measured.
+    fn message(&self, chosen_y_m: Option<f32>, measured_per_w: Option<f32>) -> Message {
+        let ladder = Ladder::from_parts(self.anchor.abs(), self.gap, self.growth).unwrap();
+        Message::Sweep(Sweep {
+            number: self.number,
+            mission: self.mission,
+            ladder: ladder.plainly(self.anchor < 0.0),
+            relay: Station {
+                at: CrossSection {
+                    y_m: chosen_y_m.unwrap_or(0.0),
+                    altitude_m: self.altitude_m,
+                },
+                power_w: self.power_w,
+            },
+            chosen: chosen_y_m.is_some(),
+            measured_per_w,
+            reaches: PerTarget::from_slice(&self.reaches).unwrap(),
+        })
+    }
+
+    /// Whether there is such a ladder, with no more reaches than it has targets, and all numbers are in range.
+    fn in_range(&self) -> bool {
+        let targets = targets(self.anchor.abs(), self.gap, self.growth);
+        (self.gap > 0 || self.growth == 0)
+            && targets[0] >= f32::MIN_POSITIVE
+            && targets[targets.len() - 1] < f32::INFINITY
+            && self.reaches.len() <= targets.len()
+            && self.reaches.iter().all(|reach| (0.0..=2e9).contains(reach))
+            && is_altitude(self.altitude_m)
+            && is_power(self.power_w)
+    }
+}
+
 /// What the three messages by which a chain forms anew have in common.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(crate) struct Forming {
@@ -159,20 +195,7 @@ impl Said {
     pub(crate) fn body(&self) -> Vec<u8> {
         let mut out = Vec::new();
         match self {
-            Self::Sweep {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
-                reaches,
-            } => {
-                out = ladder(0, [*number, *mission], (*anchor, *gap, *growth));
-                reals(&mut out, &[*altitude_m, *power_w]);
-                list(&mut out, reaches);
-            }
+            Self::Sweep(sweep) => out = sweep.body(0, &[]),
             Self::Verdict {
                 number,
                 mission,
@@ -203,35 +226,10 @@ impl Said {
                 out.push(u8::from(*answer));
             }
             Self::Measured {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
+                sweep,
                 upsilon_per_w,
-                reaches,
-            } => {
-                out = ladder(4, [*number, *mission], (*anchor, *gap, *growth));
-                reals(&mut out, &[*altitude_m, *power_w, *upsilon_per_w]);
-                list(&mut out, reaches);
-            }
-            Self::Aside {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
-                y_m,
-                reaches,
-            } => {
-                out = ladder(5, [*number, *mission], (*anchor, *gap, *growth));
-                reals(&mut out, &[*altitude_m, *power_w, *y_m]);
-                list(&mut out, reaches);
-            }
+            } => out = sweep.body(4, &[*upsilon_per_w]),
+            Self::Aside { sweep, y_m } => out = sweep.body(5, &[*y_m]),
             Self::Course {
                 number,
                 mission,
@@ -316,62 +314,12 @@ impl Said {
     pub(crate) fn message(&self) -> Message {
         let per_target = |numbers: &[f32]| PerTarget::from_slice(numbers).unwrap();
         match *self {
-            Self::Sweep {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
-                ref reaches,
-            } => Message::Sweep(Sweep {
-                number,
-                mission,
-                ladder: laid_out(anchor, gap, growth),
-                relay: station(0.0, altitude_m, power_w),
-                chosen: false,
-                measured_per_w: None,
-                reaches: per_target(reaches),
-            }),
+            Self::Sweep(ref sweep) => sweep.message(None, None),
             Self::Measured {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
+                ref sweep,
                 upsilon_per_w,
-                ref reaches,
-            } => Message::Sweep(Sweep {
-                number,
-                mission,
-                ladder: laid_out(anchor, gap, growth),
-                relay: station(0.0, altitude_m, power_w),
-                chosen: false,
-                measured_per_w: Some(upsilon_per_w),
-                reaches: per_target(reaches),
-            }),
-            Self::Aside {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
-                y_m,
-                ref reaches,
-            } => Message::Sweep(Sweep {
-                number,
-                mission,
-                ladder: laid_out(anchor, gap, growth),
-                relay: station(y_m, altitude_m, power_w),
-                chosen: true,
-                measured_per_w: None,
-                reaches: per_target(reaches),
-            }),
+            } => sweep.message(None, Some(upsilon_per_w)),
+            Self::Aside { ref sweep, y_m } => sweep.message(Some(y_m), None),
             Self::Verdict {
                 number,
                 mission,
@@ -527,37 +475,14 @@ impl Said {
         }
     }
 
-    #[expect(clippy::too_many_lines, reason = "an arm for each message")]
     fn in_range(&self) -> bool {
         match self {
-            Self::Sweep {
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
-                reaches,
-                ..
-            } => {
-                is_sweep((*anchor, *gap, *growth), reaches)
-                    && is_altitude(*altitude_m)
-                    && is_power(*power_w)
-            }
+            Self::Sweep(sweep) => sweep.in_range(),
             Self::Measured {
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
+                sweep,
                 upsilon_per_w,
-                reaches,
-                ..
-            } => {
-                is_sweep((*anchor, *gap, *growth), reaches)
-                    && is_altitude(*altitude_m)
-                    && is_power(*power_w)
-                    && (1e-9..=1e32).contains(upsilon_per_w)
-            }
+            } => sweep.in_range() && (1e-9..=1e32).contains(upsilon_per_w),
+            Self::Aside { sweep, y_m } => sweep.in_range() && is_beside(*y_m),
             Self::Verdict {
                 commit,
                 slacks,
@@ -569,21 +494,6 @@ impl Said {
                     && stand.is_none_or(is_place)
             }
             Self::Busy { .. } | Self::Heartbeat { .. } => true,
-            Self::Aside {
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
-                y_m,
-                reaches,
-                ..
-            } => {
-                is_sweep((*anchor, *gap, *growth), reaches)
-                    && is_altitude(*altitude_m)
-                    && is_power(*power_w)
-                    && is_beside(*y_m)
-            }
             Self::Course {
                 power_w,
                 bar,
@@ -685,29 +595,6 @@ fn is_sir(sir: f32) -> bool {
     (0.0..f32::INFINITY).contains(&sir)
 }
 
-/// The ladder that an anchor of either sign stands for: one below zero is of a plain pass.
-fn laid_out(anchor: f32, gap: u8, growth: u8) -> Ladder {
-    let ladder = Ladder::from_parts(anchor.abs(), gap, growth).unwrap();
-    ladder.plainly(anchor < 0.0)
-}
-
-/// Whether there is such a ladder, and the reaches are in range and no more than it has targets.
-fn is_sweep((anchor, gap, growth): (f32, u8, u8), reaches: &[f32]) -> bool {
-    let targets = targets(anchor.abs(), gap, growth);
-    (gap > 0 || growth == 0)
-        && targets[0] >= f32::MIN_POSITIVE
-        && targets[targets.len() - 1] < f32::INFINITY
-        && reaches.len() <= targets.len()
-        && reaches.iter().all(|reach| (0.0..=2e9).contains(reach))
-}
-
-fn station(y_m: f32, altitude_m: f32, power_w: f32) -> Station {
-    Station {
-        at: CrossSection { y_m, altitude_m },
-        power_w,
-    }
-}
-
 fn trial([target, penalty_m, x_m, y_m, altitude_m]: [f32; 5]) -> Trial {
     Trial {
         target,
@@ -726,14 +613,6 @@ fn pass(tag: u8, words: [u16; 2]) -> Vec<u8> {
     for word in words {
         out.extend(word.to_le_bytes());
     }
-    out
-}
-
-/// What a sweep begins with.
-fn ladder(tag: u8, words: [u16; 2], (anchor, gap, growth): (f32, u8, u8)) -> Vec<u8> {
-    let mut out = pass(tag, words);
-    reals(&mut out, &[anchor]);
-    out.extend([gap, growth]);
     out
 }
 
@@ -803,34 +682,45 @@ impl Reader<'_> {
         }
     }
 
-    #[expect(clippy::too_many_lines, reason = "an arm for each message")]
+    #[expect(clippy::option_option, reason = "what it is, if it is an option")]
+    fn option<T>(&mut self, value: fn(&mut Self) -> Option<T>) -> Option<Option<T>> {
+        Some(if self.bool()? {
+            Some(value(self)?)
+        } else {
+            None
+        })
+    }
+
+    /// A sweep, and the numbers that stand before its reaches.
+    fn sweep<const N: usize>(&mut self) -> Option<(Swept, [f32; N])> {
+        let mut sweep = Swept {
+            number: self.word()?,
+            mission: self.word()?,
+            anchor: self.real()?,
+            gap: self.byte()?,
+            growth: self.byte()?,
+            altitude_m: self.real()?,
+            power_w: self.real()?,
+            reaches: Vec::new(),
+        };
+        let more = self.reals()?;
+        sweep.reaches = self.list()?;
+        Some((sweep, more))
+    }
+
     fn said(&mut self) -> Option<Said> {
         Some(match self.byte()? {
-            0 => Said::Sweep {
-                number: self.word()?,
-                mission: self.word()?,
-                anchor: self.real()?,
-                gap: self.byte()?,
-                growth: self.byte()?,
-                altitude_m: self.real()?,
-                power_w: self.real()?,
-                reaches: self.list()?,
-            },
+            0 => {
+                let (sweep, []) = self.sweep()?;
+                Said::Sweep(sweep)
+            }
             1 => Said::Verdict {
                 number: self.word()?,
                 mission: self.word()?,
                 own: self.bool()?,
-                commit: if self.bool()? {
-                    Some(self.byte()?)
-                } else {
-                    None
-                },
+                commit: self.option(Self::byte)?,
                 slacks: self.list()?,
-                stand: if self.bool()? {
-                    Some(self.real()?)
-                } else {
-                    None
-                },
+                stand: self.option(Self::real)?,
             },
             2 => Said::Busy {
                 number: self.word()?,
@@ -839,28 +729,17 @@ impl Reader<'_> {
                 mission: self.word()?,
                 answer: self.bool()?,
             },
-            4 => Said::Measured {
-                number: self.word()?,
-                mission: self.word()?,
-                anchor: self.real()?,
-                gap: self.byte()?,
-                growth: self.byte()?,
-                altitude_m: self.real()?,
-                power_w: self.real()?,
-                upsilon_per_w: self.real()?,
-                reaches: self.list()?,
-            },
-            5 => Said::Aside {
-                number: self.word()?,
-                mission: self.word()?,
-                anchor: self.real()?,
-                gap: self.byte()?,
-                growth: self.byte()?,
-                altitude_m: self.real()?,
-                power_w: self.real()?,
-                y_m: self.real()?,
-                reaches: self.list()?,
-            },
+            4 => {
+                let (sweep, [upsilon_per_w]) = self.sweep()?;
+                Said::Measured {
+                    sweep,
+                    upsilon_per_w,
+                }
+            }
+            5 => {
+                let (sweep, [y_m]) = self.sweep()?;
+                Said::Aside { sweep, y_m }
+            }
             6 => Said::Course {
                 number: self.word()?,
                 mission: self.word()?,
@@ -871,11 +750,7 @@ impl Reader<'_> {
             7 => Said::Worth {
                 number: self.word()?,
                 mission: self.word()?,
-                trial: if self.bool()? {
-                    Some(self.byte()?)
-                } else {
-                    None
-                },
+                trial: self.option(Self::byte)?,
                 slack_m: self.real()?,
                 outlook: self.reals()?,
             },
@@ -959,7 +834,6 @@ pub(crate) fn wide(value: f32) -> f64 {
     value.into()
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "this is the rounding")]
 pub(crate) fn narrow(value: f64) -> f32 {
     value as f32
 }

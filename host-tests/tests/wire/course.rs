@@ -1,6 +1,7 @@
 //! What the joint method says: sweeps from beside the line, courses, and what came of them. Their ranges, number by number,
 //! their counts, what is refused, and what a relay does with them.
 
+use host_tests::fixtures::paper;
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::joint::Outlook;
 use uav_relay::optimiser::joint::outlook::PARTS;
@@ -8,41 +9,21 @@ use uav_relay::optimiser::joint::trial::{Bar, TRIALS, Trial};
 use uav_relay::optimiser::ladder::Ladder;
 use uav_relay::place::{CrossSection, Station};
 use uav_relay::wire::digest::digest;
-use uav_relay::wire::message::{Course, MAX_BODY, Message, MessageError, Sweep, Worth};
-use uav_relay::{Band, Instant, Interference, MissionConfig, Placement, Port, Relay, Wiring};
+use uav_relay::wire::message::{Course, Message, Sweep, Worth};
+use uav_relay::{Instant, Interference, MissionConfig, Placement, Port, Relay, Wiring};
 
+use super::bodies::{
+    ENCODING, STRANGE, VALUE, assert_ranges, assert_refused_cut_and_longer, assert_refused_padded,
+    single, verdict_on, with, written, zeros,
+};
 use super::codec::Said;
-use super::receive::{FIELD, counted, paper, relay_of};
-use super::sequence::{FIRST, SECOND, framed, one_of_each, sent, settle};
-use super::strategies::pad;
-
-const ENCODING: Result<(), MessageError> = Err(MessageError::Encoding);
-const VALUE: Result<(), MessageError> = Err(MessageError::Value);
-
-/// What a receiver makes of a body; whatever it takes it writes as it was.
-fn verdict_on(body: &[u8]) -> Result<(), MessageError> {
-    let message = Message::decode(body)?;
-    assert_eq!(written(&message), body);
-    Ok(())
-}
-
-fn written(message: &Message) -> Vec<u8> {
-    let mut body = [0; MAX_BODY];
-    let len = message.encode(&mut body).unwrap();
-    body[..len].to_vec()
-}
+use super::receive::{FIELD, counted, relay_of};
+use super::sequence::{FIRST, SECOND, framed, one_of_each, sent, settle, source};
 
 fn aside() -> Said {
     Said::Aside {
-        number: 1,
-        mission: 2,
-        anchor: 1.5,
-        gap: 0,
-        growth: 0,
-        altitude_m: 20.0,
-        power_w: 1.0,
+        sweep: single(1.5),
         y_m: -12.5,
-        reaches: vec![100.0],
     }
 }
 
@@ -65,22 +46,6 @@ fn worth(trial: Option<u8>) -> Said {
         outlook: [0.5; 12],
     }
 }
-
-/// Puts `number` at `at` of a body.
-fn with(said: &Said, at: usize, number: f32) -> Vec<u8> {
-    let mut body = said.body();
-    body[at..at + 4].copy_from_slice(&number.to_le_bytes());
-    body
-}
-
-/// Numbers that are none.
-const STRANGE: [f32; 5] = [
-    f32::NAN,
-    -f32::NAN,
-    f32::from_bits(0x7F80_0001),
-    f32::INFINITY,
-    f32::NEG_INFINITY,
-];
 
 #[test]
 fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
@@ -106,20 +71,7 @@ fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
             (&course, trial + 16, 0.1, 1e5, "altitude of a trial"),
         ]);
     }
-    for (said, at, least, most, what) in ranges {
-        for good in [least, most] {
-            assert_eq!(verdict_on(&with(said, at, good)), Ok(()), "{what} {good}");
-        }
-        let beyond = [least.next_down(), most.next_up()];
-        for bad in beyond.into_iter().chain(STRANGE) {
-            assert_eq!(verdict_on(&with(said, at, bad)), VALUE, "{what} {bad}");
-        }
-        for zero in [0.0, -0.0] {
-            let fits = (least..=most).contains(&zero);
-            let read = verdict_on(&with(said, at, zero));
-            assert_eq!(read.is_ok(), fits, "{what} {zero}");
-        }
-    }
+    assert_ranges(&ranges);
 }
 
 #[test]
@@ -141,7 +93,6 @@ fn a_slack_and_every_number_of_an_outlook_are_finite_and_may_be_any_such() {
 
 #[test]
 fn a_course_has_up_to_three_trials() {
-    assert_eq!(TRIALS, 3);
     for count in 0..=u8::MAX {
         let mut body = course(1).body();
         let one = body.split_off(22);
@@ -169,10 +120,7 @@ fn a_worth_names_one_of_three_trials() {
 #[test]
 fn a_single_target_takes_one_reach_from_beside_the_line_too() {
     for count in 0..=17_u8 {
-        let mut body = aside().body();
-        body.truncate(23);
-        body.push(count);
-        body.extend(vec![0; 4 * usize::from(count)]);
+        let body = zeros(aside().body(), 23, count);
         let expected = match count {
             0 | 1 => Ok(()),
             2..=16 => VALUE,
@@ -192,23 +140,8 @@ fn cut_longer_and_padded_ones_are_refused() {
         worth(None),
         worth(Some(2)),
     ] {
-        let body = said.body();
-        assert_eq!(verdict_on(&body), Ok(()));
-        for len in 0..body.len() {
-            assert_eq!(verdict_on(&body[..len]), ENCODING, "{len} of {said:?}");
-        }
-        for extra in 0..=u8::MAX {
-            assert_eq!(verdict_on(&[&body[..], &[extra]].concat()), ENCODING);
-        }
-        let counted = !matches!(said, Said::Worth { .. });
-        for tag in [true, false].into_iter().filter(|&tag| tag || counted) {
-            for more in 0..9 {
-                let mut padded = body.clone();
-                pad(&mut padded, tag, more);
-                assert_eq!(padded.len(), body.len() + 1 + more);
-                assert_eq!(verdict_on(&padded), ENCODING, "{padded:x?}");
-            }
-        }
+        assert_refused_cut_and_longer(&said.body(), &format!("{said:?}"));
+        assert_refused_padded(&said.body(), !matches!(said, Said::Worth { .. }));
     }
 }
 
@@ -320,8 +253,7 @@ fn counted_of(interference: Interference, port: Port, tag: usize) -> Vec<&'stati
 
 #[test]
 fn what_came_of_a_course_that_is_not_awaited_is_stale() {
-    let source = paper(8).interference;
-    let read = counted_of(source, Port::Downstream, 7);
+    let read = counted_of(paper(8).interference, Port::Downstream, 7);
     assert_eq!(read, ["received", "stale"]);
 }
 
@@ -334,25 +266,10 @@ fn courses_and_asides_are_stale_in_a_field() {
     }
 }
 
-/// A mission with room above the line and to its sides.
-fn wide() -> MissionConfig {
-    MissionConfig {
-        band: Band {
-            least_m: 20.0,
-            most_m: 300.0,
-        },
-        lateral: Band {
-            least_m: -60.0,
-            most_m: 40.0,
-        },
-        ..paper(8)
-    }
-}
-
 /// Relay 4 of 8 once it knows where it is to be, with a place by the pass before the next; a course of the three before it, and
 /// what comes back of that.
 fn on_course(now: &mut Instant) -> (Relay, Said, Said) {
-    let mut relay = relay_of(wide(), 4, Wiring::Pair);
+    let mut relay = relay_of(source(), 4, Wiring::Pair);
     let kinds = one_of_each(FIRST, digest(relay.mission()));
     hear(&mut relay, *now, Port::Upstream, &kinds[5]);
     let mut out = Vec::new();
@@ -493,7 +410,7 @@ fn a_course_with_other_trials_does_not_repeat_and_asks_for_a_new_view() {
 
 #[test]
 fn a_course_asks_a_relay_for_a_new_view_that_does_not_know_where_it_is_to_be() {
-    let mut relay = relay_of(wide(), 4, Wiring::Pair);
+    let mut relay = relay_of(source(), 4, Wiring::Pair);
     let course = &one_of_each(FIRST, digest(relay.mission()))[6];
     hear(&mut relay, Instant::ZERO, Port::Upstream, course);
     assert_eq!(counted(relay.stats()), ["received", "stale"]);

@@ -1,5 +1,6 @@
 //! How a chain forms anew, frame by frame: hellos, a proposal through three relays, the count back, and what is refused.
 
+use host_tests::fixtures::{NETWORK, paper};
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::Header;
 use uav_relay::{
@@ -7,7 +8,7 @@ use uav_relay::{
 };
 
 use super::codec::{Forming, Said, plain, wire};
-use super::receive::{NETWORK, counted, paper, relay};
+use super::receive::{counted, relay};
 use super::sequence::{FIRST, framed, one_of_each, sent};
 
 pub(crate) const ASKS: u8 = 1;

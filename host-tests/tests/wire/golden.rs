@@ -8,7 +8,7 @@ use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message};
 
-use super::codec::{self, Said};
+use super::codec::{self, Said, Swept};
 use super::offer::Offer;
 
 #[derive(Deserialize)]
@@ -148,12 +148,12 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
     let some = |what: fn(&Said) -> bool| {
         assert!(frames.iter().any(|vector| what(&vector.message)));
     };
-    some(|said| matches!(said, Said::Sweep { reaches, .. } if reaches.len() == 16));
-    some(|said| matches!(said, Said::Sweep { gap: 0, reaches, .. } if reaches.len() == 1));
-    some(|said| matches!(said, Said::Sweep { reaches, .. } if reaches.is_empty()));
-    some(|said| matches!(said, Said::Sweep { gap: 255, .. }));
-    some(|said| matches!(said, Said::Sweep { anchor, .. } if *anchor == f32::MIN_POSITIVE));
-    some(|said| matches!(said, Said::Sweep { anchor, .. } if *anchor == f32::MAX));
+    some(|said| matches!(said, Said::Sweep(sweep) if sweep.reaches.len() == 16));
+    some(|said| matches!(said, Said::Sweep(sweep) if sweep.gap == 0 && sweep.reaches.len() == 1));
+    some(|said| matches!(said, Said::Sweep(sweep) if sweep.reaches.is_empty()));
+    some(|said| matches!(said, Said::Sweep(Swept { gap: 255, .. })));
+    some(|said| matches!(said, Said::Sweep(sweep) if sweep.anchor == f32::MIN_POSITIVE));
+    some(|said| matches!(said, Said::Sweep(sweep) if sweep.anchor == f32::MAX));
     some(|said| matches!(said, Said::Verdict { commit: None, slacks, .. } if slacks.is_empty()));
     some(
         |said| matches!(said, Said::Verdict { commit: Some(15), slacks, .. } if slacks.len() == 16),
@@ -161,12 +161,12 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
     some(|said| matches!(said, Said::Busy { .. }));
     some(|said| matches!(said, Said::Heartbeat { answer: true, .. }));
     some(|said| matches!(said, Said::Heartbeat { answer: false, .. }));
-    some(|said| matches!(said, Said::Measured { reaches, .. } if reaches.len() == 16));
+    some(|said| matches!(said, Said::Measured { sweep, .. } if sweep.reaches.len() == 16));
     some(|said| matches!(said, Said::Measured { upsilon_per_w, .. } if *upsilon_per_w == 1e-9));
     some(|said| matches!(said, Said::Measured { upsilon_per_w, .. } if *upsilon_per_w == 1e32));
-    some(|said| matches!(said, Said::Aside { reaches, .. } if reaches.len() == 16));
+    some(|said| matches!(said, Said::Aside { sweep, .. } if sweep.reaches.len() == 16));
     some(
-        |said| matches!(said, Said::Aside { y_m, reaches, .. } if *y_m == -1e5 && reaches.is_empty()),
+        |said| matches!(said, Said::Aside { y_m, sweep } if *y_m == -1e5 && sweep.reaches.is_empty()),
     );
     some(|said| matches!(said, Said::Aside { y_m, .. } if *y_m == 1e5));
     for count in 0..=3 {
@@ -199,7 +199,7 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
     some(|said| matches!(said, Said::Worth { slack_m, .. } if *slack_m == f32::MIN));
     some(|said| matches!(said, Said::Worth { outlook, .. } if outlook.contains(&f32::MAX)));
     some(|said| matches!(said, Said::Worth { outlook, .. } if outlook.contains(&f32::MIN)));
-    some(|said| matches!(said, Said::Sweep { anchor, .. } if *anchor < 0.0));
+    some(|said| matches!(said, Said::Sweep(sweep) if sweep.anchor < 0.0));
     some(|said| matches!(said, Said::Verdict { stand: None, .. }));
     some(|said| matches!(said, Said::Verdict { stand: Some(x_m), .. } if *x_m == 0.0));
     some(|said| matches!(said, Said::Verdict { stand: Some(x_m), .. } if *x_m == 1e6));

@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 
+use host_tests::fixtures::NETWORK;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -12,23 +13,17 @@ use uav_relay::{Instant, Port, Wiring};
 
 use super::codec::{Said, plain, wire};
 use super::config;
-use super::receive::{NETWORK, drain, relay};
+use super::receive::{drain, relay};
 use super::strategies::{messages, sweeps};
 use super::stream::unstuffed;
 
 /// Puts a number and a digest into a message, where it has them.
 pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
     match &mut said {
-        Said::Sweep {
-            number, mission, ..
+        Said::Sweep(sweep) | Said::Measured { sweep, .. } | Said::Aside { sweep, .. } => {
+            (sweep.number, sweep.mission) = (as_number, as_mission);
         }
-        | Said::Measured {
-            number, mission, ..
-        }
-        | Said::Verdict {
-            number, mission, ..
-        }
-        | Said::Aside {
+        Said::Verdict {
             number, mission, ..
         }
         | Said::Course {
@@ -69,10 +64,10 @@ fn lies_within_the_ranges_never_lead_out_of_bounds() {
             let now = Instant::ZERO;
             for (number, (sweep, verdict, plausible)) in (0..).zip(lies) {
                 let mut sweep = renamed(sweep, number, mission);
-                if let Said::Sweep { reaches, .. } = &mut sweep
+                if let Said::Sweep(sweep) = &mut sweep
                     && plausible
                 {
-                    for reach in reaches {
+                    for reach in &mut sweep.reaches {
                         *reach %= 1000.0;
                     }
                 }

@@ -2,14 +2,6 @@
 //! and with everything that must be refused.
 //!
 //! Random tests draw from the environment variable `SEED` (1 if unset), which each of them prints.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
 
 use crc::{CRC_32_ISCSI, Crc};
 use proptest::collection::vec;
@@ -18,6 +10,7 @@ use proptest::test_runner::{Config, RngSeed};
 use uav_relay::wire::crc::Crc32c;
 use uav_relay_oracle::random::seed;
 
+mod bodies;
 mod codec;
 mod course;
 mod damage;

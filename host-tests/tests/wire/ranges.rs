@@ -1,5 +1,6 @@
 //! The ranges of an offer, number by number, up to their bounds and no farther; and what an operator's upload is written as.
 
+use host_tests::fixtures::paper;
 use uav_relay::channel::AirGround;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::message::{Message, MessageError};
@@ -9,7 +10,6 @@ use super::offer::{
     ALTITUDE, BYTES, DISTANCE, ETA, INTERFERER, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, Offer, POWER,
     RELAYS, RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y, offer,
 };
-use super::receive::paper;
 
 /// Whether a body is taken; out of range is the only other thing that it may be.
 fn taken(body: &[u8]) -> bool {

@@ -4,24 +4,22 @@
 use std::cell::Cell;
 use std::collections::BTreeMap;
 
+use host_tests::fixtures::{self, NETWORK, paper};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use uav_relay::channel::AirGround;
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::DeframeError;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::{
-    Band, Channel, Duration, Field, FieldPoint, Identity, Instant, Interference, Interferer,
-    Mission, MissionConfig, Port, Profile, Relay, Settings, Stats, Wiring,
+    Duration, Field, FieldPoint, Instant, Interference, Mission, MissionConfig, Port, Relay,
+    Settings, Stats, Wiring,
 };
 
 use super::codec::{Said, sealed};
 use super::config;
 use super::strategies::pieces;
 use super::stream::{chunks, unstuffed};
-
-pub(crate) const NETWORK: u16 = 7;
 
 /// A field in which a chain of eight can be placed.
 pub(crate) const FIELD: Field = Field::new(&[
@@ -39,29 +37,6 @@ pub(crate) const FIELD: Field = Field::new(&[
     },
 ]);
 
-/// The paper's scenario.
-pub(crate) fn paper(relays: u16) -> MissionConfig {
-    MissionConfig {
-        relays,
-        distance_m: 1000.0,
-        min_separation_m: 4.0,
-        tx_power_w: 80.0,
-        common: Profile {
-            altitude_m: 20.0,
-            power_w: 1.0,
-        },
-        channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
-        band: Band::at(20.0),
-        lateral: Band::NONE,
-        interference: Interference::Source(Interferer {
-            power_w: 80.0,
-            x_m: 500.0,
-            y_m: 400.0,
-        }),
-        tolerance: 1e-4,
-    }
-}
-
 /// Relay `index` of `relays` in the paper's scenario, on network 7.
 pub(crate) fn relay(index: u16, relays: u16, wiring: Wiring) -> Relay {
     relay_of(paper(relays), index, wiring)
@@ -70,15 +45,11 @@ pub(crate) fn relay(index: u16, relays: u16, wiring: Wiring) -> Relay {
 /// Relay `index` of this mission, on network 7.
 pub(crate) fn relay_of(mission: MissionConfig, index: u16, wiring: Wiring) -> Relay {
     let mission = Mission::try_new(mission).unwrap();
-    let identity = Identity {
-        network: NETWORK,
-        index,
-    };
     let settings = Settings {
         wiring,
         ..Settings::default()
     };
-    Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
+    fixtures::relay(mission, index, settings)
 }
 
 /// The counters of which each incoming frame raises one.

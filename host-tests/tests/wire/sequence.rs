@@ -4,6 +4,7 @@
 use std::cell::Cell;
 use std::collections::BTreeMap;
 
+use host_tests::fixtures::{NETWORK, paper};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -13,11 +14,11 @@ use uav_relay::{
     Band, Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, Relay, Wiring,
 };
 
-use super::codec::{Forming, Said, plain, wire};
+use super::codec::{Forming, Said, Swept, plain, wire};
 use super::config;
 use super::lies::renamed;
 use super::offer::{Offer, offer};
-use super::receive::{FIELD, NETWORK, counted, drain, paper, relay_of};
+use super::receive::{FIELD, counted, drain, relay_of};
 use super::strategies::messages;
 use super::stream::unstuffed;
 
@@ -43,7 +44,7 @@ const WEAK: Field = Field::new(&[FieldPoint {
 pub(crate) const FIRST: u16 = 64;
 pub(crate) const SECOND: u16 = 65;
 
-/// The paper's scenario with other interference, between 20 m and 300 m, with room to both sides.
+/// The paper's scenario with this interference, between 20 m and 300 m, with room to both sides.
 fn mission(interference: Interference) -> MissionConfig {
     MissionConfig {
         interference,
@@ -59,7 +60,8 @@ fn mission(interference: Interference) -> MissionConfig {
     }
 }
 
-fn source() -> MissionConfig {
+/// The same with the paper's interferer.
+pub(crate) fn source() -> MissionConfig {
     mission(paper(8).interference)
 }
 
@@ -103,22 +105,22 @@ pub(crate) fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> 
 }
 
 /// One message of each tag, of this pass.
-#[expect(clippy::too_many_lines, reason = "a message of each tag")]
 pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     let x_m = 400.0;
     let altitude_m = 20.0;
-    let (anchor, power_w) = (1.0, 1.0);
+    let power_w = 1.0;
+    let sweep = Swept {
+        number,
+        mission,
+        anchor: 1.0,
+        gap: 0,
+        growth: 0,
+        altitude_m,
+        power_w,
+        reaches: vec![x_m],
+    };
     vec![
-        Said::Sweep {
-            number,
-            mission,
-            anchor,
-            gap: 0,
-            growth: 0,
-            altitude_m,
-            power_w,
-            reaches: vec![x_m],
-        },
+        Said::Sweep(sweep.clone()),
         Said::Verdict {
             number,
             mission,
@@ -133,27 +135,10 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             answer: false,
         },
         Said::Measured {
-            number,
-            mission,
-            anchor,
-            gap: 0,
-            growth: 0,
-            altitude_m,
-            power_w,
+            sweep: sweep.clone(),
             upsilon_per_w: 1e8,
-            reaches: vec![x_m],
         },
-        Said::Aside {
-            number,
-            mission,
-            anchor,
-            gap: 0,
-            growth: 0,
-            altitude_m,
-            power_w,
-            y_m: -12.5,
-            reaches: vec![x_m],
-        },
+        Said::Aside { sweep, y_m: -12.5 },
         Said::Course {
             number,
             mission,
@@ -302,17 +287,15 @@ fn a_sweep_goes_the_way_of_the_mission_and_its_verdict_back() {
             let [
                 (
                     port,
-                    Said::Sweep {
-                        number: FIRST,
-                        reaches,
-                        ..
-                    },
+                    Said::Sweep(Swept {
+                        number, reaches, ..
+                    }),
                 ),
             ] = &out[..]
             else {
                 panic!("{out:?}");
             };
-            assert_eq!(*port, to);
+            assert_eq!((*port, *number), (to, FIRST));
             assert_eq!(reaches[0] > 400.0, to == Port::Downstream, "a step onward");
             relay.handle_bytes(now, from, &framed(4, from, &kinds[kind]));
             assert_eq!(
@@ -421,15 +404,15 @@ fn what_comes_from_beyond_rx_is_of_no_use() {
 
     let (mut relay, from, to) = relay_4(mission(Interference::Field(FIELD)));
     let mut sweep = one_of_each(FIRST, digest(relay.mission()))[0].clone();
-    if let Said::Sweep { reaches, .. } = &mut sweep {
-        reaches[0] = 1000.0_f32.next_up();
+    if let Said::Sweep(sweep) = &mut sweep {
+        sweep.reaches[0] = 1000.0_f32.next_up();
     }
     relay.handle_bytes(now, from, &framed(4, from, &sweep));
     let out = sent(&mut relay, now);
-    let [(port, Said::Sweep { reaches, .. })] = &out[..] else {
+    let [(port, Said::Sweep(sweep))] = &out[..] else {
         panic!("{out:?}");
     };
-    assert_eq!((*port, &reaches[..]), (to, &[][..]));
+    assert_eq!((*port, &sweep.reaches[..]), (to, &[][..]));
 }
 
 /// In a field there are no turns: such a pass changes nothing about the one under way.
@@ -447,33 +430,19 @@ fn tokens_are_stale_in_a_field() {
 }
 
 /// Makes a message one that may well be of this mission.
-#[expect(clippy::too_many_lines, reason = "an arm for each message")]
 fn tamed(said: Said) -> Said {
     let into = |reach: f32| reach % 1000.0;
     match said {
-        Said::Sweep {
-            number,
-            mission,
-            anchor,
-            gap,
-            growth,
-            altitude_m,
-            power_w,
-            mut reaches,
-        } => {
-            for reach in &mut reaches {
-                *reach = into(*reach);
-            }
-            Said::Sweep {
-                number,
-                mission,
-                anchor: 1.0_f32.copysign(anchor),
-                gap: gap.min(140),
-                growth: if gap == 0 { 0 } else { growth.min(4) },
-                altitude_m,
-                power_w,
-                reaches,
-            }
+        Said::Sweep(mut sweep) => {
+            sweep.anchor = 1.0_f32.copysign(sweep.anchor);
+            sweep.growth = if sweep.gap == 0 {
+                0
+            } else {
+                sweep.growth.min(4)
+            };
+            sweep.gap = sweep.gap.min(140);
+            sweep.reaches = sweep.reaches.into_iter().map(into).collect();
+            Said::Sweep(sweep)
         }
         Said::Verdict {
             number,
@@ -496,28 +465,13 @@ fn tamed(said: Said) -> Said {
                 stand: stand.map(into),
             }
         }
-        Said::Aside {
-            number,
-            mission,
-            altitude_m,
-            y_m,
-            mut reaches,
-            ..
-        } => {
-            reaches.truncate(1);
-            for reach in &mut reaches {
-                *reach = into(*reach);
-            }
+        Said::Aside { mut sweep, y_m } => {
+            (sweep.anchor, sweep.gap, sweep.growth) = (1.0, 0, 0);
+            sweep.power_w = 1.0;
+            sweep.reaches = sweep.reaches.into_iter().take(1).map(into).collect();
             Said::Aside {
-                number,
-                mission,
-                anchor: 1.0,
-                gap: 0,
-                growth: 0,
-                altitude_m,
-                power_w: 1.0,
+                sweep,
                 y_m: y_m % 100.0,
-                reaches,
             }
         }
         Said::Course {
@@ -565,8 +519,8 @@ fn the_smallest_targets_are_met_in_a_field() {
             let mut relay = relay_of(mission(Interference::Field(field)), own, Wiring::Pair);
             let now = Instant::ZERO;
             let mut sweep = one_of_each(FIRST, digest(relay.mission()))[0].clone();
-            if let Said::Sweep { anchor: own, .. } = &mut sweep {
-                *own = anchor;
+            if let Said::Sweep(sweep) = &mut sweep {
+                sweep.anchor = anchor;
             }
             relay.handle_bytes(
                 now,
@@ -574,7 +528,7 @@ fn the_smallest_targets_are_met_in_a_field() {
                 &framed(own, Port::Downstream, &sweep),
             );
             match &sent(&mut relay, now)[..] {
-                [(Port::Upstream, Said::Sweep { reaches, .. })] => {
+                [(Port::Upstream, Said::Sweep(Swept { reaches, .. }))] => {
                     // As near to Tx as the three relays before it leave room for.
                     assert!((12.0..12.1).contains(&reaches[0]), "{reaches:?}");
                 }

@@ -96,7 +96,7 @@ fn a_pass_waits_for_a_neighbour_that_takes_another() {
     assert!(
         matches!(
             &out[..],
-            [(Port::Shared, Said::Sweep { number: FIRST, .. })]
+            [(Port::Shared, Said::Sweep(sweep))] if sweep.number == FIRST
         ),
         "{out:?}"
     );

@@ -3,12 +3,13 @@
 use blake2::Blake2sMac;
 use blake2::digest::consts::U8;
 use blake2::digest::{FixedOutput, Mac};
+use host_tests::fixtures::{NETWORK, paper};
 use uav_relay::wire::auth::{Auth, Key, TAG};
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Identity, Instant, Mission, Port, Relay, Settings, Wiring};
 
 use super::codec::{Said, header, sealed, wire};
-use super::receive::{NETWORK, paper};
+
 use super::stream::unstuffed;
 use uav_relay::wire::frame::Header;
 

@@ -6,7 +6,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay::wire::frame::Header;
 
-use super::codec::{Forming, Said, plain, sealed, targets, wire};
+use super::codec::{Forming, Said, Swept, plain, sealed, targets, wire};
 use super::offered::{NUMBERS, offers};
 
 /// The largest node number.
@@ -82,7 +82,7 @@ pub(crate) fn sweeps(least: usize) -> BoxedStrategy<Said> {
                 if gap == 0 {
                     reaches.truncate(1);
                 }
-                Said::Sweep {
+                Said::Sweep(Swept {
                     number,
                     mission,
                     anchor: sign * anchor,
@@ -91,7 +91,7 @@ pub(crate) fn sweeps(least: usize) -> BoxedStrategy<Said> {
                     altitude_m,
                     power_w,
                     reaches,
-                }
+                })
             },
         )
         .boxed()
@@ -134,25 +134,9 @@ pub(crate) fn measured(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
     ];
     (plain, upsilons)
         .prop_map(|(said, upsilon_per_w)| match said {
-            Said::Sweep {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
-                reaches,
-            } => Said::Measured {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
+            Said::Sweep(sweep) => Said::Measured {
+                sweep,
                 upsilon_per_w,
-                reaches,
             },
             other => other,
         })
@@ -163,26 +147,7 @@ pub(crate) fn measured(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
 pub(crate) fn asides(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
     (plain, beside())
         .prop_map(|(said, y_m)| match said {
-            Said::Sweep {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
-                reaches,
-            } => Said::Aside {
-                number,
-                mission,
-                anchor,
-                gap,
-                growth,
-                altitude_m,
-                power_w,
-                y_m,
-                reaches,
-            },
+            Said::Sweep(sweep) => Said::Aside { sweep, y_m },
             other => other,
         })
         .boxed()

@@ -1,13 +1,14 @@
 //! Uploads, message by message, as the document has them: who is offered what, what a proposal of another mission leads to, and
 //! what is left after a reboot. `ground` has what Tx and Rx say.
 
+use host_tests::fixtures::paper;
 use uav_relay::wire::digest::digest;
 use uav_relay::{Duration, Event, Instant, Interference, Mission, Port, Relay, Upload, Wiring};
 
 use super::codec::{Forming, Said};
 use super::forming::{ASKS, FLIES, FORMS, FRESH, READY, events};
 use super::offer::{BYTES, Offer, offer};
-use super::receive::{FIELD, counted, paper, relay};
+use super::receive::{FIELD, counted, relay};
 use super::sequence::{FIRST, framed, one_of_each, sent};
 use super::signed::{Peer, said, set, with_key};
 

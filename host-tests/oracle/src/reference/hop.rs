@@ -1,6 +1,6 @@
 //! One hop with its sender held still: the SIR as a function of the receiver's place, and bisections on it.
 
-use super::{Link, meets, received_w};
+use super::link::{Link, meets, received_w};
 
 /// Halvings after which any f64 interval in metres has collapsed to neighbours, with room to spare.
 const HALVINGS: usize = 200;

@@ -1,7 +1,7 @@
 //! The best target of a chain, by bisection, and the paper's fixed-step schedule.
 
-use super::Link;
 use super::hop::Hop;
+use super::link::Link;
 
 /// Relative width at which the bracket of a target is narrow enough.
 const TOLERANCE: f64 = 1e-13;

@@ -1,7 +1,7 @@
 //! How far a single node may stand, and the greedy chain built from that.
 
 use super::hop::{Hop, bisect};
-use super::{Link, meets};
+use super::link::{Link, meets};
 
 impl Link {
     /// The farthest place in [`from_x`, D], metres, at which relay `k` in 1..=N meets `target` (linear, > 0) while relay k-1

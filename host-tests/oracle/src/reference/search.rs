@@ -1,6 +1,6 @@
 //! Brute force over the places themselves, for chains of one or two relays: no target, no reach, nothing greedy.
 
-use super::Link;
+use super::link::Link;
 
 /// Golden-section steps per refined cell: the cell shrinks by about 2e-9.
 const STEPS: usize = 42;

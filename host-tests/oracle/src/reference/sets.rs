@@ -6,7 +6,7 @@
 //! places in the gap after an interval (sender at the interval's end).
 
 use super::hop::{Hop, bisect};
-use super::{Link, meets};
+use super::link::{Link, meets};
 
 type Interval = (f64, f64);
 

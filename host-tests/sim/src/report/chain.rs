@@ -7,11 +7,11 @@ use serde::Serialize;
 use uav_relay::{Interference, Mission};
 
 use super::attack::AttackReport;
-use super::flown::{offered, version};
+use super::flown::version;
+use super::hops::{self, RelayReport, db, hop_sirs};
 use super::left::{LostReport, left, lost};
 use super::recovery::{self, RecoveryReport, recoveries};
-use super::timeline::{self, MomentReport};
-use super::{RelayReport, db, hop_sirs};
+use super::timeline::{self, MomentReport, seconds};
 use crate::simulator::outcome::{Ending, Outcome, Turning};
 use crate::simulator::setup::Setup;
 
@@ -130,8 +130,8 @@ impl ChainReport {
         let places = places.unwrap_or_default();
         let sirs = hop_sirs(mission, &places);
         let worst = sirs.iter().copied().reduce(f64::min);
-        let mut relays = super::relays(&places, &sirs);
-        let offered = offered(&outcome.moments);
+        let mut relays = hops::relays(&places, &sirs);
+        let offered = outcome.offered();
         for (report, (node, relay)) in relays.iter_mut().zip(&chain) {
             report.index = *node;
             report.version = offered.map(|_| relay.version);
@@ -232,7 +232,7 @@ impl ChainReport {
 
     /// The report as a table to read, and what it cost.
     pub fn table(&self) -> String {
-        let mut text = super::hops_table(&self.relays, &self.lost, self.rx_sir, self.room);
+        let mut text = hops::hops_table(&self.relays, &self.lost, self.rx_sir, self.room);
         if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
             _ = writeln!(
                 text,
@@ -316,11 +316,6 @@ impl ChainReport {
     }
 }
 
-/// Virtual time since the start, s.
-pub(super) fn seconds(at: uav_relay::Instant) -> f64 {
-    at.as_micros() as f64 / 1e6
-}
-
 /// Who noticed the relays that really went silent; over a bad link a living one may be missed for a while as well.
 fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
     let killed = |index: u16| {
@@ -355,7 +350,9 @@ fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
 
 fn error(method: &str, outcome: &Outcome) -> Option<String> {
     let error = ended(method, outcome)?;
-    let missing = offered(&outcome.moments).filter(|newest| *newest > version(outcome));
+    let missing = outcome
+        .offered()
+        .filter(|newest| *newest > version(outcome));
     Some(match missing {
         Some(version) => format!("{error}; mission {version} was not adopted"),
         None => error,

@@ -3,7 +3,7 @@
 use uav_relay::Mission;
 
 use super::left::left;
-use crate::simulator::outcome::{Moment, Outcome, Turning};
+use crate::simulator::outcome::Outcome;
 use crate::simulator::setup::Setup;
 
 /// The mission that the chain flies when a run of `setup` has ended, with all its relays: what a report has to be of.
@@ -21,13 +21,4 @@ pub(super) fn version(outcome: &Outcome) -> u16 {
     let chain = left(outcome);
     let versions = chain.iter().map(|(_, relay)| relay.version);
     versions.max().unwrap_or(0)
-}
-
-/// The newest mission that the ground has begun to upload, by its version.
-pub(super) fn offered(moments: &[Moment]) -> Option<u16> {
-    let versions = moments.iter().filter_map(|moment| match moment.what {
-        Turning::Offered(version) => Some(version),
-        _ => None,
-    });
-    versions.max()
 }

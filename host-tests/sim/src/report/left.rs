@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::flown::offered;
 use crate::simulator::outcome::{Ending, Outcome, RelayEnd};
 
 /// A relay that is not in the chain any more.
@@ -69,7 +68,7 @@ pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostRepo
             x_m: relay.setpoint.map(|place| f64::from(place.x_m)),
             y_m: relay.setpoint.map(|place| f64::from(place.y_m)),
             h_m: relay.setpoint.map(|place| f64::from(place.altitude_m)),
-            version: offered(&outcome.moments).map(|_| relay.version),
+            version: outcome.offered().map(|_| relay.version),
             why: match outcome.ending {
                 _ if relay.killed.is_some() => "silent",
                 Ending::Cut => "cut",

@@ -6,8 +6,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use uav_relay::Instant;
 
-use super::chain::seconds;
-use super::timeline::list;
+use super::timeline::{list, seconds};
 use crate::simulator::outcome::{Moment, Turning};
 
 /// One new view of the chain. All times are of virtual time since the start, s.

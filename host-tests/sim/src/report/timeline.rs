@@ -3,9 +3,14 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use uav_relay::Instant;
 
-use super::chain::seconds;
 use crate::simulator::outcome::{Moment, Turning};
+
+/// Virtual time since the start, s.
+pub(super) fn seconds(at: Instant) -> f64 {
+    at.as_micros() as f64 / 1e6
+}
 
 /// One moment.
 #[derive(Clone, PartialEq, Debug, Serialize)]

@@ -8,7 +8,7 @@ use toml::Table;
 use super::check::{mistake, wrong_type};
 use super::error::{Problem, ScenarioError};
 use super::keys::number;
-use super::{
+use super::spec::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
 };
 

@@ -10,164 +10,16 @@ mod error;
 mod file;
 mod keys;
 mod read;
+mod spec;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 pub use error::{Problem, ScenarioError};
-
-/// Everything a host tool has to know about a flight, in SI units, with x along the line from Tx (x = 0) to Rx and y to the
-/// right of it as seen from above.
-///
-/// A value that came from [`Scenario::load`] or [`Scenario::parse`] lies within the ranges given here.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Scenario {
-    /// Distance D from Tx to Rx, in metres, 1 to 1e6.
-    pub distance_m: f64,
-    /// Common altitude of the relays, in metres, 0.1 to 1e5.
-    pub altitude_m: f64,
-    /// Lowest altitude the joint methods may choose, in metres, 0.1 to `altitude_m` (its default).
-    pub altitude_min_m: f64,
-    /// Highest altitude the joint methods may choose, in metres, `altitude_m` (its default) to 1e5.
-    pub altitude_max_m: f64,
-    /// How far to the left of the line the joint method may choose places, as y in metres, -1e5 to 0 (its default).
-    pub lateral_min_m: f64,
-    /// How far to its right, as y in metres, 0 (its default) to 1e5.
-    pub lateral_max_m: f64,
-    /// Smallest distance allowed between two relays, in metres, 0 (its default) to 1e5.
-    pub min_separation_m: f64,
-    /// Transmit power of Tx, in watts, 1e-6 to 1e6.
-    pub tx_w: f64,
-    /// Transmit power of every relay that has none of its own, in watts, 1e-6 to 1e6.
-    pub uav_w: f64,
-    /// How signals weaken with distance.
-    pub channel: ChannelSpec,
-    /// What disturbs the hops.
-    pub interference: Interference,
-    /// What differs for single relays, by relay number (1 to 1000, 1 is next to Tx).
-    pub relays: BTreeMap<u16, RelayOverride>,
-}
-
-/// The radio channel: its carrier and the excess losses over free space.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ChannelSpec {
-    /// Carrier frequency, in hertz, 1e6 to 1e12.
-    pub carrier_hz: f64,
-    /// Excess loss of a line-of-sight link, in dB, 0 to 200.
-    pub excess_loss_los_db: f64,
-    /// Excess loss of an obstructed link, in dB, `excess_loss_los_db` to 200.
-    pub excess_loss_nlos_db: f64,
-    /// Which path loss the links between the ground and the air have.
-    pub air_ground: AirGround,
-}
-
-/// The path loss eta of a link between the ground and the air.
-#[derive(Debug, Clone, PartialEq)]
-pub enum AirGround {
-    /// That of a line-of-sight link.
-    Los,
-    /// That of an obstructed link.
-    Nlos,
-    /// This weight, 0 to 1, times the line-of-sight one, plus the rest times the obstructed one.
-    Weight(f64),
-}
-
-/// What disturbs the hops: known transmitters, or a random field along x.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Interference {
-    /// One interferer or more; never empty when it was read from a file.
-    Sources(Vec<Source>),
-    /// An interference power known only by its distribution.
-    Field(Field),
-}
-
-/// One interfering transmitter, on the ground.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Source {
-    /// Transmit power, in watts, 1e-6 to 1e9.
-    pub power_w: f64,
-    /// Place along the line from Tx to Rx, in metres, -1e7 to 1e7 (0 is Tx; beyond Rx is allowed).
-    pub x_m: f64,
-    /// Offset from that line on the ground, in metres, -1e7 to 1e7: to its right above 0.
-    pub y_m: f64,
-}
-
-/// Interference power I(x) such that I / `i_max_w` has a Beta distribution that depends on x.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Field {
-    /// Upper bound on the received interference power, in watts, 1e-30 to 1e6.
-    pub i_max_w: f64,
-    /// The distribution at some places, sorted by strictly increasing x; never empty when read from a file.
-    pub beta: Vec<BetaPoint>,
-}
-
-/// The distribution of the interference at one place.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BetaPoint {
-    /// Place along the line from Tx to Rx, in metres, -1e7 to 1e7.
-    pub x_m: f64,
-    /// First shape parameter, above 1 (E[1/I] is infinite otherwise) and at most 1e6.
-    pub alpha: f64,
-    /// Second shape parameter, above 0 and at most 1e6.
-    pub beta: f64,
-}
-
-/// What differs for one relay; at least one field is set when it was read from a file.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct RelayOverride {
-    /// Altitude it holds, in metres, 0.1 to 1e5; the altitude band, which is for the joint methods, does not bind it.
-    pub altitude_m: Option<f64>,
-    /// Its own transmit power, in watts, 1e-6 to 1e6.
-    pub power_w: Option<f64>,
-}
-
-impl Default for ChannelSpec {
-    /// The paper's channel: 2 GHz, 0.1 dB and 21 dB of excess loss, line of sight between ground and air.
-    fn default() -> Self {
-        Self {
-            carrier_hz: 2e9,
-            excess_loss_los_db: 0.1,
-            excess_loss_nlos_db: 21.0,
-            air_ground: AirGround::Los,
-        }
-    }
-}
-
-impl Default for Scenario {
-    /// The paper's multi-hop scenario: 1 km, relays at 20 m and 4 m apart at least, one 80 W interferer halfway.
-    fn default() -> Self {
-        Self {
-            distance_m: 1000.0,
-            altitude_m: 20.0,
-            altitude_min_m: 20.0,
-            altitude_max_m: 20.0,
-            lateral_min_m: 0.0,
-            lateral_max_m: 0.0,
-            min_separation_m: 4.0,
-            tx_w: 80.0,
-            uav_w: 1.0,
-            channel: ChannelSpec::default(),
-            interference: Interference::Sources(vec![Source {
-                power_w: 80.0,
-                x_m: 500.0,
-                y_m: 400.0,
-            }]),
-            relays: BTreeMap::new(),
-        }
-    }
-}
+pub use spec::{
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
+};
 
 impl Scenario {
-    /// Every interferer, as a picture wants it: power in watts, place along x and offset y in metres; none in a field.
-    pub fn sources(&self) -> Vec<(f64, f64, f64)> {
-        match &self.interference {
-            Interference::Sources(sources) => {
-                sources.iter().map(|s| (s.power_w, s.x_m, s.y_m)).collect()
-            }
-            Interference::Field(_) => Vec::new(),
-        }
-    }
-
     /// Reads a scenario file of at most 1 MiB.
     ///
     /// # Errors

@@ -5,11 +5,12 @@ mod ending;
 mod flight;
 mod ground;
 mod start;
+mod state;
+mod station;
 mod story;
 mod strike;
 
-pub use flight::FlightSpec;
-pub use ground::UploadSpec;
+pub use state::Chain;
 
 use std::collections::BTreeMap;
 
@@ -17,14 +18,13 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::settings::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::wire::upload::Upload;
-use uav_relay::{Instant, Method, Placement, Relay, Sample};
+use uav_relay::{Instant, Method, Placement, Sample};
 
-use flight::Flight;
-use ground::{Station, stations};
 use start::{Start, switched_on};
+use state::Member;
+use station::stations;
 
-use super::attack::{Attacker, Struck};
+use super::attack::Struck;
 use super::faults::Injected;
 use super::link::Line;
 use super::outcome::{Ending, Outcome, RelayEnd, Turning};
@@ -33,48 +33,6 @@ use super::setup::Setup;
 
 /// After this many happenings the run is given up: some minutes of computing.
 const MOST_HAPPENINGS: u64 = 400_000_000;
-
-/// One relay in the run.
-#[derive(Debug)]
-struct Member {
-    relay: Relay,
-    /// Its number in the mission, from 1.
-    node: u16,
-    /// Its lines: toward Tx (or to all), toward Rx.
-    lines: [Line; 2],
-    killed: Option<Instant>,
-    /// How often it has been switched on.
-    starts: u32,
-    /// Passes that it has begun before it was switched on last.
-    swept: u32,
-    /// What it has stored of uploads.
-    stored: Option<Upload>,
-    /// Where it was told to fly when that was last found to be within its limits.
-    safe: Option<Placement>,
-    /// Its neighbours toward Tx and Rx when it was heard last.
-    beside: [Option<u16>; 2],
-    /// The wake-up in the queue that counts: the earliest one. Any other is void.
-    wake: Option<Instant>,
-}
-
-/// A chain under way.
-#[derive(Debug)]
-pub struct Chain {
-    setup: Setup,
-    members: Vec<Member>,
-    queue: Queue,
-    rng: ChaCha8Rng,
-    outcome: Outcome,
-    now: Instant,
-    happenings: u64,
-    /// How often a relay has taken a place.
-    holding: usize,
-    /// Kills, boots, partitions and strikes that are still to come.
-    ahead: usize,
-    stations: Vec<Station>,
-    attacker: Option<Attacker>,
-    flight: Option<Flight>,
-}
 
 impl Chain {
     /// Switches every relay on at time 0.

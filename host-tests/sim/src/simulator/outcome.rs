@@ -142,4 +142,13 @@ impl Outcome {
         let places = self.relays.iter().map(|relay| relay.setpoint);
         places.map(|place| place.map(bits)).collect()
     }
+
+    /// The newest mission that the ground has begun to upload, by its version.
+    pub fn offered(&self) -> Option<u16> {
+        let versions = self.moments.iter().filter_map(|moment| match moment.what {
+            Turning::Offered(version) => Some(version),
+            _ => None,
+        });
+        versions.max()
+    }
 }

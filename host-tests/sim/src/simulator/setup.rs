@@ -2,10 +2,10 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::{Auth, Instant, Key, Mission, Profile, Settings, Wiring};
+use uav_relay::{Auth, Instant, Key, Mission, Profile, Settings, Side, Upload, Wiring};
 
 use super::attack::Attack;
-use super::chain::{FlightSpec, UploadSpec};
+use super::drones::FlightSpec;
 use super::faults::Faults;
 use super::link::LinkSpec;
 
@@ -26,6 +26,17 @@ impl Partition {
         let during = now >= self.from && self.until.is_none_or(|until| now < until);
         during && (one <= self.after) != (other <= self.after)
     }
+}
+
+/// A mission that is uploaded in the run.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct UploadSpec {
+    /// Where: the transmitter is upstream of the chain, the receiver downstream.
+    pub end: Side,
+    /// When.
+    pub at: Instant,
+    /// What.
+    pub upload: Upload,
 }
 
 /// The stream of random numbers that keys are drawn from.

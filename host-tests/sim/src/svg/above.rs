@@ -5,14 +5,12 @@
 use super::axis::{self, Frame, Scale};
 use super::canvas::Canvas;
 use super::labels::{Area, Labels, width};
-use super::{BOTTOM, LEFT, Picture, RIGHT, Room, TOP, hops, length, nodes, sources};
-
-/// By how much the picture is higher with this view.
-pub(super) const HEIGHT: f64 = 232.0;
+use super::picture::{ABOVE, BOTTOM, LEFT, Picture, RIGHT, Room, TOP, length};
+use super::{hops, nodes, sources};
 
 /// The plot, edge by edge: as high as fits, below the axis of the view from the side.
 const PLOT_TOP: f64 = BOTTOM + 52.0;
-const PLOT_BOTTOM: f64 = BOTTOM + HEIGHT;
+const PLOT_BOTTOM: f64 = BOTTOM + ABOVE;
 
 /// Height of the words.
 const SIZE: f64 = 10.0;

@@ -1,7 +1,7 @@
 //! What happened to the chain, as a strip below the picture: one sign for each event, evenly spaced, whenever it was.
 
 use super::canvas::Canvas;
-use super::{Picture, WIDTH, bottom};
+use super::picture::{Picture, WIDTH, bottom};
 
 /// Height of the strip.
 const STRIP: f64 = 84.0;

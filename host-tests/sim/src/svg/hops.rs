@@ -3,7 +3,7 @@
 use super::axis::Frame;
 use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
-use super::{Picture, decibels, length, placed, worst};
+use super::picture::{Picture, decibels, length, placed, worst};
 
 /// Colours by dB above the worst hop, up to so many dB. Four of Okabe and Ito's, told apart by every kind of eye;
 /// the worst hops are also the widest lines, for prints without colour.

@@ -3,7 +3,7 @@
 use super::canvas::Canvas;
 use super::hops::CLASSES;
 use super::nodes::cross;
-use super::{Picture, bottom};
+use super::picture::{Picture, bottom};
 
 /// Draws the legend below the plot.
 pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {

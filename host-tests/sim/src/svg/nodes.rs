@@ -3,7 +3,7 @@
 use super::axis::{Frame, round_step};
 use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
-use super::{Picture, is_gone, length, placed};
+use super::picture::{Picture, is_gone, length, placed};
 
 /// Height of a relay's number.
 const SIZE: f64 = 9.0;

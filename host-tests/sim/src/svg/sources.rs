@@ -3,7 +3,7 @@
 use super::axis::Frame;
 use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
-use super::{LEFT, Picture, RIGHT, TOP, length};
+use super::picture::{LEFT, Picture, RIGHT, TOP, length};
 
 /// Height of the words, and from one line of them to the next.
 const SIZE: f64 = 10.0;

@@ -6,7 +6,7 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`locus`], [`single`], [`single_gains`], [`aside`] | one relay |
+//! | [`locus`], [`single`], [`single_gains`], [`single_sheet`], [`aside`] | one relay |
 //! | [`fewest`], [`convergence`], [`gain`], [`cost`] | chains at one altitude |
 //! | [`beta`], [`stochastic`] | fields of interference |
 //! | [`altitude`], [`adjust`], [`joint`] | altitudes |
@@ -36,6 +36,7 @@ pub mod sheet;
 mod signs;
 pub mod single;
 pub mod single_gains;
+pub mod single_sheet;
 pub mod stochastic;
 pub mod trouble;
 pub mod walk;
@@ -55,7 +56,7 @@ pub struct Figure {
 /// Every figure, in the order of the paper, then this project's own.
 pub const ALL: [Figure; 15] = [
     figure("locus", locus::sheet),
-    figure("single", single::sheet),
+    figure("single", single_sheet::sheet),
     figure("fewest-by-place", fewest::by_place_sheet),
     figure("fewest-by-power", fewest::by_power_sheet),
     figure("convergence", convergence::sheet),

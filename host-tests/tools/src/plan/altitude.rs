@@ -10,7 +10,9 @@ use uav_relay::optimiser::pass::{Behind, Link};
 use uav_relay::place::Station;
 use uav_relay::{Method, Placement};
 
-use super::{Briefed, NoPlan, Plan, source};
+use super::briefed::Briefed;
+use super::found::{NoPlan, Plan};
+use super::source;
 use uav_relay_sim::scenario::Scenario;
 use uav_relay_sim::simulator::chain;
 use uav_relay_sim::simulator::outcome::Ending;

@@ -5,8 +5,10 @@
 use uav_relay::planning::fleet::ranges;
 use uav_relay::planning::single::stochastic;
 
+use super::ask::{Ask, Number};
+use super::briefed::{Briefed, is_free};
+use super::found::{NoPlan, Plan};
 use super::source::{fewest, nothing, placed, solved};
-use super::{Ask, Briefed, NoPlan, Number, Plan};
 use uav_relay_sim::scenario::Scenario;
 
 pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
@@ -47,7 +49,7 @@ fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan
     }
     let target = ranges::best(&briefed.mission, profile).ok_or_else(nothing)?;
     let places = placed(&briefed, target).ok_or_else(nothing)?;
-    let proven = super::is_free(scenario, |free| {
+    let proven = is_free(scenario, |free| {
         let free = Briefed::new(free, relays, tolerance).ok()?;
         let most = ranges::best(&free.mission, profile)?;
         Some(f64::from(most) <= f64::from(target) * (1.0 + tolerance))

@@ -6,7 +6,8 @@ use serde::Serialize;
 
 use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
 
-use super::{Number, Plan};
+use super::ask::Number;
+use super::found::Plan;
 
 /// The one interferer that stands for several.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]

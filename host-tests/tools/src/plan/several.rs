@@ -5,8 +5,10 @@
 
 use uav_relay::Placement;
 
-use super::{Ask, Briefed, Fitted, MOST_RELAYS, NoPlan, Number, Plan};
-use super::{altitude, source};
+use super::ask::{Ask, Number};
+use super::briefed::{Briefed, MOST_RELAYS};
+use super::found::{Fitted, NoPlan, Plan};
+use super::{altitude, one, source};
 use crate::multi_interferer::{best_common_altitude, optimum, polish};
 use uav_relay_sim::command::narrow;
 use uav_relay_sim::hypothetical::Hypothetical;
@@ -94,7 +96,7 @@ impl Planner<'_> {
             number: Number::Of(relays),
             ..*self.ask
         };
-        let by_one = match source::plan(&self.with_one(), &ask) {
+        let by_one = match one::plan(&self.with_one(), &ask) {
             Ok(plan) => {
                 let sir = scene.chain_sir(&plan.chain());
                 Some((plan, sir))

@@ -1,25 +1,15 @@
-//! Plans against one interferer.
+//! Places against one interferer: one relay by a theorem, several at the altitudes they hold.
 
 use uav_relay::optimiser::plan as silent;
 use uav_relay::planning::fleet;
 use uav_relay::planning::single::{Found, aside, free, given_altitude, given_x};
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 
-use super::{Ask, Briefed, MOST_RELAYS, NoPlan, Number, Plan, Theorem, altitude};
+use super::ask::Ask;
+use super::briefed::{Briefed, MOST_RELAYS, is_free};
+use super::found::{NoPlan, Plan, Theorem};
 use uav_relay_sim::command::narrow;
 use uav_relay_sim::scenario::Scenario;
-
-pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
-    match ask.number {
-        Number::Of(1) => alone(scenario, ask),
-        Number::Of(relays) if ask.free_altitude => altitude::best(scenario, relays, ask.tolerance),
-        Number::Of(relays) => best(scenario, relays, ask.tolerance),
-        Number::Meeting(target) if ask.free_altitude => {
-            altitude::fewest(scenario, target, ask.tolerance)
-        }
-        Number::Meeting(target) => level(scenario, target, ask.tolerance),
-    }
-}
 
 /// The fewest relays at the altitudes they hold, by eq. (Opt).
 pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
@@ -32,7 +22,7 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
 }
 
 /// One relay, by Theorem 1, 2 or 3, or beside the line. One that holds its altitude holds its place above the line too.
-fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
+pub(super) fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, 1, ask.tolerance)?;
     let profile = briefed.profile(1);
     let mission = if briefed.held.is_empty() {
@@ -188,7 +178,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     let target = solved(&briefed)?;
     let places = placed(&briefed, target).ok_or_else(nothing)?;
     let proven = briefed.level()
-        && super::is_free(scenario, |free| {
+        && is_free(scenario, |free| {
             let most = solved(&Briefed::new(free, relays, tolerance).ok()?).ok()?;
             Some(f64::from(most) <= f64::from(target) * (1.0 + 2.0 * tolerance))
         });

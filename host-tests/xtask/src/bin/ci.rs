@@ -3,6 +3,7 @@
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
 
+use uav_relay_xtask::FUZZ_TARGETS;
 use uav_relay_xtask::toolchain::llvm_tool;
 
 /// The emulator that runs the firmware.
@@ -11,9 +12,6 @@ const QEMU: &str = "qemu-system-arm";
 /// What to type where it is missing.
 const MISSING: &str =
     "qemu-system-arm is missing; type: sudo apt-get install --yes qemu-system-arm";
-
-/// The fuzz targets; a test of theirs holds this list against theirs.
-const TARGETS: [&str; 5] = ["deframe", "frame", "relay", "chain", "scenario"];
 
 /// The target the firmware is built for.
 const TARGET: &str = "thumbv7em-none-eabihf";
@@ -145,7 +143,7 @@ fn steps() -> Vec<Step> {
 /// What needs more than a stable compiler: every fuzz target for some seconds from its corpus on, the corpora under Miri.
 fn nightly_steps() -> Vec<Step> {
     let mut steps = Vec::new();
-    for target in TARGETS {
+    for target in FUZZ_TARGETS {
         // What is found goes where it is not taken for a part of the corpus; of a missing folder libFuzzer makes an error.
         let found = format!("target/fuzz/{target}");
         _ = std::fs::create_dir_all(&found);

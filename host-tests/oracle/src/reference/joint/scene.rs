@@ -1,8 +1,8 @@
 //! The joint problem in units of D.
 
-use super::super::Link;
+use super::super::link::Link;
+use super::corridor::{Corridor, Hold};
 use super::space::{Across, Triple};
-use super::{Corridor, Hold};
 
 /// A side of a room that is narrower than this has no width, in units of D.
 const NO_WIDTH: f64 = 1e-9;

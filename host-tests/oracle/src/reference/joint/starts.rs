@@ -3,7 +3,6 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::Effort;
 use super::draws::{Side, bow, levels};
 use super::kicks::kicked;
 use super::levels::{Slot, at_places, best_chain, in_room, least_advance};
@@ -11,6 +10,22 @@ use super::polish::polish;
 use super::scene::{Room, Scene};
 use super::space::{Across, Triple};
 use crate::random::log_uniform;
+
+/// How hard to search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effort {
+    /// Seed of all that is drawn: the same seed gives the same optimum.
+    pub seed: u64,
+    /// Searches over levels drawn anew, >= 1; the time is about proportional.
+    pub rounds: u32,
+}
+
+impl Effort {
+    /// Two rounds: some milliseconds with few relays, about half a second with 50 (release build).
+    pub fn usual(seed: u64) -> Self {
+        Self { seed, rounds: 2 }
+    }
+}
 
 /// ln SIR below which no chain is looked for.
 const LEAST: f64 = -200.0;

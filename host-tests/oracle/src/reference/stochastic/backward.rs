@@ -1,7 +1,7 @@
 //! Chains built from Rx toward Tx, each hop as long as a target allows: the paper's Algorithm 4 and what it should find.
 
-use super::StochasticLink;
-use crate::reference::Station;
+use super::link::StochasticLink;
+use crate::reference::link::Station;
 
 /// A chain built backward, and the target it was built for.
 #[derive(Debug, Clone, PartialEq)]

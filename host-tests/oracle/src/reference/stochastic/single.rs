@@ -1,6 +1,6 @@
 //! One relay: the paper's Algorithm 3, as printed and as it should be, and its optimum by brute force.
 
-use super::StochasticLink;
+use super::link::StochasticLink;
 
 /// Where one relay ends up.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,11 +2,11 @@
 
 use clap::Args;
 use uav_relay::{Instant, Wiring};
-use uav_relay_sim::command::{Failure, number};
+use uav_relay_sim::command::Failure;
 use uav_relay_sim::simulator::attack::Attack;
 use uav_relay_sim::simulator::setup::{Partition, Setup};
 
-use crate::options::Options;
+use crate::times::instant;
 use crate::upload::Uploads;
 
 /// The options for that.
@@ -86,9 +86,8 @@ impl Hostile {
         all.max().unwrap_or(Instant::ZERO)
     }
 
-    /// Whether this goes together with a chain of `uavs`, and with the other options.
-    pub(crate) fn agree(&self, options: &Options) -> Result<(), Failure> {
-        let uavs = options.uavs;
+    /// Whether this goes together with a chain of `uavs`, and with a closed loop if there `is_loop`.
+    pub(crate) fn agree(&self, uavs: u16, is_loop: bool) -> Result<(), Failure> {
         for (name, ones) in [("--kill", &self.kill), ("--boot", &self.boot)] {
             if let Some(one) = ones.iter().find(|one| !(1..=uavs).contains(&one.index)) {
                 let line = format!("{name} {}@..: relay must be within 1 to {uavs}", one.index);
@@ -110,7 +109,7 @@ impl Hostile {
             };
             return Err(Failure::input(line));
         }
-        if self.is_eventful() && options.closed_loop.is_some() {
+        if self.is_eventful() && is_loop {
             let line = "--closed-loop goes with none of --kill, --boot, --partition, --forge, --replay and --upload";
             return Err(Failure::input(line));
         }
@@ -186,16 +185,4 @@ fn partition(text: &str) -> Result<Partition, String> {
         from,
         until: Some(until),
     })
-}
-
-/// Seconds after the start, 0 to 1e6.
-pub(crate) fn instant(text: &str) -> Option<Instant> {
-    let seconds = number(text, 0.0, 1e6).ok()?;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "within 0 to 1e12"
-    )]
-    let micros = (seconds * 1e6) as u64;
-    Some(Instant::from_micros(micros))
 }

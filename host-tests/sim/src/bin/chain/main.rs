@@ -2,6 +2,7 @@
 
 mod hostile;
 mod options;
+mod times;
 mod upload;
 
 use std::io::IsTerminal as _;
@@ -82,7 +83,9 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         let line = format!("--closed-loop: there is nothing to measure with --method {method}");
         return Err(Failure::input(line));
     }
-    options.hostile.agree(options)?;
+    options
+        .hostile
+        .agree(options.uavs, options.closed_loop.is_some())?;
     let is_field = matches!(scenario.interference, Interference::Field(_));
     if options.method.is_for_fields() != is_field {
         let line = if is_field {

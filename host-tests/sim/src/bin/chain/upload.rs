@@ -5,9 +5,9 @@ use uav_relay::{
     Band, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Side, Upload,
 };
 use uav_relay_sim::command::{Failure, narrow, number};
-use uav_relay_sim::simulator::chain::UploadSpec;
+use uav_relay_sim::simulator::setup::UploadSpec;
 
-use crate::hostile::instant;
+use crate::times::instant;
 
 /// The options for that.
 #[derive(Args, Debug)]

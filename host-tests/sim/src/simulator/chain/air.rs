@@ -5,7 +5,7 @@ use uav_relay::{Instant, Port};
 use super::super::attack::Recorded;
 use super::super::faults::Faults;
 use super::super::queue::Happening;
-use super::Chain;
+use super::state::Chain;
 
 /// Who hears a frame, counted from 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -3,8 +3,8 @@
 use uav_relay::{Phase, Side, Wiring};
 
 use super::super::outcome::Ending;
-use super::ground::Station;
-use super::{Chain, Member};
+use super::state::{Chain, Member};
+use super::station::Station;
 
 impl Chain {
     pub(super) fn ending(&self) -> Option<Ending> {

@@ -1,66 +1,12 @@
-//! The ground's end of an upload: the transmitter and the receiver, as nodes of the run.
+//! The ground's end of an upload.
 
-use uav_relay::ground::{Ground, Progress};
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::wire::upload::Upload;
-use uav_relay::{Instant, Port, Side, Wiring};
+use uav_relay::{Port, Side, Wiring};
 
-use super::super::forge::NETWORK;
-use super::super::link::Line;
 use super::super::outcome::{Moment, Turning};
 use super::super::queue::Happening;
-use super::super::setup::Setup;
-use super::Chain;
 use super::air::Receiver;
-
-/// A mission that is uploaded in the run.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct UploadSpec {
-    /// Where: the transmitter is upstream of the chain, the receiver downstream.
-    pub end: Side,
-    /// When.
-    pub at: Instant,
-    /// What.
-    pub upload: Upload,
-}
-
-/// The transmitter or the receiver.
-#[derive(Debug)]
-pub(super) struct Station {
-    end: Side,
-    ground: Ground,
-    line: Line,
-    wake: Option<Instant>,
-}
-
-impl Station {
-    /// Whether an upload of its is under way.
-    pub(super) fn is_busy(&self) -> bool {
-        matches!(
-            self.ground.progress(),
-            Progress::Offering | Progress::Held { .. }
-        )
-    }
-}
-
-/// One station for every end that something is uploaded from.
-pub(super) fn stations(setup: &Setup) -> Vec<Station> {
-    let Some(proof) = setup.proof(1) else {
-        return Vec::new();
-    };
-    let uploads = setup.uploads.iter().map(|spec| spec.end);
-    let mut ends: Vec<Side> = uploads.collect();
-    ends.sort();
-    ends.dedup();
-    ends.into_iter()
-        .map(|end| Station {
-            end,
-            ground: Ground::new(&setup.mission, end, NETWORK, setup.settings.wiring, proof),
-            line: Line::default(),
-            wake: None,
-        })
-        .collect()
-}
+use super::state::Chain;
 
 impl Chain {
     /// Upload number `which` of the setup begins.

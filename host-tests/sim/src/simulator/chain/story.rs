@@ -3,7 +3,7 @@
 use uav_relay::{Event, Side};
 
 use super::super::outcome::{Moment, Turning};
-use super::{Chain, Member};
+use super::state::{Chain, Member};
 
 impl Chain {
     /// Takes out what relay `index` (from 0) has to tell its firmware.

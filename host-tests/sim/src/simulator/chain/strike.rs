@@ -6,7 +6,7 @@ use uav_relay::{Duration, Port, Wiring};
 use super::super::attack::{Attacker, Strike, fate};
 use super::super::forge::{Way, destination, forge};
 use super::super::queue::Happening;
-use super::{Chain, Member};
+use super::state::{Chain, Member};
 
 /// How long an attacker that has heard nothing yet waits.
 const WAIT: Duration = Duration::from_millis(10);

@@ -5,16 +5,11 @@
 
 mod counted;
 mod image;
+mod row;
 
 use std::process::ExitCode;
 
-/// One row of the table.
-struct Row {
-    what: &'static str,
-    unit: &'static str,
-    value: u64,
-    budget: Option<u64>,
-}
+use row::Row;
 
 fn main() -> ExitCode {
     match measure() {
@@ -47,15 +42,6 @@ fn report(rows: &[Row]) -> ExitCode {
     } else {
         println!("cost: over budget: {}", over.join("; "));
         ExitCode::FAILURE
-    }
-}
-
-const fn row(what: &'static str, unit: &'static str, value: u64, budget: Option<u64>) -> Row {
-    Row {
-        what,
-        unit,
-        value,
-        budget,
     }
 }
 

@@ -1,0 +1,40 @@
+//! Upsilon = E[1/I] of any distribution.
+
+/// Upsilon = E[1/I] in 1/W, as the integral of the moment-generating function `m` over the negative half line.
+///
+/// `m`(t) = E[exp(t I)] for t <= 0, I > 0 in W. With y = e^z the integrand is analytic and falls off exponentially on both
+/// sides, so the trapezoidal rule is good to about 1e-13. `None` where the integral has no end in f64: E[1/I] infinite, or
+/// nearly so (a Beta distribution with alpha below about 1.1). At most some 4000 evaluations of `m`.
+pub fn upsilon_by_mgf(m: impl Fn(f64) -> f64) -> Option<f64> {
+    const STEP: f64 = 0.25;
+    // Somewhere about 1 / I: where the function has fallen to a half.
+    let centre = (-1000..=1000)
+        .map(|k| f64::from(k) * 0.69)
+        .find(|z| m(-z.exp()) < 0.5)?;
+    let (mut sum, mut last, mut quiet) = (0.0, 0.0, 0);
+    for k in 0.. {
+        let y = (centre - 40.0 + STEP * f64::from(k)).exp();
+        if !y.is_finite() {
+            return None;
+        }
+        let term = y * m(-y);
+        sum += term;
+        // What is left, if the terms go on falling as from the last one to this.
+        let ratio = term / last;
+        let left = if ratio < 1.0 {
+            term * ratio / (1.0 - ratio)
+        } else {
+            f64::INFINITY
+        };
+        quiet = if term <= 0.0 || left < 1e-14 * sum {
+            quiet + 1
+        } else {
+            0
+        };
+        if quiet > 40 {
+            return Some(sum * STEP);
+        }
+        last = term;
+    }
+    None
+}

@@ -1,0 +1,16 @@
+//! Times on the command line.
+
+use uav_relay::Instant;
+use uav_relay_sim::command::number;
+
+/// Seconds after the start, 0 to 1e6.
+pub(crate) fn instant(text: &str) -> Option<Instant> {
+    let seconds = number(text, 0.0, 1e6).ok()?;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "within 0 to 1e12"
+    )]
+    let micros = (seconds * 1e6) as u64;
+    Some(Instant::from_micros(micros))
+}

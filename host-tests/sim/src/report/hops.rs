@@ -1,0 +1,151 @@
+//! The relays at their places, with the SIR of every hop.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+use uav_relay::place::Station;
+use uav_relay::sir::{Sender, at_receiver};
+use uav_relay::{Mission, Placement, Profile};
+
+use super::left::LostReport;
+
+/// One relay at its place.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct RelayReport {
+    /// Index in the chain, from 1.
+    pub index: u16,
+    /// Distance from the transmitter, m.
+    pub x_m: f64,
+    /// Distance from the line to the receiver, m: to its right above 0.
+    pub y_m: f64,
+    /// Altitude, m.
+    pub h_m: f64,
+    /// SIR of the hop that ends here, linear.
+    pub sir: f64,
+    /// The same in dB.
+    pub sir_db: f64,
+    /// Version of the mission that it flies, 0 for the one it took off with; absent where nothing was uploaded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
+}
+
+/// A linear power ratio in dB.
+pub fn db(linear: f64) -> f64 {
+    10.0 * linear.log10()
+}
+
+/// The SIR of every hop, from the transmitter's to the receiver's, for relays that stand at `places`.
+///
+/// By the formulas of the crate, as a relay works them out; at most the largest f32, where two places all but coincide.
+pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
+    let mut sender = Sender::transmitter(mission);
+    let mut from_m = 0.0;
+    let mut sirs = Vec::with_capacity(places.len() + 1);
+    for (place, profile) in places {
+        sirs.push(f64::from(
+            sender.sir_at(mission, from_m, *place).min(f32::MAX),
+        ));
+        let relay = Station {
+            at: place.cross_section(),
+            power_w: profile.power_w,
+        };
+        sender = Sender::relay(mission, relay);
+        from_m = place.x_m;
+    }
+    if let Some((place, profile)) = places.last() {
+        sirs.push(f64::from(at_receiver(mission, *place, profile.power_w)));
+    }
+    sirs
+}
+
+/// The relays at `places`, with the SIR of the hop that ends at each.
+pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport> {
+    (1..)
+        .zip(places.iter().zip(sirs))
+        .map(|(index, ((place, _), &sir))| RelayReport {
+            index,
+            x_m: f64::from(place.x_m),
+            y_m: f64::from(place.y_m),
+            h_m: f64::from(place.altitude_m),
+            sir,
+            sir_db: db(sir),
+            version: None,
+        })
+        .collect()
+}
+
+/// The relays and Rx as a table to read, those that are lost at their last places among them; nothing where no relay has a
+/// place. With y where there is `room` beside the line.
+pub fn hops_table(
+    relays: &[RelayReport],
+    lost: &[LostReport],
+    rx_sir: Option<f64>,
+    room: bool,
+) -> String {
+    let aside = |words: &dyn Fn() -> String| {
+        if room {
+            format!(" {:>12}", words())
+        } else {
+            String::new()
+        }
+    };
+    let mut text = String::new();
+    if !(relays.is_empty() && lost.is_empty()) {
+        _ = writeln!(
+            text,
+            "{:>6} {:>12}{} {:>10} {:>12} {:>9}",
+            "relay",
+            "x [m]",
+            aside(&|| "y [m]".to_owned()),
+            "h [m]",
+            "SIR",
+            "SIR [dB]"
+        );
+        let kept = relays.iter().map(|relay| {
+            let line = format!(
+                "{:>6} {:>12.3}{} {:>10.2} {:>12.6} {:>9.3}",
+                relay.index,
+                relay.x_m,
+                aside(&|| format!("{:.3}", relay.y_m)),
+                relay.h_m,
+                relay.sir,
+                relay.sir_db
+            );
+            (relay.index, line)
+        });
+        let gone = lost.iter().map(|relay| {
+            let y = || {
+                relay
+                    .y_m
+                    .map_or_else(|| "-".to_owned(), |y_m| format!("{y_m:.3}"))
+            };
+            (relay.index, lost_line(relay, &aside(&y)))
+        });
+        let mut lines: Vec<(u16, String)> = kept.chain(gone).collect();
+        lines.sort_by_key(|(index, _)| *index);
+        for (_, line) in lines {
+            _ = writeln!(text, "{line}");
+        }
+    }
+    if let Some(rx_sir) = rx_sir {
+        _ = writeln!(
+            text,
+            "{:>6} {:>12}{} {:>10} {:>12.6} {:>9.3}",
+            "Rx",
+            "",
+            aside(&String::new),
+            "",
+            rx_sir,
+            db(rx_sir)
+        );
+    }
+    text
+}
+
+fn lost_line(relay: &LostReport, aside: &str) -> String {
+    let place = relay.x_m.zip(relay.h_m).map_or_else(
+        || format!("{:>12}{aside} {:>10}", "-", "-"),
+        |(x_m, h_m)| format!("{x_m:>12.3}{aside} {h_m:>10.2}"),
+    );
+    format!("{:>6} {place} {:>12}", relay.index, relay.why)
+}

@@ -1,0 +1,55 @@
+//! The state of a run: its relays, the ground, the drones, and what is still to happen.
+
+use rand_chacha::ChaCha8Rng;
+use uav_relay::wire::upload::Upload;
+use uav_relay::{Instant, Placement, Relay};
+
+use super::super::attack::Attacker;
+use super::super::drones::Flight;
+use super::super::link::Line;
+use super::super::outcome::Outcome;
+use super::super::queue::Queue;
+use super::super::setup::Setup;
+use super::station::Station;
+
+/// One relay in the run.
+#[derive(Debug)]
+pub(super) struct Member {
+    pub(super) relay: Relay,
+    /// Its number in the mission, from 1.
+    pub(super) node: u16,
+    /// Its lines: toward Tx (or to all), toward Rx.
+    pub(super) lines: [Line; 2],
+    pub(super) killed: Option<Instant>,
+    /// How often it has been switched on.
+    pub(super) starts: u32,
+    /// Passes that it has begun before it was switched on last.
+    pub(super) swept: u32,
+    /// What it has stored of uploads.
+    pub(super) stored: Option<Upload>,
+    /// Where it was told to fly when that was last found to be within its limits.
+    pub(super) safe: Option<Placement>,
+    /// Its neighbours toward Tx and Rx when it was heard last.
+    pub(super) beside: [Option<u16>; 2],
+    /// The wake-up in the queue that counts: the earliest one. Any other is void.
+    pub(super) wake: Option<Instant>,
+}
+
+/// A chain under way.
+#[derive(Debug)]
+pub struct Chain {
+    pub(super) setup: Setup,
+    pub(super) members: Vec<Member>,
+    pub(super) queue: Queue,
+    pub(super) rng: ChaCha8Rng,
+    pub(super) outcome: Outcome,
+    pub(super) now: Instant,
+    pub(super) happenings: u64,
+    /// How often a relay has taken a place.
+    pub(super) holding: usize,
+    /// Kills, boots, partitions and strikes that are still to come.
+    pub(super) ahead: usize,
+    pub(super) stations: Vec<Station>,
+    pub(super) attacker: Option<Attacker>,
+    pub(super) flight: Option<Flight>,
+}

@@ -1,0 +1,46 @@
+//! The transmitter and the receiver, as nodes of the run.
+
+use uav_relay::ground::{Ground, Progress};
+use uav_relay::{Instant, Side};
+
+use super::super::forge::NETWORK;
+use super::super::link::Line;
+use super::super::setup::Setup;
+
+/// The transmitter or the receiver.
+#[derive(Debug)]
+pub(super) struct Station {
+    pub(super) end: Side,
+    pub(super) ground: Ground,
+    pub(super) line: Line,
+    pub(super) wake: Option<Instant>,
+}
+
+impl Station {
+    /// Whether an upload of its is under way.
+    pub(super) fn is_busy(&self) -> bool {
+        matches!(
+            self.ground.progress(),
+            Progress::Offering | Progress::Held { .. }
+        )
+    }
+}
+
+/// One station for every end that something is uploaded from.
+pub(super) fn stations(setup: &Setup) -> Vec<Station> {
+    let Some(proof) = setup.proof(1) else {
+        return Vec::new();
+    };
+    let uploads = setup.uploads.iter().map(|spec| spec.end);
+    let mut ends: Vec<Side> = uploads.collect();
+    ends.sort();
+    ends.dedup();
+    ends.into_iter()
+        .map(|end| Station {
+            end,
+            ground: Ground::new(&setup.mission, end, NETWORK, setup.settings.wiring, proof),
+            line: Line::default(),
+            wake: None,
+        })
+        .collect()
+}

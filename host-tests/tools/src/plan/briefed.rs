@@ -1,0 +1,77 @@
+//! A mission as its relays are briefed for it.
+
+use uav_relay::{Mission, Placement, Profile};
+use uav_relay_sim::mission;
+use uav_relay_sim::report::hop_sirs;
+use uav_relay_sim::scenario::Scenario;
+
+use super::found::{NoPlan, Plan};
+
+/// Most relays that a scenario may ask to be told apart while their number is not yet known.
+pub(super) const MOST_RELAYS: u16 = uav_relay::mission::MAX_RELAYS;
+
+/// A mission, and what each relay of it holds.
+pub(super) struct Briefed {
+    pub(super) mission: Mission,
+    pub(super) own: Vec<(u16, Profile)>,
+    pub(super) held: Vec<u16>,
+}
+
+impl Briefed {
+    pub(super) fn new(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Self, NoPlan> {
+        let (mission, own) = mission::mission(scenario, relays, tolerance)?;
+        Ok(Self {
+            mission,
+            own,
+            held: mission::held(scenario, relays),
+        })
+    }
+
+    pub(super) fn profile(&self, index: u16) -> Profile {
+        self.own
+            .iter()
+            .find(|(at, _)| *at == index)
+            .map_or(self.mission.config().common, |(_, profile)| *profile)
+    }
+
+    /// Whether all relays have the same altitude.
+    pub(super) fn level(&self) -> bool {
+        let common = self.mission.config().common;
+        self.own
+            .iter()
+            .all(|(_, own)| !((own.altitude_m - common.altitude_m).abs() > 0.0))
+    }
+
+    /// The plan of these places, which the crate's own formulas judge.
+    pub(super) fn plan(self, places: &[Placement], how: &'static str, proven: bool) -> Plan {
+        let held: Vec<(Placement, Profile)> = (1..)
+            .zip(places)
+            .map(|(index, place)| {
+                let profile = Profile {
+                    altitude_m: place.altitude_m,
+                    ..self.profile(index)
+                };
+                (*place, profile)
+            })
+            .collect();
+        Plan {
+            mission: self.mission,
+            sirs: hop_sirs(&self.mission, &held),
+            places: held,
+            how,
+            proven,
+            theorem: None,
+            most: None,
+            fitted: None,
+        }
+    }
+}
+
+/// Whether a least separation costs nothing, as `is_as_good` finds of the scenario without it.
+pub(super) fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) -> bool {
+    let free = Scenario {
+        min_separation_m: 0.0,
+        ..scenario.clone()
+    };
+    !(scenario.min_separation_m > 0.0) || is_as_good(&free) == Some(true)
+}

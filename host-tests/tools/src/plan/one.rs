@@ -1,0 +1,19 @@
+//! Plans against one interferer: which rule places the relays.
+
+use uav_relay_sim::scenario::Scenario;
+
+use super::ask::{Ask, Number};
+use super::found::{NoPlan, Plan};
+use super::{altitude, source};
+
+pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
+    match ask.number {
+        Number::Of(1) => source::alone(scenario, ask),
+        Number::Of(relays) if ask.free_altitude => altitude::best(scenario, relays, ask.tolerance),
+        Number::Of(relays) => source::best(scenario, relays, ask.tolerance),
+        Number::Meeting(target) if ask.free_altitude => {
+            altitude::fewest(scenario, target, ask.tolerance)
+        }
+        Number::Meeting(target) => source::level(scenario, target, ask.tolerance),
+    }
+}
