@@ -208,6 +208,12 @@ impl Beside {
         true
     }
 
+    /// The silence so far of a neighbour of the same view is excused; whether there is one, and it is not lost.
+    pub(crate) fn excuse(&mut self, now: Instant) -> bool {
+        let counted = self.state == State::Linked && self.is_agreed();
+        counted && self.neighbour.excuse(now)
+    }
+
     /// Nothing has come for a while. `seeks` tells whether others could be heard here.
     pub(crate) fn silent(&mut self, now: Instant, settings: &Settings, seeks: bool) -> Quiet {
         if !MEMBERSHIP {

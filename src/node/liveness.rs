@@ -2,6 +2,10 @@
 //!
 //! Any intact frame from it is a sign of life. After `Settings::quiet` without one it is asked for a heartbeat, sixteen times
 //! over until `Settings::lost` has passed; then it is lost, and asked every `quiet` from there on.
+//!
+//! Relays of one view that choose their places jointly solve the same chain at the same time, and have nothing to say until they
+//! are done. So while a relay solves, the silence of a neighbour that it is in one view with is excused: both times count from the end
+//! of its own solving.
 
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -56,6 +60,14 @@ impl Neighbour {
         self.heard = now;
         self.met = true;
         core::mem::take(&mut self.lost)
+    }
+
+    /// Its silence so far says nothing; whether it is not lost already.
+    pub(crate) fn excuse(&mut self, now: Instant) -> bool {
+        if !self.lost {
+            self.heard = now;
+        }
+        !self.lost
     }
 
     /// Nothing has come for a while.

@@ -147,11 +147,43 @@ impl Node {
             node.timers.set(Timer::Work, now + PAUSE);
         }
         if !leader && MEMBERSHIP {
-            // Until then the first pass should have come, were this the beginning.
-            let first = settings.hop_time.times(2 * u32::from(relays));
-            node.timers.set(Timer::Call, now + settings.quiet + first);
+            node.await_first(now);
         }
         node
+    }
+
+    /// By when the first pass should have come, were this the beginning.
+    fn await_first(&mut self, now: Instant) {
+        let Settings {
+            hop_time, quiet, ..
+        } = self.settings;
+        let first = hop_time.times(2 * u32::from(self.members.all));
+        self.timers.set(Timer::Call, now + quiet + first);
+    }
+
+    /// Whether it is at the chain's solution, as every relay of its view is.
+    fn is_solving(&mut self) -> bool {
+        let works = self.timers.runs(Timer::Work);
+        let (share, own) = self.parts();
+        works && share.is_solving(own)
+    }
+
+    /// It has just found out where it is to be: what it waits for it waits for from now on.
+    fn solved(&mut self, now: Instant) {
+        let quiet = self.settings.quiet;
+        for side in [Side::Upstream, Side::Downstream] {
+            if self.beside(side).excuse(now) {
+                self.timers.set(Timer::of(side), now + quiet);
+            }
+        }
+        if self.awaits_first() {
+            self.await_first(now);
+        }
+    }
+
+    /// Whether no pass has come yet, and it has not called for one.
+    fn awaits_first(&self) -> bool {
+        MEMBERSHIP && self.share.is_fresh() && !self.members.calls
     }
 
     const fn beside(&mut self, side: Side) -> &mut Beside {
@@ -292,8 +324,13 @@ impl Node {
             match timer {
                 Timer::Work => {
                     let (share, own) = self.parts();
+                    let solving = share.is_solving(own);
                     let next = share.work(own);
+                    let solved = solving && !share.is_solving(own);
                     self.proceed(now, next);
+                    if solved {
+                        self.solved(now);
+                    }
                 }
                 Timer::Repeat => {
                     if self.share.phase() == Phase::Waiting {
@@ -305,6 +342,7 @@ impl Node {
                 Timer::Upstream => self.silence(now, Side::Upstream),
                 Timer::Downstream => self.silence(now, Side::Downstream),
                 Timer::Remind => self.remind(now),
+                Timer::Call if self.awaits_first() && self.is_solving() => self.await_first(now),
                 Timer::Call if MEMBERSHIP => self.call_again(now),
                 Timer::Call => {}
             }
@@ -330,6 +368,10 @@ impl Node {
 
     fn silence(&mut self, now: Instant, side: Side) {
         let (settings, seeks) = (self.settings, self.seeks());
+        if self.is_solving() && self.beside(side).excuse(now) {
+            self.timers.set(Timer::of(side), now + settings.quiet);
+            return;
+        }
         let quiet = self.beside(side).silent(now, &settings, seeks);
         self.timers.set(Timer::of(side), quiet.look_again);
         if quiet.lost {

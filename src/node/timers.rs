@@ -77,6 +77,11 @@ impl Timers {
         *self.slot(timer) = Some(at);
     }
 
+    /// Whether it runs.
+    pub(crate) fn runs(&mut self, timer: Timer) -> bool {
+        self.slot(timer).is_some()
+    }
+
     pub(crate) fn stop(&mut self, timer: Timer) {
         *self.slot(timer) = None;
     }
