@@ -377,23 +377,35 @@ impl Mission {
     /// `across_squared` is how far apart across the line two neighbours among them may be, m^2: that much they need not be along
     /// x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
-        let behind = f32::from(match self.heading() {
-            Heading::TowardRx => self.config.relays.saturating_sub(index),
-            Heading::TowardTx => index.saturating_sub(1),
-        });
-        let least = self.least_step(across_squared);
-        self.end_after(behind, least)
+        self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
     /// The same where whoever comes after may stand as close as they like.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
-        self.end_after(f32::from(self.config.relays.saturating_sub(index)), 0.0)
+        self.end_after(self.behind(index), 0.0)
+    }
+
+    /// How many relays come after `index` on the way of a pass.
+    fn behind(&self, index: u16) -> f32 {
+        f32::from(match self.heading() {
+            Heading::TowardRx => self.config.relays.saturating_sub(index),
+            Heading::TowardTx => index.saturating_sub(1),
+        })
     }
 
     /// The last place of relay `index` toward Rx that leaves those after it their separation, m.
     pub(crate) fn latest(&self, index: u16) -> f32 {
+        self.latest_at(index, self.config.min_separation_m)
+    }
+
+    /// The same where those may stand as close as they like.
+    pub(crate) fn latest_freely(&self, index: u16) -> f32 {
+        self.latest_at(index, 0.0)
+    }
+
+    fn latest_at(&self, index: u16, least: f32) -> f32 {
         let after = f32::from(self.config.relays.saturating_sub(index));
-        self.config.distance_m - after * self.step_of(self.config.min_separation_m)
+        self.config.distance_m - after * self.step_of(least)
     }
 
     /// What a step between two that must be `least` apart takes with its rounding, m.

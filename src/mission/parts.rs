@@ -59,7 +59,13 @@ impl Band {
 
     /// The number in it that is nearest to `at_m`.
     pub const fn nearest(self, at_m: f32) -> f32 {
-        at_m.max(self.least_m).min(self.most_m)
+        if at_m >= self.most_m {
+            self.most_m
+        } else if at_m > self.least_m {
+            at_m
+        } else {
+            self.least_m
+        }
     }
 
     /// From the lowest to the highest, m.

@@ -138,16 +138,13 @@ impl Ladder {
         let gaps = gaps(self.gap, self.growth);
         let (lower, upper) = targets.split_at_mut(HALF);
         let mut target = self.anchor;
-        for (slot, gap) in upper.iter_mut().zip(gaps) {
+        for (slot, gap) in upper.iter_mut().zip(&gaps) {
             target += target * gap;
             *slot = target;
         }
         target = self.anchor;
-        for (slot, gap) in lower
-            .iter_mut()
-            .rev()
-            .zip(gaps.into_iter().skip(1).chain([0.0]))
-        {
+        let [_, outward @ ..] = &gaps;
+        for (slot, gap) in lower.iter_mut().rev().zip(outward.iter().chain(&[0.0])) {
             *slot = target;
             target /= 1.0 + gap;
         }

@@ -93,7 +93,7 @@ impl Link<'_> {
                 fill(reaches, pairs.map_while(reach));
             }
             Some(Onward::Tx(hop)) => {
-                let longest = |target, from_m| self.longest(&hop, target, from_m);
+                let longest = |target, from_m| self.longest(&hop, target, from_m, self.latest());
                 fill(
                     reaches,
                     pairs.map_while(|(&target, &from_m)| Some(longest(target, from_m)?.from_m)),
@@ -138,13 +138,22 @@ impl Link<'_> {
         }
         mission.field()?;
         let altitude_m = self.behind.map(|behind| behind.relay.at.altitude_m);
-        Some(Onward::Tx(Retreat::new(
-            mission, self.own, self.index, altitude_m,
-        )))
+        let hop = Retreat::new(mission, self.own, self.index, altitude_m);
+        Some(Onward::Tx(if self.plain {
+            hop
+        } else {
+            hop.to_the_end(mission, self.index)
+        }))
     }
 
-    /// The hop that begins nearest to Tx of all that end from `low` on.
-    fn longest(&self, hop: &Retreat, target: f32, low: f32) -> Option<Step> {
+    /// The last place that the relay before on a pass toward Tx may take, m: as many as its neighbours' altitudes allow may be above
+    /// each other.
+    fn latest(&self) -> f32 {
+        self.mission.latest_freely(self.index.saturating_add(1))
+    }
+
+    /// The hop that begins nearest to Tx of all that end from `low` to `high`; on a plain pass, at `low`.
+    fn longest(&self, hop: &Retreat, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Whatever a neighbour says, nobody stands beyond Rx.
         if low > distance_m {
@@ -155,11 +164,10 @@ impl Link<'_> {
             return Some(Step { to_m: low, from_m });
         };
         let heard = Heard::new(mission, behind.measured_per_w);
-        let high = if self.plain {
-            low
-        } else {
-            mission.latest(self.index.saturating_add(1))
-        };
+        if self.plain {
+            let from_m = hop.reach(target, low, heard.quiet(low))?;
+            return Some(Step { to_m: low, from_m });
+        }
         hop.longest(heard, target, low, high)
     }
 
@@ -187,7 +195,7 @@ impl Link<'_> {
         let high = if self.plain {
             reach
         } else {
-            mission.latest(self.index)
+            mission.latest_freely(self.index)
         };
         let step = if here <= 0.0 || high < reach {
             Step {
@@ -218,9 +226,14 @@ impl Link<'_> {
                     .mission
                     .least_step(self.own.at.apart_squared(behind.relay.at));
                 let low = from_m.max(place + apart).max(place.next_up());
-                let step = self.longest(&hop, target, low)?;
-                let met = step.from_m <= place;
-                met.then_some(if step.to_m <= from_m {
+                // Rather where all that are toward Rx of it have room along the line, however high they fly.
+                let clear = self.mission.latest(self.index.saturating_add(1));
+                let to = |high| {
+                    let step = self.longest(&hop, target, low, high)?;
+                    (step.from_m <= place).then_some(step)
+                };
+                let step = to(clear).or_else(|| to(self.latest()))?;
+                Some(if step.to_m <= from_m {
                     Stand::AtReach
                 } else {
                     Stand::At(step.to_m)

@@ -31,7 +31,6 @@ pub struct Agreed {
 #[derive(Clone, Debug)]
 pub struct Planner {
     search: Search,
-    targets: PerTarget,
     reaches: PerTarget,
     /// The next reaches, as far as they are known.
     next: PerTarget,
@@ -50,7 +49,6 @@ impl Planner {
         let search = Search::new(mission, leader, schedule)?;
         let mut planner = Self {
             search,
-            targets: PerTarget::new(),
             reaches: PerTarget::new(),
             next: PerTarget::new(),
             index: mission.leader(),
@@ -62,7 +60,6 @@ impl Planner {
     }
 
     fn start_sweep(&mut self, mission: &Mission) {
-        self.targets = self.search.ladder().targets();
         self.reaches = origins(mission);
         self.index = mission.leader();
         self.behind = None;
@@ -82,6 +79,7 @@ impl Planner {
         profile_of: impl Fn(u16) -> Profile,
         hops: u16,
     ) -> Result<Option<Agreed>, Infeasible> {
+        let mut targets = self.search.ladder().targets();
         for _ in 0..hops {
             let profile = profile_of(self.index);
             let link = Link {
@@ -93,7 +91,7 @@ impl Planner {
                 plain: self.search.ladder().is_plain(),
                 end_m: None,
             };
-            if !link.go_on(&self.targets, &self.reaches, &mut self.next) {
+            if !link.go_on(&targets, &self.reaches, &mut self.next) {
                 continue;
             }
             self.reaches = core::mem::take(&mut self.next);
@@ -104,7 +102,7 @@ impl Planner {
             }
             let verdict = pass::close(&link, *self.search.ladder(), &self.reaches);
             if let Some(commit) = verdict.commit
-                && let Some(&target) = self.targets.get(usize::from(commit))
+                && let Some(&target) = targets.get(usize::from(commit))
             {
                 return Ok(Some(Agreed {
                     ladder: *self.search.ladder(),
@@ -116,6 +114,7 @@ impl Planner {
             }
             self.search.advance(&verdict.slacks)?;
             self.start_sweep(mission);
+            targets = self.search.ladder().targets();
         }
         Ok(None)
     }

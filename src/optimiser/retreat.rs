@@ -65,6 +65,24 @@ impl Retreat {
         }
     }
 
+    /// The same hop of relay `index` where those before it hold back to leave themselves room rather than this one.
+    pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
+        Self {
+            end_m: mission.end_freely(index),
+            ..self
+        }
+    }
+
+    /// The place nearest to Tx at which its receiver leaves the sender room, m.
+    fn nearest(&self) -> f32 {
+        let place = self.end_m + self.least_step;
+        if place - self.end_m < self.least_step {
+            place.next_up()
+        } else {
+            place
+        }
+    }
+
     /// The place nearest to Tx in [end, `from_m`] from which the sender still meets `target`; `None` if there is none.
     ///
     /// `target` is a linear SIR above zero, `from_m` the receiver's place in [0, D], `quiet` what it hears through: Upsilon
@@ -98,6 +116,7 @@ impl Retreat {
 
     /// The hop that begins nearest to Tx of all into [`low`, `high`]; `None` if there is none.
     pub fn longest(&self, heard: Heard<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
+        let low = low.max(self.nearest());
         let squares = [
             self.climb_squared,
             self.climb_squared + square(self.least_step),

@@ -149,8 +149,11 @@ impl Search {
     }
 
     /// Tries `ladder` next instead: the one by which the head, having solved the chain beforehand, expects a commit.
+    ///
+    /// Where that is plain, all are.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
-        self.ladder = ladder;
+        self.plain |= ladder.is_plain();
+        self.ladder = ladder.plainly(self.plain);
     }
 
     /// The lowest target that no chain can meet, once the last pass gave these `slacks`; `None` of plain passes alone.
@@ -240,6 +243,7 @@ impl Search {
     }
 
     /// The next ladder inside a bracket.
+    #[inline(never)] // its stack is not for working out the targets
     fn inside(&mut self, low: f32, high: f32, targets: &[f32], slacks: &[f32]) -> Ladder {
         let width = (high - low) / low;
         let stalled = width > PROGRESS * self.width;
@@ -311,6 +315,7 @@ struct Trials {
 impl Search {
     /// Whether `verdict`, which commits nothing, is on a pass that was to be agreed on: somebody cannot stand where another needs
     /// it. Then the target that was.
+    #[inline(never)] // its stack is not for the search that goes on
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();
         let due = Verdict::new(mission, self.ladder, &targets, verdict.slacks.clone());

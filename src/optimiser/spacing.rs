@@ -89,26 +89,42 @@ impl Hop {
         at: CrossSection,
         spread_squared: f32,
     ) -> Self {
+        let end_m = mission.end_for(index, spread_squared);
+        let hop = Self::free(interferer, sender, at, end_m);
+        let before = mission.end_for(index.saturating_sub(1), spread_squared);
+        Self {
+            from_tx: index <= 1,
+            // The transmitter stands on the ground: its altitude alone keeps the head clear of it.
+            least_step: if index <= 1 {
+                0.0
+            } else {
+                mission.least_step(hop.across_squared)
+            },
+            gathered_m: [end_m, before],
+            ..hop
+        }
+    }
+
+    /// The hop from `sender` to a node at `at` that may be as near to it as it likes, and goes no farther than `end_m`.
+    pub(crate) fn free(
+        interferer: &Interferer,
+        sender: Sender,
+        at: CrossSection,
+        end_m: f32,
+    ) -> Self {
         let (from, aside) = (sender.at, interferer.y_m);
         let climb = at.altitude_m - from.altitude_m;
-        let across_squared = at.apart_squared(from);
         Self {
             sender,
             interferer_x_m: interferer.x_m,
             aside_squared: square(aside - at.y_m) + square(at.altitude_m),
             base: (aside - from.y_m) * (aside + from.y_m - 2.0 * at.y_m)
                 + from.altitude_m * (at.altitude_m + climb),
-            across_squared,
-            from_tx: index <= 1,
-            // The transmitter stands on the ground: its altitude alone keeps the head clear of it.
-            least_step: if index <= 1 {
-                0.0
-            } else {
-                mission.least_step(across_squared)
-            },
-            end_m: mission.end_for(index, spread_squared),
-            gathered_m: [index, index.saturating_sub(1)]
-                .map(|index| mission.end_for(index, spread_squared)),
+            across_squared: at.apart_squared(from),
+            from_tx: true,
+            least_step: 0.0,
+            end_m,
+            gathered_m: [end_m; 2],
         }
     }
 
@@ -188,9 +204,9 @@ impl Hop {
             return None;
         }
         let near = (from_m + self.least_step).min(self.end_m);
-        // Nobody hears even the nearest sender within this of the interferer.
-        let zone =
-            sqrt(ratio * (square(self.least_step) + self.across_squared) - self.aside_squared);
+        // Nobody hears even the nearest sender within this of the interferer; its place is rounded, as is the node's.
+        let nearest = self.least_step + 2.0 * f32::EPSILON * near;
+        let zone = sqrt(ratio * (square(nearest) + self.across_squared) - self.aside_squared);
         let place = if (near - self.interferer_x_m).abs() < zone {
             (self.interferer_x_m - zone).next_down()
         } else {

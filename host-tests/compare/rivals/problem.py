@@ -1,7 +1,7 @@
 """One placement problem: what is chosen, the logarithm of every hop's SIR, and the rules a chain keeps, all with slopes.
 
-Choices are x, from 0 (transmitter) to SPAN (receiver), relay by relay, then, where altitudes are chosen too, h from 0
-(bottom of the band) to SPAN (top). Lengths inside are in units of the link's length. The values alone cost time
+Choices are x, from 0 (transmitter) to SPAN (receiver), relay by relay; then, where there is room to the side, y from 0 (left
+end of the room) to SPAN (right end); then, where altitudes are chosen, h from 0 (bottom of the band) to SPAN (top). Lengths inside are in units of the link's length. The values alone cost time
 proportional to the number of relays, for any number of chains at once (the last axis is a chain); the slopes its square,
 for they fill a matrix.
 """
@@ -23,11 +23,17 @@ class Problem:
     def __init__(self, link):
         self.relays = n = link["relays"]
         self.distance_m = d = link["distance_m"]
-        self.low_m, self.high_m = link["low_m"], link["high_m"]
-        self.chooses_altitudes = self.high_m > self.low_m
-        self.choices = 2 * n if self.chooses_altitudes else n
+        # Low and high ends of x, y and h, m.
+        self.ends_m = (
+            (0.0, d),
+            (link["left_m"], link["right_m"]),
+            (link["low_m"], link["high_m"]),
+        )
+        # Which of them are chosen, by number, and how much each grows over a whole choice.
+        self.axes = [axis for axis, (low, high) in enumerate(self.ends_m) if high > low]
+        self.rise = [(self.ends_m[axis][1] - self.ends_m[axis][0]) / d / SPAN for axis in self.axes]
+        self.choices = len(self.axes) * n
         self.apart = link["min_separation_m"] / d
-        self._low, self._high = self.low_m / d, self.high_m / d
         self._x_i, self._y_i = link["x_i"] / d, link["y_i"] / d
         senders = np.full(n, link["relay_w"] * link["eta"] / link["mu_los"])
         senders[0] = link["tx_w"]
@@ -36,24 +42,22 @@ class Problem:
         self._last = np.log(at_rx * ((1.0 - self._x_i) ** 2 + self._y_i**2))
 
     def split(self, choices):
-        """The places along the link and the altitudes, in units of its length."""
-        shares = np.asarray(choices) / SPAN
-        x = shares[..., : self.relays]
-        if self.chooses_altitudes:
-            return x, self._low + (self._high - self._low) * shares[..., self.relays :]
-        return x, np.full_like(x, self._low)
+        """x, y and h of every relay, in units of the link's length."""
+        n, choices = self.relays, np.asarray(choices)
+        places = [np.full_like(choices[..., :n], low / self.distance_m) for low, _ in self.ends_m]
+        for block, (axis, rise) in enumerate(zip(self.axes, self.rise)):
+            places[axis] = places[axis] + rise * choices[..., block * n : (block + 1) * n]
+        return places
 
     def in_order(self, choices):
-        """The same chain with its places in rising order; altitudes stay with the number of the relay."""
+        """The same chain with its places in rising order; sides and altitudes stay with the number of the relay."""
         x, rest = choices[..., : self.relays], choices[..., self.relays :]
         return np.concatenate((np.sort(x), rest), axis=-1)
 
     def chain(self, choices):
-        """[x, h] of every relay in metres, held to the ends of their ranges against rounding."""
-        x, h = self.split(choices)
-        x_m = np.clip(x * self.distance_m, 0.0, self.distance_m)
-        h_m = np.clip(h * self.distance_m, self.low_m, self.high_m)
-        return np.column_stack((x_m, h_m)).tolist()
+        """[x, y, h] of every relay in metres, held to the ends of their ranges against rounding."""
+        places = zip(self.split(choices), self.ends_m)
+        return np.column_stack([np.clip(place * self.distance_m, *ends) for place, ends in places]).tolist()
 
     def worst(self, choices):
         """ln SIR of the worst hop, of one chain or of many."""
@@ -64,56 +68,51 @@ class Problem:
         n, hop = self.relays, np.arange(self.relays)
         logs, near, far, end = self._hop_logs(choices)
         slopes = np.zeros((n + 1, self.choices))
-        slopes[hop, hop] = far[1] - near[1]
-        slopes[hop[1:], hop[:-1]] = near[1][1:]
-        slopes[n, n - 1] = -end[1]
-        if self.chooses_altitudes:
-            rise = self._high - self._low
-            slopes[hop, n + hop] = (far[2] - near[2]) * rise
-            slopes[hop[1:], n + hop[:-1]] = near[2][1:] * rise
-            slopes[n, 2 * n - 1] = -end[2] * rise
-        return logs, slopes / SPAN
+        for block, (axis, rise) in enumerate(zip(self.axes, self.rise)):
+            by_far, by_near, by_end = far[1][axis], near[1][axis], end[1][axis]
+            first = block * n
+            slopes[hop, first + hop] = rise * (by_far - by_near)
+            slopes[hop[1:], first + hop[:-1]] = rise * by_near[1:]
+            slopes[n, first + n - 1] = -rise * by_end
+        return logs, slopes
 
     def rules(self, choices):
         """Margins of order and least separation of neighbours, none of which may be negative, and a row of slopes for each.
 
-        N - 1 at a common altitude, where they are one and the same, else 2 (N - 1).
+        N - 1 where x alone is chosen, where they are one and the same, else 2 (N - 1).
         """
         n, pair = self.relays, np.arange(self.relays - 1)
-        x, h = self.split(choices)
+        gaps = [np.diff(place) for place in self.split(choices)]
         order = np.zeros((n - 1, self.choices))
-        order[pair, pair + 1] = 1.0
-        order[pair, pair] = -1.0
-        if not self.chooses_altitudes:
-            return np.diff(x) - self.apart, order / SPAN
-        logs, by_x, by_h = _ln_square(np.diff(x), np.diff(h), 0.0)
-        by_h = by_h * (self._high - self._low)
+        order[pair, pair + 1] = self.rise[0]
+        order[pair, pair] = -self.rise[0]
+        if len(self.axes) == 1:
+            return gaps[0] - self.apart, order
+        logs, by = _ln_square(*gaps)
         apart = np.zeros((n - 1, self.choices))
-        apart[pair, pair + 1] = by_x
-        apart[pair, pair] = -by_x
-        apart[pair, n + pair + 1] = by_h
-        apart[pair, n + pair] = -by_h
-        return np.append(np.diff(x), logs - 2.0 * np.log(self.apart)), np.vstack((order, apart)) / SPAN
+        for block, (axis, rise) in enumerate(zip(self.axes, self.rise)):
+            apart[pair, block * n + pair + 1] = rise * by[axis]
+            apart[pair, block * n + pair] = -rise * by[axis]
+        return np.append(gaps[0], logs - 2.0 * np.log(self.apart)), np.vstack((order, apart))
 
     def crowding(self, choices):
         """By how much neighbours stand too close, as shares of the least separation, summed: of one chain or of many."""
-        x, h = self.split(choices)
-        gaps = np.hypot(np.diff(x), np.diff(h))
-        return np.maximum(0.0, 1.0 - gaps / self.apart).sum(axis=-1)
+        squares = sum(np.diff(place) ** 2 for place in self.split(choices))
+        return np.maximum(0.0, 1.0 - np.sqrt(squares) / self.apart).sum(axis=-1)
 
     def _hop_logs(self, choices):
-        x, h = self.split(choices)
-        near = _ln_square(np.diff(x, prepend=0.0), np.diff(h, prepend=0.0), 0.0)
-        far = _ln_square(x - self._x_i, h, self._y_i**2)
-        end = _ln_square(x[..., -1] - 1.0, h[..., -1], 0.0)
+        x, y, h = self.split(choices)
+        near = _ln_square(*(np.diff(place, prepend=0.0) for place in (x, y, h)))
+        far = _ln_square(x - self._x_i, y - self._y_i, h)
+        end = _ln_square(x[..., -1] - 1.0, y[..., -1], h[..., -1])
         last = np.expand_dims(self._last - end[0], -1)
         return np.concatenate((self._hops + far[0] - near[0], last), axis=-1), near, far, end
 
 
-def _ln_square(dx, dh, rest):
-    """ln(dx^2 + dh^2 + rest), and its slopes by dx and dh."""
-    square = np.maximum(dx * dx + dh * dh + rest, LEAST_SQUARE)
-    return np.log(square), 2.0 * dx / square, 2.0 * dh / square
+def _ln_square(dx, dy, dh):
+    """ln(dx^2 + dy^2 + dh^2), and its slopes by the three."""
+    square = np.maximum(dx * dx + dy * dy + dh * dh, LEAST_SQUARE)
+    return np.log(square), (2.0 * dx / square, 2.0 * dy / square, 2.0 * dh / square)
 
 
 def check_slopes(problem, rng):

@@ -1,4 +1,5 @@
-"""What a solver has seen: the best chain that keeps the rules, how many chains, and when one was first good enough."""
+"""What a solver has seen: the best chain that keeps the rules, how many chains, and when one was first good enough, or on a
+level with the chain that solvers are compared with."""
 
 import math
 import time
@@ -17,14 +18,14 @@ class Record:
     It counts time on the processor: what other programs take of the machine in between is not the solver's.
     """
 
-    def __init__(self, problem, limit_s, good_sir):
+    def __init__(self, problem, limit_s, good_sir, level_sir):
         self._problem = problem
         self._limit_s = limit_s
-        self._good = math.log(good_sir)
+        self._good, self._level = math.log(good_sir), math.log(level_sir)
         self.evaluations = 0
         self.worst = -math.inf
         self.choices = None
-        self.good = None
+        self.good = self.level = None
         self.time_s = None
         self._began = time.process_time()
 
@@ -46,7 +47,12 @@ class Record:
         if worst > self.worst and (margins.size == 0 or margins.min() >= -SLACK):
             self.worst, self.choices = float(worst), choices.copy()
             if self.good is None and worst >= self._good:
-                self.good = {"after_s": self.elapsed_s(), "chain": self._problem.chain(choices)}
+                self.good = self._mark(choices)
+            if self.level is None and worst >= self._level:
+                self.level = self._mark(choices)
+
+    def _mark(self, choices):
+        return {"after_s": self.elapsed_s(), "chain": self._problem.chain(choices)}
 
     def stop(self):
         """Stops the clock."""
@@ -62,6 +68,7 @@ class Record:
             "sir": math.exp(self.worst),
             "chain": self._problem.chain(self.choices),
             "good": self.good,
+            "level": self.level,
             "cut": self.time_s >= self._limit_s,
         }
         return {"found": found}

@@ -50,6 +50,9 @@ struct Options {
     /// Score the chains of an earlier --json again; nothing is solved, and Python is not needed
     #[arg(long, value_name = "FILE", conflicts_with_all = ["limit", "venv"])]
     from: Option<PathBuf>,
+    /// Put an excerpt into FILE in place of the table there, between the lines of the two comments that say where it is
+    #[arg(long, value_name = "FILE")]
+    readme: Option<PathBuf>,
     /// Where the virtual environment of Python is, or is made; without it beside what is built, target/compare
     #[arg(long, value_name = "DIR")]
     venv: Option<PathBuf>,
@@ -67,10 +70,38 @@ fn run(options: &Options) -> Result<String, Failure> {
         Some(file) => read(file)?,
         None => solve(options)?,
     };
+    if let Some(file) = &options.readme {
+        put(file, &table::excerpt(&results).map_err(Failure::input)?)?;
+    }
     if options.json {
         return command::json(&results);
     }
     table::table(&results).map_err(Failure::input)
+}
+
+/// What stands around the table in the README.
+const MARKS: [&str; 2] = [
+    "<!-- cargo compare --readme README.md -->\n",
+    "<!-- end of that -->\n",
+];
+
+/// Puts `excerpt` between the two marks in `file`.
+fn put(file: &Path, excerpt: &str) -> Result<(), Failure> {
+    let wrong = |why: String| Failure::input(format!("--readme {}: {why}", file.display()));
+    let text = std::fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
+    let [begin, end] = MARKS;
+    let parts = text
+        .split_once(begin)
+        .and_then(|(before, rest)| Some((before, rest.split_once(end)?.1)));
+    let Some((before, after)) = parts else {
+        return Err(wrong(format!(
+            "no lines {} and {}",
+            begin.trim(),
+            end.trim()
+        )));
+    };
+    let text = format!("{before}{begin}\n{excerpt}\n{end}{after}");
+    std::fs::write(file, text).map_err(|error| wrong(error.to_string()))
 }
 
 fn read(file: &Path) -> Result<Results, Failure> {
@@ -114,9 +145,10 @@ fn solve(options: &Options) -> Result<Results, Failure> {
 /// This crate first: its time is what the others' is compared with, so it is taken right before theirs.
 fn by_all(problem: Problem, rivals: &mut Rivals, bar: &ProgressBar) -> Result<Solved, String> {
     let mut runs = own::runs(problem)?;
+    let level = table::level(problem, &runs)?;
     for solver in SOLVERS {
         bar.set_message(format!("{problem}: {}", solver.title));
-        runs.push(rivals.run(solver, problem)?);
+        runs.push(rivals.run(solver, problem, level)?);
         bar.inc(1);
     }
     Ok(Solved { problem, runs })

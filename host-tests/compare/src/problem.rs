@@ -1,4 +1,4 @@
-//! What is solved: relays at a common altitude, and relays that choose their altitudes.
+//! What is solved: relays at a common altitude, relays that choose their altitudes, and those with room to the side as well.
 
 use std::fmt;
 
@@ -15,6 +15,8 @@ pub(crate) enum Choice {
     Places,
     /// Their places and their altitudes.
     Altitudes,
+    /// Their places, their altitudes and how far they go to either side.
+    Sides,
 }
 
 /// The best places of a number of relays.
@@ -27,7 +29,7 @@ pub(crate) struct Problem {
 }
 
 /// The true optima (linear SIR) by number of relays, from an independent program, to nine or ten digits.
-const OPTIMA: [(Choice, &[(u16, f64)]); 2] = [
+const OPTIMA: [(Choice, &[(u16, f64)]); 3] = [
     (
         Choice::Places,
         &[
@@ -46,6 +48,7 @@ const OPTIMA: [(Choice, &[(u16, f64)]); 2] = [
             (50, 6.498_377_624_8),
         ],
     ),
+    (Choice::Sides, &[(8, 1.543_032_046), (50, 9.002_614_360)]),
 ];
 
 /// Every problem, in the order of the tables.
@@ -64,6 +67,7 @@ impl fmt::Display for Problem {
         let what = match self.choice {
             Choice::Places => "places",
             Choice::Altitudes => "places and altitudes",
+            Choice::Sides => "places, sides and altitudes",
         };
         write!(f, "{what} of {}", self.relays)
     }
@@ -85,10 +89,14 @@ impl Problem {
                 let text = include_str!("../../../examples/altitudes.toml");
                 Scenario::parse("altitudes.toml", text).map_err(|error| error.to_string())
             }
+            Choice::Sides => {
+                let text = include_str!("../../../examples/side.toml");
+                Scenario::parse("side.toml", text).map_err(|error| error.to_string())
+            }
         }
     }
 
-    /// The same for the judge and the other solvers, and the altitudes that relays may fly at.
+    /// The same for the judge and the other solvers, and where relays may fly across the line.
     pub(crate) fn link(self) -> Result<(Link, Corridor), String> {
         let scenario = self.scenario()?;
         let Interference::Sources(sources) = &scenario.interference else {
@@ -112,15 +120,19 @@ impl Problem {
             y_i: source.y_m,
             mu_los,
             mu_nlos: factor(channel.excess_loss_nlos_db),
-            // Both scenarios see the ground in line of sight.
+            // All scenarios see the ground in line of sight.
             eta: mu_los,
             relays: vec![station; usize::from(self.relays)],
         };
-        let band = match self.choice {
-            Choice::Places => (scenario.altitude_m, scenario.altitude_m),
-            Choice::Altitudes => (scenario.altitude_min_m, scenario.altitude_max_m),
+        let corridor = match self.choice {
+            Choice::Places => Corridor::plane(scenario.altitude_m, scenario.altitude_m),
+            Choice::Altitudes | Choice::Sides => Corridor {
+                least_m: scenario.altitude_min_m,
+                most_m: scenario.altitude_max_m,
+                left_m: scenario.lateral_min_m,
+                right_m: scenario.lateral_max_m,
+            },
         };
-        let (least_m, most_m) = band;
-        Ok((link, Corridor::plane(least_m, most_m)))
+        Ok((link, corridor))
     }
 }

@@ -67,23 +67,26 @@ pub(crate) struct Found {
     pub(crate) evaluations: Option<u64>,
     /// SIR (linear) of the worst hop, as the solver has it.
     pub(crate) sir: f64,
-    /// x and h of every relay, m.
+    /// x, y and h of every relay, m.
     pub(crate) chain: Chain,
-    /// The first chain on the way that was good enough.
+    /// The first chain on the way within [`crate::score::GOOD`] of the optimum.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) good: Option<Good>,
+    pub(crate) good: Option<Mark>,
+    /// The first chain on the way that was as good as what this crate found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) level: Option<Mark>,
     /// Whether the time limit ended it.
     pub(crate) cut: bool,
 }
 
-/// The first chain within [`crate::score::GOOD`] of the optimum.
+/// A chain on the way.
 #[derive(Debug, Serialize, Deserialize)]
-pub(crate) struct Good {
+pub(crate) struct Mark {
     /// Time on the processor from the beginning, s.
     pub(crate) after_s: f64,
-    /// x and h of every relay, m.
+    /// x, y and h of every relay, m.
     pub(crate) chain: Chain,
 }
 
-/// x and h of every relay, m, from the transmitter on.
-pub(crate) type Chain = Vec<[f64; 2]>;
+/// x, y and h of every relay, m, from the transmitter on.
+pub(crate) type Chain = Vec<[f64; 3]>;

@@ -29,7 +29,11 @@ pub(crate) struct Solver {
 }
 
 /// All of them.
-pub(crate) const SOLVERS: [Solver; 4] = [
+pub(crate) const SOLVERS: [Solver; 5] = [
+    Solver {
+        name: "scipy-slsqp-one",
+        title: "SciPy SLSQP, its best start alone",
+    },
     Solver {
         name: "scipy-slsqp",
         title: "SciPy SLSQP, 20 starts",
@@ -92,11 +96,11 @@ impl Rivals {
             },
         };
         let small = Problem {
-            choice: Choice::Altitudes,
+            choice: Choice::Sides,
             relays: 3,
         };
         let link = link(small)?;
-        let versions = rivals.ask(&json!({ "good_sir": 1.0, "link": link }))?;
+        let versions = rivals.ask(&json!({ "good_sir": 1.0, "level_sir": 1.0, "link": link }))?;
         rivals.versions = serde_json::from_value(versions).map_err(|error| error.to_string())?;
         Ok(rivals)
     }
@@ -106,13 +110,19 @@ impl Rivals {
         &self.versions
     }
 
-    /// Has `solver` solve `problem`.
-    pub(crate) fn run(&mut self, solver: Solver, problem: Problem) -> Result<Run, String> {
+    /// Has `solver` solve `problem`, and say when it first met `level`, linear SIR.
+    pub(crate) fn run(
+        &mut self,
+        solver: Solver,
+        problem: Problem,
+        level: f64,
+    ) -> Result<Run, String> {
         let optimum = problem.optimum().ok_or("a problem without an optimum")?;
         let task = json!({
             "solver": solver.name,
             "limit_s": self.limit_s,
             "good_sir": optimum * (1.0 - GOOD),
+            "level_sir": level,
             "link": link(problem)?,
         });
         let answer = self.ask(&task)?;
@@ -152,14 +162,16 @@ impl Drop for Rivals {
 
 /// The problem in numbers.
 fn link(problem: Problem) -> Result<Value, String> {
-    let (link, band) = problem.link()?;
+    let (link, room) = problem.link()?;
     let relay = link.relays.first().ok_or("a problem without relays")?;
     Ok(json!({
         "relays": link.len(),
         "distance_m": link.distance_m,
         "min_separation_m": link.min_separation_m,
-        "low_m": band.least_m,
-        "high_m": band.most_m,
+        "left_m": room.left_m,
+        "right_m": room.right_m,
+        "low_m": room.least_m,
+        "high_m": room.most_m,
         "tx_w": link.tx_w,
         "relay_w": relay.power_w,
         "interferer_w": link.interferer_w,

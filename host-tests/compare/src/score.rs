@@ -5,7 +5,7 @@ use std::fmt;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
 
-use crate::results::Found;
+use crate::results::{Found, Mark};
 
 /// How far below the optimum a chain is good enough, relative: the tolerance of the relays' mission.
 pub(crate) const GOOD: f64 = 1e-4;
@@ -23,6 +23,8 @@ pub(crate) enum Refusal {
     Count(usize),
     /// A relay is not between transmitter and receiver: its index from 1, and x in m.
     Outside(usize, f64),
+    /// A relay is farther to the side than there is room: its index from 1, and y in m.
+    Side(usize, f64),
     /// A relay is not in the band of altitudes: its index from 1, and h in m.
     Altitude(usize, f64),
     /// A relay stands behind the one before it: its index from 1.
@@ -38,6 +40,7 @@ impl fmt::Display for Refusal {
         match self {
             Self::Count(relays) => write!(f, "it has {relays} relays"),
             Self::Outside(relay, x_m) => write!(f, "relay {relay} is at x = {x_m} m"),
+            Self::Side(relay, y_m) => write!(f, "relay {relay} is at y = {y_m} m"),
             Self::Altitude(relay, h_m) => write!(f, "relay {relay} is at h = {h_m} m"),
             Self::Order(relay) => write!(f, "relay {relay} is behind the one before it"),
             Self::Separation(relay, gap_m) => {
@@ -48,8 +51,8 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// SIR (linear) of the worst hop of a chain of [x, h] in m.
-pub(crate) fn judge(link: &Link, band: Corridor, chain: &[[f64; 2]]) -> Result<f64, Refusal> {
+/// SIR (linear) of the worst hop of a chain of [x, y, h] in m.
+pub(crate) fn judge(link: &Link, room: Corridor, chain: &[[f64; 3]]) -> Result<f64, Refusal> {
     let count = Refusal::Count(chain.len());
     if chain.len() != link.len() {
         return Err(count);
@@ -57,16 +60,20 @@ pub(crate) fn judge(link: &Link, band: Corridor, chain: &[[f64; 2]]) -> Result<f
     // Not a number is within no range.
     let within =
         |low: f64, value: f64, high: f64| (low - SLACK_M..=high + SLACK_M).contains(&value);
-    for (relay, [x_m, h_m]) in (1..).zip(chain) {
+    for (relay, [x_m, y_m, h_m]) in (1..).zip(chain) {
         if !within(0.0, *x_m, link.distance_m) {
             return Err(Refusal::Outside(relay, *x_m));
         }
-        if !within(band.least_m, *h_m, band.most_m) {
+        if !within(room.left_m, *y_m, room.right_m) {
+            return Err(Refusal::Side(relay, *y_m));
+        }
+        if !within(room.least_m, *h_m, room.most_m) {
             return Err(Refusal::Altitude(relay, *h_m));
         }
     }
-    for (relay, ([from_x, from_h], [x, h])) in (2..).zip(chain.iter().zip(chain.iter().skip(1))) {
-        let gap_m = (x - from_x).hypot(h - from_h);
+    for (relay, (from, to)) in (2..).zip(chain.iter().zip(chain.iter().skip(1))) {
+        let ([from_x, from_y, from_h], [x, y, h]) = (from, to);
+        let gap_m = (x - from_x).hypot(y - from_y).hypot(h - from_h);
         if x - from_x < -SLACK_M {
             return Err(Refusal::Order(relay));
         }
@@ -74,7 +81,11 @@ pub(crate) fn judge(link: &Link, band: Corridor, chain: &[[f64; 2]]) -> Result<f
             return Err(Refusal::Separation(relay, gap_m));
         }
     }
-    let place = |&[x_m, altitude_m]: &[f64; 2]| Place::in_plane(x_m, altitude_m);
+    let place = |&[x_m, y_m, altitude_m]: &[f64; 3]| Place {
+        x_m,
+        y_m,
+        altitude_m,
+    };
     let places: Vec<Place> = chain.iter().map(place).collect();
     sir(link, &places).ok_or(count)
 }
@@ -85,23 +96,32 @@ pub(crate) struct Score {
     pub(crate) sir: f64,
     /// When the solver first had a chain that is good enough, s; `None` if it never had.
     pub(crate) good_after_s: Option<f64>,
+    /// When it first had one as good as the chain that it is compared with, s.
+    pub(crate) level_after_s: Option<f64>,
 }
 
-/// The score of what a solver found; its own word is taken for the time alone.
+/// The score of what a solver found, which is compared with a chain of `level`, linear SIR; its own word is taken for the time
+/// alone.
 pub(crate) fn score(
     link: &Link,
-    band: Corridor,
+    room: Corridor,
     optimum: f64,
+    level: f64,
     found: &Found,
 ) -> Result<Score, Refusal> {
-    let sir = judge(link, band, &found.chain)?;
+    let sir = judge(link, room, &found.chain)?;
     if !((found.sir / sir - 1.0).abs() <= SIR_SLACK) {
         return Err(Refusal::Sir(found.sir, sir));
     }
-    let least = optimum * (1.0 - GOOD);
-    let good_after_s = match &found.good {
-        Some(good) if judge(link, band, &good.chain)? >= least * (1.0 - 1e-9) => Some(good.after_s),
-        _ => None,
+    let after = |mark: &Option<Mark>, least: f64| match mark {
+        Some(mark) if judge(link, room, &mark.chain)? >= least * (1.0 - 1e-9) => {
+            Ok(Some(mark.after_s))
+        }
+        _ => Ok(None),
     };
-    Ok(Score { sir, good_after_s })
+    Ok(Score {
+        sir,
+        good_after_s: after(&found.good, optimum * (1.0 - GOOD))?,
+        level_after_s: after(&found.level, level)?,
+    })
 }

@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use crate::problem::Choice;
+use crate::problem::{Choice, Problem};
 use crate::results::{Answer, Found, Results, Run, Solved};
-use crate::score::{Score, score};
+use crate::score::{Score, judge, score};
 
-const TITLES: [(Choice, &str); 2] = [
+const TITLES: [(Choice, &str); 3] = [
     (
         Choice::Places,
         "Places, all at 20 m (the default scenario):",
@@ -15,26 +15,48 @@ const TITLES: [(Choice, &str); 2] = [
         Choice::Altitudes,
         "Places and altitudes (`examples/altitudes.toml`):",
     ),
+    (
+        Choice::Sides,
+        "Places, altitudes and up to 280 m to either side (`examples/side.toml`):",
+    ),
 ];
 
 const HEAD: &str = "\
-| N | solver | SIR of the worst hop | short of the optimum by | chains evaluated | within 1e-4 of it after | time in all |
-| --- | --- | --- | --- | --- | --- | --- |
+| N | solver | SIR of the worst hop | short of the optimum by | chains evaluated | within 1e-4 of it after | as good as the first line after | time in all |
+| --- | --- | --- | --- | --- | --- | --- | --- |
 ";
 
 const NOTES: &str = "\
 In parentheses: times as long as the first line of that N in the same run.
 
 - `uav-relay, as the head predicts`: what the head computes from the mission before the first sweep, and every relay's place. \
-`every relay by itself`: the joint method on the whole chain from the scenario, from all of its starts, which each relay works out \
-alone. \
+`one relay for all`: the joint method on the whole chain from the mission, from all of its starts, which each relay works out \
+alone, and every relay's place. \
 `all relays by messages`: the computing of all relays of a simulated chain one after the other, and every frame they exchange.
 - The others have the whole problem in one place, in f64. SLSQP: the largest t with ln SIR >= t at every hop, order and least \
-separation as constraints, with their slopes; choices from 0 to 10; from equal spacings (at five altitudes where those are chosen) and random chains. \
+separation as constraints, with their slopes; choices from 0 to 10; from equal spacings (at five altitudes where those are chosen, \
+with room to the side at five sides as well) and random chains. \
+`its best start alone`: the one of the equal spacings from which it is as good as the first line soonest; the time to find out \
+which one that is does not count. \
 Differential evolution (rand1bin, 15 members a choice, until they agree to 1e-6 or four fifths of the time limit are over) on the \
 worst hop of the sorted chain. G_MLSL_LDS with LD_LBFGS on a smooth stand-in for the worst hop, 1000 evaluations.
 - Time is time on the processor, of the solver alone, in one thread. Every SIR is computed from the places, \
-in f64, by formulas that no solver shares; a chain that breaks order, band or least separation does not count.
+in f64, by formulas that no solver shares; a chain that breaks order, room or least separation does not count.
+";
+
+/// What the README shows, in its order.
+const EXCERPT: [(Choice, u16, &str); 6] = [
+    (Choice::Places, 8, "8 relays at 20 m"),
+    (Choice::Places, 50, "50 relays at 20 m"),
+    (Choice::Altitudes, 8, "8 relays, altitudes too"),
+    (Choice::Altitudes, 50, "50 relays, altitudes too"),
+    (Choice::Sides, 8, "8 relays, altitudes and sides"),
+    (Choice::Sides, 50, "50 relays, altitudes and sides"),
+];
+
+const EXCERPT_HEAD: &str = "\
+| problem | solver | short of the optimum by | as good as the first line after | time in all |
+| --- | --- | --- | --- | --- |
 ";
 
 /// The tables and the notes.
@@ -53,64 +75,133 @@ pub(crate) fn table(results: &Results) -> Result<String, String> {
         text.push('\n');
     }
     text.push_str(NOTES);
+    _ = writeln!(text, "\n{}", circumstances(results));
+    Ok(text)
+}
+
+/// The table of the README.
+pub(crate) fn excerpt(results: &Results) -> Result<String, String> {
+    let mut text = EXCERPT_HEAD.to_owned();
+    for (choice, relays, title) in EXCERPT {
+        let problem = Problem { choice, relays };
+        let solved = results.problems.iter().find(|s| s.problem == problem);
+        let solved = solved.ok_or_else(|| format!("{problem}: not solved"))?;
+        let mut title = title;
+        for (solver, line) in lines(solved)? {
+            let cells = match line {
+                Err(why) => format!("{why} | |"),
+                Ok(line) => format!("{} | {} | {}", line.short, line.level, line.all),
+            };
+            _ = writeln!(text, "| {title} | {solver} | {cells} |");
+            title = "";
+        }
+    }
+    _ = writeln!(text, "\n{}", circumstances(results));
+    Ok(text)
+}
+
+/// Where and when, and by what.
+fn circumstances(results: &Results) -> String {
     let (machine, versions) = (&results.machine, &results.versions);
-    _ = writeln!(
-        text,
-        "\n{} on {}; Python {}, SciPy {}, NLopt {}, at most {} s a solver and problem.",
+    format!(
+        "{} on {}; Python {}, SciPy {}, NLopt {}, at most {} s a solver and problem.",
         machine.date,
         machine.processor,
         versions.python,
         versions.scipy,
         versions.nlopt,
         results.limit_s
-    );
+    )
+}
+
+/// SIR (linear) of the chain that all others of the problem are compared with: the first.
+pub(crate) fn level(problem: Problem, runs: &[Run]) -> Result<f64, String> {
+    let (link, room) = problem.link()?;
+    match runs.first().map(|own| &own.answer) {
+        Some(Answer::Found(found)) => {
+            judge(&link, room, &found.chain).map_err(|refusal| format!("{problem}: {refusal}"))
+        }
+        _ => Err(format!("{problem}: nothing to compare with")),
+    }
+}
+
+/// The cells of a chain that counts.
+struct Line {
+    sir: String,
+    short: String,
+    evaluations: String,
+    good: String,
+    level: String,
+    all: String,
+}
+
+/// A solver, and its line or why it has none.
+type Entry<'a> = (&'a str, Result<Line, String>);
+
+/// The lines of one problem in the table.
+fn rows(solved: &Solved) -> Result<String, String> {
+    let mut text = String::new();
+    for (solver, line) in lines(solved)? {
+        let cells = match line {
+            Err(why) => format!("{why} | | | | |"),
+            Ok(line) => [
+                line.sir,
+                line.short,
+                line.evaluations,
+                line.good,
+                line.level,
+                line.all,
+            ]
+            .join(" | "),
+        };
+        _ = writeln!(text, "| {} | {solver} | {cells} |", solved.problem.relays);
+    }
     Ok(text)
 }
 
-/// The lines of one problem.
-fn rows(solved: &Solved) -> Result<String, String> {
+/// The solvers of one problem; what each came to, or why that does not count.
+fn lines(solved: &Solved) -> Result<Vec<Entry<'_>>, String> {
     let problem = solved.problem;
     let optimum = problem
         .optimum()
         .ok_or_else(|| format!("{problem}: not one of the problems"))?;
-    let (link, band) = problem.link()?;
+    let (link, room) = problem.link()?;
     let own_s = solved.runs.first().and_then(|own| match &own.answer {
         Answer::Found(found) => Some(found.time_s),
         Answer::Error(_) => None,
     });
     let own_s = own_s.ok_or_else(|| format!("{problem}: nothing to compare with"))?;
-    let mut text = String::new();
-    for Run { solver, answer } in &solved.runs {
-        let cells = match answer {
-            Answer::Error(why) => nothing(why),
-            Answer::Found(found) => match score(&link, band, optimum, found) {
-                Err(refusal) => nothing(&format!("does not count: {refusal}")),
-                Ok(score) => cells(found, &score, optimum, own_s),
-            },
-        };
-        _ = writeln!(text, "| {} | {solver} | {cells} |", problem.relays);
-    }
-    Ok(text)
+    // Where that does not count, nobody is compared with it.
+    let level = level(problem, &solved.runs).unwrap_or(f64::INFINITY);
+    let of = |Run { answer, .. }: &Run| match answer {
+        Answer::Error(why) => Err(plain(why)),
+        Answer::Found(found) => match score(&link, room, optimum, level, found) {
+            Err(refusal) => Err(plain(&format!("does not count: {refusal}"))),
+            Ok(score) => Ok(line(found, &score, optimum, own_s)),
+        },
+    };
+    let lines = solved.runs.iter().map(|run| (run.solver.as_str(), of(run)));
+    Ok(lines.collect())
 }
 
-/// The cells of a chain that counts.
-fn cells(found: &Found, score: &Score, optimum: f64, own_s: f64) -> String {
-    let short = short((optimum - score.sir) / optimum);
-    let evaluations = found.evaluations.map_or_else(String::new, spaced);
-    let good = score
-        .good_after_s
-        .map_or_else(|| "never".to_owned(), |after_s| time(after_s, own_s));
-    let all = time(found.time_s, own_s);
+fn line(found: &Found, score: &Score, optimum: f64, own_s: f64) -> Line {
+    let after = |after_s: Option<f64>| {
+        after_s.map_or_else(|| "never".to_owned(), |after_s| time(after_s, own_s))
+    };
     let cut = if found.cut { ", cut off" } else { "" };
-    format!(
-        "{:.6} | {short} | {evaluations} | {good} | {all}{cut}",
-        score.sir
-    )
+    Line {
+        sir: format!("{:.6}", score.sir),
+        short: short((optimum - score.sir) / optimum),
+        evaluations: found.evaluations.map_or_else(String::new, spaced),
+        good: after(score.good_after_s),
+        level: after(score.level_after_s),
+        all: time(found.time_s, own_s) + cut,
+    }
 }
 
-/// The cells of a solver that has no chain to show.
-fn nothing(why: &str) -> String {
-    format!("{} | | | |", why.replace(['|', '\n'], " "))
+/// Text that fits in a cell.
+fn plain(why: &str) -> String {
+    why.replace(['|', '\n'], " ")
 }
 
 /// What is missing to the optimum, relative; that is known to nine digits.

@@ -308,7 +308,13 @@ impl Ledger {
             let silence = turn.now.since(self.heard[of]);
             self.missed[of] |= there[of] && silence >= scenario.settings[at].lost;
         }
-        prop_assert_eq!(self.noticed, self.missed, "neighbours of relay {}", at + 1);
+        if scenario.settings[at].method == Method::Joint {
+            // While it solves the chain, silence is excused: it misses nobody too soon.
+            let soon = self.noticed[0] > self.missed[0] || self.noticed[1] > self.missed[1];
+            prop_assert!(!soon, "neighbours of relay {}", at + 1);
+        } else {
+            prop_assert_eq!(self.noticed, self.missed, "neighbours of relay {}", at + 1);
+        }
         Ok(())
     }
 

@@ -64,6 +64,10 @@ impl Ledger {
             _ if pass.digest != view => Met::Foreign,
             // Places are moved where there are some.
             Met::TakenUp if pass.moves && !stands => Met::Foreign,
+            // Rebooted in the midst of the sweep before, it does not know yet where it is to begin.
+            Met::TakenUp if pass.courses && self.begins_anew() && after.stale > before.stale => {
+                Met::Foreign
+            }
             met => met,
         };
         let other = u32::from(pass.digest != view);

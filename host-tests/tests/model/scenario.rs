@@ -202,19 +202,16 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     };
     let corridor = Corridor::plane(f64::from(narrow.least_m), f64::from(narrow.most_m));
     let mut link = drawn.link;
-    // Relays that differ find their joint places by courses. A chain begun again goes on from where those led, and may end at
-    // another target than the first time: what is asked below holds for equals alone.
-    let mixed = kind == Kind::Adjust;
     // All at one altitude to begin with, but for single ones.
     let common_m = log_uniform(rng, corridor.least_m, corridor.most_m);
     for relay in &mut link.relays {
-        let own = mixed && rng.random_bool(0.2);
+        let own = rng.random_bool(0.2);
         relay.altitude_m = if own {
             log_uniform(rng, corridor.least_m, corridor.most_m)
         } else {
             common_m
         };
-        relay.power_w *= if mixed && rng.random_bool(0.1) {
+        relay.power_w *= if rng.random_bool(0.1) {
             log_uniform(rng, 0.3, 3.0)
         } else {
             1.0
@@ -238,7 +235,7 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     };
     let mut settings = settings(link.len(), common, &own);
     for one in &mut settings {
-        one.hold_altitude = mixed && rng.random_bool(0.1);
+        one.hold_altitude = rng.random_bool(0.1);
     }
     // A search that need not keep relays apart finds more than any that must, and finds it surely.
     let unseparated = Link {

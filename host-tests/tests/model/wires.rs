@@ -62,6 +62,8 @@ pub(crate) struct Pass {
     pub(crate) digest: u16,
     /// Whether it is one of Algorithm 2.
     pub(crate) moves: bool,
+    /// Whether it is a course of the joint method.
+    pub(crate) courses: bool,
 }
 
 /// The pass that a frame hands onward, if that is what it does.
@@ -80,6 +82,7 @@ pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
                 number,
                 digest: message.mission()?,
                 moves: matches!(message, Message::Token(_)),
+                courses: matches!(message, Message::Course(_)),
             });
         }
     }

@@ -159,8 +159,47 @@ fn a_plan_for_relays_that_differ_is_no_worse_than_what_they_agree_on() {
     }
 }
 
-/// Forty scenarios of up to 30 relays whose optima are stored; two are short by up to a hundredth. `COUNT=2000` takes all of them,
-/// of up to 100 relays, and prints how many are short, and which.
+/// One of those scenarios: what the plan comes to over what the judge found.
+fn over_the_judge(number: u32, optimum: f64) -> f64 {
+    let Drawn { link, corridor, .. } = numbered(number);
+    let relays = u16::try_from(link.len()).unwrap();
+    let plan = free(&of_link(&link, corridor), Number::Of(relays));
+    // One relay right above the line goes by a theorem.
+    assert!(!plan.proven || relays == 1);
+    let places: Vec<_> = plan
+        .places
+        .iter()
+        .map(|(at, _)| joint::Place {
+            x_m: f64::from(at.x_m),
+            y_m: f64::from(at.y_m),
+            altitude_m: f64::from(at.altitude_m),
+        })
+        .collect();
+    // What an f32 rounds away between two places.
+    let rounded = Link {
+        min_separation_m: (link.min_separation_m - 1e-6 * link.distance_m).max(0.0),
+        ..link.clone()
+    };
+    assert!(
+        joint::keeps_rules(&rounded, corridor, &[], &places),
+        "{number}"
+    );
+    joint::sir(&link, &places).unwrap() / optimum
+}
+
+/// Forty scenarios of up to 30 relays whose optima are stored. `COUNT=2000` takes all of them, of up to 100 relays, and prints how
+/// many are short, and which. Of all, none is below 0.98, and these are short by more than a thousandth:
+///
+/// | number | relays | reached | why |
+/// | --- | --- | --- | --- |
+/// | 1759 | 97 | 0.9805 | the interferer is right before Rx: a start leads into another basin |
+/// | 1637, 553 | 70, 31 | 0.995, 0.997 | a separation that no hop keeps next to the interferer: places across the line are those of a chain without it |
+/// | 939, 1607 | 82, 18 | 0.995, 0.996 | a band of one altitude and a separation that binds along much of the chain |
+/// | 957 | 4 | 0.997 | relays take turns at two places, which are polished one at a time |
+/// | 439 | 11 | 0.998 | not found out |
+/// | 839 | 2 | 0.9987 | both would have to move at once |
+///
+/// The judge is short by 0.03 % itself at 566.
 #[test]
 fn a_plan_comes_near_the_optimum_of_the_judge() {
     let optima = optima().unwrap();
@@ -168,34 +207,39 @@ fn a_plan_comes_near_the_optimum_of_the_judge() {
         .ok()
         .map(|text| text.parse().unwrap());
     let (enough, most) = count.map_or((40, 30), |count| (count, 100));
-    let (mut judged, mut least) = (0, f64::INFINITY);
-    let mut missed = Vec::new();
-    for number in 0..COUNT {
-        let Drawn { link, corridor, .. } = numbered(number);
-        let optimum = optima[number as usize];
-        let relays = u16::try_from(link.len()).unwrap();
-        if relays > most || !(optimum > 0.0) || judged == enough {
-            continue;
-        }
-        judged += 1;
-        let plan = free(&of_link(&link, corridor), Number::Of(relays));
-        let ratio = plan.sir() / optimum;
-        assert!(ratio < 1.0 + 1e-5, "{number}: {ratio}");
-        // One relay right above the line goes by a theorem.
-        assert!(!plan.proven || relays == 1);
-        least = least.min(ratio);
-        if ratio < 0.999 {
-            missed.push((number, ratio));
-        }
-    }
+    let chosen: Vec<u32> = (0..COUNT)
+        .filter(|&number| numbered(number).link.len() <= most && optima[number as usize] > 0.0)
+        .take(enough)
+        .collect();
+    let judge = |part: &[u32]| -> Vec<(u32, f64)> {
+        let ratio = |&number: &u32| (number, over_the_judge(number, optima[number as usize]));
+        part.iter().map(ratio).collect()
+    };
+    let (left, right) = chosen.split_at(chosen.len() / 2);
+    let ratios = std::thread::scope(|scope| {
+        let other = scope.spawn(|| judge(right));
+        let mut ratios = judge(left);
+        ratios.extend(other.join().unwrap());
+        ratios
+    });
+    let judged = ratios.len();
+    let better: Vec<_> = ratios
+        .iter()
+        .filter(|(_, ratio)| *ratio > 1.0 + 1e-5)
+        .collect();
+    let missed: Vec<_> = ratios.iter().filter(|(_, ratio)| *ratio < 0.999).collect();
+    let least = ratios
+        .iter()
+        .map(|(_, ratio)| *ratio)
+        .fold(f64::INFINITY, f64::min);
     println!(
-        "{} of {judged} short by more than a thousandth, {} of them by more than a fiftieth: {missed:?}; least {least}",
+        "{} of {judged} short by more than a thousandth: {missed:?}; least {least}; better than the judge: {better:?}",
         missed.len(),
-        missed.iter().filter(|(_, ratio)| *ratio < 0.98).count()
     );
-    // A local optimum now and then. Of these forty none is far below; of two thousand some are, and only their share is held.
-    assert!(missed.len() * 20 <= judged);
-    assert!(count.is_some() || least > 0.98);
+    assert!(better.len() <= usize::from(count.is_some()), "{better:?}");
+    assert!(better.iter().all(|(_, ratio)| *ratio < 1.001));
+    assert!(missed.len() * 200 <= judged);
+    assert!(least > 0.98);
 }
 
 #[test]

@@ -101,6 +101,24 @@ fn five_go_to_the_side_as_the_simulated_chain_does() {
     settles(&flight);
 }
 
+/// One of them holds its altitude all the same: it stays up there, and goes to the side with the others.
+#[test]
+fn five_go_to_the_side_around_one_that_holds_its_altitude() {
+    let flight = past(150.0, 280.0, Some((3, 100.0)), Method::Joint);
+    let places = simulated(&flight);
+    let metres = |[_, y, altitude]: [u32; 3]| (f32::from_bits(y), f32::from_bits(altitude));
+    for (relay, (y_m, altitude_m)) in (1..).zip(places.iter().copied().map(metres)) {
+        assert!(y_m < -1.0, "relay {relay}: y = {y_m}");
+        assert_eq!(
+            altitude_m == 100.0,
+            relay == 3,
+            "relay {relay}: {altitude_m}"
+        );
+    }
+    assert_ne!(places, simulated(&past(150.0, 280.0, None, Method::Joint)));
+    settles(&flight);
+}
+
 #[test]
 fn five_adjust_themselves_as_the_simulated_chain_does() {
     settles(&past(

@@ -529,8 +529,8 @@ fn the_smallest_targets_are_met_in_a_field() {
             );
             match &sent(&mut relay, now)[..] {
                 [(Port::Upstream, Said::Sweep(Swept { reaches, .. }))] => {
-                    // As near to Tx as the three relays before it leave room for.
-                    assert!((12.0..12.1).contains(&reaches[0]), "{reaches:?}");
+                    // Three relays before it may be above each other, as far as this one knows, and those then keep no distance along x.
+                    assert!((1e-4..1e-2).contains(&reaches[0]), "{reaches:?}");
                 }
                 [
                     (

@@ -6,7 +6,6 @@ use super::task::Lead;
 use super::turning::Turning;
 use crate::mission::{Band, Mission, Profile};
 use crate::node::context::Context;
-use crate::optimiser::joint::Outlook;
 use crate::optimiser::joint::course::Coursing;
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::search::Infeasible;
@@ -86,8 +85,28 @@ pub(super) enum Pass {
 pub(super) struct Chosen {
     /// Across the line.
     pub(super) at: CrossSection,
+    /// Where it was by its own solution of the chain, before courses moved it: every beginning is from there.
+    solved: CrossSection,
     /// And no farther along it, m.
     pub(super) end_m: f32,
+    /// Whether nobody holds back there.
+    pub(super) plain: bool,
+}
+
+impl Chosen {
+    pub(super) const fn new(at: CrossSection, end_m: f32, plain: bool) -> Self {
+        Self {
+            at,
+            solved: at,
+            end_m,
+            plain,
+        }
+    }
+
+    /// What courses have come to counts no more.
+    pub(super) const fn begin_again(&mut self) {
+        self.at = self.solved;
+    }
 }
 
 /// A relay's share of the algorithms.
@@ -103,8 +122,6 @@ pub(crate) struct Share {
     pub(super) chosen: Option<Chosen>,
     /// Where it is to be across the line.
     pub(super) at: CrossSection,
-    /// What came of the last course, as the relay before is to know it.
-    pub(super) worth: Option<(Option<u8>, f32, Outlook)>,
     /// Where the neighbour toward Rx stands, as far as it has said.
     pub(super) after: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
@@ -124,7 +141,6 @@ impl Share {
             profile,
             chosen: None,
             at: profile.on_line().at,
-            worth: None,
             after: None,
             setpoint: None,
             target: None,
@@ -178,12 +194,18 @@ impl Share {
 
     /// Goes on with a computation: the relay's own share of the current pass, or the leader's next pass.
     ///
-    /// Bounded by 16 hops of 16 reaches, 128 points of an uneven field (or all of them for one target), ten relays of the joint method,
+    /// Bounded by 12 hops of 16 reaches, 128 points of an uneven field (or all of them for one target), ten relays of the joint method,
     /// or 624 places of Algorithm 2.
     pub(crate) fn work(&mut self, own: Own<'_>) -> Next {
         if self.exchange.phase() == Phase::Waiting {
             match &self.pass {
-                Pass::Sweep(sweeping) if !sweeping.is_done() => return self.go_on_with_sweep(own),
+                Pass::Sweep(sweeping) if !sweeping.is_done() => {
+                    let unknown = ALTITUDE && sweeping.chosen && self.chosen.is_none();
+                    if unknown && self.solve(own).is_none() {
+                        return Next::Work { moved: false };
+                    }
+                    return self.go_on_with_sweep(own);
+                }
                 Pass::Turn(_) if ADJUST => return self.go_on_with_turn(own),
                 _ => {}
             }
@@ -264,15 +286,17 @@ impl Share {
                 stand: sweeping.stand(),
                 own: sweeping.own || self.differs(own),
             })),
-            Pass::Course(_) if ALTITUDE => self.worth.map(|(trial, slack_m, outlook)| {
-                Message::Worth(Worth {
-                    number,
-                    mission,
-                    trial,
-                    slack_m,
-                    outlook,
+            Pass::Course(coursing) if ALTITUDE => {
+                coursing.worth.map(|(trial, slack_m, outlook)| {
+                    Message::Worth(Worth {
+                        number,
+                        mission,
+                        trial,
+                        slack_m,
+                        outlook,
+                    })
                 })
-            }),
+            }
             Pass::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Moved(Moved {
                     number,

@@ -6,6 +6,7 @@ use core::task::Poll;
 use super::core::{Chosen, Own, Pass, Share};
 use super::state::Next;
 use super::task::{Chain, Lead, MOST_SOLVED};
+use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, Turn};
 use crate::optimiser::joint::course::{Courser, Coursing};
 use crate::optimiser::joint::trial::{Bar, Trials};
@@ -49,28 +50,27 @@ impl Share {
 
     /// What this relay is on a sweep.
     pub(super) fn link<'a>(&self, own: Own<'a>, chosen: bool) -> Link<'a> {
+        let there = self.chosen.filter(|_| chosen);
         Link {
             mission: own.mission,
             behind: None,
             index: own.index,
             own: self.station_for(chosen),
             measured_per_w: own.measured_per_w,
-            plain: false,
-            end_m: self.chosen.filter(|_| chosen).map(|chosen| chosen.end_m),
+            plain: chosen && there.is_none_or(|there| there.plain),
+            end_m: there.map(|there| there.end_m),
         }
     }
 
     /// Solves some more of the chain as if all relays were alike; the target, linear SIR, once this relay knows where it is to be.
     ///
     /// Where that is not to be had, it stays where it was given to be, and the target says nothing.
+    #[inline(never)]
     pub(super) fn solve(&mut self, own: Own<'_>) -> Option<f32> {
         let seat = Seat::common(own.mission);
-        if !matches!(self.lead, Lead::Solving(_)) {
-            let Some(chain) = Chain::new(own.mission) else {
-                self.choose_given(own);
-                return Some(0.0);
-            };
-            self.lead = Lead::Solving(chain);
+        if !matches!(self.lead, Lead::Solving(_)) && !self.begin_solving(own.mission) {
+            self.choose_given(own);
+            return Some(0.0);
         }
         let Lead::Solving(chain) = &mut self.lead else {
             return None;
@@ -80,9 +80,9 @@ impl Share {
         };
         let target = if let Ok(target) = solved {
             let end_m = chain.end_m(own.mission, &|_| seat, own.index);
-            let at = chain.at(own.index, seat);
+            let (at, plain) = (chain.at(own.index, seat), !chain.holds_back());
             let at = self.seat(own).room.nearest(at);
-            self.chosen = Some(Chosen { at, end_m });
+            self.chosen = Some(Chosen::new(at, end_m, plain));
             target
         } else {
             self.choose_given(own);
@@ -92,11 +92,20 @@ impl Share {
         Some(target)
     }
 
+    /// Whether the chain can be solved.
+    #[inline(never)] // a solver is built here once
+    fn begin_solving(&mut self, mission: &Mission) -> bool {
+        let Some(chain) = Chain::new(mission) else {
+            return false;
+        };
+        self.lead = Lead::Solving(chain);
+        true
+    }
+
     fn choose_given(&mut self, own: Own<'_>) {
-        self.chosen = Some(Chosen {
-            at: self.seat(own).room.nearest(self.profile.on_line().at),
-            end_m: own.mission.end_for(own.index, 0.0),
-        });
+        let at = self.seat(own).room.nearest(self.profile.on_line().at);
+        let end_m = own.mission.end_for(own.index, 0.0);
+        self.chosen = Some(Chosen::new(at, end_m, true));
     }
 
     /// The leader goes over to sweeps at the places chosen, about `target` if that is known.
@@ -106,6 +115,14 @@ impl Share {
             Ladder::around(target * 1.000_001, gap, target * 0.5, target * 2.0)
         });
         self.search_with(own, ladder, false)
+    }
+
+    /// A sweep of relays that have not been on a course, or a first course: where an earlier one, of a chain that was begun again
+    /// since, has moved this one counts no more.
+    pub(super) const fn begin_again(&mut self) {
+        if let Some(chosen) = &mut self.chosen {
+            chosen.begin_again();
+        }
     }
 
     /// The leader begins the joint method by messages, from the chain that was agreed on for `target`.
@@ -160,6 +177,9 @@ impl Share {
         told: &Trials,
     ) -> Next {
         let begins = bar.begins();
+        if begins {
+            self.begin_again();
+        }
         if begins || !matches!(self.pass, Pass::Course(_)) {
             self.pass = Pass::Course(Coursing::new(bar));
         }
@@ -204,10 +224,10 @@ impl Share {
             return Next::Stale;
         };
         let outlook = coursing.conclude(relay, trial, after);
+        coursing.worth = Some((trial, slack_m, outlook));
         if let (Some(at), Some(chosen)) = (coursing.at(), &mut self.chosen) {
             chosen.at = at;
         }
-        self.worth = Some((trial, slack_m, outlook));
         self.exchange.answer();
         let Lead::Ascending(ascent) = &mut self.lead else {
             return Next::Answer {
@@ -231,6 +251,6 @@ impl Share {
     fn search_last(&mut self, own: Own<'_>, target: f32) -> Result<(), Infeasible> {
         let gap = own.mission.config().tolerance / 4.0;
         let ladder = Ladder::around(target, gap, target * 0.5, target * 2.0);
-        self.search_with(own, Some(ladder), true)
+        self.search_with(own, Some(ladder.plainly(true)), true)
     }
 }

@@ -7,12 +7,13 @@ use super::turning::Turning;
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::local::Beside;
 use crate::optimiser::pass::origins;
+use crate::optimiser::plan::Planner;
 use crate::optimiser::search::{Infeasible, Schedule, Search};
 use crate::place::Placement;
-use crate::settings::Method;
+use crate::settings::{Method, Settings};
 
-/// Hops of the prediction in one call of `work`: 16 reaches each. In an uneven field a part of one.
-const HOPS_AT_ONCE: u16 = 16;
+/// Hops of the prediction in one call of `work`, 16 reaches each. In an uneven field a part of one.
+const HOPS_AT_ONCE: u16 = 12;
 
 /// The same in an even field, where a reach takes twice the work.
 const FIELD_HOPS_AT_ONCE: u16 = 8;
@@ -61,38 +62,57 @@ impl Share {
         }
     }
 
+    /// What the leader begins with: its prediction, if it may, or the search itself.
     #[inline(never)] // a planner is built here once; its stack is not for every call of `work`
     fn begin_lead(&mut self, own: Own<'_>) -> Result<(), Infeasible> {
-        self.lead = Lead::begin(own.mission, self.profile, own.settings)?;
-        Ok(())
+        let Settings {
+            predict, schedule, ..
+        } = *own.settings;
+        if predict && schedule == Schedule::Bracketed {
+            self.lead = Lead::Predicting(Planner::new(own.mission, self.profile, schedule)?);
+            return Ok(());
+        }
+        self.search_by(
+            own,
+            schedule,
+            None,
+            own.settings.method == Method::Align,
+            false,
+        )
     }
 
     /// Goes over to trying targets, with `ladder` first if there is one.
-    #[inline(never)]
     pub(super) fn search_with(
         &mut self,
         own: Own<'_>,
         ladder: Option<Ladder>,
         last: bool,
     ) -> Result<(), Infeasible> {
-        let mut search = Search::new(own.mission, self.profile, Schedule::Bracketed)?;
+        self.search_by(own, Schedule::Bracketed, ladder, last, false)
+    }
+
+    /// The leader goes back to the places that the relays were given: nothing can be met at those chosen.
+    pub(super) fn search_given(&mut self, own: Own<'_>) -> Result<(), Infeasible> {
+        self.search_by(own, Schedule::Bracketed, None, true, true)
+    }
+
+    #[inline(never)]
+    fn search_by(
+        &mut self,
+        own: Own<'_>,
+        schedule: Schedule,
+        ladder: Option<Ladder>,
+        last: bool,
+        given: bool,
+    ) -> Result<(), Infeasible> {
+        let mut search = Search::new(own.mission, self.profile, schedule)?;
         if let Some(ladder) = ladder {
             search.begin_with(ladder);
         }
         self.lead = Lead::Searching {
             search,
             last,
-            given: false,
-        };
-        Ok(())
-    }
-
-    /// The leader goes back to the places that the relays were given: nothing can be met at those chosen.
-    pub(super) fn search_given(&mut self, own: Own<'_>) -> Result<(), Infeasible> {
-        self.lead = Lead::Searching {
-            search: Search::new(own.mission, self.profile, Schedule::Bracketed)?,
-            last: true,
-            given: true,
+            given,
         };
         Ok(())
     }

@@ -57,6 +57,10 @@ impl Share {
         sweeping.ladder = ladder;
         sweeping.chosen = chosen;
         sweeping.begin(behind, from);
+        // Of places chosen, a plain pass is of those that courses came to.
+        if chosen && !ladder.is_plain() {
+            self.begin_again();
+        }
         self.exchange.wait();
         self.go_on_with_sweep(own)
     }
@@ -64,7 +68,7 @@ impl Share {
     /// Goes on with this relay's share of a sweep, as far as one call may.
     pub(super) fn go_on_with_sweep(&mut self, own: Own<'_>) -> Next {
         let is_chosen = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.chosen);
-        if ALTITUDE && is_chosen && self.chosen.is_none() && self.solve(own).is_none() {
+        if ALTITUDE && is_chosen && self.chosen.is_none() {
             // First it has to find out where it is to be.
             return Next::Work { moved: false };
         }

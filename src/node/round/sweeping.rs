@@ -158,7 +158,7 @@ impl Sweeping {
     fn link<'a>(&self, link: Link<'a>) -> Link<'a> {
         Link {
             behind: self.behind,
-            plain: self.chosen || self.ladder.is_plain(),
+            plain: link.plain || self.ladder.is_plain(),
             ..link
         }
     }

@@ -1,11 +1,10 @@
 //! What the leader has beyond every other relay: which pass comes next.
 
-use crate::mission::{Mission, Profile};
 use crate::optimiser::joint::Solver;
 use crate::optimiser::joint::ascent::Ascent;
 use crate::optimiser::plan::Planner;
-use crate::optimiser::search::{Infeasible, Schedule, Search};
-use crate::settings::{Adjust, Method, Settings};
+use crate::optimiser::search::Search;
+use crate::settings::Adjust;
 use crate::wire::message::Turn;
 
 /// The most relays whose chain is solved in one relay, without a message; longer ones are solved by messages.
@@ -95,25 +94,5 @@ impl Rounds {
             }
         };
         false
-    }
-}
-
-impl Lead {
-    /// What the leader begins with: its prediction, if it may, or the search itself.
-    pub(crate) fn begin(
-        mission: &Mission,
-        profile: Profile,
-        settings: &Settings,
-    ) -> Result<Self, Infeasible> {
-        if settings.predict && settings.schedule == Schedule::Bracketed {
-            Planner::new(mission, profile, settings.schedule).map(Self::Predicting)
-        } else {
-            let last = settings.method == Method::Align;
-            Search::new(mission, profile, settings.schedule).map(|search| Self::Searching {
-                search,
-                last,
-                given: false,
-            })
-        }
     }
 }

@@ -23,6 +23,8 @@ pub(crate) struct Coursing {
     /// The target, the sender's place and its own in the trial that was gone by last; none before the first course.
     nominal: Option<(f32, Placement, Placement)>,
     policy: Policy,
+    /// What came of the last course, as the relay before is to know it: the trial, the slack at Rx, m, and its outlook.
+    pub(crate) worth: Option<(Option<u8>, f32, Outlook)>,
 }
 
 /// What a relay is on a course.
@@ -67,6 +69,7 @@ impl Coursing {
             power_in_w: None,
             nominal: None,
             policy: Policy::NONE,
+            worth: None,
         }
     }
 
@@ -165,8 +168,8 @@ impl Coursing {
             return *after;
         };
         let trust = self.bar.trust_after(trial);
-        let (outlook, policy) = link.weigh(target, trust, from, own, after);
-        self.policy = policy;
+        let mut outlook = *after;
+        self.policy = link.weigh(target, trust, from, own, &mut outlook);
         outlook
     }
 

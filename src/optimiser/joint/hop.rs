@@ -20,14 +20,20 @@
 use super::axis::Triple;
 use crate::sir::square;
 
-/// What a reach depends on: where the hop begins, three coordinates, and the two that are free of where it ends.
-pub(super) type Row = [f32; 5];
-
-/// A reach's derivatives.
+/// A reach's derivatives, by where the hop begins, three coordinates, p, and by the two that are free of where it ends, w.
 #[derive(Clone, Copy, Debug)]
+#[expect(
+    clippy::struct_field_names,
+    reason = "each is a derivative by what its name says"
+)]
 pub(super) struct Reach {
-    pub(super) slope: Row,
-    pub(super) bend: [Row; 5],
+    pub(super) by_p: Triple,
+    pub(super) by_w: [f32; 2],
+    pub(super) by_pp: [Triple; 3],
+    /// By each of w, and p.
+    pub(super) by_wp: [Triple; 2],
+    /// By the first of w twice, by both, by the second twice.
+    pub(super) by_ww: [f32; 3],
     /// By ln gamma, m.
     pub(super) by_target: f32,
 }
@@ -35,8 +41,11 @@ pub(super) struct Reach {
 impl Reach {
     /// That of a hop that ends where it ends, whatever is moved.
     pub(super) const FIXED: Self = Self {
-        slope: [0.0; 5],
-        bend: [[0.0; 5]; 5],
+        by_p: [0.0; 3],
+        by_w: [0.0; 2],
+        by_pp: [[0.0; 3]; 3],
+        by_wp: [[0.0; 3]; 2],
+        by_ww: [0.0; 3],
         by_target: 0.0,
     };
 
@@ -50,23 +59,28 @@ impl Reach {
         if !(square(a) > 1e-9 * c * length) {
             return Self::FIXED;
         }
-        let slope = [c * d, c * dy, c * dz, y - sy - c * dy, z - sz - c * dz].map(|f| f / a);
-        let mut bend = [
-            [-c, 0.0, 0.0, 0.0, 0.0],
-            [0.0, -c, 0.0, c, 0.0],
-            [0.0, 0.0, -c, 0.0, c],
-            [0.0, c, 0.0, 1.0 - c, 0.0],
-            [0.0, 0.0, c, 0.0, 1.0 - c],
-        ];
-        let mixed = [c, 0.0, 0.0, 0.0, 0.0];
-        for ((row, r), f) in bend.iter_mut().zip(slope).zip(mixed) {
-            for ((cell, r2), f2) in row.iter_mut().zip(slope).zip(mixed) {
-                *cell = (*cell + f * r2 + r * f2 + (1.0 - c) * r * r2) / a;
-            }
-        }
+        let by_p = [c * d, c * dy, c * dz].map(|f| f / a);
+        let by_w = [y - sy - c * dy, z - sz - c * dz].map(|f| f / a);
+        let [p, p1, p2] = by_p;
+        let [w1, w2] = by_w;
+        let k = 1.0 - c;
+        let by_x = |r: f32| (c * r + k * p * r) / a;
+        let both = |r: f32, q: f32| k * r * q / a;
+        let twice = |f: f32, r: f32, q: f32| (f + k * r * q) / a;
+        let across = |r: f32| (r * c + k * r * p) / a;
         Self {
-            slope,
-            bend,
+            by_p,
+            by_w,
+            by_pp: [
+                [(-c + c * p + p * c + k * p * p) / a, by_x(p1), by_x(p2)],
+                [across(p1), twice(-c, p1, p1), both(p1, p2)],
+                [across(p2), both(p2, p1), twice(-c, p2, p2)],
+            ],
+            by_wp: [
+                [across(w1), twice(c, w1, p1), both(w1, p2)],
+                [across(w2), both(w2, p1), twice(c, w2, p2)],
+            ],
+            by_ww: [twice(k, w1, w1), both(w1, w2), twice(k, w2, w2)],
             by_target: -0.5 * c * length / a,
         }
     }

@@ -54,7 +54,7 @@ const RIM: f32 = 0.999_99;
 const STIFFNESS: f32 = 100.0;
 
 /// The least separation is taken for that much larger, so that what is left missing is none.
-const MARGIN: f32 = 1.0005;
+pub(super) const MARGIN: f32 = 1.0005;
 
 /// A relay, as its place is chosen.
 #[derive(Clone, Copy, Debug)]
@@ -65,8 +65,6 @@ pub(crate) struct Link<'a> {
     distance_m: f32,
     /// The least distance to the sender, m.
     apart_m: f32,
-    /// The hop for a reach of the relay.
-    mission: &'a Mission,
     /// No hop meets more.
     most: f32,
 }
@@ -91,7 +89,6 @@ impl<'a> Link<'a> {
             } else {
                 MARGIN * config.min_separation_m
             },
-            mission,
             most: if first {
                 first_most(mission, interferer, room)
             } else {
@@ -100,13 +97,20 @@ impl<'a> Link<'a> {
         }
     }
 
+    /// The same as near to its sender as it likes, too.
+    pub(crate) fn unparted(self) -> Self {
+        Self {
+            apart_m: 0.0,
+            ..self
+        }
+    }
+
     /// The place at `wanted`, or as far toward it as the hop goes, for `target`, with the sender at `from_m` along x; `None` where no
     /// hop meets it. Beyond Rx nobody goes.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
-        let hop = Hop::new(self.mission, self.interferer, self.sender, 1, at, 0.0)
-            .ending(self.distance_m);
+        let hop = Hop::free(self.interferer, self.sender, at, self.distance_m);
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
@@ -260,8 +264,8 @@ impl<'a> Link<'a> {
         0.5 * weight * square(near)
     }
 
-    /// What the relay before, at `from`, sees of the slack through this relay at `to`, which moves by up to `trust` of its distance
-    /// from the interferer, and its policy; `after` is what it sees itself.
+    /// The policy of the relay at `to`, which moves by up to `trust` of its distance from the interferer. `outlook` is what it sees,
+    /// and becomes what the relay before, at `from`, sees of the slack through it.
     ///
     /// Work: some 400 multiplications and two square roots.
     pub(crate) fn weigh(
@@ -270,18 +274,17 @@ impl<'a> Link<'a> {
         trust: f32,
         from: Placement,
         to: Placement,
-        after: &Outlook,
-    ) -> (Outlook, Policy) {
+        outlook: &mut Outlook,
+    ) -> Policy {
         let capped = target > self.most;
         let c = self.sender.gain.ratio(target.min(self.most));
         let source = self.source();
         let place = triple(to);
-        let mut after = *after;
         let (near, weight) = self.near(c, to);
         let [dx, dy, dh] = minus(source, place);
         if near > 0.0 {
             let slope = [2.0 * dx, 2.0 * dy, 2.0 * dh];
-            after.penalise(weight, near, slope, c * square(self.apart_m));
+            outlook.penalise(weight, near, slope, c * square(self.apart_m));
         }
         let Room { lateral, band } = self.room;
         let low = [from.x_m, lateral.least_m, band.least_m];
@@ -310,12 +313,11 @@ impl<'a> Link<'a> {
         let far = trust * sqrt(square(dx) + square(dy) + square(dh));
         let [_, l1, l2] = axis.first(low.map(|low| low.max(-far).min(0.0)));
         let [_, h1, h2] = axis.first(high.map(|high| high.min(far).max(0.0)));
-        let (before, policy) = after.before(axis, &hop, [l1, l2], [h1, h2]);
-        let policy = Policy {
+        let policy = outlook.pass(axis, &hop, [l1, l2], [h1, h2]);
+        Policy {
             rising: (normal < 0.0) == (c > 1.0),
             ..policy
-        };
-        (before, policy)
+        }
     }
 
     /// The coordinate that is to follow, one that is not at an end of its room `low` to `high`, and the slope of F by it: the steeper,

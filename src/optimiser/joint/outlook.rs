@@ -6,7 +6,7 @@
 //! and Todorov 2014).
 
 use super::axis::{Axis, Triple};
-use super::hop::{Reach, Row};
+use super::hop::Reach;
 use super::policy::Policy;
 use crate::place::Placement;
 use crate::root::sqrt;
@@ -102,39 +102,44 @@ impl Outlook {
         }
     }
 
-    /// What the relay before sees of it through a hop, whose relay steps by the policy that is best within `low` to `high`, m from
-    /// where it is, by the two coordinates that do not follow.
-    pub(super) fn before(
-        &self,
+    /// Becomes what the relay before sees of it through a hop, whose relay steps by the policy that is best within `low` to `high`, m
+    /// from where it is, by the two coordinates that do not follow.
+    pub(super) fn pass(
+        &mut self,
         axis: Axis,
         hop: &Reach,
         low: [f32; 2],
         high: [f32; 2],
-    ) -> (Self, Policy) {
-        let r = hop.slope;
+    ) -> Policy {
         let [vx, vy, vh] = axis.first(self.slope);
-        let [rx, ry, rh, rwy, rwh] = r;
+        let p = hop.by_p;
+        let [rwy, rwh] = hop.by_w;
         // The slack as a function of z: first derivatives by w, second ones by all.
         let (gy, gh) = (vx * rwy + vy, vx * rwh + vh);
-        let [m0, m1, m2] = axis
+        let [(mp, [my, mh]), (yp, [ymy, ymh]), (hp, [_, hmh])] = axis
             .first_of(self.bend)
-            .map(|[x, y, h]| add([0.0, 0.0, 0.0, y, h], r, x));
-        let none = [0.0; 5];
-        let mut q = hop.bend;
-        for ((row, r), m) in q.iter_mut().zip(r).zip([none, none, none, m1, m2]) {
-            *row = add(add(m, m0, r), *row, vx);
-        }
-        let [q0, q1, q2, [yx, yy0, yh0, yy, yh], [hx, hy0, hh0, _, hh]] = q;
-        let (ay, ah) = ([yx, yy0, yh0], [hx, hy0, hh0]);
+            .map(|[x, y, h]| (p.map(|r| r * x), [y + rwy * x, h + rwh * x]));
+        let [by_yp, by_hp] = hop.by_wp;
+        let ay = add(add(yp, mp, rwy), by_yp, vx);
+        let ah = add(add(hp, mp, rwh), by_hp, vx);
+        let [by_yy, by_yh, by_hh] = hop.by_ww;
+        let yy = ymy + my * rwy + by_yy * vx;
+        let yh = ymh + mh * rwy + by_yh * vx;
+        let hh = hmh + mh * rwh + by_hh * vx;
         let policy = Policy::best([gy, gh], [yy, yh, hh], [ay, ah], low, high);
         let ([ky, kh], [fy, fh]) = (policy.step, policy.follow);
         // And with w stepping as it does, by p alone.
         let (py, ph) = (gy + yy * ky + yh * kh, gh + yh * ky + hh * kh);
-        let mut slope = [vx * rx, vx * ry, vx * rh];
+        let mut slope = p.map(|r| vx * r);
         for ((((cell, ay), ah), fy), fh) in slope.iter_mut().zip(ay).zip(ah).zip(fy).zip(fh) {
             *cell += ay * ky + ah * kh + fy * py + fh * ph;
         }
-        let mut bend = [q0, q1, q2].map(|[x, y, h, _, _]| [x, y, h]);
+        let mut bend = hop.by_pp;
+        for (row, r) in bend.iter_mut().zip(p) {
+            for (cell, m) in row.iter_mut().zip(mp) {
+                *cell = m * r + *cell * vx;
+            }
+        }
         let (full_y, full_h) = (mix(ay, fy, yy, fh, yh), mix(ah, fy, yh, fh, hh));
         for ((((row, ay), ah), ky), kh) in bend.iter_mut().zip(ay).zip(ah).zip(fy).zip(fh) {
             for ((((cell, my), mh), fy), fh) in
@@ -143,7 +148,7 @@ impl Outlook {
                 *cell += ky * my + kh * mh + ay * fy + ah * fh;
             }
         }
-        let before = Self {
+        *self = Self {
             slope: axis.back(slope),
             bend: axis.back_of(bend),
             by_target: self.by_target + vx * hop.by_target,
@@ -151,17 +156,16 @@ impl Outlook {
             square: self.square + 0.5 * (yy * ky * ky + hh * kh * kh) + yh * ky * kh,
         };
         let follow = policy.follow.map(|row| axis.back(row));
-        let policy = Policy {
+        Policy {
             axis,
             follow,
             ..policy
-        };
-        (before, policy)
+        }
     }
 }
 
 /// a + b f
-fn add(a: Row, b: Row, f: f32) -> Row {
+fn add(a: Triple, b: Triple, f: f32) -> Triple {
     let mut sum = a;
     for (cell, b) in sum.iter_mut().zip(b) {
         *cell += b * f;
@@ -169,7 +173,7 @@ fn add(a: Row, b: Row, f: f32) -> Row {
     sum
 }
 
-/// a + b f + c g
+/// a + (b f + c g)
 fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     let mut sum = a;
     for ((cell, b), c) in sum.iter_mut().zip(b).zip(c) {

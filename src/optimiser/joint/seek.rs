@@ -3,8 +3,8 @@
 /// A search in ln gamma.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// The highest that was met, and its slack, m.
-    low: Option<(f32, f32)>,
+    /// The highest that was met, and whether relays have to hold back for it.
+    low: Option<(f32, bool)>,
     /// The lowest that was not.
     high: Option<f32>,
     /// What is tried.
@@ -27,10 +27,10 @@ impl Seek {
         }
     }
 
-    /// Upward from `sigma`, which has `slack`, by `step` and then three times as much each time; to `width`.
-    pub(super) const fn up(sigma: f32, slack: f32, step: f32, width: f32) -> Self {
+    /// Upward from `sigma`, which is met, with relays that have to hold back or not, by `step` and then three times as much each time; to `width`.
+    pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
-            low: Some((sigma, slack)),
+            low: Some((sigma, holds_back)),
             high: None,
             sigma: sigma + step,
             step,
@@ -39,10 +39,10 @@ impl Seek {
         }
     }
 
-    /// What came of it: `slack`, m, or that a hop cannot meet it. Whether there is more to try.
-    pub(super) fn tried(&mut self, slack: Option<f32>) -> bool {
-        match slack.filter(|slack| *slack >= 0.0) {
-            Some(slack) => self.low = Some((self.sigma, slack)),
+    /// What came of it: that it is met, and whether relays have to hold back. Whether there is more to try.
+    pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
+        match met {
+            Some(holds_back) => self.low = Some((self.sigma, holds_back)),
             None => self.high = Some(self.sigma),
         }
         self.sigma = match (self.low, self.high) {
@@ -65,9 +65,9 @@ impl Seek {
         true
     }
 
-    /// The highest target that was met.
-    pub(super) fn found(&self) -> Option<f32> {
-        self.low.map(|(sigma, _)| sigma)
+    /// The highest target that was met, and whether relays have to hold back for it.
+    pub(super) const fn found(&self) -> Option<(f32, bool)> {
+        self.low
     }
 }
 

@@ -9,7 +9,7 @@ use core::task::Poll;
 use super::ascent::{Ascent, Turn};
 use super::axis::Triple;
 use super::cells::Cell;
-use super::link::{self, Link, Room, minus, triple};
+use super::link::{self, Link, MARGIN, Room, minus, triple};
 use super::outlook::Outlook;
 use super::policy::Brief;
 use super::seek::Seek;
@@ -17,17 +17,25 @@ use super::starts::Start;
 use crate::mission::{Interferer, Mission, Profile};
 use crate::optimiser::search::Infeasible;
 use crate::optimiser::spacing::Hop;
-use crate::place::{CrossSection, Placement, Station};
+use crate::optimiser::spacing::Stand;
+use crate::place::{CrossSection, Placement};
+use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
 use crate::sir::Sender;
 
 /// Relays in a segment.
 const SEGMENT: usize = 10;
-/// The same number, to count relays by.
+/// How many of them are held; without the feature `altitude` nobody solves a chain.
+const STAGES: usize = if cfg!(feature = "altitude") {
+    SEGMENT
+} else {
+    0
+};
+/// The same number as of a segment, to count relays by.
 const SEGMENT_RELAYS: u16 = 10;
 
 /// Relays in one portion of a pass that changes nothing.
-const PLAIN: u16 = 40;
+const PLAIN: u16 = 20;
 
 /// How close to the optimum a start is judged, in ln gamma.
 const JUDGED: f32 = 4e-6;
@@ -40,6 +48,17 @@ const CEILING: f32 = 5e-5;
 
 /// How far above that ceiling the other hops are when a chain is probed first, in ln gamma.
 const PROBED: f32 = 3e-4;
+
+/// Most relays of a chain that is polished.
+const POLISHED: u16 = 5;
+
+/// How often the moves of a polish are halved, and the first of them, as a part of the room.
+const HALVINGS: u16 = 12;
+const FIRST_MOVE: f32 = 0.25;
+
+/// What a move has to gain, in ln gamma, and how many are taken.
+const GAIN: f32 = 2e-5;
+const MOVES: u8 = 200;
 
 /// What one relay brings along, as far as it is known.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -119,6 +138,8 @@ struct Pass {
     penalty: f32,
     /// The last place that the next relay may take, m.
     end_m: f32,
+    /// Whether a relay has to hold back.
+    holds_back: bool,
 }
 
 /// What is being worked out.
@@ -130,8 +151,10 @@ enum Work {
     Seek(Seek, Purpose),
     /// The chain as it is for one target, to be kept.
     Settle(f32, Purpose),
-    /// Whether the chain has all that can be had, by the rules of the sweep.
-    Probe,
+    /// Whether the relays of this segment, the last of which is to stand there, can hold back as a target is met.
+    Stand(u8, f32, Seek, Purpose),
+    /// The next move of a chain that meets this.
+    Polish(f32),
     /// A pass back, at this segment.
     Back(u8),
     /// A pass forward with a part of the step and a target; to be kept if `true`.
@@ -148,8 +171,19 @@ enum Purpose {
     Tighten,
     /// What an ascent has come to.
     Judge,
-    /// What the best of them comes to by the rules of the sweep.
+    /// What that comes to by the rules of the sweep.
     Last,
+    /// Whether the chain has all that can be had, by the same rules.
+    Probe,
+    /// Whether one relay's move gains something, by the same rules.
+    Move,
+}
+
+impl Purpose {
+    /// Whether relays go by the rules of the sweep.
+    const fn is_sweep(self) -> bool {
+        matches!(self, Self::Last | Self::Probe | Self::Move)
+    }
 }
 
 /// A chain being solved, for at most `RELAYS` relays; `SEGMENTS` is at least a tenth of that.
@@ -164,9 +198,17 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     ascent: Ascent,
     work: Work,
     pass: Pass,
+    /// Whether relays have to hold back for what was found.
+    holds_back: bool,
+    /// Whether any start came up against the least separation.
+    walled: bool,
+    /// Which move of the polish is tried, how many were taken, and where its relay was.
+    moving: u16,
+    moved: u8,
+    kept: Cell,
     /// The segment whose policies are at hand.
     held: Option<u8>,
-    stages: [Stage; SEGMENT],
+    stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
     cells: [Cell; RELAYS],
 }
@@ -177,6 +219,8 @@ struct Chain<'a, F> {
     mission: &'a Mission,
     interferer: &'a Interferer,
     seat_of: &'a F,
+    /// What the power is worth that the mission has all relays hold.
+    gain: PowerRatio,
 }
 
 impl<'a, F: Fn(u16) -> Seat> Chain<'a, F> {
@@ -189,11 +233,16 @@ impl<'a, F: Fn(u16) -> Seat> Chain<'a, F> {
         if index <= 1 {
             return Sender::transmitter(self.mission);
         }
-        let station = Station {
+        let power_w = (self.seat_of)(index - 1).power_w;
+        let common = power_w.to_bits() == self.mission.config().common.power_w.to_bits();
+        Sender {
             at: from.cross_section(),
-            power_w: (self.seat_of)(index - 1).power_w,
-        };
-        Sender::relay(self.mission, station)
+            gain: if common {
+                self.gain
+            } else {
+                self.mission.relay_gain(power_w)
+            },
+        }
     }
 
     /// Relay `index`, fed from `from`.
@@ -227,9 +276,9 @@ impl<'a, F: Fn(u16) -> Seat> Chain<'a, F> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Begins; `None` in a field, or where the chain has more than `RELAYS` relays.
+    /// Begins; `None` in a field, where the chain has more than `RELAYS` relays, or without the feature `altitude`.
     pub fn new(mission: &Mission) -> Option<Self> {
-        let fits = usize::from(mission.relays()) <= RELAYS.min(SEGMENT * SEGMENTS);
+        let fits = usize::from(mission.relays()) <= RELAYS.min(STAGES * SEGMENTS);
         (fits && mission.interferer().is_some()).then(|| Self {
             number: 0,
             start: Start::Far,
@@ -238,8 +287,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             ascent: Ascent::new(1.0, 0.0, 0.0, 0.0),
             work: Work::Begin,
             pass: Pass::default(),
+            holds_back: false,
+            walled: false,
+            moving: 0,
+            moved: 0,
+            kept: Cell::default(),
             held: None,
-            stages: [Stage::default(); SEGMENT],
+            stages: [Stage::default(); STAGES],
             marks: [Mark::default(); SEGMENTS],
             cells: [Cell::default(); RELAYS],
         })
@@ -255,7 +309,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.cells.get(at).copied().unwrap_or_default()
     }
 
-    /// Goes on for one portion: ten relays back and forward, or forty without a change. The target, linear SIR, once the chain is
+    /// Goes on for one portion: ten relays back and forward, or twenty without a change. The target, linear SIR, once the chain is
     /// solved; `seat_of` gives what relay 1..=N brings along, and must answer the same every time.
     ///
     /// # Errors
@@ -272,15 +326,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             mission,
             interferer,
             seat_of: &seat_of,
+            gain: mission.relay_gain(mission.config().common.power_w),
         };
         match self.work {
             Work::Begin => self.begin(&chain),
             Work::Seek(seek, purpose) => self.seek(&chain, seek, purpose),
             Work::Settle(sigma, purpose) => self.settle(&chain, sigma, purpose),
-            Work::Probe => {
-                self.probe(&chain);
-                Poll::Pending
+            Work::Stand(segment, place_m, seek, purpose) => {
+                self.stand(&chain, segment, place_m, seek, purpose)
             }
+            Work::Polish(sigma) => self.polish(&chain, sigma),
             Work::Back(segment) => {
                 self.back(&chain, segment);
                 Poll::Pending
@@ -315,12 +370,26 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             self.number += 1;
             return Poll::Pending;
         }
+        if matches!(start, Start::Through { .. } | Start::Turns) && !self.walled {
+            self.number += 1;
+            return Poll::Pending;
+        }
         self.start = start;
         self.ascent = Ascent::new(chain.distance_m(), 0.0, 0.0, 0.0);
         self.restart();
         self.work = match start {
             Start::Near => Work::Settle(floor + 0.04, Purpose::Start),
-            Start::Arch { .. } | Start::Around { .. } | Start::Far => {
+            Start::Turns => {
+                for index in 1..=chain.mission.relays() {
+                    let room = (chain.seat_of)(index).room;
+                    let apart_m = MARGIN * chain.mission.config().min_separation_m;
+                    let at = Start::in_turn(index, chain.interferer, room, apart_m);
+                    self.keep(index, 0.0, Cell::of(at, room));
+                }
+                let sigma = chain.ceiling() + 2.0 * CEILING;
+                Work::Seek(Seek::down(sigma, 0.1, 1.5, JUDGED), Purpose::Last)
+            }
+            Start::Arch { .. } | Start::Around { .. } | Start::Far | Start::Through { .. } => {
                 Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, 0.02), Purpose::Start)
             }
         };
@@ -379,13 +448,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     ) -> Poll<Option<f32>> {
         let target = libm::expf(sigma);
         let relays = chain.mission.relays();
-        if purpose == Purpose::Last && self.pass.done == 0 {
+        if purpose.is_sweep() && self.pass.done == 0 {
             self.pass.end_m = self.end_m(chain.mission, chain.seat_of, 0);
         }
         for _ in 0..PLAIN {
             let index = self.pass.done + 1;
             if index > relays {
-                if purpose == Purpose::Last {
+                if purpose.is_sweep() {
                     let power_w = (chain.seat_of)(relays).power_w;
                     let reach_m = sqrt(chain.mission.receiver_gain(power_w) / target);
                     let (slack, _) = Outlook::tail(reach_m, chain.distance_m(), self.pass.from);
@@ -401,15 +470,21 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             let room = (chain.seat_of)(index).room;
             let wanted = self.shaped(chain, index, room, target, purpose);
             let from = self.pass.from;
-            let place = if purpose == Purpose::Last {
-                self.pass.end_m += self.least_step(chain.mission, chain.seat_of, index);
-                let sender = chain.sender(index, from);
-                let end_m = self.pass.end_m;
-                let hop = Hop::new(chain.mission, chain.interferer, sender, index, wanted, 0.0)
-                    .ending(end_m);
-                hop.reach(target, from.x_m).map(|x_m| wanted.at(x_m))
+            let place = if purpose.is_sweep() {
+                let step = self.least_step(chain.mission, chain.seat_of, index);
+                self.pass.end_m = Self::end_after(chain.mission, self.pass.end_m, step);
+                if let Some(mark) = self.mark(index) {
+                    // From one pass back to the next nobody sees anything, and there is room.
+                    mark.slope = [from.x_m, 0.0, 0.0];
+                }
+                let hop = self.hop(chain, index, self.pass.end_m);
+                let reach = hop.reach(target, from.x_m);
+                self.pass.holds_back |= reach.is_none();
+                reach
+                    .or_else(|| hop.outermost(target, from.x_m))
+                    .map(|x_m| wanted.at(x_m))
             } else {
-                let link = chain.link(index, from, room);
+                let link = self.link(chain, index, from, room);
                 link.at(target, from.x_m, wanted).inspect(|at| {
                     self.pass.penalty += link.penalty(target, *at);
                 })
@@ -428,15 +503,61 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Keeps the `cell` of relay `index`, which comes after one at `x_m`.
     fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
-        let at = usize::from(index).wrapping_sub(1);
-        if at.is_multiple_of(SEGMENT)
-            && let Some(mark) = self.marks.get_mut(at / SEGMENT)
-        {
+        if let Some(mark) = self.mark(index) {
             mark.x_m = x_m;
         }
+        let at = usize::from(index).wrapping_sub(1);
         if let Some(kept) = self.cells.get_mut(at) {
             *kept = cell;
         }
+    }
+
+    /// The mark before relay `index`, the first of its segment.
+    fn mark(&mut self, index: u16) -> Option<&mut Mark> {
+        let at = usize::from(index).wrapping_sub(1);
+        self.marks
+            .get_mut(at / SEGMENT)
+            .filter(|_| at.is_multiple_of(SEGMENT))
+    }
+
+    /// Relay `index`, fed from `from`, as the start has it.
+    fn link<'a>(
+        &self,
+        chain: &Chain<'a, impl Fn(u16) -> Seat>,
+        index: u16,
+        from: Placement,
+        room: Room,
+    ) -> Link<'a> {
+        let link = chain.link(index, from, room);
+        match self.start {
+            Start::Through { .. } => link.unparted(),
+            _ => link,
+        }
+    }
+
+    /// The hop to relay `index` of the chain as it is, by the rules of the sweep; no farther than `end_m`.
+    fn hop(&self, chain: &Chain<'_, impl Fn(u16) -> Seat>, index: u16, end_m: f32) -> Hop {
+        let at = |index| self.at(index, (chain.seat_of)(index));
+        let before = if index > 1 {
+            at(index - 1)
+        } else {
+            CrossSection::default()
+        };
+        let sender = chain.sender(index, before.at(0.0));
+        Hop::new(
+            chain.mission,
+            chain.interferer,
+            sender,
+            index,
+            at(index),
+            0.0,
+        )
+        .ending(end_m)
+    }
+
+    /// Whether relays have to hold back for the target that was found.
+    pub const fn holds_back(&self) -> bool {
+        self.holds_back
     }
 
     /// The least step along x between relay `index` and the one before it, which keep their separation.
@@ -449,59 +570,203 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         mission.step_with_room(across)
     }
 
-    /// The last place along x that leaves the relays after `index` of a solved chain their room, m.
+    /// The last place along x that leaves the relays after `index` of a solved chain their room, m: to the bit what the passes
+    /// by the rules of the sweep go by.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
-        let first = index.saturating_add(1);
-        let behind =
-            (first..=mission.relays()).map(|after| self.least_step(mission, seat_of, after));
-        mission.config().distance_m - behind.sum::<f32>()
+        let steps = (1..=mission.relays()).map(|at| self.least_step(mission, seat_of, at));
+        let first = mission.config().distance_m - steps.clone().sum::<f32>();
+        steps
+            .take(index.into())
+            .fold(first, |end_m, step| Self::end_after(mission, end_m, step))
+    }
+
+    fn end_after(mission: &Mission, end_m: f32, step: f32) -> f32 {
+        (end_m + step).min(mission.config().distance_m)
     }
 
     fn seek(
         &mut self,
         chain: &Chain<'_, impl Fn(u16) -> Seat>,
-        mut seek: Seek,
+        seek: Seek,
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
         let Poll::Ready(slack) = self.plain(chain, seek.sigma, purpose, false) else {
             return Poll::Pending;
         };
+        let met = slack.is_some_and(|slack| slack >= 0.0);
+        if met && self.pass.holds_back {
+            let place_m = self.pass.from.x_m;
+            self.work = Work::Stand(Self::last_of(chain.mission), place_m, seek, purpose);
+            return Poll::Pending;
+        }
+        self.tried(chain, seek, purpose, met.then_some(false))
+    }
+
+    /// One segment less till it is known whether all relays can stand where those after them need it; the last of this one is to
+    /// stand at `place_m`. Bounded by twenty relays.
+    fn stand(
+        &mut self,
+        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        segment: u8,
+        place_m: f32,
+        seek: Seek,
+        purpose: Purpose,
+    ) -> Poll<Result<f32, Infeasible>> {
+        match (
+            self.stands(chain, segment, place_m, libm::expf(seek.sigma)),
+            segment.checked_sub(1),
+        ) {
+            (Some(place_m), Some(before)) => {
+                self.work = Work::Stand(before, place_m, seek, purpose);
+                Poll::Pending
+            }
+            (place_m, _) => self.tried(chain, seek, purpose, place_m.map(|_| true)),
+        }
+    }
+
+    /// Where the relay before `segment` is to stand.
+    fn stands(
+        &self,
+        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        segment: u8,
+        mut place_m: f32,
+        target: f32,
+    ) -> Option<f32> {
+        let relays = chain.mission.relays();
+        let [mut x_m, ..] = self.marks.get(usize::from(segment))?.slope;
+        let mut end_m = self.end_m(
+            chain.mission,
+            chain.seat_of,
+            u16::from(segment) * SEGMENT_RELAYS,
+        );
+        let mut before = [(0.0, 0.0); SEGMENT];
+        for (k, index) in Self::relays_of(segment, relays) {
+            let step = self.least_step(chain.mission, chain.seat_of, index);
+            end_m = Self::end_after(chain.mission, end_m, step);
+            *before.get_mut(k)? = (x_m, end_m);
+            x_m = self.hop(chain, index, end_m).outermost(target, x_m)?;
+        }
+        for (k, index) in Self::relays_of(segment, relays).rev() {
+            let (from_m, end_m) = *before.get(k)?;
+            place_m = match self
+                .hop(chain, index, end_m)
+                .stand(target, from_m, place_m)?
+            {
+                Stand::AtReach => from_m,
+                Stand::At(x_m) => x_m,
+            };
+        }
+        Some(place_m)
+    }
+
+    /// What came of a target: that it is `met`, and whether relays have to hold back.
+    fn tried(
+        &mut self,
+        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        mut seek: Seek,
+        purpose: Purpose,
+        met: Option<bool>,
+    ) -> Poll<Result<f32, Infeasible>> {
         self.restart();
-        self.work = if seek.tried(slack) {
+        if purpose == Purpose::Probe {
+            // If it does not meet the ceiling, its other hops have to be shorter.
+            self.work = if met.is_some() {
+                self.again = true;
+                let sigma = chain.ceiling() + 2.0 * CEILING;
+                Work::Seek(Seek::down(sigma, 1e-5, 2.0, 1e-6), Purpose::Last)
+            } else {
+                let turn = self.ascent.probed();
+                self.next(turn, chain)
+            };
+            return Poll::Pending;
+        }
+        if purpose == Purpose::Move {
+            self.work = if let Some(holds_back) = met {
+                self.moved = self.moved.saturating_add(1);
+                Work::Seek(Seek::up(seek.sigma, holds_back, GAIN, 1e-6), Purpose::Last)
+            } else {
+                let (index, _, _) = self.move_of(chain.mission);
+                self.keep(index, 0.0, self.kept);
+                self.moving += 1;
+                Work::Polish(seek.sigma - GAIN)
+            };
+            return Poll::Pending;
+        }
+        self.work = if seek.tried(met) {
             Work::Seek(seek, purpose)
         } else {
-            match seek.found() {
-                Some(sigma) if purpose == Purpose::Last => {
-                    return Poll::Ready(Ok(libm::expf(sigma)));
+            match (seek.found(), purpose) {
+                (Some((sigma, holds_back)), Purpose::Last) if self.again => {
+                    self.holds_back = holds_back;
+                    Work::Polish(sigma)
                 }
-                Some(sigma) if purpose == Purpose::Raise => {
+                (Some((sigma, _)), Purpose::Last) => {
+                    if self.best.is_none_or(|(best, _)| sigma > best) {
+                        self.best = Some((sigma, self.number));
+                    }
+                    self.given_up()
+                }
+                (Some((sigma, _)), Purpose::Raise) => {
                     Work::Settle(sigma.min(self.ascent.limit()), purpose)
                 }
-                Some(sigma) => Work::Settle(sigma, purpose),
-                None if purpose == Purpose::Last => return Poll::Ready(Err(Infeasible)),
-                None => self.given_up(),
+                (Some((sigma, _)), _) => Work::Settle(sigma, purpose),
+                (None, Purpose::Last) if self.again => return Poll::Ready(Err(Infeasible)),
+                (None, _) => self.given_up(),
             }
         };
         Poll::Pending
     }
 
-    /// Whether the chain meets the ceiling by the rules of the sweep; if not, its other hops have to be shorter.
-    fn probe(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>) {
-        let ceiling = chain.ceiling();
-        let Poll::Ready(slack) = self.plain(chain, ceiling - CEILING, Purpose::Last, false) else {
-            return;
-        };
-        self.restart();
-        self.work = if slack.is_some_and(|slack| slack >= 0.0) {
-            self.best = Some((ceiling, self.number));
-            Work::Seek(
-                Seek::down(ceiling + 2.0 * CEILING, 1e-5, 2.0, 1e-6),
-                Purpose::Last,
-            )
+    /// Whose move is tried, which of four ways, and how often it is halved.
+    fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
+        // A mission has relays; the compiler does not know that.
+        let relays = mission.relays().max(1);
+        let tried = self.moving / 6;
+        (tried % relays + 1, self.moving % 6, tried / relays)
+    }
+
+    /// Tries the next move of a chain of few relays that meets `sigma`: each alone by a part of its room, and by less and less. What
+    /// the derivatives do not see, since something else binds there, it may.
+    fn polish(
+        &mut self,
+        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        sigma: f32,
+    ) -> Poll<Result<f32, Infeasible>> {
+        let (index, way, halved) = self.move_of(chain.mission);
+        if chain.mission.relays() > POLISHED || halved > HALVINGS || self.moved >= MOVES {
+            return Poll::Ready(Ok(libm::expf(sigma)));
+        }
+        let room = (chain.seat_of)(index).room;
+        self.kept = self.cell(index);
+        let part = FIRST_MOVE
+            * libm::ldexpf(1.0, -i32::from(halved))
+            * if way % 2 > 0 { 1.0 } else { -1.0 };
+        let mut at = self.kept.place(room);
+        if way < 2 {
+            at.altitude_m += part * room.band.span_m();
         } else {
-            let turn = self.ascent.probed();
-            self.next(turn, chain.mission)
-        };
+            at.y_m += part * room.lateral.span_m();
+        }
+        let mut moved = Cell::of(at, room);
+        if way > 3 {
+            let other = if way == 4 {
+                index + 2
+            } else {
+                index.saturating_sub(2)
+            };
+            if other < 1 || other > chain.mission.relays() {
+                self.moving += 1;
+                return Poll::Pending;
+            }
+            moved = Cell::of(self.cell(other).place((chain.seat_of)(other).room), room);
+        }
+        if moved == self.kept {
+            self.moving += 1;
+            return Poll::Pending;
+        }
+        self.keep(index, 0.0, moved);
+        self.work = Work::Seek(Seek::down(sigma + GAIN, GAIN, 1.0, GAIN), Purpose::Move);
+        Poll::Pending
     }
 
     /// Nothing came of the start.
@@ -540,30 +805,28 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             }
             Purpose::Raise => {
                 let turn = self.ascent.raised(sigma, slack);
-                self.next(turn, chain.mission)
+                self.next(turn, chain)
             }
             Purpose::Tighten => {
                 let turn = self.ascent.tightened(slack);
-                self.next(turn, chain.mission)
+                self.next(turn, chain)
             }
-            Purpose::Judge | Purpose::Last => self.judged(sigma, chain.ceiling()),
+            Purpose::Judge | Purpose::Last | Purpose::Probe | Purpose::Move => {
+                self.judged(sigma, chain.ceiling())
+            }
         };
         Poll::Pending
     }
 
-    /// An ascent has come to `sigma`.
-    fn judged(&mut self, sigma: f32, ceiling: f32) -> Work {
-        if self.again {
-            let sigma = sigma.min(ceiling + CEILING);
-            return Work::Seek(Seek::down(sigma + 2e-5, 1e-5, 2.0, 1e-6), Purpose::Last);
-        }
-        // What is above the ceiling has been probed in vain, and the more so the higher it is.
-        let worth = sigma.min(2.0 * ceiling - sigma);
-        if self.best.is_none_or(|(best, _)| worth > best) {
-            self.best = Some((worth, self.number));
-        }
-        self.number += 1;
-        Work::Begin
+    /// An ascent has come to `sigma`: by the rules of the sweep.
+    fn judged(&self, sigma: f32, ceiling: f32) -> Work {
+        let sigma = sigma.min(ceiling + CEILING);
+        let seek = if self.again {
+            Seek::down(sigma + 2e-5, 1e-5, 2.0, 1e-6)
+        } else {
+            Seek::down(sigma + JUDGED, JUDGED, 3.0, JUDGED)
+        };
+        Work::Seek(seek, Purpose::Last)
     }
 
     /// Whether the start may still be the best.
@@ -573,24 +836,33 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     fn look_back(&mut self, mission: &Mission) -> Work {
         self.ascent.look_back();
-        let last = (usize::from(mission.relays()) - 1) / SEGMENT;
-        Work::Back(u8::try_from(last).unwrap_or(u8::MAX))
+        Work::Back(Self::last_of(mission))
     }
 
-    fn next(&mut self, turn: Turn, mission: &Mission) -> Work {
+    /// The last segment.
+    fn last_of(mission: &Mission) -> u8 {
+        let last = (usize::from(mission.relays()) - 1) / SEGMENT;
+        u8::try_from(last).unwrap_or(u8::MAX)
+    }
+
+    fn next(&mut self, turn: Turn, chain: &Chain<'_, impl Fn(u16) -> Seat>) -> Work {
         self.restart();
         match turn {
             Turn::Try { share, sigma } => Work::Forward(share, sigma, false),
-            Turn::Raise if self.ascent.at_limit() => Work::Probe,
-            Turn::Raise => {
-                let Ascent { sigma, slack, .. } = self.ascent;
-                Work::Seek(Seek::up(sigma, slack, 0.02, 1e-5), Purpose::Raise)
+            Turn::Raise if self.ascent.at_limit() => {
+                let sigma = chain.ceiling() - CEILING;
+                Work::Seek(Seek::down(sigma, 1e-5, 2.0, 1e-6), Purpose::Probe)
             }
-            Turn::Again => self.look_back(mission),
+            Turn::Raise => {
+                let Ascent { sigma, .. } = self.ascent;
+                Work::Seek(Seek::up(sigma, false, 0.02, 1e-5), Purpose::Raise)
+            }
+            Turn::Again => self.look_back(chain.mission),
             Turn::Over if self.is_promising() && self.ascent.tighten() => {
                 Work::Settle(self.ascent.sigma, Purpose::Tighten)
             }
             Turn::Over => {
+                self.walled |= self.ascent.penalty > 0.0;
                 let sigma = self.ascent.sigma;
                 Work::Seek(
                     Seek::down(sigma + JUDGED, JUDGED, 3.0, JUDGED),
@@ -623,7 +895,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         for (k, index) in Self::relays_of(segment, relays) {
             let room = (chain.seat_of)(index).room;
             let wanted = self.cell(index).place(room);
-            let to = chain.link(index, from, room).at(target, from.x_m, wanted)?;
+            let to = self
+                .link(chain, index, from, room)
+                .at(target, from.x_m, wanted)?;
             *places.get_mut(k)? = from;
             self.stages.get_mut(k)?.x_m = to.x_m;
             from = to;
@@ -643,9 +917,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         for (k, index) in Self::relays_of(segment, relays).rev() {
             let from = *places.get(k)?;
             let room = (chain.seat_of)(index).room;
-            let link = chain.link(index, from, room);
-            let policy;
-            (outlook, policy) = link.weigh(target, self.ascent.trust, from, to, &outlook);
+            let link = self.link(chain, index, from, room);
+            let policy = link.weigh(target, self.ascent.trust, from, to, &mut outlook);
             self.stages.get_mut(k)?.policy = Brief::of(&policy);
             to = from;
         }
@@ -656,7 +929,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     fn back(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>, segment: u8) {
         let before = self.nominal_before(chain, segment);
         let Some(outlook) = self.recall(chain, segment, before) else {
-            self.work = self.next(Turn::Over, chain.mission);
+            self.work = self.next(Turn::Over, chain);
             return;
         };
         self.ascent.add(&outlook);
@@ -667,7 +940,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             Work::Back(next)
         } else {
             let turn = self.ascent.weighed();
-            self.next(turn, chain.mission)
+            self.next(turn, chain)
         };
     }
 
@@ -708,20 +981,20 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             } else {
                 self.ascent.failed()
             };
-            self.work = self.next(turn, chain.mission);
+            self.work = self.next(turn, chain);
             return;
         }
         let segment = u8::try_from(usize::from(self.pass.done) / SEGMENT).unwrap_or(u8::MAX);
         if self.held != Some(segment) {
             if self.recall(chain, segment, self.pass.old).is_none() {
-                self.work = self.next(Turn::Over, chain.mission);
+                self.work = self.next(Turn::Over, chain);
             }
             return;
         }
         if self.follow(chain, segment, target, share, kept).is_none() {
             // Only of a trial: what is kept has been tried.
             let turn = self.ascent.failed();
-            self.work = self.next(turn, chain.mission);
+            self.work = self.next(turn, chain);
         }
     }
 
@@ -741,7 +1014,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             let policy = policy.policy();
             let nominal = self.cell(index).place(room).at(x_m);
             let change: Triple = minus(triple(from), triple(old));
-            let link = chain.link(index, from, room);
+            let link = self.link(chain, index, from, room);
             let wanted = link.wanted(target, from, nominal, &policy, share, change);
             let cell = Cell::of(link.at(target, from.x_m, wanted)?.cross_section(), room);
             let place = link.at(target, from.x_m, cell.place(room))?;

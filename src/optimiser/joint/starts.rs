@@ -18,6 +18,11 @@ pub(super) enum Start {
     Arch { aside: f32, up: f32 },
     /// A spiral about the interferer: toward a place right above it or beside it, and from there to Rx.
     Around { aside: f32, up: f32, far: f32 },
+    /// An arch, with no least separation till the places are judged, by rules that let relays hold back.
+    Through { aside: f32, up: f32 },
+    /// As far off the line as the room goes, one relay after the other in turn at its corner and a least separation aside from there:
+    /// for relays that have no room to stand in a row.
+    Turns,
     /// Low, from a target so high that no hop leaps to the far side of the interferer.
     Near,
     /// Relay 1 right above Rx, as high or far aside as pays, the others on the way down from there.
@@ -34,6 +39,9 @@ const ARCHES: [(f32, f32); 7] = [
     (-0.25, 0.0),
     (0.25, 0.0),
 ];
+
+/// How many of them are tried with no least separation.
+const THROUGH: usize = 3;
 
 /// Spirals: aside and up of the place they lead to first, and how far that is from the interferer, in parts of the geometric mean of
 /// the distances of Tx and Rx.
@@ -135,6 +143,27 @@ impl Start {
         })
     }
 
+    /// Where relay `index` flies across the line that takes its turn with the one before, `apart_m` from it.
+    pub(super) fn in_turn(
+        index: u16,
+        interferer: &Interferer,
+        room: Room,
+        apart_m: f32,
+    ) -> CrossSection {
+        let Room { lateral, band } = room;
+        let left =
+            (interferer.y_m - lateral.least_m).abs() > (interferer.y_m - lateral.most_m).abs();
+        let off = if index % 2 > 0 { apart_m } else { 0.0 };
+        room.nearest(CrossSection {
+            y_m: if left {
+                lateral.least_m + off
+            } else {
+                lateral.most_m - off
+            },
+            altitude_m: band.most_m,
+        })
+    }
+
     /// Start `number` for relays with that `room`; `None` after the last, `Some(None)` where it is no use.
     #[expect(
         clippy::option_option,
@@ -165,15 +194,19 @@ impl Start {
         match number.checked_sub(SPIRALS.len())? {
             0 => Some(free.then_some(Self::Far)),
             1 => Some(free.then_some(Self::Near)),
-            _ => None,
+            2 => Some((!lateral.is_single()).then_some(Self::Turns)),
+            past => {
+                let &(aside, up) = ARCHES.get(past - 3).filter(|_| past < 3 + THROUGH)?;
+                Some(fits((aside, up)).then_some(Self::Through { aside, up }))
+            }
         }
     }
 
     /// Where a relay flies across the line that comes after one at `x_m`, of a chain `distance_m` long.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
-            Self::Arch { aside, up } => (aside, up),
-            Self::Near | Self::Far | Self::Around { .. } => (0.0, 0.0),
+            Self::Arch { aside, up } | Self::Through { aside, up } => (aside, up),
+            Self::Near | Self::Far | Self::Turns | Self::Around { .. } => (0.0, 0.0),
         };
         let t = (x_m / distance_m).clamp(0.0, 1.0);
         let rise = 2.0 * distance_m * t * (1.0 - t);

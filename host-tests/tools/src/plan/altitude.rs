@@ -7,8 +7,9 @@ use uav_relay::mission::MAX_RELAYS;
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::optimiser::pass::{Behind, Link};
+use uav_relay::optimiser::spacing::Stand;
 use uav_relay::place::Station;
-use uav_relay::{Method, Placement};
+use uav_relay::{Method, Mission, Placement};
 
 use super::briefed::Briefed;
 use super::found::{NoPlan, Plan};
@@ -57,41 +58,54 @@ fn agreed(briefed: &Briefed) -> Option<Vec<Placement>> {
 /// The places that the joint method finds; `None` where it finds none.
 fn joint(briefed: &Briefed) -> Option<Vec<Placement>> {
     let mission = &briefed.mission;
-    let seat_of = |index| {
+    solved(mission, |index| {
         let holds = briefed.held.contains(&index);
         Seat::of(mission, briefed.profile(index), holds)
-    };
+    })
+}
+
+/// The places that the joint method finds for relays of which `seat_of` says what they bring along; `None` where it finds none.
+///
+/// This is what one relay does by itself for the whole chain, and what the sweep makes of it.
+pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Placement>> {
     let mut solver = Box::new(Chain::new(mission)?);
     let target = loop {
-        if let Poll::Ready(solved) = solver.step(mission, seat_of) {
+        if let Poll::Ready(solved) = solver.step(mission, &seat_of) {
             break solved.ok()?;
         }
     };
-    let mut places: Vec<Placement> = Vec::new();
-    let mut behind = None;
-    for index in 1..=mission.relays() {
+    let own_of = |index| {
         let seat = seat_of(index);
-        let own = Station {
+        Station {
             at: solver.at(index, seat),
             power_w: seat.power_w,
-        };
-        let link = Link {
-            mission,
-            behind,
-            index,
-            own,
+        }
+    };
+    let link_of = |index: u16| Link {
+        mission,
+        behind: (index > 1).then(|| Behind {
+            relay: own_of(index - 1),
             measured_per_w: None,
-            plain: false,
-            end_m: Some(solver.end_m(mission, &seat_of, index)),
-        };
+        }),
+        index,
+        own: own_of(index),
+        measured_per_w: None,
+        plain: !solver.holds_back(),
+        end_m: Some(solver.end_m(mission, &seat_of, index)),
+    };
+    let mut places: Vec<Placement> = Vec::new();
+    for index in 1..=mission.relays() {
         let from_m = places.last().map_or(0.0, |place| place.x_m);
         let mut reaches = PerTarget::new();
-        link.extend(&[target], &[from_m], &mut reaches);
-        places.push(own.at.at(*reaches.first()?));
-        behind = Some(Behind {
-            relay: own,
-            measured_per_w: None,
-        });
+        link_of(index).extend(&[target], &[from_m], &mut reaches);
+        places.push(own_of(index).at.at(*reaches.first()?));
+    }
+    for index in (2..=mission.relays()).rev() {
+        let at = usize::from(index) - 1;
+        let (from_m, place_m) = (places[at - 1].x_m, places[at].x_m);
+        if let Stand::At(x_m) = link_of(index).stand(target, from_m, place_m)? {
+            places[at - 1].x_m = x_m;
+        }
     }
     Some(places)
 }

@@ -21,6 +21,7 @@ mod source;
 
 use uav_relay_sim::scenario::{Interference, Scenario};
 
+pub use altitude::solved;
 pub use ask::{Ask, Number};
 pub use found::{Fitted, NoPlan, Plan, Theorem};
 

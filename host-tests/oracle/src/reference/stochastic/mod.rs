@@ -7,6 +7,7 @@
 mod backward;
 mod equals;
 mod link;
+mod own;
 mod single;
 mod upsilon;
 

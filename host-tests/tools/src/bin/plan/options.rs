@@ -16,7 +16,8 @@ pub(crate) struct Options {
     pub(crate) scenario: Option<PathBuf>,
     #[command(flatten)]
     wanted: Wanted,
-    /// Whether each relay holds the altitude the scenario gives it, or may choose one in the scenario's band
+    /// Whether each relay stays above the line at the altitude the scenario gives it, or may choose an altitude in the scenario's
+    /// band (geometry.altitude_min_m to altitude_max_m) and a place beside the line (geometry.lateral_min_m to lateral_max_m)
     #[arg(long, value_name = "A", value_enum, default_value_t = Altitude::Given)]
     pub(crate) altitude: Altitude,
     /// Where the only relay has to stand, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
@@ -58,7 +59,7 @@ struct Wanted {
 pub(crate) enum Altitude {
     /// As the scenario gives it
     Given,
-    /// Any in the scenario's band
+    /// Any in the scenario's band, and anywhere beside the line that it leaves room
     Free,
 }
 

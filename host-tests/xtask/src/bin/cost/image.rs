@@ -34,7 +34,7 @@ const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",
         &["--no-default-features"],
-        [40 * 1024, 4608, 2560],
+        [40 * 1024, 4 * 1024, 2 * 1024],
     ),
     (
         "flash of that with `auth`",
@@ -63,17 +63,17 @@ const IMAGES: &[Image] = &[
     (
         "flash of the relay image, everything and `auth`",
         &["--features", "auth"],
-        [112 * 1024, 10 * 1024, 5632],
+        [112 * 1024, 10 * 1024, 4 * 1024],
     ),
     (
         "flash of the relay image, everything and `upload`",
         &["--features", "upload"],
-        [112 * 1024, 10 * 1024, 5632],
+        [112 * 1024, 10 * 1024, 4 * 1024],
     ),
     (
         "flash of the relay image, everything but `auth`",
         &[],
-        [112 * 1024, 10 * 1024, 5632],
+        [112 * 1024, 10 * 1024, 4 * 1024],
     ),
 ];
 
