@@ -208,7 +208,7 @@ impl Relay {
     /// Writes the next frame to be sent into `frame`, if there is one.
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
-        let sender = self.node.chain().node;
+        let sender = self.node.member().node;
         let mut header = Header {
             network: self.network,
             sender,
@@ -290,12 +290,12 @@ impl Relay {
 
     /// Its place in the chain as it was counted last, 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
     pub fn index(&self) -> u16 {
-        self.node.chain().index
+        self.node.member().index
     }
 
     /// The number of the view of the chain that it has agreed to, 0 before the chain has had to form anew.
     pub fn view(&self) -> u16 {
-        self.node.chain().view
+        self.node.member().view
     }
 
     /// The nodes it takes for its neighbours toward the transmitter and toward the receiver, by their place in the chain that
@@ -306,7 +306,7 @@ impl Relay {
 
     /// The mission the relay flies, with as many relays as are left of it.
     pub fn mission(&self) -> &Mission {
-        &self.node.chain().mission
+        &self.node.member().mission
     }
 
     /// What the measurements at this place say so far, and `None` before they say anything.

@@ -1,13 +1,14 @@
 //! What a relay is and flies, as every layer is handed it, and what a layer asks of the others.
 
-use crate::mission::Mission;
-use crate::settings::Settings;
+use crate::mission::{Band, Mission};
+use crate::place::Placement;
+use crate::settings::{Method, Settings};
 use crate::time::Instant;
 use crate::wire::digest::{MissionId, digest};
 
-/// The relay in its chain.
+/// The relay as a member of its chain.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Chain {
+pub(crate) struct Member {
     /// The mission that it flies, with as many relays as are in the view.
     pub(crate) mission: Mission,
     pub(crate) settings: Settings,
@@ -25,7 +26,7 @@ pub(crate) struct Chain {
     pub(crate) index: u16,
 }
 
-impl Chain {
+impl Member {
     pub(crate) fn new(mission: Mission, settings: Settings, node: u16) -> Self {
         let digest = digest(&mission);
         Self {
@@ -50,13 +51,58 @@ impl Chain {
 #[derive(Clone, Copy)]
 pub(crate) struct Context<'a> {
     pub(crate) now: Instant,
-    pub(crate) chain: &'a Chain,
+    pub(crate) member: &'a Member,
     /// The newest mission that the relay holds.
     pub(crate) latest: MissionId,
     /// Whether nobody comes after it on a pass.
     pub(crate) end: bool,
     /// Upsilon as it measures it where it stands, 1/W.
     pub(crate) measured_per_w: Option<f32>,
+}
+
+impl<'a> Context<'a> {
+    pub(crate) const fn mission(&self) -> &'a Mission {
+        &self.member.mission
+    }
+
+    pub(crate) const fn settings(&self) -> &'a Settings {
+        &self.member.settings
+    }
+
+    /// Its place among the relays of the view, 1 next to Tx.
+    pub(crate) const fn index(&self) -> u16 {
+        self.member.index
+    }
+
+    /// The digest that the passes of the view bear.
+    pub(crate) const fn digest(&self) -> u16 {
+        self.member.pass_digest()
+    }
+
+    /// Whether the joint method is asked for, and has something to choose.
+    pub(crate) fn joins(&self) -> bool {
+        let config = self.mission().config();
+        let free = !(config.band.is_single() && config.lateral.is_single());
+        cfg!(feature = "altitude") && self.settings().method == Method::Joint && free
+    }
+
+    pub(crate) fn is_last(&self) -> bool {
+        self.mission().after(self.index()).is_none()
+    }
+
+    /// Whether a neighbour may stand at `place`.
+    pub(crate) fn is_between(&self, place: Placement) -> bool {
+        (0.0..=self.mission().config().distance_m).contains(&place.x_m)
+    }
+
+    /// The altitudes that this relay may choose from, when it holds `altitude_m`.
+    pub(crate) fn band(&self, altitude_m: f32) -> Band {
+        if self.settings().hold_altitude {
+            Band::at(altitude_m)
+        } else {
+            self.mission().config().band
+        }
+    }
 }
 
 /// What a layer asks of the others, or has them know.

@@ -15,7 +15,7 @@
 //! | a proposal that does not name the mission held | a hello, and no part in it |
 //! | a decision on a view that was granted | its mission is flown: `Event::Adopted` |
 
-use super::context::Chain;
+use super::context::Member;
 use crate::mission::Mission;
 use crate::wire::digest::MissionId;
 #[cfg(feature = "upload")]
@@ -35,8 +35,8 @@ pub(crate) struct MissionUpdate {
 }
 
 /// Whether newer missions are taken in flight: only where frames are signed.
-pub(crate) const fn takes_uploads(chain: &Chain) -> bool {
-    UPLOAD && chain.settings.auth.is_some()
+pub(crate) const fn takes_uploads(member: &Member) -> bool {
+    UPLOAD && member.settings.auth.is_some()
 }
 
 impl MissionUpdate {
@@ -54,21 +54,21 @@ impl MissionUpdate {
     }
 
     /// The mission of that number, if it is the one flown or the one held.
-    pub(crate) fn mission_of(&self, chain: &Chain, id: MissionId) -> Option<Mission> {
+    pub(crate) fn mission_of(&self, member: &Member, id: MissionId) -> Option<Mission> {
         #[cfg(feature = "upload")]
-        if id != chain.active {
+        if id != member.active {
             let upload = self.upload.filter(|upload| upload.id() == id)?;
             return Mission::try_new(*upload.config()).ok();
         }
-        (id == chain.active).then_some(chain.mission)
+        (id == member.active).then_some(member.mission)
     }
 }
 
 #[cfg(feature = "upload")]
 impl MissionUpdate {
     /// Holds `upload` from now on, if it is for this relay and newer than what it holds; whether it is.
-    pub(crate) fn hold(&mut self, chain: &Chain, upload: Upload) -> bool {
-        let newer = upload.id() > self.latest && fits(chain, &upload);
+    pub(crate) fn hold(&mut self, member: &Member, upload: Upload) -> bool {
+        let newer = upload.id() > self.latest && fits(member, &upload);
         if newer {
             self.latest = upload.id();
             self.upload = Some(upload);
@@ -77,14 +77,14 @@ impl MissionUpdate {
     }
 
     /// The same by the relay's own firmware.
-    pub(crate) fn hand_in(&mut self, chain: &Chain, upload: &Upload) -> Result<(), UploadError> {
-        if !takes_uploads(chain) {
+    pub(crate) fn hand_in(&mut self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
+        if !takes_uploads(member) {
             return Err(UploadError::Unsigned);
         }
-        if !fits(chain, upload) {
+        if !fits(member, upload) {
             return Err(UploadError::Base);
         }
-        if self.hold(chain, *upload) {
+        if self.hold(member, *upload) {
             Ok(())
         } else {
             Err(UploadError::Old)
@@ -94,11 +94,11 @@ impl MissionUpdate {
     /// A relay that has just been switched on, `untouched` or not, flies `upload`, which it held before: the mission of it.
     pub(crate) fn resume(
         &mut self,
-        chain: &Chain,
+        member: &Member,
         upload: &Upload,
         untouched: bool,
     ) -> Result<Mission, UploadError> {
-        if !fits(chain, upload) {
+        if !fits(member, upload) {
             return Err(UploadError::Base);
         }
         if self.upload.is_some() || !untouched {
@@ -124,8 +124,8 @@ impl MissionUpdate {
 
 /// Whether `upload` is for this relay. None is for relays in a field, even if its base has the digest of their mission.
 #[cfg(feature = "upload")]
-fn fits(chain: &Chain, upload: &Upload) -> bool {
-    upload.base() == chain.digest
-        && upload.config().relays == chain.all
-        && chain.mission.field().is_none()
+fn fits(member: &Member, upload: &Upload) -> bool {
+    upload.base() == member.digest
+        && upload.config().relays == member.all
+        && member.mission.field().is_none()
 }

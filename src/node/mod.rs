@@ -16,6 +16,7 @@
 //! | [`context`] | what a relay is and flies, as every layer is handed it, and what a layer asks of the others |
 //! | `retransmit` | how long an answer is awaited, and when a message is sent again |
 //! | `numbering` | what a number that is not the expected one means |
+//! | `timing` | what the layers have in common in keeping time |
 //! | `steering` | the setpoint on its way to the agreed place |
 //! | [`sample`] | the interference that a relay measures |
 //!
@@ -30,6 +31,7 @@ mod retransmit;
 pub(crate) mod round;
 pub mod sample;
 mod steering;
+mod timing;
 pub(crate) mod view;
 
 use crate::event::{Event, Pending};
@@ -39,13 +41,13 @@ use crate::place::Placement;
 use crate::settings::{Identity, Method, Settings, Wiring};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
-use crate::time::{Duration, Instant};
+use crate::time::Instant;
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Hello, Message};
 #[cfg(feature = "upload")]
 use crate::wire::upload::{Upload, UploadError};
 
-use context::{Chain, Context, Effects};
+use context::{Context, Effects, Member};
 use mission_update::{MissionUpdate, takes_uploads};
 use neighbour::Neighbours;
 use neighbour::state::CANDIDATES;
@@ -54,9 +56,6 @@ use round::state::Phase;
 use sample::{Meter, Sample};
 use steering::Steering;
 use view::ViewChange;
-
-/// How long a relay rests between two portions of a computation, so that a caller's loop gets its turn.
-const PAUSE: Duration = Duration::from_micros(250);
 
 /// A pass whose digest is so many views off is of the same mission.
 const VIEWS: u16 = 64;
@@ -71,7 +70,7 @@ struct Telemetry {
 /// A relay's share of the protocol.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
-    chain: Chain,
+    member: Member,
     neighbours: Neighbours,
     view: ViewChange,
     update: MissionUpdate,
@@ -84,15 +83,15 @@ pub(crate) struct Node {
 /// What the layers are handed, of those that it is made of.
 fn of<'a>(
     now: Instant,
-    chain: &'a Chain,
+    member: &'a Member,
     neighbours: &Neighbours,
     update: &MissionUpdate,
     meter: &Meter,
 ) -> Context<'a> {
-    let onward = Side::onward(chain.mission.heading());
+    let onward = Side::onward(member.mission.heading());
     Context {
         now,
-        chain,
+        member,
         latest: update.latest(),
         end: neighbours.at(onward).has_no_peer(),
         measured_per_w: meter.published(),
@@ -113,16 +112,16 @@ impl Node {
         let seed = seed.wrapping_add(u32::from(identity.index));
         let [a, b, ..] = seed.wrapping_mul(0x9E37_79B1).to_le_bytes();
         let number = u16::from_le_bytes([a, b]);
-        let chain = Chain::new(mission, settings, identity.index);
-        let neighbours = Neighbours::new(identity.index, chain.all, now, &settings);
+        let member = Member::new(mission, settings, identity.index);
+        let neighbours = Neighbours::new(identity.index, member.all, now, &settings);
         let mut node = Self {
-            update: MissionUpdate::new(chain.active),
+            update: MissionUpdate::new(member.active),
             view: ViewChange::new(!seed),
             round: Round::new(leads, number, profile, seed),
             steering: Steering::new(&settings, neighbours.nodes(), seed, now),
             meter: Meter::new(settings.measure),
             telemetry: Telemetry::default(),
-            chain,
+            member,
             neighbours,
         };
         if leads || settings.method == Method::Joint {
@@ -138,15 +137,15 @@ impl Node {
     fn await_first(&mut self, now: Instant) {
         let Settings {
             hop_time, quiet, ..
-        } = self.chain.settings;
-        let first = hop_time.times(2 * u32::from(self.chain.all));
+        } = self.member.settings;
+        let first = hop_time.times(2 * u32::from(self.member.all));
         self.view.await_first(now + quiet + first);
     }
 
     fn context(&self, now: Instant) -> Context<'_> {
         of(
             now,
-            &self.chain,
+            &self.member,
             &self.neighbours,
             &self.update,
             &self.meter,
@@ -155,11 +154,11 @@ impl Node {
 
     /// Where passes go to, and where they come from.
     const fn onward(&self) -> Side {
-        Side::onward(self.chain.mission.heading())
+        Side::onward(self.member.mission.heading())
     }
 
     const fn back(&self) -> Side {
-        Side::back(self.chain.mission.heading())
+        Side::back(self.member.mission.heading())
     }
 
     /// On which side node `sender` is, if it may have something to say to this relay: a neighbour, or one that might become
@@ -169,9 +168,9 @@ impl Node {
         if let Some(side) = self.ground_side(sender) {
             return Some(side);
         }
-        let own = self.chain.node;
+        let own = self.member.node;
         let near = sender.abs_diff(own) <= if self.searches() { CANDIDATES } else { 1 };
-        if !near || sender == own || sender < 1 || sender > self.chain.all {
+        if !near || sender == own || sender < 1 || sender > self.member.all {
             return None;
         }
         Some(if sender < own {
@@ -183,7 +182,7 @@ impl Node {
 
     /// Whether others than the neighbours of the mission can be heard.
     fn searches(&self) -> bool {
-        self.chain.settings.wiring == Wiring::Shared
+        self.member.settings.wiring == Wiring::Shared
     }
 
     fn raise(&mut self, event: Event) {
@@ -295,7 +294,7 @@ impl Node {
         #[cfg(feature = "upload")]
         if let Message::Offer(upload) = message
             && !taken
-            && takes_uploads(&self.chain)
+            && takes_uploads(&self.member)
         {
             // It takes this relay for its neighbour: a hello alone would only make it say the same again.
             if self.is_of_mission(side, upload.base()) {
@@ -325,7 +324,7 @@ impl Node {
         let Some(digest) = message.mission() else {
             return true;
         };
-        let (active, latest) = (self.chain.active, self.update.latest());
+        let (active, latest) = (self.member.active, self.update.latest());
         let proposes = message.is_of_a_call();
         if !proposes && !message.is_of_a_view() {
             return self.is_of_mission(side, digest);
@@ -333,15 +332,15 @@ impl Node {
         let known = match message {
             Message::Proposal(proposal) => proposal.mission_id == latest,
             Message::Decision(decision) => [active, latest].contains(&decision.mission_id),
-            _ => digest == self.chain.pass_digest(),
+            _ => digest == self.member.pass_digest(),
         };
         if known {
             return true;
         }
-        let off = digest.wrapping_sub(self.chain.pass_digest());
+        let off = digest.wrapping_sub(self.member.pass_digest());
         let near = !proposes && off.min(off.wrapping_neg()) <= VIEWS;
         // It was loaded with the same mission, so it flies an older or a newer one.
-        let takes = takes_uploads(&self.chain);
+        let takes = takes_uploads(&self.member);
         let kin = takes && self.neighbours.at(side).holds.is_some();
         if !(near || kin) {
             self.refuse_mission(side);
@@ -359,7 +358,7 @@ impl Node {
     }
 
     fn is_of_mission(&mut self, side: Side, digest: u16) -> bool {
-        let same = digest == self.chain.digest;
+        let same = digest == self.member.digest;
         if !same {
             self.refuse_mission(side);
         }
@@ -374,9 +373,9 @@ impl Node {
     /// A sign of life from the neighbour at `side`.
     fn hear(&mut self, now: Instant, side: Side) {
         let Self {
-            chain, neighbours, ..
+            member, neighbours, ..
         } = self;
-        if neighbours.at_mut(side).heard(now, &chain.settings) {
+        if neighbours.at_mut(side).heard(now, &member.settings) {
             self.raise(Event::NeighbourBack(side));
         }
     }
@@ -412,7 +411,7 @@ impl Node {
         }
         let context = of(
             now,
-            &self.chain,
+            &self.member,
             &self.neighbours,
             &self.update,
             &self.meter,
@@ -442,7 +441,7 @@ impl Node {
         let solved = self.is_solving(now);
         let context = of(
             now,
-            &self.chain,
+            &self.member,
             &self.neighbours,
             &self.update,
             &self.meter,
@@ -466,7 +465,7 @@ impl Node {
             let fresh = self.round.is_fresh();
             let context = of(
                 now,
-                &self.chain,
+                &self.member,
                 &self.neighbours,
                 &self.update,
                 &self.meter,
@@ -481,10 +480,10 @@ impl Node {
     /// It has just found out where it is to be: what it waits for it waits for from now on.
     fn solved(&mut self, now: Instant) {
         let Self {
-            chain, neighbours, ..
+            member, neighbours, ..
         } = self;
         for side in [Side::Upstream, Side::Downstream] {
-            neighbours.at_mut(side).excuse(now, &chain.settings);
+            neighbours.at_mut(side).excuse(now, &member.settings);
         }
         if self.awaits_first() {
             self.await_first(now);
@@ -494,12 +493,12 @@ impl Node {
     fn silence(&mut self, now: Instant, side: Side) {
         let (solving, searches) = (self.is_solving(now), self.searches());
         let Self {
-            chain,
+            member,
             neighbours,
             steering,
             ..
         } = self;
-        let settings = &chain.settings;
+        let settings = &member.settings;
         let neighbour = neighbours.at_mut(side);
         if solving && neighbour.excuse(now, settings) {
             return;
@@ -521,7 +520,7 @@ impl Node {
             // Whoever was to be counted next is not there any more.
             let context = of(
                 now,
-                &self.chain,
+                &self.member,
                 &self.neighbours,
                 &self.update,
                 &self.meter,
@@ -533,13 +532,13 @@ impl Node {
 
     /// Owes node `to` at `side` a hello, which may ask for one in return.
     fn owe_hello(&mut self, side: Side, to: u16, ask: bool) {
-        let distance = to.abs_diff(self.chain.node);
+        let distance = to.abs_diff(self.member.node);
         self.neighbours.at_mut(side).owe(distance, ask);
     }
 
     /// The next hello that is owed: at which side, to which node.
     fn next_hello(&mut self) -> Option<(Side, u16, Hello)> {
-        let (own, all) = (self.chain.node, self.chain.all);
+        let (own, all) = (self.member.node, self.member.all);
         for side in [Side::Upstream, Side::Downstream] {
             for _ in 0..CANDIDATES {
                 let Some((distance, ask)) = self.neighbours.at_mut(side).take_hello() else {
@@ -560,7 +559,7 @@ impl Node {
     fn hello(&self, side: Side, ask: bool) -> Hello {
         let latest = self.update.latest();
         Hello {
-            mission: self.chain.digest,
+            mission: self.member.digest,
             newest: self.view.newest(),
             neighbour: self.neighbours.at(side).node(),
             ask,
@@ -568,13 +567,13 @@ impl Node {
             fresh: self.round.is_fresh(),
             ready: self.neighbours.at(side.other()).is_ready(),
             holds: latest,
-            flies: self.chain.active == latest,
+            flies: self.member.active == latest,
         }
     }
 
     /// A hello from node `from` at `side`, of the same mission.
     fn on_hello(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
-        let own = self.chain.node;
+        let own = self.member.node;
         let known = self.view.newest();
         self.view.heard_of(hello.newest);
         if hello.ask {
@@ -599,21 +598,21 @@ impl Node {
 
     /// A hello from node `from` at `side`, which is not taken for the neighbour there.
     fn consider(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
-        let own = self.chain.node;
+        let own = self.member.node;
         let Self {
-            chain,
+            member,
             neighbours,
             steering,
             ..
         } = self;
         let neighbour = neighbours.at_mut(side);
-        neighbour.notice(now, &chain.settings);
+        neighbour.notice(now, &member.settings);
         if hello.neighbour != own && hello.neighbour != 0 {
             return;
         }
         let pairs = hello.neighbour == own;
         let nearer = from.abs_diff(own) < neighbour.node().abs_diff(own);
-        if neighbour.consider(from, pairs, nearer, hello.ready, now, &chain.settings) {
+        if neighbour.consider(from, pairs, nearer, hello.ready, now, &member.settings) {
             neighbour.holds = Some(hello.holds);
             steering.link(side, Some(from));
             self.raise(Event::NeighbourBack(side));
@@ -625,12 +624,12 @@ impl Node {
     /// The neighbour at `side` has said, one way or the other, whether it takes this relay for its own.
     fn told(&mut self, now: Instant, side: Side, mutual: bool) {
         let Self {
-            chain, neighbours, ..
+            member, neighbours, ..
         } = self;
-        if !neighbours.at_mut(side).told(mutual, now, &chain.settings) || !mutual {
+        if !neighbours.at_mut(side).told(mutual, now, &member.settings) || !mutual {
             return;
         }
-        let newer = self.view.newest() > self.chain.view;
+        let newer = self.view.newest() > self.member.view;
         if newer && !self.neighbours.at(side).has_grace(now) {
             // One of the two has missed something.
             self.view.ask(now);
@@ -645,23 +644,23 @@ impl Node {
         };
         let (place, id) = (proposed.place, proposed.mission_id);
         let leads = place == 1;
-        let mission = self.update.mission_of(&self.chain, id).zip(granted);
+        let mission = self.update.mission_of(&self.member, id).zip(granted);
         let mission = mission.and_then(|(mission, relays)| mission.with_relays(relays).ok());
         let (Some(relays), Some(mission)) = (granted, mission) else {
             self.raise(Event::NoQuorum);
             return self.neighbours.refuse();
         };
-        self.chain.index = match mission.heading() {
+        self.member.index = match mission.heading() {
             Heading::TowardRx => place,
             Heading::TowardTx => relays.saturating_sub(place).saturating_add(1),
         };
-        self.chain.view = proposed.view;
+        self.member.view = proposed.view;
         self.fly(mission, id);
         self.view.heard_of(proposed.view);
         let (back, onward) = (self.back(), self.onward());
         self.neighbours.at_mut(back).agree_with_proposer();
         self.neighbours.at_mut(onward).agree(place == relays);
-        let works = self.chain.settings.method == Method::Joint;
+        let works = self.member.settings.method == Method::Joint;
         self.round.renew(now, leads, works);
         bump(&mut self.telemetry.stats.views);
         self.raise(Event::Reformed);
@@ -673,32 +672,32 @@ impl Node {
 
     /// Flies `mission` from now on, which is that of `id`.
     fn fly(&mut self, mission: Mission, id: MissionId) {
-        self.chain.mission = mission;
-        if id == self.chain.active {
+        self.member.mission = mission;
+        if id == self.member.active {
             return;
         }
-        self.chain.active = id;
+        self.member.active = id;
         let common = mission.config().common;
         self.round
-            .load(self.chain.settings.profile.unwrap_or(common));
+            .load(self.member.settings.profile.unwrap_or(common));
         self.raise(Event::Adopted);
     }
 
     /// One measurement, by a relay that measures.
     pub(crate) fn handle_sample(&mut self, sample: Sample) {
-        let at = self.round.setpoint().filter(|_| self.chain.index == 1);
-        if !self.meter.take(&self.chain.mission, at, sample) {
+        let at = self.round.setpoint().filter(|_| self.member.index == 1);
+        if !self.meter.take(&self.member.mission, at, sample) {
             bump(&mut self.telemetry.stats.samples_refused);
         }
     }
 
     /// The leader begins again, at `now`; nobody else has anything to begin.
     pub(crate) fn restart(&mut self, now: Instant) {
-        let leads = self.chain.index == self.chain.mission.leader();
+        let leads = self.member.index == self.member.mission.leader();
         if leads && !self.view.has_no_quorum() && self.view.awaited().is_none() {
             let context = of(
                 now,
-                &self.chain,
+                &self.member,
                 &self.neighbours,
                 &self.update,
                 &self.meter,
@@ -725,7 +724,7 @@ impl Node {
         if let Some(message) = self.next_of_a_round(now) {
             return Some(message);
         }
-        let mission = self.chain.digest;
+        let mission = self.member.digest;
         if let Some((side, to, answer)) = self.neighbours.take_heartbeat() {
             return Some((side, to, Message::Heartbeat { mission, answer }));
         }
@@ -757,7 +756,7 @@ impl Node {
         let (next, before) = (peer(onward), peer(back));
         let context = of(
             now,
-            &self.chain,
+            &self.member,
             &self.neighbours,
             &self.update,
             &self.meter,
@@ -828,8 +827,8 @@ impl Node {
         }
     }
 
-    pub(crate) const fn chain(&self) -> &Chain {
-        &self.chain
+    pub(crate) const fn member(&self) -> &Member {
+        &self.member
     }
 
     /// The neighbours toward Tx and toward Rx.
@@ -858,12 +857,12 @@ impl Node {
 impl Node {
     /// On which side `node` is, if it is the ground transmitter or receiver and near enough to be heard.
     fn ground_side(&self, node: u16) -> Option<Side> {
-        let (own, all) = (self.chain.node, self.chain.all);
-        let most = match self.chain.settings.wiring {
+        let (own, all) = (self.member.node, self.member.all);
+        let most = match self.member.settings.wiring {
             Wiring::Pair => 1,
             Wiring::Shared => CANDIDATES,
         };
-        let near = takes_uploads(&self.chain) && node.abs_diff(own) <= most;
+        let near = takes_uploads(&self.member) && node.abs_diff(own) <= most;
         match node {
             0 if near => Some(Side::Upstream),
             _ if near && node == all.saturating_add(1) => Some(Side::Downstream),
@@ -873,7 +872,7 @@ impl Node {
 
     /// A message from the ground at `side`; whether it is one for the ground to say.
     fn on_ground(&mut self, now: Instant, side: Side, message: &Message) -> bool {
-        let base = self.chain.digest;
+        let base = self.member.digest;
         match message {
             Message::Offer(_) | Message::Hello(_) if message.mission() != Some(base) => {
                 self.refuse_mission(side);
@@ -895,7 +894,7 @@ impl Node {
         }
         let to = match side {
             Side::Upstream => 0,
-            Side::Downstream => self.chain.all.saturating_add(1),
+            Side::Downstream => self.member.all.saturating_add(1),
         };
         let hello = Hello {
             neighbour: 0,
@@ -908,7 +907,7 @@ impl Node {
     /// An offer from node `from` at `side`, for relays that were loaded with the same mission. Answered only by who holds as new
     /// a mission then: any other answer would be answered by the same offer.
     fn on_offer(&mut self, now: Instant, side: Side, from: u16, upload: &Upload) {
-        if !takes_uploads(&self.chain) {
+        if !takes_uploads(&self.member) {
             return bump(&mut self.telemetry.stats.unsigned);
         }
         let id = upload.id();
@@ -924,7 +923,7 @@ impl Node {
 
     /// Holds `upload` from now on, if it is newer than what is held.
     fn hold(&mut self, now: Instant, upload: Upload) {
-        if self.update.hold(&self.chain, upload) {
+        if self.update.hold(&self.member, upload) {
             self.held(now);
         }
     }
@@ -944,7 +943,7 @@ impl Node {
         now: Instant,
         upload: &Upload,
     ) -> Result<(), UploadError> {
-        self.update.hand_in(&self.chain, upload)?;
+        self.update.hand_in(&self.member, upload)?;
         self.held(now);
         Ok(())
     }
@@ -952,12 +951,12 @@ impl Node {
     /// A relay that has just been switched on flies `upload`, which it held before.
     pub(crate) fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         let untouched = self.view.newest() == 0 && self.round.is_untouched();
-        let mission = self.update.resume(&self.chain, upload, untouched)?;
-        self.chain.mission = mission;
-        self.chain.active = upload.id();
+        let mission = self.update.resume(&self.member, upload, untouched)?;
+        self.member.mission = mission;
+        self.member.active = upload.id();
         let common = mission.config().common;
         self.round
-            .load(self.chain.settings.profile.unwrap_or(common));
+            .load(self.member.settings.profile.unwrap_or(common));
         Ok(())
     }
 
@@ -968,7 +967,7 @@ impl Node {
 
     /// The neighbour `from` at `side` says that it holds the mission of that number.
     fn compare(&mut self, side: Side, from: u16, holds: MissionId) {
-        if !takes_uploads(&self.chain) {
+        if !takes_uploads(&self.member) {
             return;
         }
         let latest = self.update.latest();

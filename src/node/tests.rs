@@ -71,7 +71,7 @@ fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
 /// A hello of a neighbour that has taken relay 2.
 fn hello(node: &Node, holds: MissionId) -> Message {
     Message::Hello(Hello {
-        mission: node.chain.digest,
+        mission: node.member.digest,
         newest: 0,
         neighbour: 2,
         ask: false,
@@ -118,7 +118,7 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
     let new = upload(1);
     node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(new));
     assert_eq!(node.update.latest(), new.id());
-    assert_ne!(node.chain.active, new.id());
+    assert_ne!(node.member.active, new.id());
     let told = said(&mut node);
     assert!(
         matches!(told[..], [(1, Message::Hello(Hello { holds, flies: false, .. }))] if holds == new.id()),

@@ -24,10 +24,10 @@
 //!
 //! While a view is proposed no pass goes on. One that was decided against leaves the places where they are.
 
-use super::PAUSE;
 use super::context::{Context, Effects, Proposer};
 use super::numbering::Stragglers;
 use super::retransmit::{Retransmit, Trip};
+use super::timing::{PAUSE, earliest};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
@@ -35,7 +35,7 @@ use crate::wire::message::{Decision, Message, PriorView, Proposal};
 
 /// Where the view change is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum State {
+enum ViewState {
     Settled,
     Proposed,
     Decided,
@@ -59,7 +59,7 @@ pub(crate) struct Proposed {
 
 /// What is to be sent.
 #[derive(Clone, Copy, Debug, Default)]
-struct Due {
+struct ViewDue {
     proposal: bool,
     decision: bool,
     busy: bool,
@@ -68,7 +68,7 @@ struct Due {
 /// The view change, as one relay takes part in it.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
-    state: State,
+    state: ViewState,
     proposed: Option<Proposed>,
     /// The largest number of a view heard of.
     newest: u16,
@@ -78,13 +78,13 @@ pub(crate) struct ViewChange {
     ask_at: Option<Instant>,
     stragglers: Stragglers,
     retransmit: Retransmit,
-    due: Due,
+    due: ViewDue,
 }
 
 impl ViewChange {
     pub(crate) const fn new(seed: u32) -> Self {
         Self {
-            state: State::Settled,
+            state: ViewState::Settled,
             proposed: None,
             newest: 0,
             asks: false,
@@ -92,7 +92,7 @@ impl ViewChange {
             ask_at: None,
             stragglers: Stragglers::NONE,
             retransmit: Retransmit::new(seed),
-            due: Due {
+            due: ViewDue {
                 proposal: false,
                 decision: false,
                 busy: false,
@@ -138,7 +138,7 @@ impl ViewChange {
 
     /// The proposal whose decision is awaited.
     pub(crate) fn awaited(&self) -> Option<Proposed> {
-        self.proposed.filter(|_| self.state == State::Proposed)
+        self.proposed.filter(|_| self.state == ViewState::Proposed)
     }
 
     /// The last proposal that was taken part in.
@@ -148,12 +148,12 @@ impl ViewChange {
 
     /// Whether this relay leads a part of the chain that is too small.
     pub(crate) fn has_no_quorum(&self) -> bool {
-        self.state == State::NoQuorum
+        self.state == ViewState::NoQuorum
     }
 
     /// A proposal or a decision from the neighbour before or after, of a mission that this relay holds.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
-        let all = context.chain.all;
+        let all = context.member.all;
         match message {
             // A chain has no more relays than its mission.
             Message::Proposal(proposal) if proposal.place < all => {
@@ -178,7 +178,7 @@ impl ViewChange {
             ..Effects::NONE
         };
         if again {
-            if self.state == State::Proposed {
+            if self.state == ViewState::Proposed {
                 self.due.busy = true;
             } else {
                 self.due.decision = true;
@@ -188,7 +188,7 @@ impl ViewChange {
                 ..from
             };
         }
-        let agreed = context.chain.view;
+        let agreed = context.member.view;
         let newest = self
             .awaited()
             .map_or(agreed, |known| known.view.max(agreed));
@@ -230,11 +230,11 @@ impl ViewChange {
         place: u16,
         before: Option<PriorView>,
     ) -> Effects {
-        let mission = &context.chain.mission;
+        let mission = &context.member.mission;
         let known = PriorView {
-            view: context.chain.view,
+            view: context.member.view,
             relays: mission.relays(),
-            leader: context.chain.index == mission.leader(),
+            leader: context.member.index == mission.leader(),
         };
         let before = match before {
             Some(told) if told.view > known.view => told,
@@ -244,7 +244,7 @@ impl ViewChange {
             },
             _ => known,
         };
-        self.state = State::Proposed;
+        self.state = ViewState::Proposed;
         self.stragglers = Stragglers::NONE;
         self.proposed = Some(Proposed {
             view,
@@ -255,7 +255,7 @@ impl ViewChange {
         });
         self.retransmit.heard();
         self.retransmit.stop();
-        self.due = Due::default();
+        self.due = ViewDue::default();
         let effects = if context.end {
             self.decide(context)
         } else {
@@ -275,7 +275,7 @@ impl ViewChange {
         };
         // Of two halves the one with the leader is the larger.
         let there = 2 * u32::from(proposed.place) + u32::from(proposed.before.leader);
-        let enough = !context.chain.settings.quorum || there > u32::from(proposed.before.relays);
+        let enough = !context.member.settings.quorum || there > u32::from(proposed.before.relays);
         self.conclude(context, enough.then_some(proposed.place))
     }
 
@@ -297,7 +297,7 @@ impl ViewChange {
         let Some(proposed) = &mut self.proposed else {
             return Effects::NONE;
         };
-        let holds = [context.latest, context.chain.active].contains(&proposed.mission_id);
+        let holds = [context.latest, context.member.active].contains(&proposed.mission_id);
         if !holds {
             // A newer mission has taken its place since: the others come to hold that one, too.
             return Effects::FOREIGN;
@@ -305,14 +305,14 @@ impl ViewChange {
         proposed.relays = relays;
         let leads = proposed.place == 1;
         self.state = if relays.is_none() && leads {
-            State::NoQuorum
+            ViewState::NoQuorum
         } else {
-            State::Decided
+            ViewState::Decided
         };
         self.retransmit.stop();
-        self.due = Due {
+        self.due = ViewDue {
             decision: !leads,
-            ..Due::default()
+            ..ViewDue::default()
         };
         // Until somebody else is found there is nothing to ask again.
         self.asks = false;
@@ -338,7 +338,7 @@ impl ViewChange {
 
     /// What could not be said to the neighbour after can be now.
     pub(crate) fn resend(&mut self) {
-        self.due.proposal |= self.state == State::Proposed;
+        self.due.proposal |= self.state == ViewState::Proposed;
     }
 
     /// `leads` tells whether nobody is before this relay, `fresh` whether nothing has come to it since it was switched on.
@@ -349,7 +349,7 @@ impl ViewChange {
         fresh: bool,
     ) -> Effects {
         let mut resent = false;
-        if self.retransmit.is_due(context.now) && self.state == State::Proposed {
+        if self.retransmit.is_due(context.now) && self.state == ViewState::Proposed {
             self.due.proposal = true;
             resent = true;
         }
@@ -371,7 +371,7 @@ impl ViewChange {
             self.asks = true;
             self.tries = 0;
         }
-        self.ask_at = Some(context.now + self.patience(&context.chain.settings));
+        self.ask_at = Some(context.now + self.patience(&context.member.settings));
         if !leads {
             return Effects {
                 ask: true,
@@ -418,7 +418,7 @@ impl ViewChange {
     /// What is to be sent back; it is taken for sent then.
     pub(crate) fn take_back(&mut self) -> Option<Message> {
         let proposed = self.proposed?;
-        if core::mem::take(&mut self.due.decision) && self.state != State::Proposed {
+        if core::mem::take(&mut self.due.decision) && self.state != ViewState::Proposed {
             return Some(Message::Decision(Decision {
                 mission_id: proposed.mission_id,
                 view: proposed.view,
@@ -436,42 +436,37 @@ impl ViewChange {
     }
 }
 
-/// The earlier of two times.
-pub(crate) fn earliest(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {
-    [a, b].into_iter().flatten().min()
-}
-
 /// What a decision has to travel: at most through all relays of the mission.
 const fn trip(context: &Context<'_>) -> Trip {
     Trip {
-        hop_time: context.chain.settings.hop_time,
-        hops: context.chain.all,
+        hop_time: context.member.settings.hop_time,
+        hops: context.member.all,
         slow: false,
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Proposed, State, ViewChange};
+    use super::{Proposed, ViewChange, ViewState};
     use crate::mission::Mission;
     use crate::mission::tests::paper;
-    use crate::node::context::{Chain, Context, Effects, Proposer};
+    use crate::node::context::{Context, Effects, Member, Proposer};
     use crate::settings::Settings;
     use crate::time::Instant;
     use crate::wire::digest::MissionId;
     use crate::wire::message::{Decision, Message, PriorView, Proposal};
 
     /// Relay 2 of 3, which holds mission 4 and flies the one it was loaded with.
-    struct Relay {
-        chain: Chain,
+    struct Second {
+        member: Member,
         latest: MissionId,
     }
 
-    impl Relay {
+    impl Second {
         fn new() -> Self {
             let mission = Mission::try_new(paper(3)).unwrap();
             Self {
-                chain: Chain::new(mission, Settings::default(), 2),
+                member: Member::new(mission, Settings::default(), 2),
                 latest: MissionId {
                     version: 4,
                     digest: 0x1234,
@@ -482,7 +477,7 @@ mod tests {
         fn context(&self) -> Context<'_> {
             Context {
                 now: Instant::ZERO,
-                chain: &self.chain,
+                member: &self.member,
                 latest: self.latest,
                 end: false,
                 measured_per_w: None,
@@ -520,7 +515,7 @@ mod tests {
     /// The leader was switched on again in the midst of a proposal, and has been offered another mission.
     #[test]
     fn a_proposal_of_the_same_view_with_another_mission_is_another() {
-        let mut relay = Relay::new();
+        let mut relay = Second::new();
         let mut view = ViewChange::new(1);
         let first = relay.proposal(1);
         let proposed = Effects {
@@ -544,7 +539,7 @@ mod tests {
 
     #[test]
     fn a_decision_is_of_the_mission_that_was_proposed() {
-        let relay = Relay::new();
+        let relay = Second::new();
         let mut view = ViewChange::new(1);
         view.handle(&relay.context(), &relay.proposal(1));
         let other = MissionId {
@@ -564,13 +559,13 @@ mod tests {
     /// A newer mission has taken the place of the one proposed: it cannot be flown any more.
     #[test]
     fn who_has_lost_the_mission_has_no_part_in_its_view() {
-        let mut relay = Relay::new();
+        let mut relay = Second::new();
         let mut view = ViewChange::new(1);
         view.handle(&relay.context(), &relay.proposal(1));
         let decision = relay.decision(1, relay.latest);
         relay.latest.version = 5;
         assert_eq!(view.handle(&relay.context(), &decision), Effects::FOREIGN);
-        assert_eq!(view.state, State::Proposed);
+        assert_eq!(view.state, ViewState::Proposed);
         assert!(matches!(view.proposed, Some(Proposed { relays: None, .. })));
     }
 }

@@ -15,7 +15,7 @@ pub(super) fn addressed<'a>(
     port: Port,
     plain: &'a [u8],
 ) -> Option<(Side, Opened<'a>)> {
-    let own = node.chain().node;
+    let own = node.member().node;
     let stats = node.stats_mut();
     let frame = match frame::open(plain) {
         Ok(opened) => opened,

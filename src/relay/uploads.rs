@@ -36,6 +36,6 @@ impl Relay {
 
     /// The version of the mission that it flies: 0 for the one that was loaded before flight.
     pub fn version(&self) -> u16 {
-        self.node.chain().active.version
+        self.node.member().active.version
     }
 }

@@ -8,7 +8,7 @@
 pub(crate) mod liveness;
 pub(crate) mod state;
 
-use super::view::earliest;
+use super::timing::earliest;
 use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::Instant;

@@ -27,7 +27,7 @@ pub(crate) const CANDIDATES: u16 = 4;
 const DOUBLINGS: u8 = 4;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum State {
+enum NeighbourState {
     /// The other node has taken this one, too, as far as it has said.
     Linked,
     /// It has not, or not any more.
@@ -70,7 +70,7 @@ pub(crate) struct Neighbour {
     grace: Instant,
     /// The node that the last proposal came from.
     proposer: u16,
-    state: State,
+    state: NeighbourState,
     liveness: Liveness,
     hold_down: Option<HoldDown>,
     /// When a node that is not taken was heard last.
@@ -108,9 +108,9 @@ impl Neighbour {
             grace: now,
             proposer: node,
             state: if node == 0 {
-                State::NoPeer
+                NeighbourState::NoPeer
             } else {
-                State::Linked
+                NeighbourState::Linked
             },
             liveness: Liveness::new(now),
             hold_down: None,
@@ -137,24 +137,24 @@ impl Neighbour {
 
     /// Whether nobody is there, and nobody is sought any more.
     pub(crate) fn has_no_peer(&self) -> bool {
-        self.state == State::NoPeer
+        self.state == NeighbourState::NoPeer
     }
 
     /// Whether nobody is needed there, or somebody can be heard.
     pub(crate) fn is_ready(&self) -> bool {
         match self.state {
-            State::NoPeer => true,
-            State::Linked | State::Pairing { .. } => self.liveness.is_there(),
-            State::Searching { .. } => false,
+            NeighbourState::NoPeer => true,
+            NeighbourState::Linked | NeighbourState::Pairing { .. } => self.liveness.is_there(),
+            NeighbourState::Searching { .. } => false,
         }
     }
 
     /// Whether it is certain who is there, and somebody else than when a proposal was decided last.
     pub(crate) fn has_changed(&self, now: Instant) -> bool {
         match self.state {
-            State::Linked => self.node != self.counted && now >= self.grace,
-            State::NoPeer => self.counted != 0,
-            State::Pairing { .. } | State::Searching { .. } => false,
+            NeighbourState::Linked => self.node != self.counted && now >= self.grace,
+            NeighbourState::NoPeer => self.counted != 0,
+            NeighbourState::Pairing { .. } | NeighbourState::Searching { .. } => false,
         }
     }
 
@@ -204,14 +204,16 @@ impl Neighbour {
 
     /// Whether somebody is there, and takes this relay for its neighbour, too, as far as it has said.
     pub(crate) fn is_mutual(&self) -> bool {
-        self.state == State::Linked
+        self.state == NeighbourState::Linked
     }
 
     /// The neighbour has said whether it takes this relay for its own; whether that is new.
     pub(crate) fn told(&mut self, mutual: bool, now: Instant, settings: &Settings) -> bool {
         let (next, wait) = match (self.state, mutual) {
-            (State::Pairing { .. }, true) => (State::Linked, settings.quiet),
-            (State::Linked, false) => (State::Pairing { since: now }, tick(settings)),
+            (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, settings.quiet),
+            (NeighbourState::Linked, false) => {
+                (NeighbourState::Pairing { since: now }, tick(settings))
+            }
             _ => return false,
         };
         self.state = next;
@@ -221,7 +223,8 @@ impl Neighbour {
 
     /// The silence so far of a neighbour of the same view is excused; whether there is one, and it is not lost.
     pub(crate) fn excuse(&mut self, now: Instant, settings: &Settings) -> bool {
-        let excused = self.state == State::Linked && self.is_agreed() && self.liveness.excuse(now);
+        let excused =
+            self.state == NeighbourState::Linked && self.is_agreed() && self.liveness.excuse(now);
         if excused {
             self.look_at = Some(now + settings.quiet);
         }
@@ -254,7 +257,7 @@ impl Neighbour {
         let mut lost = false;
         let mut look_again = now + step;
         match self.state {
-            State::Linked => {
+            NeighbourState::Linked => {
                 let silence = self.liveness.silent(now, settings);
                 lost = silence.lost;
                 self.signs.ask = true;
@@ -265,20 +268,20 @@ impl Neighbour {
                     look_again = silence.look_again;
                 }
             }
-            State::Pairing { since } => {
+            NeighbourState::Pairing { since } => {
                 lost = self.liveness.silent(now, settings).lost;
                 self.hello_all();
                 if lost || is_over(since) {
                     self.search(now);
                 }
             }
-            State::Searching { since } => {
+            NeighbourState::Searching { since } => {
                 self.hello_all();
                 if is_over(since) {
-                    self.state = State::NoPeer;
+                    self.state = NeighbourState::NoPeer;
                 }
             }
-            State::NoPeer => {
+            NeighbourState::NoPeer => {
                 self.hello_all();
                 if !self.is_near(now, settings) {
                     look_again = now + settings.lost;
@@ -304,7 +307,7 @@ impl Neighbour {
 
     const fn search(&mut self, now: Instant) {
         self.node = 0;
-        self.state = State::Searching { since: now };
+        self.state = NeighbourState::Searching { since: now };
         self.hold_down = None;
         self.hello_all();
     }
@@ -323,20 +326,20 @@ impl Neighbour {
         settings: &Settings,
     ) -> bool {
         let takes = match self.state {
-            State::Searching { .. } => true,
-            State::NoPeer => courts || self.passes(node, now, settings),
-            State::Linked | State::Pairing { .. } => {
+            NeighbourState::Searching { .. } => true,
+            NeighbourState::NoPeer => courts || self.passes(node, now, settings),
+            NeighbourState::Linked | NeighbourState::Pairing { .. } => {
                 nearer && ready && self.passes(node, now, settings)
             }
         };
         if !takes {
             return false;
         }
-        if !matches!(self.state, State::Searching { .. }) {
+        if !matches!(self.state, NeighbourState::Searching { .. }) {
             self.grace = now + settings.quiet;
         }
         self.node = node;
-        self.state = State::Pairing { since: now };
+        self.state = NeighbourState::Pairing { since: now };
         self.liveness = Liveness::new(now);
         self.liveness.heard(now);
         self.hold_down = None;

@@ -1,9 +1,10 @@
 //! What the leader works out before it begins a pass: its prediction, the targets or altitudes to try next.
 
-use super::core::{ADJUST, ALTITUDE, Own, Share};
-use super::state::Next;
-use super::task::Lead;
+use super::computation::{ADJUST, ALTITUDE, Computation};
+use super::state::Action;
+use super::task::LeaderTask;
 use super::turning::Turning;
+use crate::node::context::Context;
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::local::Beside;
 use crate::optimiser::pass::origins;
@@ -18,26 +19,26 @@ const HOPS_AT_ONCE: u16 = 12;
 /// The same in an even field, where a reach takes twice the work.
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
-impl Share {
+impl Computation {
     /// Goes on with the leader's computation; whether the next pass can begin.
-    pub(super) fn plan(&mut self, own: Own<'_>) -> Result<bool, Infeasible> {
-        if self.is_solving(own) {
-            if let Some(target) = self.solve(own) {
-                self.search_chosen(own, target)?;
+    pub(super) fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
+        if self.is_solving(context) {
+            if let Some(target) = self.solve(context) {
+                self.search_chosen(context, target)?;
                 return Ok(true);
             }
             return Ok(false);
         }
-        let (mission, profile) = (own.mission, self.profile);
-        match &mut self.lead {
-            Lead::No => {
-                self.begin_lead(own)?;
+        let (mission, profile) = (context.mission(), self.profile);
+        match &mut self.task {
+            LeaderTask::No => {
+                self.begin_task(context)?;
                 Ok(false)
             }
-            Lead::Predicting(planner) => {
+            LeaderTask::Predicting(planner) => {
                 // The leader knows its own profile; of the others it can only assume what the mission has in common.
                 let profile_of = |index| {
-                    if index == own.index {
+                    if index == context.index() {
                         profile
                     } else {
                         mission.config().common
@@ -54,8 +55,8 @@ impl Share {
                     // The others may hold something else: let their answers decide.
                     Err(Infeasible) => None,
                 };
-                let last = own.settings.method == Method::Align;
-                self.search_with(own, ladder, last)?;
+                let last = context.settings().method == Method::Align;
+                self.search_with(context, ladder, last)?;
                 Ok(true)
             }
             _ => Ok(true),
@@ -64,19 +65,20 @@ impl Share {
 
     /// What the leader begins with: its prediction, if it may, or the search itself.
     #[inline(never)] // a planner is built here once; its stack is not for every call of `work`
-    fn begin_lead(&mut self, own: Own<'_>) -> Result<(), Infeasible> {
+    fn begin_task(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         let Settings {
             predict, schedule, ..
-        } = *own.settings;
+        } = *context.settings();
         if predict && schedule == Schedule::Bracketed {
-            self.lead = Lead::Predicting(Planner::new(own.mission, self.profile, schedule)?);
+            let planner = Planner::new(context.mission(), self.profile, schedule)?;
+            self.task.predict(planner);
             return Ok(());
         }
         self.search_by(
-            own,
+            context,
             schedule,
             None,
-            own.settings.method == Method::Align,
+            context.settings().method == Method::Align,
             false,
         )
     }
@@ -84,69 +86,65 @@ impl Share {
     /// Goes over to trying targets, with `ladder` first if there is one.
     pub(super) fn search_with(
         &mut self,
-        own: Own<'_>,
+        context: &Context<'_>,
         ladder: Option<Ladder>,
         last: bool,
     ) -> Result<(), Infeasible> {
-        self.search_by(own, Schedule::Bracketed, ladder, last, false)
+        self.search_by(context, Schedule::Bracketed, ladder, last, false)
     }
 
     /// The leader goes back to the places that the relays were given: nothing can be met at those chosen.
-    pub(super) fn search_given(&mut self, own: Own<'_>) -> Result<(), Infeasible> {
-        self.search_by(own, Schedule::Bracketed, None, true, true)
+    pub(super) fn search_given(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
+        self.search_by(context, Schedule::Bracketed, None, true, true)
     }
 
     #[inline(never)]
     fn search_by(
         &mut self,
-        own: Own<'_>,
+        context: &Context<'_>,
         schedule: Schedule,
         ladder: Option<Ladder>,
         last: bool,
         given: bool,
     ) -> Result<(), Infeasible> {
-        let mut search = Search::new(own.mission, self.profile, schedule)?;
+        let mut search = Search::new(context.mission(), self.profile, schedule)?;
         if let Some(ladder) = ladder {
             search.begin_with(ladder);
         }
-        self.lead = Lead::Searching {
-            search,
-            last,
-            given,
-        };
+        self.task.search(search, last, given);
         Ok(())
     }
 
     /// The leader begins the pass it has planned.
-    pub(super) fn begin_pass(&mut self, own: Own<'_>) -> Next {
-        let mission = own.mission;
-        match &self.lead {
-            Lead::Searching { search, given, .. } => {
+    pub(super) fn begin_pass(&mut self, context: &Context<'_>) -> Action {
+        let mission = context.mission();
+        match &self.task {
+            LeaderTask::Searching { search, given, .. } => {
                 let ladder = *search.ladder();
-                let chosen = own.joins() && self.chosen.is_some() && !given;
+                let chosen = context.joins() && self.chosen.is_some() && !given;
                 self.begin();
-                self.sweep_on(own, ladder, chosen, None, &origins(mission))
+                self.sweep_on(context, ladder, chosen, None, &origins(mission))
             }
-            Lead::Ascending(ascent) if ALTITUDE => {
+            LeaderTask::Ascending(ascent) if ALTITUDE => {
                 let ascent = *ascent;
                 self.begin();
-                self.set_course(own, ascent)
+                self.set_course(context, ascent)
             }
-            Lead::Adjusting(rounds) if ADJUST => {
+            LeaderTask::Adjusting(rounds) if ADJUST => {
                 let (turn, sir) = (rounds.turn(), rounds.sir);
                 self.begin();
                 let tx = Beside {
                     place: Placement::default(),
                     apart_m: 0.0,
                 };
-                self.take_turn(own, Turning::new(turn, sir, tx, mission.tx_gain()))
+                self.take_turn(context, Turning::new(turn, sir, tx, mission.tx_gain()))
             }
-            _ => Next::Work { moved: false },
+            _ => Action::Work { moved: false },
         }
     }
 
     fn begin(&mut self) {
-        self.exchange.begin();
+        self.state.begin();
         self.sweeps = self.sweeps.saturating_add(1);
     }
 }

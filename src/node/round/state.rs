@@ -41,7 +41,7 @@ pub enum Phase {
 
 /// What the node has to do now.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Next {
+pub(crate) enum Action {
     /// Nothing at all.
     Nothing,
     /// Decision a message of a pass that is over.
@@ -87,12 +87,12 @@ pub(crate) enum Arrival {
 
 impl Arrival {
     /// What to do about one that is not taken up.
-    pub(crate) const fn refused(self, exchange: Exchange) -> Option<Next> {
+    pub(crate) const fn refused(self, state: RoundState) -> Option<Action> {
         match self {
             Self::New => None,
-            Self::Again => Some(exchange.again()),
-            Self::Straggler => Some(Next::Stale),
-            Self::Foreign => Some(Next::Foreign),
+            Self::Again => Some(state.again()),
+            Self::Straggler => Some(Action::Stale),
+            Self::Foreign => Some(Action::Foreign),
         }
     }
 }
@@ -106,7 +106,7 @@ const INCARNATION: u16 = 64;
 
 /// Which pass is under way, and how far.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Exchange {
+pub(crate) struct RoundState {
     phase: Phase,
     number: u16,
     /// Whether a pass has come since the relay was switched on, or since the view.
@@ -114,7 +114,7 @@ pub(crate) struct Exchange {
     stragglers: Stragglers,
 }
 
-impl Exchange {
+impl RoundState {
     /// The leader's `number` is a random one.
     pub(crate) const fn new(phase: Phase, number: u16) -> Self {
         Self {
@@ -226,10 +226,10 @@ impl Exchange {
     }
 
     /// What to do about a pass that has come again.
-    pub(crate) const fn again(self) -> Next {
+    pub(crate) const fn again(self) -> Action {
         match self.phase {
-            Phase::Waiting => Next::Busy,
-            _ => Next::Repeat,
+            Phase::Waiting => Action::Busy,
+            _ => Action::Repeat,
         }
     }
 
@@ -246,26 +246,26 @@ impl Exchange {
 
 #[cfg(test)]
 mod tests {
-    use super::{Arrival, Exchange, INCARNATION, Phase, STRAGGLERS};
+    use super::{Arrival, INCARNATION, Phase, RoundState, STRAGGLERS};
     use crate::node::numbering::SUSPICIOUS;
 
     /// One that has taken part in pass 200.
-    fn begun() -> Exchange {
-        let mut exchange = Exchange::new(Phase::Idle, 0);
-        exchange.take(200);
-        exchange
+    fn begun() -> RoundState {
+        let mut state = RoundState::new(Phase::Idle, 0);
+        state.take(200);
+        state
     }
 
     #[test]
     fn who_has_missed_the_beginning_takes_up_a_first_pass_alone() {
         for number in 0..=u16::MAX {
-            let mut exchange = Exchange::new(Phase::Idle, 7);
+            let mut state = RoundState::new(Phase::Idle, 7);
             let expected = if number % INCARNATION == 0 {
                 Arrival::New
             } else {
                 Arrival::Foreign
             };
-            assert_eq!(exchange.arrival(number, false), expected, "{number}");
+            assert_eq!(state.arrival(number, false), expected, "{number}");
         }
     }
 
@@ -287,10 +287,10 @@ mod tests {
                 } else {
                     Arrival::Foreign
                 };
-                let mut exchange = begun();
-                exchange.take(last);
+                let mut state = begun();
+                state.take(last);
                 assert_eq!(
-                    exchange.arrival(number, false),
+                    state.arrival(number, false),
                     expected,
                     "{number} after {last}"
                 );
@@ -300,29 +300,29 @@ mod tests {
 
     #[test]
     fn the_same_again_is_answered_and_the_fourth_straggler_in_a_row_is_none() {
-        let mut exchange = begun();
-        assert_eq!(exchange.arrival(200, true), Arrival::Again);
-        assert_eq!(exchange.arrival(200, false), Arrival::Foreign);
+        let mut state = begun();
+        assert_eq!(state.arrival(200, true), Arrival::Again);
+        assert_eq!(state.arrival(200, false), Arrival::Foreign);
         for _ in 1..SUSPICIOUS {
-            assert_eq!(exchange.arrival(199, false), Arrival::Straggler);
+            assert_eq!(state.arrival(199, false), Arrival::Straggler);
         }
-        assert_eq!(exchange.arrival(199, false), Arrival::Foreign);
-        assert_eq!(exchange.arrival(199, false), Arrival::Straggler);
+        assert_eq!(state.arrival(199, false), Arrival::Foreign);
+        assert_eq!(state.arrival(199, false), Arrival::Straggler);
     }
 
     #[test]
     fn a_leader_begins_each_life_and_view_with_a_first_number_and_has_no_other() {
-        let mut exchange = Exchange::new(Phase::Planning, 0xFFF0);
+        let mut state = RoundState::new(Phase::Planning, 0xFFF0);
         for view in 0..3 {
             for pass in 0..200 {
-                exchange.begin();
+                state.begin();
                 assert_eq!(
-                    exchange.number.is_multiple_of(INCARNATION),
+                    state.number.is_multiple_of(INCARNATION),
                     pass == 0,
                     "{view}, {pass}"
                 );
             }
-            exchange.renew(true);
+            state.renew(true);
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::wire::message::Turn;
 pub(crate) const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };
 
 /// A chain being solved by the joint method.
-pub(crate) type Chain = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
+pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
 /// What the leader is at.
 #[cfg_attr(
@@ -22,13 +22,13 @@ pub(crate) type Chain = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
     )
 )]
 #[derive(Clone, Debug)]
-pub(crate) enum Lead {
+pub(crate) enum LeaderTask {
     /// Not the leader, or nothing begun yet, or all done.
     No,
     /// Solving the chain from the mission.
     Predicting(Planner),
     /// The same by the joint method: every relay does that, not the leader alone.
-    Solving(Chain),
+    Solving(ChainSolver),
     /// The joint method by messages.
     Ascending(Ascent),
     /// Trying targets at the altitudes held; whether the chain settles with what is agreed.
@@ -94,5 +94,41 @@ impl Rounds {
             }
         };
         false
+    }
+}
+
+impl LeaderTask {
+    /// Nothing is left to do.
+    pub(crate) fn rest(&mut self) {
+        *self = Self::No;
+    }
+
+    /// Solves the chain from the mission.
+    pub(crate) fn predict(&mut self, planner: Planner) {
+        *self = Self::Predicting(planner);
+    }
+
+    /// The same by the joint method.
+    pub(crate) fn solve(&mut self, chain: ChainSolver) {
+        *self = Self::Solving(chain);
+    }
+
+    /// Begins the joint method by messages.
+    pub(crate) fn ascend(&mut self, ascent: Ascent) {
+        *self = Self::Ascending(ascent);
+    }
+
+    /// Tries targets: the `last` thing to do, and of the places `given`, or not.
+    pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
+        *self = Self::Searching {
+            search,
+            last,
+            given,
+        };
+    }
+
+    /// Begins Algorithm 2.
+    pub(crate) fn adjust(&mut self, adjust: Adjust) {
+        *self = Self::Adjusting(Rounds::new(adjust));
     }
 }
