@@ -13,7 +13,7 @@ pub enum Event {
     Converged,
     /// Raised at the head: no target can be met.
     Infeasible,
-    /// No sign of life from that neighbour for `Settings::lost`. It goes on being asked.
+    /// No sign of life from that neighbour for `Settings::dead_after`. It goes on being asked.
     NeighbourLost(Side),
     /// A lost neighbour has been heard again.
     NeighbourBack(Side),

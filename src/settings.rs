@@ -98,9 +98,9 @@ pub struct Settings {
     /// above 0. For messages that take longer it is multiplied.
     pub hop_time: Duration,
     /// After this long without a frame from a neighbour it is asked for a sign of life; above 0.
-    pub quiet: Duration,
-    /// After this long without one it counts as lost; above `quiet`.
-    pub lost: Duration,
+    pub probe_after: Duration,
+    /// After this long without one it counts as lost; above `probe_after`.
+    pub dead_after: Duration,
     /// Whether a part of the chain goes on without the others only if it is the larger one: half of the last chain with its
     /// leader, or more. Without that, the two parts of a chain that is split, but still flies, would get in each other's way.
     pub quorum: bool,
@@ -122,8 +122,8 @@ impl Default for Settings {
             wiring: Wiring::Pair,
             auth: None,
             hop_time: Duration::from_millis(30),
-            quiet: Duration::from_millis(5_000),
-            lost: Duration::from_millis(15_000),
+            probe_after: Duration::from_millis(5_000),
+            dead_after: Duration::from_millis(15_000),
             quorum: true,
             guard: None,
         }
@@ -151,7 +151,7 @@ pub enum SetupError {
     HopTime,
     /// `auth.epoch` is zero.
     Epoch,
-    /// `quiet` is zero, or `lost` not above it.
+    /// `probe_after` is zero, or `dead_after` not above it.
     Silence,
     /// A number of `guard` is not within its range, or the crate was built without the feature for it.
     Guard,
@@ -172,7 +172,7 @@ impl core::fmt::Display for SetupError {
             }
             Self::HopTime => "hop_time must be above 0",
             Self::Epoch => "auth.epoch must be above 0, and above that of every start before",
-            Self::Silence => "quiet must be above 0 and lost above quiet",
+            Self::Silence => "probe_after must be above 0 and dead_after above probe_after",
             Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, hover of 0 to 1e3, and its feature",
         })
     }
@@ -229,7 +229,7 @@ pub(crate) fn check(
     if settings.auth.is_some_and(|auth| auth.epoch == 0) {
         return Err(SetupError::Epoch);
     }
-    if settings.quiet.as_micros() == 0 || settings.lost <= settings.quiet {
+    if settings.probe_after.as_micros() == 0 || settings.dead_after <= settings.probe_after {
         return Err(SetupError::Silence);
     }
     if settings

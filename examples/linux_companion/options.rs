@@ -55,10 +55,10 @@ struct Options {
     upload_file: Option<PathBuf>,
     /// Milliseconds of silence after which a neighbour is asked for a sign of life
     #[arg(long, value_name = "MS", default_value_t = 5_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
-    quiet_ms: u64,
-    /// Milliseconds of silence after which it counts as lost, above those of --quiet-ms
+    probe_after_ms: u64,
+    /// Milliseconds of silence after which it counts as lost, above those of --probe-after-ms
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
-    lost_ms: u64,
+    dead_after_ms: u64,
     #[command(flatten)]
     mission: MissionOptions,
     /// How the places are found; with --field, only by `align`. What counts is what the first relay is given, with --field the
@@ -128,11 +128,11 @@ fn plan(options: &Options) -> Result<Plan, String> {
             "--index {index}: must be within 1 to {of}, the number given by --of"
         ));
     }
-    if options.lost_ms <= options.quiet_ms {
+    if options.dead_after_ms <= options.probe_after_ms {
         return Err(format!(
-            "--lost-ms {}: must be within {} to 3600000, above --quiet-ms",
-            options.lost_ms,
-            options.quiet_ms + 1
+            "--dead-after-ms {}: must be within {} to 3600000, above --probe-after-ms",
+            options.dead_after_ms,
+            options.probe_after_ms + 1
         ));
     }
     if options.field.is_some() && options.method != Method::Align {
@@ -157,8 +157,8 @@ fn plan(options: &Options) -> Result<Plan, String> {
         hop_time: Duration::from_micros(
             byte_time(options.baud).times(frame).as_micros() + LATENCY.as_micros(),
         ),
-        quiet: Duration::from_millis(options.quiet_ms),
-        lost: Duration::from_millis(options.lost_ms),
+        probe_after: Duration::from_millis(options.probe_after_ms),
+        dead_after: Duration::from_millis(options.dead_after_ms),
         ..Settings::default()
     };
     Ok(Plan {

@@ -210,7 +210,7 @@ fn a_chain_of_any_length_needs_one_round_trip() {
 fn who_fails_while_all_solve_is_missed() {
     let (link, corridor) = roomy(50, 500.0, 150.0, 280.0, 300.0);
     let mut setup = setup(&link, corridor).unwrap();
-    let lost = setup.settings.lost;
+    let lost = setup.settings.dead_after;
     setup.kills.push((25, Instant::from_millis(1_000)));
     let clean = Setup {
         kills: Vec::new(),

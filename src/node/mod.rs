@@ -136,10 +136,12 @@ impl Node {
     /// By when the first pass should have come, were this the beginning.
     fn await_first(&mut self, now: Instant) {
         let Settings {
-            hop_time, quiet, ..
+            hop_time,
+            probe_after,
+            ..
         } = self.member.settings;
         let first = hop_time.times(2 * u32::from(self.member.all));
-        self.view.await_first(now + quiet + first);
+        self.view.await_first(now + probe_after + first);
     }
 
     fn context(&self, now: Instant) -> Context<'_> {

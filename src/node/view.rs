@@ -397,7 +397,7 @@ impl ViewChange {
     fn patience(&mut self, settings: &Settings) -> Duration {
         let wait = settings.hop_time.times(8 << self.tries.min(12));
         self.tries = self.tries.saturating_add(1);
-        wait.min(settings.quiet)
+        wait.min(settings.probe_after)
     }
 
     /// Whether the proposal is to be sent onward; it is taken for sent then.

@@ -91,8 +91,8 @@ impl Bench {
         if input.below(8) == 7 {
             // As impatient as it can be.
             settings.hop_time = Duration::from_micros(1);
-            settings.quiet = Duration::from_micros(1);
-            settings.lost = Duration::from_micros(2);
+            settings.probe_after = Duration::from_micros(1);
+            settings.dead_after = Duration::from_micros(2);
         }
         let now = Instant::from_micros(u64::from(input.word()));
         let seed = u32::from(input.word());

@@ -9,7 +9,11 @@ use crate::pty::Pty;
 
 #[test]
 fn a_settled_relay_sleeps() {
-    let mut chain = Chain::start(3, QUIET, &["--quiet-ms", "500", "--lost-ms", "10000"]);
+    let mut chain = Chain::start(
+        3,
+        QUIET,
+        &["--probe-after-ms", "500", "--dead-after-ms", "10000"],
+    );
     chain.settled();
     assert_idle(&chain.relays, 100);
     for relay in &mut chain.relays {

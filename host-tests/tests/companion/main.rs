@@ -277,7 +277,11 @@ fn on_one_shared_channel_they_settle_at_the_same_places() {
 
 #[test]
 fn a_killed_process_is_noticed_by_both_neighbours_and_so_is_its_return() {
-    let mut chain = Chain::start(3, QUIET, &["--quiet-ms", "400", "--lost-ms", "1200"]);
+    let mut chain = Chain::start(
+        3,
+        QUIET,
+        &["--probe-after-ms", "400", "--dead-after-ms", "1200"],
+    );
     let settled = chain.settled();
     let killed = Instant::now();
     // A relay that is dropped is killed.

@@ -48,7 +48,7 @@ fn start(chain: &mut Chain, files: &Files, index: usize) -> Relay {
     chain.options = files.options("key", &format!("epoch{index}"));
     chain
         .options
-        .extend(["--quiet-ms", "500", "--lost-ms", "1500"].map(str::to_owned));
+        .extend(["--probe-after-ms", "500", "--dead-after-ms", "1500"].map(str::to_owned));
     chain.relay(index)
 }
 

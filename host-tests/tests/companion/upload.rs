@@ -34,7 +34,7 @@ fn relay(files: &Files, index: usize, ttys: &[&str]) -> Relay {
     options.push(file.to_str().unwrap().to_owned());
     let number = index.to_string();
     let mut arguments = vec!["--index", &number, "--of", "2"];
-    arguments.extend(["--quiet-ms", "500", "--lost-ms", "1500"]);
+    arguments.extend(["--probe-after-ms", "500", "--dead-after-ms", "1500"]);
     arguments.extend(ttys);
     arguments.extend(options.iter().map(String::as_str));
     Relay::start(&arguments)

@@ -10,7 +10,7 @@ use uav_relay_sim::simulator::outcome::Ending;
 use super::*;
 
 /// After the last loss or start, while frames go on being lost and corrupted, a chain has settled within this time: twenty
-/// times `Settings::lost`.
+/// times `Settings::dead_after`.
 const RECOVERY: Duration = Duration::from_millis(300_000);
 
 /// Eight relays, alike or not, loss up to 50 %, corruption up to 20 %, duplicates, reordering, up to three relays lost at any

@@ -293,7 +293,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// A neighbour is missed from the moment it has been silent for `Settings::lost` until it is heard.
+    /// A neighbour is missed from the moment it has been silent for `Settings::dead_after` until it is heard.
     fn miss(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let there = [at > 0, at + 1 < scenario.relays()];
         for event in turn.events {

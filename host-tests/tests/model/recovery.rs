@@ -60,8 +60,8 @@ impl World<'_> {
         let waits: u64 = hops.map(|hops| (2 * hops + 2) * hop_us * 9 / 8).sum();
         // Where handshakes were lost too, they are said again when there has been silence for long enough.
         let greets = if self.scenario.signs() { 2 } else { 0 };
-        let quiet_us = self.scenario.settings[0].quiet.as_micros();
-        let silence_us = greets * quiet_us + 2 * self.a_call().as_micros();
+        let probe_after_us = self.scenario.settings[0].probe_after.as_micros();
+        let silence_us = greets * probe_after_us + 2 * self.a_call().as_micros();
         Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us)
     }
 
@@ -69,8 +69,8 @@ impl World<'_> {
     /// vain, and calls again after no more than `quiet`.
     fn a_call(&self) -> Duration {
         let calls = self.relays.len() as u64 - 1;
-        let quiet_us = self.scenario.settings[0].quiet.as_micros();
-        Duration::from_micros(calls * quiet_us)
+        let probe_after_us = self.scenario.settings[0].probe_after.as_micros();
+        Duration::from_micros(calls * probe_after_us)
     }
 
     /// What Algorithm 2 ends with is what its worst hop has, no more and no less; other methods may leave hops that have more.

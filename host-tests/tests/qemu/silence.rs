@@ -43,7 +43,11 @@ fn both_neighbours_notice_a_drone_that_is_switched_off() {
     fleet.wait("two neighbours that notice", |lines| {
         sides.iter().all(|side| noticed(lines, side).is_some())
     });
-    let Settings { lost, quiet, .. } = Settings::default();
+    let Settings {
+        dead_after: lost,
+        probe_after: quiet,
+        ..
+    } = Settings::default();
     for side in &sides {
         let took = noticed(&fleet.lines, side).unwrap() - side.2;
         println!(

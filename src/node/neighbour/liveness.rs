@@ -16,9 +16,9 @@ const QUESTIONS: u64 = 16;
 /// How long after one question the next one is asked, while an answer is urgent.
 pub(crate) fn tick(settings: &Settings) -> Duration {
     let span = settings
-        .lost
+        .dead_after
         .as_micros()
-        .saturating_sub(settings.quiet.as_micros());
+        .saturating_sub(settings.probe_after.as_micros());
     Duration::from_micros((span / QUESTIONS).max(1))
 }
 
@@ -72,13 +72,13 @@ impl Liveness {
 
     /// Nothing has come for a while.
     pub(crate) fn silent(&mut self, now: Instant, settings: &Settings) -> Silence {
-        let gone = now.since(self.heard) >= settings.lost;
+        let gone = now.since(self.heard) >= settings.dead_after;
         let lost = gone && !self.lost;
         self.lost |= gone;
         let look_again = if self.lost {
-            now + settings.quiet
+            now + settings.probe_after
         } else {
-            (now + tick(settings)).min(self.heard + settings.lost)
+            (now + tick(settings)).min(self.heard + settings.dead_after)
         };
         Silence { lost, look_again }
     }

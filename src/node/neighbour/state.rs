@@ -98,7 +98,7 @@ impl Neighbour {
         let look_at = if node == 0 {
             None
         } else {
-            Some(now + settings.quiet)
+            Some(now + settings.probe_after)
         };
         Self {
             look_at,
@@ -197,7 +197,7 @@ impl Neighbour {
     pub(crate) fn heard(&mut self, now: Instant, settings: &Settings) -> bool {
         let back = self.liveness.heard(now);
         if self.is_mutual() {
-            self.look_at = Some(now + settings.quiet);
+            self.look_at = Some(now + settings.probe_after);
         }
         back
     }
@@ -210,7 +210,9 @@ impl Neighbour {
     /// The neighbour has said whether it takes this relay for its own; whether that is new.
     pub(crate) fn told(&mut self, mutual: bool, now: Instant, settings: &Settings) -> bool {
         let (next, wait) = match (self.state, mutual) {
-            (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, settings.quiet),
+            (NeighbourState::Pairing { .. }, true) => {
+                (NeighbourState::Linked, settings.probe_after)
+            }
             (NeighbourState::Linked, false) => {
                 (NeighbourState::Pairing { since: now }, tick(settings))
             }
@@ -226,7 +228,7 @@ impl Neighbour {
         let excused =
             self.state == NeighbourState::Linked && self.is_agreed() && self.liveness.excuse(now);
         if excused {
-            self.look_at = Some(now + settings.quiet);
+            self.look_at = Some(now + settings.probe_after);
         }
         excused
     }
@@ -250,9 +252,9 @@ impl Neighbour {
     ) -> bool {
         let step = tick(settings);
         let span = settings
-            .lost
+            .dead_after
             .as_micros()
-            .saturating_sub(settings.quiet.as_micros());
+            .saturating_sub(settings.probe_after.as_micros());
         let is_over = |since: Instant| now.since(since).as_micros() >= span;
         let mut lost = false;
         let mut look_again = now + step;
@@ -284,7 +286,7 @@ impl Neighbour {
             NeighbourState::NoPeer => {
                 self.hello_all();
                 if !self.is_near(now, settings) {
-                    look_again = now + settings.lost;
+                    look_again = now + settings.dead_after;
                 }
             }
         }
@@ -294,7 +296,7 @@ impl Neighbour {
 
     fn is_near(&self, now: Instant, settings: &Settings) -> bool {
         self.near
-            .is_some_and(|near| now.since(near) <= settings.lost)
+            .is_some_and(|near| now.since(near) <= settings.dead_after)
     }
 
     /// A node that is not taken has been heard: where the chain has ended here so far, and nobody was near, it is looked after.
@@ -336,7 +338,7 @@ impl Neighbour {
             return false;
         }
         if !matches!(self.state, NeighbourState::Searching { .. }) {
-            self.grace = now + settings.quiet;
+            self.grace = now + settings.probe_after;
         }
         self.node = node;
         self.state = NeighbourState::Pairing { since: now };
@@ -350,7 +352,7 @@ impl Neighbour {
     /// Whether a node that is heard now has been for the whole of its hold-down.
     fn passes(&mut self, node: u16, now: Instant, settings: &Settings) -> bool {
         let since = match self.hold_down {
-            Some(known) if known.node == node && now.since(known.heard) <= settings.quiet => {
+            Some(known) if known.node == node && now.since(known.heard) <= settings.probe_after => {
                 known.since
             }
             _ => now,
@@ -361,7 +363,7 @@ impl Neighbour {
             heard: now,
         });
         let times = 1 << self.losses.min(DOUBLINGS);
-        now.since(since) >= settings.lost.times(times)
+        now.since(since) >= settings.dead_after.times(times)
     }
 
     /// The neighbour has asked for a sign of life.
