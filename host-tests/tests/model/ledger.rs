@@ -306,7 +306,7 @@ impl Ledger {
         }
         for of in [0, 1] {
             let silence = turn.now.since(self.heard[of]);
-            self.missed[of] |= there[of] && silence >= scenario.settings[at].lost;
+            self.missed[of] |= there[of] && silence >= scenario.settings[at].dead_after;
         }
         if scenario.settings[at].method == Method::Joint {
             // While it solves the chain, silence is excused: it misses nobody too soon.
