@@ -823,7 +823,7 @@ impl Node {
         if self.view.has_no_quorum() {
             Phase::NoQuorum
         } else if self.view.awaited().is_some() {
-            Phase::Waiting
+            Phase::ViewChange
         } else {
             self.round.phase()
         }

@@ -1,6 +1,7 @@
 //! The relays, connected, and the clock: after every turn of a main loop the rules are checked.
 
 use proptest::prop_assert;
+use uav_relay::Phase;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Duration, Event, Instant, Port, Relay, Side};
 
@@ -183,13 +184,15 @@ impl<'a> World<'a> {
         let ended = self.wires.arrive(line, bytes, &frame.bytes);
         let before = *self.relays[to].stats();
         let stands = self.relays[to].setpoint().is_some();
+        let suspended = self.relays[to].phase() == Phase::ViewChange;
         self.relays[to].handle_bytes(self.now, port, bytes);
         let after = self.relays[to].stats();
         let is_taken = taken(after) > taken(&before);
         let signs = self.scenario.signs();
         self.ledgers[to].heard(from, ended, is_taken.then_some(frame), signs, self.now)?;
         if let Some(pass) = pass(&frame.bytes).filter(|_| is_taken) {
-            let met = self.ledgers[to].meets(self.scenario, pass, stands, &before, after)?;
+            let met =
+                self.ledgers[to].meets(self.scenario, pass, stands, suspended, &before, after)?;
             self.tally.add(match met {
                 Met::TakenUp => "passes taken up",
                 Met::Again => "passes again",

@@ -50,18 +50,21 @@ impl Ledger {
         Ok(())
     }
 
-    /// The relay, which `stands` somewhere or nowhere, was handed a pass, and counted from `before` to `after`.
+    /// The relay, which `stands` somewhere or nowhere and may have been `suspended` by a view change, was handed a pass, and counted from `before` to `after`.
     pub(crate) fn meets(
         &mut self,
         scenario: &Scenario,
         pass: Pass,
         stands: bool,
+        suspended: bool,
         before: &Stats,
         after: &Stats,
     ) -> Checked<Met> {
         let view = digest(&scenario.mission).wrapping_add(self.view);
         let met = match self.rule(pass.number) {
             _ if pass.digest != view => Met::Foreign,
+            // Its view is being changed.
+            _ if suspended => Met::Late,
             // Places are moved where there are some.
             Met::TakenUp if pass.moves && !stands => Met::Foreign,
             // Rebooted in the midst of the sweep before, it does not know yet where it is to begin.

@@ -35,6 +35,8 @@ pub enum Phase {
     Holding,
     /// The leader has found that no target can be met.
     Infeasible,
+    /// A new view is proposed, and the decision awaited: no pass goes on.
+    ViewChange,
     /// The leader has found that most of the chain cannot be reached: its part holds its places.
     NoQuorum,
 }

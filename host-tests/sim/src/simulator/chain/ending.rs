@@ -23,7 +23,12 @@ impl Chain {
             let living = self.members.iter().filter(|member| member.killed.is_none());
             living.map(|member| member.relay.phase())
         };
-        let busy = |phase| matches!(phase, Phase::Planning | Phase::Waiting | Phase::Idle);
+        let busy = |phase| {
+            matches!(
+                phase,
+                Phase::Planning | Phase::Waiting | Phase::ViewChange | Phase::Idle
+            )
+        };
         if phases().any(busy) && !phases().any(|phase| phase == Phase::Infeasible) {
             return None;
         }
