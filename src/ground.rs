@@ -4,7 +4,7 @@
 //! | --- | --- | --- |
 //! | `Offering` | it holds an older mission, or has not answered | it is offered the new one, every second; after three without an answer the next one of the four nearest is |
 //! | `Held` | it holds the new one, and flies another yet | it is asked every second |
-//! | `Flown` | it flies it: so does every relay that was counted, or it flies nothing | done |
+//! | `Flown` | it flies it: so does every relay of its view, or it takes part in nothing until it does | done |
 //! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
 
 use crate::mission::Mission;

@@ -55,7 +55,7 @@ impl Retreat {
                 None => mission.receiver_gain(own.power_w),
             },
             climb_squared: square(climb),
-            // The receiver stands on the ground: its altitude alone keeps the tail clear of it.
+            // The receiver stands on the ground: its altitude alone keeps relay N clear of it.
             least_step: match altitude_m {
                 Some(_) => mission.least_step(square(climb)),
                 None => 0.0,

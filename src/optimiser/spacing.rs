@@ -100,7 +100,7 @@ impl Hop {
                 + from.altitude_m * (at.altitude_m + climb),
             across_squared,
             from_tx: index <= 1,
-            // The transmitter stands on the ground: its altitude alone keeps the head clear of it.
+            // The transmitter stands on the ground: its altitude alone keeps relay 1 clear of it.
             least_step: if index <= 1 {
                 0.0
             } else {
