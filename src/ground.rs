@@ -249,7 +249,7 @@ impl Ground {
         matches!(self.progress, Progress::Offering | Progress::Held { .. })
     }
 
-    /// Asks again, if it is time to.
+    /// Asks again, or the next relay, if it is time to. Constant work.
     pub fn handle_timeout(&mut self, now: Instant) {
         if self.again.is_none_or(|again| again > now) {
             return;
@@ -279,12 +279,12 @@ impl Ground {
         }
     }
 
-    /// When [`Ground::handle_timeout`] wants to be called; `None` once there is nothing left to do.
+    /// When [`Ground::handle_timeout`] is to be called at the latest; `None` once there is nothing left to do.
     pub const fn poll_timeout(&self) -> Option<Instant> {
         self.again
     }
 
-    /// Writes the next frame into `frame`, if there is one, and returns its length.
+    /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.
     pub fn poll_transmit(&mut self, frame: &mut FrameBuf) -> Option<usize> {
         if self.counter == u32::MAX {
             return None;

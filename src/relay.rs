@@ -51,6 +51,8 @@ pub struct Transmit {
 /// - *Inputs* [`handle_bytes`](Self::handle_bytes) and [`handle_timeout`](Self::handle_timeout) take anything, never fail
 ///   and do a bounded amount of work; what is wrong with it is counted in [`stats`](Self::stats).
 /// - *Time* is an argument and should not run backward. The relay never reads a clock.
+/// - *Getters* take constant work, and their numbers are those of the last agreement. Places are in metres in the frame of
+///   [`MissionConfig`](crate::MissionConfig).
 /// - *Output* is made from the state when it is asked for, so nothing can overflow. After every input, call
 ///   [`poll_transmit`](Self::poll_transmit) until it gives `None`, then [`poll_event`](Self::poll_event) until `None`,
 ///   then sleep until [`poll_timeout`](Self::poll_timeout) or the next byte.
@@ -198,8 +200,6 @@ impl Relay {
     /// Relays that fell silent at `side` have landed, or were taken away: the guard need not keep clear of them any more.
     ///
     /// Constant work.
-    ///
-    /// Constant work.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
         self.node.clear_lost(now, side);
     }
@@ -250,7 +250,7 @@ impl Relay {
         Transmit { port, len }
     }
 
-    /// The next thing the firmware should know of, if there is one. Call until there is none. Constant work. Call until there is none. Constant work.
+    /// The next thing the firmware should know of, if there is one. Call until there is none. Constant work.
     pub fn poll_event(&mut self) -> Option<Event> {
         self.node.poll_event()
     }
@@ -266,7 +266,7 @@ impl Relay {
         self.node.setpoint()
     }
 
-    /// Where to be in the end, once the chain has agreed.
+    /// The place that the chain has agreed on for this relay, where it is to be in the end; `None` before the first agreement.
     pub fn final_setpoint(&self) -> Option<Placement> {
         self.node.final_setpoint()
     }
@@ -276,7 +276,7 @@ impl Relay {
         self.node.hold_reason(side)
     }
 
-    /// The SIR (linear) that every hop of the agreed chain meets.
+    /// The SIR (linear) that every hop of the agreed chain meets; `None` before the first agreement.
     pub fn target(&self) -> Option<f32> {
         self.node.round().target()
     }
@@ -307,8 +307,8 @@ impl Relay {
         self.node.chain().view
     }
 
-    /// The nodes it takes for its neighbours toward the transmitter and toward the receiver, by their place in the chain that
-    /// the mission began with.
+    /// The node numbers of its neighbours toward the transmitter and toward the receiver, `None` where it has none. A node number is
+    /// the index that a relay was given before flight; no view changes it.
     pub fn neighbours(&self) -> [Option<u16>; 2] {
         self.node.neighbours()
     }

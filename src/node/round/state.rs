@@ -33,7 +33,7 @@ pub enum Phase {
     Answered,
     /// The chain has agreed; the relay holds its place.
     Holding,
-    /// The leader has found that no target can be met. Every relay stays where it is. Every relay stays where it is.
+    /// The leader has found that no target can be met. Every relay stays where it is.
     Infeasible,
     /// The leader of this part of the chain has found that too few relays can be reached: the part holds its places.
     NoQuorum,
