@@ -144,17 +144,17 @@ impl Channel {
         }
     }
 
-    /// Path-loss factor between two drones.
+    /// Path-loss factor between two drones, 1/m^2: over d metres of P watts P / (factor d^2) are received.
     pub const fn mu_los(&self) -> f64 {
         self.mu_los
     }
 
-    /// Path-loss factor between two places on the ground.
+    /// Path-loss factor between two places on the ground, 1/m^2.
     pub const fn mu_nlos(&self) -> f64 {
         self.mu_nlos
     }
 
-    /// Path-loss factor between a drone and the ground.
+    /// Path-loss factor between a drone and the ground, 1/m^2.
     pub const fn eta(&self) -> f64 {
         self.eta
     }

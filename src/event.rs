@@ -7,21 +7,24 @@ use crate::side::Side;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Event {
-    /// `setpoint()` has a new value: fly there.
+    /// `Relay::setpoint` has a new value: fly there.
     SetpointChanged,
-    /// The chain has agreed on a target: `target()`.
+    /// The chain has agreed on a target, `Relay::target`: every relay knows its place for it.
     Converged,
-    /// Raised at the head: no target can be met.
+    /// Raised at the leader (relay 1; in a field relay N): no places meet any target that may be tried. Every relay stays where it is.
+    /// `Relay::restart`, a new view or a new mission has the leader try again.
     Infeasible,
-    /// No sign of life from that neighbour for `Settings::dead_after`. It goes on being asked.
+    /// The neighbour at that side has given no sign of life for 15 s, or what the settings say. On a channel of its own it goes on being
+    /// asked; on a shared one the relay searches for another node at that side.
     NeighbourLost(Side),
-    /// A lost neighbour has been heard again.
+    /// A lost neighbour has been heard again, or another node has taken its place.
     NeighbourBack(Side),
-    /// That neighbour flies another mission; its messages are ignored.
+    /// A node at that side was loaded with another mission, or flies one that this relay cannot come to; its messages are ignored.
     MissionMismatch(Side),
-    /// The chain has been counted anew: `Relay::index` and the relays of `Relay::mission` have new values, and new places follow.
+    /// The chain has agreed on a new view of who is in it: `Relay::view`, `Relay::index` and the relays of `Relay::mission` have new
+    /// values, and new places follow.
     Reformed,
-    /// Too few relays can be reached to go on without the others: this part of the chain holds its places.
+    /// A new view was refused: too few relays can be reached to go on without the others. This part of the chain holds its places.
     NoQuorum,
     /// A newer mission has come: `Relay::upload`. Store it, and hand it to `Relay::resume` when the relay is next switched on.
     Uploaded,

@@ -4,7 +4,7 @@
 //! | --- | --- | --- |
 //! | `Offering` | it holds an older mission, or has not answered | it is offered the new one, every second; after three without an answer the next one of the four nearest is |
 //! | `Held` | it holds the new one, and flies another yet | it is asked every second |
-//! | `Flown` | it flies it: so does every relay that was counted, or it flies nothing | done |
+//! | `Flown` | it flies it: so does every relay of its view, or it takes part in nothing until it does | done |
 //! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
 
 use crate::mission::Mission;
@@ -249,7 +249,7 @@ impl Ground {
         matches!(self.progress, Progress::Offering | Progress::Held { .. })
     }
 
-    /// Asks again, if it is time to.
+    /// Asks again, or the next relay, if it is time to. Constant work.
     pub fn handle_timeout(&mut self, now: Instant) {
         if self.again.is_none_or(|again| again > now) {
             return;
@@ -279,12 +279,12 @@ impl Ground {
         }
     }
 
-    /// When [`Ground::handle_timeout`] wants to be called; `None` once there is nothing left to do.
+    /// When [`Ground::handle_timeout`] is to be called at the latest; `None` once there is nothing left to do.
     pub const fn poll_timeout(&self) -> Option<Instant> {
         self.again
     }
 
-    /// Writes the next frame into `frame`, if there is one, and returns its length.
+    /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.
     pub fn poll_transmit(&mut self, frame: &mut FrameBuf) -> Option<usize> {
         if self.counter == u32::MAX {
             return None;

@@ -3,6 +3,8 @@
 #![doc = include_str!("tour.md")]
 
 pub mod channel;
+#[cfg(doc)]
+pub mod docs;
 pub mod event;
 pub mod field;
 #[cfg(feature = "upload")]

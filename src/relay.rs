@@ -51,6 +51,8 @@ pub struct Transmit {
 /// - *Inputs* [`handle_bytes`](Self::handle_bytes) and [`handle_timeout`](Self::handle_timeout) take anything, never fail
 ///   and do a bounded amount of work; what is wrong with it is counted in [`stats`](Self::stats).
 /// - *Time* is an argument and should not run backward. The relay never reads a clock.
+/// - *Getters* take constant work, and their numbers are those of the last agreement. Places are in metres in the frame of
+///   [`MissionConfig`](crate::MissionConfig).
 /// - *Output* is made from the state when it is asked for, so nothing can overflow. After every input, call
 ///   [`poll_transmit`](Self::poll_transmit) until it gives `None`, then [`poll_event`](Self::poll_event) until `None`,
 ///   then sleep until [`poll_timeout`](Self::poll_timeout) or the next byte.
@@ -79,7 +81,7 @@ pub struct Transmit {
 /// let identity = Identity { network: 7, index: 1 };
 /// let mut relay = Relay::new(mission, identity, Settings::default(), 1, Instant::ZERO)?;
 /// while relay.setpoint().is_none() {
-///     let now = relay.poll_timeout().expect("a head has work to do");
+///     let now = relay.poll_timeout().expect("a leader has work to do");
 ///     relay.handle_timeout(now);
 /// }
 /// let place = relay.setpoint().unwrap();
@@ -128,7 +130,7 @@ impl Relay {
         })
     }
 
-    /// Takes in bytes received at `port`, however they are cut.
+    /// Takes in bytes received at `port`, however they are cut. Bytes at a port that `Settings::wiring` does not have are dropped.
     ///
     /// A dozen instructions a byte; a CRC for at most one frame in 16 bytes; a tag, where frames are signed, and a message, at most 16
     /// reaches, for at most one in 19. What takes longer is left to [`handle_timeout`](Self::handle_timeout).
@@ -171,14 +173,16 @@ impl Relay {
         }
     }
 
-    /// Handles what is due by `now`. Bounded by one portion of a computation: 256 reaches while the leader predicts, 96 hops
-    /// of a wave, 624 places of Algorithm 2; next to nothing otherwise.
+    /// Handles what is due by `now`: timers that have run out, and one portion of a computation.
+    ///
+    /// Bounded by that portion: 256 reaches while the leader predicts, the chain's hops over ten relays (or over forty where nothing
+    /// changes) of the joint method, 624 places of Algorithm 2; next to nothing otherwise.
     #[inline(never)] // as `poll_transmit`
     pub fn handle_timeout(&mut self, now: Instant) {
         self.node.handle_timeout(now);
     }
 
-    /// Takes one measurement of the interference, where `Settings::measure` asks for them.
+    /// Takes one measurement of the interference, W or linear SIR, where `Settings::measure` asks for them.
     ///
     /// Constant work. What is no use is counted as [`Stats::samples_refused`].
     pub fn handle_sample(&mut self, sample: Sample) {
@@ -194,6 +198,8 @@ impl Relay {
     }
 
     /// Relays that fell silent at `side` have landed, or were taken away: the guard need not keep clear of them any more.
+    ///
+    /// Constant work.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
         self.node.clear_lost(now, side);
     }
@@ -205,7 +211,9 @@ impl Relay {
         self.node.restart(now);
     }
 
-    /// Writes the next frame to be sent into `frame`, if there is one.
+    /// Writes the next frame to be sent into `frame`, if there is one. Call until there is none.
+    ///
+    /// Linear in the length of the frame; a tag, where frames are signed.
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
         let sender = self.node.member().node;
@@ -242,22 +250,23 @@ impl Relay {
         Transmit { port, len }
     }
 
-    /// The next thing the firmware should know of, if there is one.
+    /// The next thing the firmware should know of, if there is one. Call until there is none. Constant work.
     pub fn poll_event(&mut self) -> Option<Event> {
         self.node.poll_event()
     }
 
-    /// When [`Relay::handle_timeout`] wants to be called, if nothing comes in before.
+    /// When [`Relay::handle_timeout`] is to be called at the latest; after a call it is `None` or later than `now`.
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.node.poll_timeout()
     }
 
-    /// Where to fly, once the chain has agreed: to its place, or with `Settings::guard` as far toward it as is safe by now.
+    /// Where to fly, once the chain has agreed, in metres in the mission's frame: to the relay's place, or with `Settings::guard` as
+    /// far toward it as is safe by now.
     pub fn setpoint(&self) -> Option<Placement> {
         self.node.setpoint()
     }
 
-    /// Where to be in the end, once the chain has agreed.
+    /// The place that the chain has agreed on for this relay, where it is to be in the end; `None` before the first agreement.
     pub fn final_setpoint(&self) -> Option<Placement> {
         self.node.final_setpoint()
     }
@@ -267,7 +276,7 @@ impl Relay {
         self.node.hold_reason(side)
     }
 
-    /// The SIR (linear) that every hop of the agreed chain meets.
+    /// The SIR (linear) that every hop of the agreed chain meets; `None` before the first agreement.
     pub fn target(&self) -> Option<f32> {
         self.node.round().target()
     }
@@ -283,28 +292,28 @@ impl Relay {
         self.node.phase()
     }
 
-    /// What has been counted since the start.
+    /// What has been counted since the relay was switched on.
     pub fn stats(&self) -> &Stats {
         self.node.stats()
     }
 
-    /// Its place in the chain as it was counted last, 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
+    /// Its place in the chain by the view agreed on, 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
     pub fn index(&self) -> u16 {
         self.node.member().index
     }
 
-    /// The number of the view of the chain that it has agreed to, 0 before the chain has had to form anew.
+    /// The number of the view of the chain that it has agreed to; 0 is the chain as the mission has it.
     pub fn view(&self) -> u16 {
         self.node.member().view
     }
 
-    /// The nodes it takes for its neighbours toward the transmitter and toward the receiver, by their place in the chain that
-    /// the mission began with.
+    /// The node numbers of its neighbours toward the transmitter and toward the receiver, `None` where it has none. A node number is
+    /// the index that a relay was given before flight; no view changes it.
     pub fn neighbours(&self) -> [Option<u16>; 2] {
         self.node.neighbours()
     }
 
-    /// The mission the relay flies, with as many relays as are left of it.
+    /// The mission the relay flies, with as many relays as are in its view.
     pub fn mission(&self) -> &Mission {
         &self.node.member().mission
     }

@@ -92,17 +92,18 @@ pub struct Settings {
     pub predict: bool,
     /// Two links or one channel.
     pub wiring: Wiring,
-    /// Whether frames carry a tag, and only frames with the right one count. All relays of a network must agree on that.
+    /// The key and the epoch that this relay signs its frames with. Then it takes signed frames alone; without, it believes whoever is
+    /// on the air. All relays of a network are given the key, or none is.
     pub auth: Option<Auth>,
     /// The longest that a sweep (100 bytes) takes from one relay's `poll_transmit` to the next one's, its computing included;
     /// above 0. For messages that take longer it is multiplied.
     pub hop_time: Duration,
-    /// After this long without a frame from a neighbour it is asked for a sign of life; above 0.
+    /// After this long without a frame from a neighbour the relay asks it for a heartbeat, sixteen times until `dead_after`; above 0.
     pub probe_after: Duration,
     /// After this long without one it counts as lost; above `probe_after`.
     pub dead_after: Duration,
-    /// Whether a part of the chain goes on without the others only if it is the larger one: half of the last chain with its
-    /// leader, or more. Without that, the two parts of a chain that is split, but still flies, would get in each other's way.
+    /// Whether a part of the chain goes on without the others only if it has a quorum: more than half of the relays of the view
+    /// before, or half with its leader. Without that, the parts of a chain that is split would get in each other's way.
     pub quorum: bool,
     /// Whether setpoints lead to the agreed place only as far as the neighbours have made room, and inside which box. The relay
     /// then has to be told where it is: `Relay::handle_position`.

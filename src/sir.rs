@@ -86,7 +86,7 @@ pub enum Turn {
 /// Where SIR_1 of a relay at `altitude_m` turns along x.
 ///
 /// The stationary points of SIR_1 are (q +- sqrt(q^2 + 4 X^2 h^2)) / 2X with q = X^2 + Y^2, of which one lies beyond Tx; for
-/// X < 0 it is written without cancellation. Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems.rs`.
+/// X < 0 it is written without cancellation. Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems/`.
 pub fn first_hop_turn(interferer: &Interferer, altitude_m: f32) -> Turn {
     let x = interferer.x_m;
     let q = square(x) + square(interferer.y_m);

@@ -6,14 +6,14 @@
 pub struct Stats {
     /// Frames handed to the link, repetitions included.
     pub sent: u32,
-    /// Sweeps sent again because no answer came.
+    /// Messages of a round (sweeps, courses, tokens) and proposals sent again because no answer came.
     pub repeats: u32,
-    /// Passes that the leader has begun.
+    /// Passes of any kind, and proposals, that this relay has begun as the leader.
     pub sweeps: u32,
     /// Messages from a neighbour, in range; what becomes of them may still be counted below as misdirected, of another
     /// mission or stale.
     pub received: u32,
-    /// Sweeps that had arrived before and were answered again.
+    /// Passes and proposals that had arrived before and are answered once more.
     pub repeated: u32,
     /// Intact frames between other nodes of the network, heard on a shared channel.
     pub overheard: u32,
@@ -39,15 +39,15 @@ pub struct Stats {
     pub foreign: u32,
     /// Intact frames from a node that is no neighbour, or for another node on a link that only this one should hear.
     pub misaddressed: u32,
-    /// Messages from the wrong side: a pass from where it should go, what comes back of it from where it came from.
+    /// Messages from the wrong side: a pass or a proposal from where it should go, what comes back of it from where it came from.
     pub misdirected: u32,
-    /// Messages of another mission.
+    /// Messages of another mission, which raise [`Event::MissionMismatch`](crate::Event::MissionMismatch).
     pub mission: u32,
-    /// Passes, and answers to them, of another view of the chain.
+    /// Messages of a round or of a view change that are of another view of the chain, or of a mission that is not flown in it.
     pub view: u32,
     /// New views of the chain that this relay has agreed to.
     pub views: u32,
-    /// Messages of a pass that is over.
+    /// Messages of a pass, or of a view change, that is over or cannot be taken part in.
     pub stale: u32,
     /// Samples of the interference that were no use: not a number, out of range, or without anything to measure for.
     pub samples_refused: u32,

@@ -55,7 +55,7 @@ pub(crate) fn auth() {
     let mut middle = relay(2, settings, THREE);
     let mut tail = relay(3, settings, THREE);
     let start = Instant::ZERO;
-    // Who is there is known before the first pass: the handshakes of the tail go first.
+    // Who is there is known before the first pass: the handshakes of the last relay go first.
     settle(&mut middle, &mut tail, start);
     settle(&mut head, &mut middle, start);
     settle(&mut middle, &mut tail, start);

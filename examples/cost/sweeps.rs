@@ -37,7 +37,7 @@ pub(crate) fn reach() {
     hprintln!("reach {}", most);
 }
 
-/// A full sweep through a middle relay, and through the tail of a chain of three; the verdict on its way back.
+/// A full sweep through a middle relay, and through the last one of a chain of three; the verdict on its way back.
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
     let settings = Settings {
@@ -135,7 +135,7 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// The largest portion of the head's prediction, and how many it takes for a hundred relays.
+/// The largest portion of the leader's prediction, and how many it takes for a hundred relays.
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
     let mut head = relay(1, Settings::default(), HUNDRED);

@@ -270,7 +270,7 @@ fn one_shared_channel_does_as_well_as_two_wires() {
     }
 }
 
-/// Relays with an altitude and a power of their own: the head predicts wrong, and the bracket finds what the exact
+/// Relays with an altitude and a power of their own: the leader predicts wrong, and the bracket finds what the exact
 /// reference calls feasible for the farthest chain.
 #[test]
 fn a_mixed_chain_is_solved_as_it_is() {

@@ -1,6 +1,6 @@
 //! How fast a chain recovers from the loss of one relay, by its length and by which one is lost.
 //!
-//! `cargo test --test recovery -- --nocapture` prints the table of the README.
+//! `cargo test --test recovery -- --nocapture` prints the table of `host-tests/RESULTS.md`.
 
 use host_tests::fixtures::mission;
 use uav_relay::Instant;

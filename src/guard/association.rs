@@ -1,26 +1,26 @@
-//! Which life of the neighbour a message is from.
+//! Which incarnation of the neighbour a message is from.
 //!
-//! Each side numbers its talk with the other at random, and a message counts only if it bears the sender's number and echoes the
-//! receiver's. The owner's number goes with the first number that echoes it; the follower relay takes a new number whenever it
-//! takes up another of the owner's. So two numbers go together once, and what was said in an earlier talk cannot count in a
+//! Each side numbers its association with the other at random, and a message counts only if it bears the sender's number and echoes the
+//! receiver's. The owner's number goes with the first number that echoes it; the follower takes a new number whenever it
+//! takes up another of the owner's. So two numbers go together once, and what was said in an earlier one cannot count in a
 //! later one, however late it comes.
 
 use crate::jitter::Jitter;
 use crate::side::Side;
 
-/// So many messages of another talk in a row are of a new one, not late ones of an old.
+/// So many messages of another association in a row are of a new one, not late ones of an old.
 const STRAYS: u8 = 3;
 
-/// A talk with the neighbour on one side.
+/// An association with the neighbour on one side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Association {
     /// The neighbour, 0 for none.
     pub(super) node: u16,
-    /// The number of this relay's talk.
+    /// The number of this relay's association.
     pub(super) own: u16,
     /// The neighbour's, as it goes with `own`; 0 for none.
     pub(super) heard: u16,
-    /// Messages of other talks in a row.
+    /// Messages of other associations in a row.
     strays: u8,
     /// Whether there is something to tell.
     pub(super) due: bool,
@@ -38,7 +38,7 @@ impl Association {
         }
     }
 
-    /// Whether a message is of this talk.
+    /// Whether a message is of this association.
     pub(super) const fn knows(&mut self, association: u16, echo: u16) -> bool {
         let known = association == self.heard && echo == self.own;
         if known {
@@ -47,7 +47,7 @@ impl Association {
         known
     }
 
-    /// One more message of another talk; whether they are too many to be late ones.
+    /// One more message of another association; whether they are too many to be late ones.
     pub(super) const fn stray(&mut self) -> bool {
         self.strays = self.strays.saturating_add(1);
         self.strays >= STRAYS

@@ -9,9 +9,9 @@ pub struct Fence {
     pub association: u16,
     /// The number of the receiver's as the sender has heard it, 0 for none.
     pub echo: u16,
-    /// From the owner: number of the fence, 0 before the first. From the follower relay: of the newest fence it has heard of.
+    /// From the owner: number of the fence, 0 before the first. From the follower: of the newest fence it has heard of.
     pub number: u16,
-    /// From the owner: where the fence is. From the follower relay: the low end of its own stretch. m along x, -1e7 to 1e7.
+    /// From the owner: where the fence is. From the follower: the low end of its own stretch. m along x, -1e7 to 1e7.
     pub x_m: f32,
     /// Where the sender is to be in the end, m along x, -1e7 to 1e7.
     pub target_m: f32,

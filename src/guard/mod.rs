@@ -6,13 +6,13 @@
 //! allows, and [`Guard::hold_reason`] says so.
 //!
 //! Between two neighbours there is a *fence*, a line across x. The relay upstream of it, its *owner*, stays the separation
-//! before it; the other one, the *follower* relay, stays at it or beyond.
+//! before it; the other one, the *follower*, stays at it or beyond.
 //!
 //! | file | one idea |
 //! | --- | --- |
 //! | [`config`] | the box that no setpoint leaves, and what else is set before flight |
 //! | `reachable` | where the relay may be, by what was reported and what it was told to fly to |
-//! | `association` | which life of the neighbour a message is from, so that late ones cannot be mistaken |
+//! | `association` | which incarnation of the neighbour a message is from, so that late ones cannot be mistaken |
 //! | `owner` | the fence downstream, which this relay places |
 //! | `follower` | the fence upstream, which the neighbour places |
 //!
@@ -22,13 +22,13 @@
 //!
 //! | | rule | so that |
 //! | --- | --- | --- |
-//! | 1 | The follower relay never lowers its setpoint below the newest fence it has heard of, and flies up to it if it is below. | what it promises holds |
+//! | 1 | The follower never lowers its setpoint below the newest fence it has heard of, and flies up to it if it is below. | what it promises holds |
 //! | 2 | It tells the newest fence it has heard of, and the low end of its own stretch. | - |
-//! | 3 | The owner counts on the lowest of: that low end, if told together with the newest fence; every fence announced since. | no message under way can make the follower relay come nearer than it is counted on |
+//! | 3 | The owner counts on the lowest of: that low end, if told together with the newest fence; every fence announced since. | no message under way can make the follower come nearer than it is counted on |
 //! | 4 | The owner never raises its setpoint to less than the separation before what it counts on. | the stretches of the two are the separation apart |
 //! | 5 | The owner announces no fence nearer than the separation beyond the high end of its own stretch. | a fence it lowers is one it has cleared already |
 //! | 6 | As far as 5 allows, the fence goes halfway between the two agreed places (and half the separation on). | both can get where they are to be |
-//! | 7 | The first fence is right at the owner's own stretch; other fences, and changes of altitude, begin when the follower relay has cleared it. Relays in the wrong order stay where they are. | a start that is too close is opened first, and no relay sinks onto another |
+//! | 7 | The first fence is right at the owner's own stretch; other fences, and changes of altitude, begin when the follower has cleared it. Relays in the wrong order stay where they are. | a start that is too close is opened first, and no relay sinks onto another |
 //! | 8 | A setpoint goes no farther toward a neighbour that has not been talked to yet (switched on, rebooted, newly linked) than it is. | nothing is granted unheard; what was granted is flown to the end |
 //! | 9 | Nothing lapses with time: of a neighbour that is replaced or starts anew, the last limit stays until it speaks for itself, or [`Guard::forget`]; if it was never heard, this relay goes no farther toward it. | a silent relay that still hovers is not flown into |
 //!
@@ -146,7 +146,7 @@ impl Guard {
         }
     }
 
-    /// What node `from` at `side` says. What is out of range is counted, what is of an earlier talk or of another node ignored.
+    /// What node `from` at `side` says. What is out of range is counted, what is of an earlier association or of another node ignored.
     pub fn hear(&mut self, side: Side, from: u16, fence: &Fence) {
         if !fence.is_valid() {
             return bump(&mut self.refused);

@@ -297,7 +297,7 @@ impl Mission {
         }
     }
 
-    /// What multiplies the quiet of a place (see [`crate::sir::inverse_interference`]) on the first hop: `p_t` / `p_MSI`, in a field
+    /// What multiplies the inverse interference of a place ([`crate::sir::quiet`]) on the first hop: `p_t` / `p_MSI`, in a field
     /// `p_t` `Upsilon_max` / eta.
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain

@@ -1,19 +1,19 @@
 //! The protocol of one relay, on messages and without bytes: what it does with a message, and with silence.
 //!
 //! Four layers, each a machine of its own beside its state table, with the same verbs: `handle` takes a message, `take_...` gives what
-//! there is to send, `handle_timeout` and `next_timeout` keep the time. None knows another: each is handed a [`context`] and gives back
+//! there is to send, `handle_timeout` and `next_timeout` keep the time. None knows another: each is handed a `context` and gives back
 //! effects, which `Node` passes on.
 //!
 //! | layer | one idea |
 //! | --- | --- |
-//! | [`neighbour`] | which node is taken for the neighbour on each side, and when it counts as lost |
-//! | [`view`] | the view change: how the chain comes to a new view of who is in it |
-//! | [`mission_update`] | a newer mission, in flight |
-//! | [`round`] | a round of agreement: sweeps, courses of the joint method, turns |
+//! | `neighbour` | which node is taken for the neighbour on each side, and when it counts as lost |
+//! | `view` | the view change: how the chain comes to a new view of who is in it |
+//! | `mission_update` | a newer mission, in flight |
+//! | `round` | a round of agreement: sweeps, courses of the joint method, turns |
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`context`] | what a relay is and flies, as every layer is handed it, and what a layer asks of the others |
+//! | `context` | what a relay is and flies, as every layer is handed it, and what a layer asks of the others |
 //! | `retransmit` | how long an answer is awaited, and when a message is sent again |
 //! | `numbering` | what a number that is not the expected one means |
 //! | `timing` | what the layers have in common in keeping time |

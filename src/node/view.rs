@@ -20,7 +20,7 @@
 //! | `Settled` | hand on: `Proposed` | - | stale | - |
 //! | `Proposed` | hand on | say busy | hand back: `Decided` | decide: `Decided` |
 //! | `Decided` | hand on: `Proposed` | hand back again | stale | - |
-//! | `NoQuorum` (leader) | - | hand back again | stale | - |
+//! | `NoQuorum` (leader) | hand on: `Proposed` | - | stale | - |
 //!
 //! While a view is proposed no pass goes on. One that was decided against leaves the places where they are.
 

@@ -29,7 +29,7 @@ pub struct Ladder {
 }
 
 impl Ladder {
-    /// The one target `target`, above 0: what the tail finds feasible, it commits.
+    /// The one target `target`, above 0: what the last relay finds feasible, it commits.
     pub const fn single(target: f32) -> Self {
         Self {
             anchor: target,
@@ -118,7 +118,7 @@ impl Ladder {
         (self.anchor, self.gap, self.growth)
     }
 
-    /// Whether this is a single target, which the tail commits when it is feasible.
+    /// Whether this is a single target, which the last relay commits when it is feasible.
     pub const fn is_single(&self) -> bool {
         self.gap == 0
     }

@@ -68,7 +68,7 @@ pub struct Hops {
 }
 
 impl Hops {
-    /// The hops of a relay of `power_w` watts, fed with `gain_in`; `after` is `None` for the tail.
+    /// The hops of a relay of `power_w` watts, fed with `gain_in`; `after` is `None` for relay N.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,

@@ -1,7 +1,7 @@
 //! The whole chain from the mission alone, without a message: the radio-silent form of Algorithm 1.
 //!
 //! It walks the hops with the very functions the relays use, so what it finds is what they agree on by messages, to the
-//! bit. The head predicts with it, a relay that must keep silent finds its own place with it, and so does a planner.
+//! bit. The leader predicts with it, a relay that must keep silent finds its own place with it, and so does a planner.
 
 use super::PerTarget;
 use super::ladder::Ladder;
@@ -11,7 +11,7 @@ use super::walk::Walk;
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// A target the whole chain meets, as the ladder and the place in it that the tail would commit.
+/// A target the whole chain meets, as the ladder and the place in it that the last relay would commit.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {

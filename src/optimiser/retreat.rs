@@ -19,7 +19,7 @@
 //!
 //! Between two points of the field d(y)^2 = c Upsilon(y) - q with q = (h - h0)^2 is linear in y, so y - d(y) is convex where it
 //! is defined, and its least value is at an end, where d falls to the least step, or where d'(y) = 1: d = c b / 2 with b the
-//! slope of Upsilon. `the_best_of_equals_in_a_field` in `host-tests/tests/fleet.rs` holds it against grids of places.
+//! slope of Upsilon. `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/` holds it against grids of places.
 //! Where a least separation or a climb makes some y useless the ranges may have holes, and l_k is a bound.
 //!
 //! Accuracy: `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` asserts it in f64.
@@ -55,7 +55,7 @@ impl Retreat {
                 None => mission.receiver_gain(own.power_w),
             },
             climb_squared: square(climb),
-            // The receiver stands on the ground: its altitude alone keeps the tail clear of it.
+            // The receiver stands on the ground: its altitude alone keeps relay N clear of it.
             least_step: match altitude_m {
                 Some(_) => mission.least_step(square(climb)),
                 None => 0.0,

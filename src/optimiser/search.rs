@@ -21,7 +21,7 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::{self, Sender};
 
-/// Which targets the head tries.
+/// Which targets the leader tries.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
@@ -148,7 +148,7 @@ impl Search {
         &self.ladder
     }
 
-    /// Tries `ladder` next instead: the one by which the head, having solved the chain beforehand, expects a commit.
+    /// Tries `ladder` next instead: the one by which the leader, having solved the chain beforehand, expects a commit.
     ///
     /// Where that is plain, all are.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {

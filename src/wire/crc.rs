@@ -2,7 +2,7 @@
 //!
 //! Its Hamming distance is 6 for the lengths used here, where the older CRC-32 has 5. A table of 256 words takes 1 KiB of
 //! flash; one of 16 words saves 960 bytes, but a full sweep, which passes the CRC twice, then takes some 690 instructions
-//! more and is above its budget. `crc_agrees_with_a_published_one` in `host-tests/tests/wire.rs` holds it against the `crc`
+//! more and is above its budget. `crc_agrees_with_a_published_one` in `host-tests/tests/wire/` holds it against the `crc`
 //! crate.
 
 /// The reversed generator polynomial.

@@ -7,7 +7,7 @@ use super::digest::MissionId;
 use super::message::{Decision, Hello, PriorView, Proposal};
 use crate::mission::MAX_RELAYS;
 
-/// What a hello, a proposal and a count have in common; what the numbers mean depends, and those that mean nothing are 0.
+/// What a hello, a proposal and a decision have in common; what the numbers mean depends, and those that mean nothing are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Forming {
     /// The number is that of a view.

@@ -44,9 +44,9 @@ pub enum Message {
     Moved(Moved),
     /// Either way, also to nodes that are no neighbours: who the sender takes for its neighbour, and which view it holds.
     Hello(Hello),
-    /// Onward: who is there, for a new view of the chain.
+    /// Onward: a new view of the chain is proposed; it counts who is there.
     Proposal(Proposal),
-    /// Back: how many there are.
+    /// Back: what was decided on the proposal, and how many relays there are.
     Decision(Decision),
     /// Either way: the fence between two neighbours.
     Fence {
@@ -93,7 +93,7 @@ impl Message {
         )
     }
 
-    /// Whether it is said of the call for a view: then its digest is that of the mission to be flown in it.
+    /// Whether it is part of a view change: then its digest is that of the mission to be flown in it.
     pub(crate) const fn is_of_a_call(&self) -> bool {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
@@ -248,7 +248,7 @@ pub struct Hello {
     pub flies: bool,
 }
 
-/// The call for a new view, as one relay hands it to the next.
+/// A proposal of a new view, as one relay hands it to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {
@@ -270,11 +270,11 @@ pub struct PriorView {
     pub view: u16,
     /// How many relays were in it, 1 to 1000.
     pub relays: u16,
-    /// Whether its leader is among those that the call has come through.
+    /// Whether its leader is among those that the proposal has come through.
     pub leader: bool,
 }
 
-/// What came of the call for a new view, as it travels back.
+/// The decision on a proposal, as it travels back.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decision {
@@ -282,7 +282,7 @@ pub struct Decision {
     pub mission_id: MissionId,
     /// The number of the view.
     pub view: u16,
-    /// The sender's place, from 1 at the one that has called: 1 to 1000.
+    /// The sender's place, from 1 at the one that has proposed: 1 to 1000.
     pub place: u16,
     /// How many relays there are, 1 to 1000; `None` if they are too few to go on without the others.
     pub relays: Option<u16>,

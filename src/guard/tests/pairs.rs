@@ -108,7 +108,7 @@ fn late_messages_grant_nothing() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
     pair.talk();
     let high = pair.follower.says(Side::Upstream);
-    // It is lowered to (20 + 120 + 10) / 2, but nobody has said so to the follower relay yet.
+    // It is lowered to (20 + 120 + 10) / 2, but nobody has said so to the follower yet.
     pair.owner.guard.commit(at(20.0));
     pair.follower.guard.commit(at(120.0));
     pair.answer();
@@ -195,7 +195,7 @@ fn relays_in_the_wrong_order_stay() {
     );
 }
 
-/// A owner that starts again knows nothing of the fence it had announced: the follower relay goes by it until it has talked to the
+/// An owner that starts again knows nothing of the fence it had announced: the follower goes by it until it has talked to the
 /// new one, and by no old message after that.
 #[test]
 fn a_new_life_is_told_from_an_old_one() {

@@ -1,6 +1,6 @@
 //! One side of a relay: which node it takes for its neighbour there, and what it does about silence.
 //!
-//! | state | the node taken is silent for `dead_after` | it says that it takes another | a node not taken hellos | time passes |
+//! | state | the node taken is silent for `dead_after` | it says that it takes another | a hello comes from a node not taken | time passes |
 //! | --- | --- | --- | --- | --- |
 //! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead, if it is nearer, can hear a node beyond and was heard all through a hold-down | - |
 //! | `Pairing` | `Searching` | - | as above | after a span `Searching` |
@@ -10,9 +10,9 @@
 //! A span is as long as a silent neighbour is asked for, `dead_after` less `probe_after`. A node that has been taken is paired with until it
 //! says that it has taken this relay, too.
 //!
-//! While it searches, it hellos the four nearest nodes there: as many as three relays in a row may be lost at once. The hold-down
+//! While it searches, it sends hellos to the four nearest nodes there: as many as three relays in a row may be lost at once. The hold-down
 //! is `dead_after`, and twice as long after every loss on that side up to sixteen times: a link that comes and goes disturbs the
-//! chain less and less. A node that has come back is counted `probe_after` later: the other one beside it may be about to take it, too.
+//! chain less and less. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be about to take it, too.
 
 use super::liveness::{Liveness, tick};
 use crate::node::context::Proposer;

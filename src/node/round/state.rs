@@ -27,17 +27,17 @@ pub enum Phase {
     Idle,
     /// The leader is computing what to begin with.
     Planning,
-    /// A pass is under way onward.
+    /// A pass or a proposal is under way onward, and what came of it has not come back.
     Waiting,
     /// What came of the last pass was no agreement.
     Answered,
     /// The chain has agreed; the relay holds its place.
     Holding,
-    /// The leader has found that no target can be met.
+    /// The leader has found that no target can be met. Every relay stays where it is.
     Infeasible,
     /// A new view is proposed, and the decision awaited: no pass goes on.
     ViewChange,
-    /// The leader has found that most of the chain cannot be reached: its part holds its places.
+    /// The leader of this part of the chain has found that too few relays can be reached: the part holds its places.
     NoQuorum,
 }
 
@@ -46,7 +46,7 @@ pub enum Phase {
 pub(crate) enum Action {
     /// Nothing at all.
     Nothing,
-    /// Decision a message of a pass that is over.
+    /// Count a message of a pass that is over.
     Stale,
     /// Call `work` after a pause.
     Work {
@@ -83,7 +83,7 @@ pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
-    /// Of another life of its leader, or one that comes after others which were missed.
+    /// Of another incarnation of its leader, or one that comes after others which were missed.
     Foreign,
 }
 

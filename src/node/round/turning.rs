@@ -39,7 +39,7 @@ impl Turning {
         }
     }
 
-    /// The hops of a relay of `power_w` watts, with its neighbour toward Rx at `after`; `None` for the tail.
+    /// The hops of a relay of `power_w` watts, with its neighbour toward Rx at `after`; `None` for relay N.
     pub(crate) fn hops(
         &self,
         mission: &Mission,

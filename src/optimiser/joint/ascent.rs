@@ -158,7 +158,7 @@ impl Ascent {
         self.square += outlook.square;
     }
 
-    /// The pass back has come to the head.
+    /// The pass back has come to the leader.
     pub(crate) fn weighed(&mut self) -> Turn {
         self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
         self.share = 0;
@@ -241,7 +241,7 @@ impl Ascent {
         }
     }
 
-    /// The next course, as the head says it.
+    /// The next course, as the leader says it.
     pub(crate) fn course(&self) -> (Bar, Trials) {
         let trial = |sigma: f32| Trial {
             target: libm::expf(sigma),

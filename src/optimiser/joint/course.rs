@@ -1,7 +1,7 @@
 //! One relay's share of the joint method by messages, where relays hold what the others do not know.
 //!
-//! A course goes from the head to the tail with a few trials, each of a target and of a part of the step; every relay works out where
-//! it is in each of them. The tail says which one is gone by, and on the way back every relay works out its next step.
+//! A course goes from the leader to the last relay with a few trials, each of a target and of a part of the step; every relay works out where
+//! it is in each of them. The last relay says which one is gone by, and on the way back every relay works out its next step.
 
 use super::link::{Link, Room, minus, tail, triple};
 use super::outlook::Outlook;
@@ -54,7 +54,7 @@ impl<'a> Courser<'a> {
         ))
     }
 
-    /// The slack at Rx of a trial of the tail, m, and its outlook.
+    /// The slack at Rx of a trial of the last relay, m, and its outlook.
     fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         tail(self.mission, self.power_w, self.room, target, at)
     }
@@ -119,7 +119,7 @@ impl Coursing {
         })
     }
 
-    /// What the tail says of the trials: the one that is gone by, its slack, m, and what Rx sees; `None` for all if there never was one.
+    /// What the last relay says of the trials: the one that is gone by, its slack, m, and what Rx sees; `None` for all if there never was one.
     pub(crate) fn close(&self, relay: Courser<'_>) -> (Option<u8>, f32, Outlook) {
         let mut best: (f32, Option<u8>, f32) = (0.0, None, 0.0);
         for (trial, number) in self.own.iter().zip(0..) {

@@ -380,7 +380,7 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// The slack of a tail of `power_w` in `room`, which is `at`, for `target`, and its outlook.
+/// The slack of a last relay of `power_w` in `room`, which is `at`, for `target`, and its outlook.
 pub(super) fn tail(
     mission: &Mission,
     power_w: f32,

@@ -64,7 +64,7 @@ impl Outlook {
         })
     }
 
-    /// The slack of a tail at `at`, m, and its outlook, when Rx, `distance_m` from Tx, is heard as far as `reach_m`: how much farther
+    /// The slack of a last relay at `at`, m, and its outlook, when Rx, `distance_m` from Tx, is heard as far as `reach_m`: how much farther
     /// from Rx it could be. Beyond Rx along x is as good as right above it.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {
         let ahead = distance_m - at.x_m;

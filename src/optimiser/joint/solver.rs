@@ -251,7 +251,7 @@ impl<'a, F: Fn(u16) -> Seat> Chain<'a, F> {
         Link::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// The slack of the tail at `at`, and its outlook.
+    /// The slack of the last relay at `at`, and its outlook.
     fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         link::tail(self.mission, power_w, room, target, at)

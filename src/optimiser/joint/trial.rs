@@ -26,7 +26,7 @@ pub struct Trial {
 /// Trials of a course, the one with the whole step first.
 pub type Trials = heapless::Vec<Trial, TRIALS>;
 
-/// By what the tail judges the trials, in ln gamma and m.
+/// By what the last relay judges the trials, in ln gamma and m.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bar {

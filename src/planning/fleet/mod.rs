@@ -46,7 +46,7 @@ const HALVINGS: u8 = 32;
 /// The fewest relays that meet `target` (linear SIR, above 0), at most [`MAX_RELAYS`]; the mission's own number is not looked at.
 ///
 /// `profile_of` gives what relay 1..=N holds. Equal to an exhaustive count wherever `proven`:
-/// `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet.rs`. Work: with one interferer a reach for each relay, and once more all
+/// `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a reach for each relay, and once more all
 /// of them where they must keep a distance; in a field at most 32 chains of [`ranges`].
 ///
 /// # Errors

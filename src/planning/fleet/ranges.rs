@@ -62,7 +62,7 @@ pub(super) fn fewest(mission: &Mission, target: f32, profile: Profile) -> Option
 /// The highest target (linear, to an f32's own step) that the mission's N equals, which hold `profile`, meet in its field; `None`
 /// without a field, or where none is met.
 ///
-/// The optimum where no least separation binds: `the_best_of_equals_in_a_field` in `host-tests/tests/fleet.rs`. Algorithm 4 may be
+/// The optimum where no least separation binds: `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/`. Algorithm 4 may be
 /// below it in an uneven field. Work: 48 chains, each three square roots for every point of the field and relay.
 pub fn best(mission: &Mission, profile: Profile) -> Option<f32> {
     mission.field()?;

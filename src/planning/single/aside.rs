@@ -51,7 +51,7 @@
 //! place higher up can be turned down until it is in the lowest plane or in an upright face, and in an upright face all level
 //! circles have their middles on the ground, so that they touch nowhere above it.
 //!
-//! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems.rs`: within 1e-4 relative of the best SIR.
+//! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
 use super::Found;
 use super::edge::{Edge, Hops, narrow};

@@ -9,7 +9,7 @@
 //! On the edges Theorems 1 and 2 are exact, and the best of them is the optimum. Right above Tx both SIRs fall with the altitude,
 //! so of that edge only the lowest place counts, which is on the lowest edge too: three are left.
 //!
-//! Accuracy: `theorem_3_is_no_worse_than_brute_force` in `host-tests/tests/theorems.rs`: within 1e-4 relative of the best SIR.
+//! Accuracy: `theorem_3_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
 use super::{Found, given_altitude, given_x};
 use crate::mission::{Mission, Profile};

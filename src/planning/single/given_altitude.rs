@@ -7,7 +7,7 @@
 //! The crossing is a root of the paper's quartic. Its coefficients cancel in f32; the SIRs themselves do not, so the root is
 //! found by halving a stretch on which their difference changes its sign once.
 //!
-//! Accuracy: `theorem_1_is_no_worse_than_brute_force` in `host-tests/tests/theorems.rs`: within 1e-4 relative of the best SIR.
+//! Accuracy: `theorem_1_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
 use super::{Found, Two};
 use crate::mission::{Mission, Profile};

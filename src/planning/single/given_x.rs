@@ -4,7 +4,7 @@
 //! beyond the paper's Psi^h = (X^2 + Y^2) / 2X, which needs X > 0: there it rises, and the worse of the two is best where they
 //! are equal (Lemma 1), or at an end of the band.
 //!
-//! Accuracy: `theorem_2_is_no_worse_than_brute_force` in `host-tests/tests/theorems.rs`: within 1e-4 relative of the best SIR.
+//! Accuracy: `theorem_2_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
 use super::{Found, Two, locus};
 use crate::mission::{Mission, Profile};

@@ -22,7 +22,7 @@ pub struct Guide {
 
 /// The ratios for a relay at `altitude_m`, m, above 0; `None` in a field.
 ///
-/// Relative error below 1e-4: `the_guide_agrees_with_the_cases` in `host-tests/tests/theorems.rs`. Constant work.
+/// Relative error below 1e-4: `the_guide_agrees_with_the_cases` in `host-tests/tests/theorems/`. Constant work.
 pub fn ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
     let interferer = mission.interferer()?;
     let config = mission.config();

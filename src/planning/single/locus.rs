@@ -8,7 +8,7 @@
 //! ```
 //!
 //! the paper's A u^2 + B u + C = 0 divided by A = p_t. Worked out in f64, and so exact to the last place of the f32 that
-//! comes out. Accuracy: `the_locus_is_where_the_hops_are_equal` in `host-tests/tests/theorems.rs`.
+//! comes out. Accuracy: `the_locus_is_where_the_hops_are_equal` in `host-tests/tests/theorems/`.
 
 use crate::mission::Mission;
 

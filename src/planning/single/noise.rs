@@ -5,7 +5,7 @@
 //! are equal where (1 - r) x^2 - 2 D x + C = 0, C = D^2 + (1 - r) h^2; of its roots x = C / (D + sqrt(D^2 - (1 - r) C)) is the
 //! one between Tx and Rx, written so that r = 1 (x = D / 2) is no special case. The discriminant is r D^2 - (1 - r)^2 h^2.
 //!
-//! Accuracy: `noise_is_no_worse_than_brute_force` in `host-tests/tests/theorems.rs`: within 1e-4 relative of the best SNR.
+//! Accuracy: `noise_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SNR.
 
 use super::Found;
 use crate::mission::{Mission, Profile};

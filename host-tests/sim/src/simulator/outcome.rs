@@ -69,7 +69,7 @@ pub struct Moment {
 pub enum Ending {
     /// Every relay holds its place, for the same target.
     Settled,
-    /// The head found that no target can be met.
+    /// The leader found that no target can be met.
     Infeasible,
     /// Relays went silent, and every neighbour of theirs has noticed.
     Broken,
@@ -109,7 +109,7 @@ pub struct RelayEnd {
 pub struct Outcome {
     /// How it ended.
     pub ending: Ending,
-    /// The relays, from the head.
+    /// The relays, from relay 1 on.
     pub relays: Vec<RelayEnd>,
     /// SIR of the chain after each round of Algorithm 2, linear; the first is that before any.
     pub rounds: Vec<f32>,

@@ -52,7 +52,7 @@ pub(crate) struct Options {
     /// Probability that a frame is overtaken by others, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
     pub(crate) reorder: f64,
-    /// The head does not solve the chain beforehand; it brackets from scratch
+    /// The leader does not solve the chain beforehand; it brackets from scratch
     #[arg(long)]
     pub(crate) no_predict: bool,
     /// Seed of every random draw; the same seed gives the same run, byte for byte

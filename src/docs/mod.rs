@@ -1,0 +1,24 @@
+//! Pages on flying a chain, beside the reference of the modules.
+//!
+//! | page | what it answers |
+//! | --- | --- |
+//! | [`planning`] | how many relays, where, and whether that is the best there is |
+//! | [`lost_relays`] | what happens when a relay falls silent, comes back, or the chain is split |
+//! | [`uploads`] | how a flying chain is given a new mission |
+//! | [`security`] | what signed frames protect, and what not |
+//! | [`wire_format`] | every byte on the wire, enough for another implementation |
+
+#[doc = include_str!("planning.md")]
+pub mod planning {}
+
+#[doc = include_str!("lost_relays.md")]
+pub mod lost_relays {}
+
+#[doc = include_str!("uploads.md")]
+pub mod uploads {}
+
+#[doc = include_str!("../../SECURITY.md")]
+pub mod security {}
+
+#[doc = include_str!("../wire/FORMAT.md")]
+pub mod wire_format {}
