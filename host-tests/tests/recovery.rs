@@ -45,9 +45,9 @@ fn only(report: &ChainReport, relays: u16, lost: u16) -> RecoveryReport {
 /// Head, middle and tail.
 fn places(relays: u16) -> Vec<(&'static str, u16)> {
     let mut places = vec![
-        ("head", 1),
+        ("leader", 1),
         ("middle", relays.div_ceil(2)),
-        ("tail", relays),
+        ("last", relays),
     ];
     places.dedup_by_key(|(_, lost)| *lost);
     places
@@ -63,7 +63,7 @@ fn one_loss_is_noticed_within_15_s_and_costs_six_sweeps_at_most() {
             if (relays, lost) == (2, 1) {
                 assert_eq!(outcome.ending, Ending::Cut);
                 println!(
-                    "| 2 | head | {:.1} s | never: the other one holds its place | | |",
+                    "| 2 | leader | {:.1} s | never: the other one holds its place | | |",
                     detected(&report)
                 );
                 continue;

@@ -52,7 +52,7 @@ struct Options {
     from: Option<PathBuf>,
     /// Put an excerpt into FILE in place of the table there, between the lines of the two comments that say where it is
     #[arg(long, value_name = "FILE")]
-    readme: Option<PathBuf>,
+    into: Option<PathBuf>,
     /// Where the virtual environment of Python is, or is made; without it beside what is built, target/compare
     #[arg(long, value_name = "DIR")]
     venv: Option<PathBuf>,
@@ -70,7 +70,7 @@ fn run(options: &Options) -> Result<String, Failure> {
         Some(file) => read(file)?,
         None => solve(options)?,
     };
-    if let Some(file) = &options.readme {
+    if let Some(file) = &options.into {
         put(file, &table::excerpt(&results).map_err(Failure::input)?)?;
     }
     if options.json {
@@ -79,15 +79,15 @@ fn run(options: &Options) -> Result<String, Failure> {
     table::table(&results).map_err(Failure::input)
 }
 
-/// What stands around the table in the README.
+/// What stands around the table in RESULTS.md.
 const MARKS: [&str; 2] = [
-    "<!-- cargo compare --readme README.md -->\n",
+    "<!-- cargo compare --into host-tests/RESULTS.md -->\n",
     "<!-- end of that -->\n",
 ];
 
 /// Puts `excerpt` between the two marks in `file`.
 fn put(file: &Path, excerpt: &str) -> Result<(), Failure> {
-    let wrong = |why: String| Failure::input(format!("--readme {}: {why}", file.display()));
+    let wrong = |why: String| Failure::input(format!("--into {}: {why}", file.display()));
     let text = std::fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
     let [begin, end] = MARKS;
     let parts = text

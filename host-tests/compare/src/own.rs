@@ -33,7 +33,7 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     if problem.choice == Choice::Places {
         let (time_s, places) = timed(|| planned(&mission))?;
         runs.push(run(
-            "**uav-relay**, as the head predicts",
+            "**uav-relay**, as the leader predicts",
             time_s,
             &mission,
             &places,

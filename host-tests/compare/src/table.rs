@@ -29,7 +29,7 @@ const HEAD: &str = "\
 const NOTES: &str = "\
 In parentheses: times as long as the first line of that N in the same run.
 
-- `uav-relay, as the head predicts`: what the head computes from the mission before the first sweep, and every relay's place. \
+- `uav-relay, as the leader predicts`: what the head computes from the mission before the first sweep, and every relay's place. \
 `one relay for all`: the joint method on the whole chain from the mission, from all of its starts, which each relay works out \
 alone, and every relay's place. \
 `all relays by messages`: the computing of all relays of a simulated chain one after the other, and every frame they exchange.
@@ -44,7 +44,7 @@ worst hop of the sorted chain. G_MLSL_LDS with LD_LBFGS on a smooth stand-in for
 in f64, by formulas that no solver shares; a chain that breaks order, room or least separation does not count.
 ";
 
-/// What the README shows, in its order.
+/// What RESULTS.md shows, in its order.
 const EXCERPT: [(Choice, u16, &str); 6] = [
     (Choice::Places, 8, "8 relays at 20 m"),
     (Choice::Places, 50, "50 relays at 20 m"),
@@ -79,7 +79,7 @@ pub(crate) fn table(results: &Results) -> Result<String, String> {
     Ok(text)
 }
 
-/// The table of the README.
+/// The table of RESULTS.md.
 pub(crate) fn excerpt(results: &Results) -> Result<String, String> {
     let mut text = EXCERPT_HEAD.to_owned();
     for (choice, relays, title) in EXCERPT {

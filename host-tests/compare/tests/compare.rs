@@ -94,7 +94,7 @@ fn help_names_every_option() {
         "--limit <S>",
         "--json",
         "--from <FILE>",
-        "--readme <FILE>",
+        "--into <FILE>",
         "--venv <DIR>",
         "[default: 30]",
     ] {
@@ -302,15 +302,15 @@ fn the_sides_that_were_chosen_are_judged() {
     );
 }
 
-/// The table of the README is what the command makes of the run that is kept beside the rivals.
+/// The table of RESULTS.md is what the command makes of the run that is kept beside the rivals.
 #[test]
-fn the_readme_has_the_run_that_is_kept() {
+fn the_results_have_the_run_that_is_kept() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let readme = std::fs::read_to_string(root.join("../../README.md")).unwrap();
+    let readme = std::fs::read_to_string(root.join("../RESULTS.md")).unwrap();
     let folder = TempDir::new().unwrap();
-    let copy = folder.path().join("README.md");
+    let copy = folder.path().join("RESULTS.md");
     // Nothing of the table is left in the copy.
-    let begin = readme.find("<!-- cargo versus").unwrap();
+    let begin = readme.find("<!-- cargo compare").unwrap();
     let begin = begin + readme[begin..].find('\n').unwrap() + 1;
     let end = readme.find("<!-- end of that -->").unwrap();
     std::fs::write(&copy, readme[..begin].to_owned() + &readme[end..]).unwrap();
@@ -318,7 +318,7 @@ fn the_readme_has_the_run_that_is_kept() {
     let arguments = [
         "--from",
         kept.to_str().unwrap(),
-        "--readme",
+        "--into",
         copy.to_str().unwrap(),
     ];
     let output = compare(&arguments);
@@ -328,7 +328,7 @@ fn the_readme_has_the_run_that_is_kept() {
     std::fs::write(&copy, "no table").unwrap();
     let line = refusal(&compare(&arguments), 2);
     assert!(
-        line.contains("--readme") && line.contains("no lines"),
+        line.contains("--into") && line.contains("no lines"),
         "{line}"
     );
 }

@@ -341,5 +341,8 @@ fn what_a_relay_is_set_to_is_checked() {
         with(1, |s| s.hop_time = Duration::from_micros(0)),
         Err(SetupError::HopTime)
     );
-    assert_eq!(with(1, |s| s.lost = s.quiet), Err(SetupError::Silence));
+    assert_eq!(
+        with(1, |s| s.dead_after = s.probe_after),
+        Err(SetupError::Silence)
+    );
 }

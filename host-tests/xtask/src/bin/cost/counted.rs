@@ -155,7 +155,7 @@ const COUNTED: &[Counted] = &[
     ),
     ("its frame", "bytes", &["sweep_bytes"], Some(100)),
     (
-        "a full sweep at the tail, message in to verdict out",
+        "a full sweep at the last relay, message in to verdict out",
         "instructions",
         &["sweep_at_tail"],
         None,
@@ -167,7 +167,7 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     (
-        "a full verdict at the head",
+        "a full verdict at the leader",
         "instructions",
         &["verdict_at_head"],
         None,
@@ -179,7 +179,7 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     (
-        "a portion of the head's prediction",
+        "a portion of the leader's prediction",
         "instructions",
         &["predict"],
         None,
