@@ -146,7 +146,8 @@ pub enum SetupError {
     Method,
     /// `method.explore_m` is not within 0 to 1e5, or its grid has fewer than 2 columns or rows.
     Adjust,
-    /// `measure.i_max_w` is not within 1e-30 to 1e6, or `measure.samples` not within 100 to 1 000 000.
+    /// `measure.i_max_w` is not within 1e-30 to 1e6, or `measure.samples` not within 100 to 1 000 000, or the crate was built
+    /// without the feature `field`.
     Measure,
     /// `hop_time` is zero.
     HopTime,
@@ -166,15 +167,15 @@ impl core::fmt::Display for SetupError {
                 "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6"
             }
             Self::Step => "the fixed step must be above 0",
-            Self::Method => "method must be Align in a field, or without the feature for it",
+            Self::Method => "method must be Align in a field, and without its feature, altitude or adjust",
             Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
             Self::Measure => {
-                "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000"
+                "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000, and the feature field on"
             }
             Self::HopTime => "hop_time must be above 0",
             Self::Epoch => "auth.epoch must be above 0, and above that of every start before",
             Self::Silence => "probe_after must be above 0 and dead_after above probe_after",
-            Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, hover of 0 to 1e3, and its feature",
+            Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, hover of 0 to 1e3, and its feature on",
         })
     }
 }
@@ -219,7 +220,9 @@ pub(crate) fn check(
         }
     }
     if let Some(Measure { i_max_w, samples }) = settings.measure
-        && !((1e-30..=1e6).contains(&i_max_w) && (100..=1_000_000).contains(&samples))
+        && !(cfg!(feature = "field")
+            && (1e-30..=1e6).contains(&i_max_w)
+            && (100..=1_000_000).contains(&samples))
     {
         return Err(SetupError::Measure);
     }

@@ -5,7 +5,7 @@
 //! semihosting, which traps on a board without a debugger: this image is not one to flash.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-#[cfg(all(target_os = "none", feature = "auth"))]
+#[cfg(target_os = "none")]
 mod auth;
 #[cfg(target_os = "none")]
 mod counter;
@@ -21,7 +21,7 @@ mod shares;
 mod stack;
 #[cfg(target_os = "none")]
 mod sweeps;
-#[cfg(all(target_os = "none", feature = "upload"))]
+#[cfg(target_os = "none")]
 mod upload;
 
 #[cfg(not(target_os = "none"))]
@@ -36,7 +36,7 @@ mod image {
     use stm32f4xx_hal as _;
     use uav_relay::Relay;
 
-    use super::{counter, methods, planning, shares, stack, sweeps};
+    use super::{auth, counter, methods, planning, shares, stack, sweeps, upload};
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -58,10 +58,8 @@ mod image {
         planning::planning();
         planning::joint();
         stack::stack();
-        #[cfg(feature = "auth")]
-        super::auth::auth();
-        #[cfg(feature = "upload")]
-        super::upload::upload();
+        auth::auth();
+        upload::upload();
         hprintln!("done 1");
         debug::exit(debug::EXIT_SUCCESS);
         counter::stop()

@@ -1,9 +1,9 @@
 //! A relay on a Linux companion computer, over real ttys: USB adapters, the UART of a header, telemetry radios.
 //!
 //! ```text
-//! cargo run --release --features upload --example linux_companion -- --index 2 --of 3 --upstream /dev/ttyUSB0 --downstream /dev/ttyUSB1
-//! cargo run --release --features upload --example linux_companion -- --index 2 --of 3 --shared /dev/ttyUSB0      # one radio for all
-//! cargo run --release --features upload --example linux_companion -- --help
+//! cargo run --example linux_companion -- --index 2 --of 3 --upstream /dev/ttyUSB0 --downstream /dev/ttyUSB1
+//! cargo run --example linux_companion -- --index 2 --of 3 --shared /dev/ttyUSB0      # one radio for all
+//! cargo run --example linux_companion -- --help
 //! ```
 //! The first relay needs no `--upstream`, the last one no `--downstream`. All relays of a chain are given the same `--of`,
 //! `--baud`, `--network` and mission; a neighbour that was given another mission is reported.

@@ -1,9 +1,9 @@
 //! The ground's end of an upload, over a real tty: hands the chain a new mission, and ends once that is flown.
 //!
 //! ```text
-//! cargo run --release --features upload --example linux_ground -- --tty /dev/ttyUSB0 --end tx --of 3 \
+//! cargo run --example linux_ground -- --tty /dev/ttyUSB0 --end tx --of 3 \
 //!   --key-file network7.key --epoch-file ground.epoch --version 1 --new-interferer 80,700,-300
-//! cargo run --release --features upload --example linux_ground -- --help
+//! cargo run --example linux_ground -- --help
 //! ```
 //! It is the transmitter or the receiver of the chain: connect it where the relay next to that listens, or to the channel that
 //! all hear (`--shared`). `--of`, `--network` and the options of the mission say what the relays were loaded with, as `linux_companion`

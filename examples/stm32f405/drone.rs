@@ -96,7 +96,7 @@ pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> 
     }
 }
 
-/// The relay, in a place of its own in RAM: the stack would have to hold it, and the copy it is made from. What
+/// The relay, unless this image was built without what it is asked for, in a place of its own in RAM: the stack would have to hold it, and the copy it is made from. What
 /// [`Relay::new`] gives is kept whole, since to take it apart on the way would be one more copy.
 #[inline(never)]
 fn switch_on(
@@ -117,7 +117,7 @@ fn switch_on(
         wiring,
         ..Settings::default()
     };
-    // What could be refused here has been checked with the configuration.
+    // All else has been checked with the configuration.
     cortex_m::singleton!(RELAY: Result<Relay, SetupError> = Relay::new(
         config.mission,
         config.identity,
@@ -126,6 +126,7 @@ fn switch_on(
         now,
     ))?
     .as_mut()
+    .map_err(|error| log::cannot_fly(*error))
     .ok()
 }
 
@@ -169,7 +170,7 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
     }))
 }
 
-/// An image without `--features auth` does not fly where frames are to be signed.
+/// An image built without the feature `auth` does not fly where frames are to be signed.
 #[cfg(not(feature = "auth"))]
 fn sign() -> Result<Option<Auth>, CannotSign> {
     if config::secret(board::block()) == Ok(None) {

@@ -1,4 +1,4 @@
-//! With `--features upload`: what was uploaded is in the flash before it is needed again.
+//! With the feature `upload`: what was uploaded is in the flash before it is needed again.
 
 use uav_relay::Relay;
 

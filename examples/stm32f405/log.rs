@@ -2,6 +2,7 @@
 //! `--features rtt`.
 
 use uav_relay::serial::SerialStats;
+use uav_relay::settings::SetupError;
 use uav_relay::{Event, Relay};
 
 use super::clock;
@@ -103,6 +104,11 @@ pub(crate) fn uploaded(version: u16, kept: bool) {
 #[cfg(not(feature = "auth"))]
 pub(crate) fn cannot_sign() {
     defmt::error!("configuration refused: it has a key, and this image was built without auth");
+}
+
+/// This image was built without the feature for the method, or for measuring.
+pub(crate) fn cannot_fly(error: SetupError) {
+    defmt::error!("configuration refused: this image cannot do it, {}", error);
 }
 
 pub(crate) fn event(event: Event, relay: &Relay) {

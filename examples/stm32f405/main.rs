@@ -18,8 +18,8 @@
 //! | `wires.rs` | its pins and interrupts |
 //! | `drone.rs` | what a drone does, whatever its links are; `fly_to` is where your autopilot comes in |
 //! | `config.rs` | the configuration, byte by byte |
-//! | `epoch.rs` | with `--features auth`, the number that rises at every start |
-//! | `uploads.rs`, `kept.rs` | with `--features upload`, the missions that were uploaded in flight: the log of them, and its use |
+//! | `epoch.rs` | with the feature `auth`, the number that rises at every start |
+//! | `uploads.rs`, `kept.rs` | with the feature `upload`, the missions that were uploaded in flight: the log of them, and its use |
 //! | `flash.rs` | the sectors that hold these two, and everything unsafe about them |
 //! | `port.rs` | a serial port that an interrupt serves |
 //! | `clock.rs` | time and sleep |

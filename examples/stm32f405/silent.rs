@@ -1,6 +1,7 @@
 //! What `log.rs` is without `--features defmt`: nothing.
 
 use uav_relay::serial::SerialStats;
+use uav_relay::settings::SetupError;
 use uav_relay::{Event, Relay};
 
 use super::config::{Config, ConfigError};
@@ -30,6 +31,8 @@ pub(crate) const fn uploaded(_: u16, _: bool) {}
 
 #[cfg(not(feature = "auth"))]
 pub(crate) const fn cannot_sign() {}
+
+pub(crate) const fn cannot_fly(_: SetupError) {}
 
 pub(crate) const fn event(_: Event, _: &Relay) {}
 

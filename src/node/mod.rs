@@ -166,7 +166,6 @@ impl Node {
     /// On which side node `sender` is, if it may have something to say to this relay: a neighbour, or one that might become
     /// one, or the ground where it may upload missions.
     pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
-        #[cfg(feature = "upload")]
         if let Some(side) = self.ground_side(sender) {
             return Some(side);
         }
@@ -180,6 +179,21 @@ impl Node {
         } else {
             Side::Downstream
         })
+    }
+
+    /// On which side `node` is, if it is the ground transmitter or receiver and near enough to be heard.
+    fn ground_side(&self, node: u16) -> Option<Side> {
+        let (own, all) = (self.member.node, self.member.all);
+        let most = match self.member.settings.wiring {
+            Wiring::Pair => 1,
+            Wiring::Shared => CANDIDATES,
+        };
+        let near = takes_uploads(&self.member) && node.abs_diff(own) <= most;
+        match node {
+            0 if near => Some(Side::Upstream),
+            _ if near && node == all.saturating_add(1) => Some(Side::Downstream),
+            _ => None,
+        }
     }
 
     /// Whether others than the neighbours of the mission can be heard.
@@ -245,7 +259,6 @@ impl Node {
     /// said again.
     #[cfg(feature = "auth")]
     pub(crate) fn meet(&mut self, now: Instant, side: Side, from: u16, first: bool) {
-        #[cfg(feature = "upload")]
         if self.ground_side(from).is_some() {
             return;
         }
@@ -857,21 +870,6 @@ impl Node {
 
 #[cfg(feature = "upload")]
 impl Node {
-    /// On which side `node` is, if it is the ground transmitter or receiver and near enough to be heard.
-    fn ground_side(&self, node: u16) -> Option<Side> {
-        let (own, all) = (self.member.node, self.member.all);
-        let most = match self.member.settings.wiring {
-            Wiring::Pair => 1,
-            Wiring::Shared => CANDIDATES,
-        };
-        let near = takes_uploads(&self.member) && node.abs_diff(own) <= most;
-        match node {
-            0 if near => Some(Side::Upstream),
-            _ if near && node == all.saturating_add(1) => Some(Side::Downstream),
-            _ => None,
-        }
-    }
-
     /// A message from the ground at `side`; whether it is one for the ground to say.
     fn on_ground(&mut self, now: Instant, side: Side, message: &Message) -> bool {
         let base = self.member.digest;

@@ -10,6 +10,9 @@ use crate::place::Placement;
 use crate::settings::Measure;
 use crate::sir::square;
 
+/// Whether this crate was built for fields. Without that, no `Settings` with `measure` is taken, and none of the code is reached.
+const FIELD: bool = cfg!(feature = "field");
+
 /// One measurement.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -37,7 +40,7 @@ impl Meter {
     pub(crate) const fn new(measure: Option<Measure>) -> Self {
         Self {
             estimator: match measure {
-                Some(Measure { i_max_w, samples }) if cfg!(feature = "field") => {
+                Some(Measure { i_max_w, samples }) if FIELD => {
                     Some((Estimator::new(i_max_w), samples))
                 }
                 _ => None,
@@ -53,8 +56,7 @@ impl Meter {
         at: Option<Placement>,
         sample: Sample,
     ) -> bool {
-        let Some((estimator, wanted)) = self.estimator.as_mut().filter(|_| cfg!(feature = "field"))
-        else {
+        let Some((estimator, wanted)) = self.estimator.as_mut().filter(|_| FIELD) else {
             return false;
         };
         let power_w = match (sample, at) {
@@ -88,10 +90,6 @@ impl Meter {
     }
 
     pub(crate) const fn published(&self) -> Option<f32> {
-        if cfg!(feature = "field") {
-            self.published
-        } else {
-            None
-        }
+        if FIELD { self.published } else { None }
     }
 }

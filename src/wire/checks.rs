@@ -118,13 +118,9 @@ fn checked(body: Body) -> Option<Message> {
             any,
             worst: sir_in_range(worst)?,
         }),
-        Body::Hello(forming) if cfg!(feature = "membership") => Message::Hello(forming.hello()?),
-        Body::Proposal(forming) if cfg!(feature = "membership") => {
-            Message::Proposal(forming.proposal()?)
-        }
-        Body::Decision(forming) if cfg!(feature = "membership") => {
-            Message::Decision(forming.count()?)
-        }
+        Body::Hello(forming) => Message::Hello(forming.hello()?),
+        Body::Proposal(forming) => Message::Proposal(forming.proposal()?),
+        Body::Decision(forming) => Message::Decision(forming.count()?),
         Body::Fence(pass, echo, number, x_m, target_m) if cfg!(feature = "guard") => {
             Message::Fence {
                 mission: pass.mission(),

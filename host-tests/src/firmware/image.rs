@@ -9,7 +9,7 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// The profile that what is flashed is built with.
 pub const PROFILE: &str = "firmware";
 
-/// Builds `examples`, with the log, authentication and uploads, and says in which folder they are.
+/// Builds `examples`, with everything and the log, and says in which folder they are.
 ///
 /// # Errors
 /// What cargo has to say, if it fails.
@@ -26,7 +26,7 @@ pub fn build(examples: &[&str]) -> Result<PathBuf, String> {
         .current_dir(root)
         .args(["build", "--locked", "--package", "uav-relay"])
         .args(["--profile", PROFILE, "--target", TARGET])
-        .args(["--features", "defmt,upload", "--target-dir"])
+        .args(["--features", "defmt", "--target-dir"])
         .arg(&folder);
     for example in examples {
         command.args(["--example", example]);

@@ -30,9 +30,6 @@ fn build(example: &str) -> PathBuf {
         .arg("--target-dir")
         .arg(target.expect("the folder for temporary files is in it"))
         .stderr(Stdio::inherit());
-    if !cfg!(debug_assertions) {
-        cargo.arg("--release");
-    }
     let output = cargo.output().unwrap();
     assert!(output.status.success(), "{example} does not build");
     String::from_utf8(output.stdout)

@@ -26,6 +26,14 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     if figure("fewest_relays")? != 22 {
         return Err("the counting image does not count 22 relays".to_owned());
     }
+    for sign in ["passed_on", "replayed"] {
+        if figure(sign)? != 1 {
+            return Err(format!("a signed sweep in the counting image: not {sign}"));
+        }
+    }
+    if figure("held")? != 1 {
+        return Err("an offer in the counting image: not held".to_owned());
+    }
     let mut rows = table(&counted, COUNTED)?;
     let mut worst = 0;
     for call in CALLS {
@@ -37,27 +45,9 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
         worst,
         Some(50_000),
     ));
+    rows.extend(table(&counted, SIGNED)?);
+    rows.extend(table(&counted, UPLOADED)?);
     Ok(rows)
-}
-
-/// The same image with the feature `auth`: what that adds.
-pub(crate) fn of_the_signing_image() -> Result<Vec<Row>, String> {
-    let counted = count(&build("cost", &["--features", "auth"])?)?;
-    for sign in ["passed_on", "replayed"] {
-        if figure(&counted, sign)? != 1 {
-            return Err(format!("a signed sweep in the counting image: not {sign}"));
-        }
-    }
-    table(&counted, SIGNED)
-}
-
-/// The same image with the feature `upload`: what that adds.
-pub(crate) fn of_the_uploading_image() -> Result<Vec<Row>, String> {
-    let counted = count(&build("cost", &["--features", "upload"])?)?;
-    if figure(&counted, "held")? != 1 {
-        return Err("an offer in the counting image: not held".to_owned());
-    }
-    table(&counted, UPLOADED)
 }
 
 fn figure(counted: &BTreeMap<String, u64>, name: &str) -> Result<u64, String> {
@@ -79,13 +69,8 @@ fn table(counted: &BTreeMap<String, u64>, of: &[Counted]) -> Result<Vec<Row>, St
     Ok(rows)
 }
 
+/// Of frames with a tag.
 const SIGNED: &[Counted] = &[
-    (
-        "`size_of::<Relay>()` with `auth`",
-        "bytes",
-        &["size_of_relay"],
-        None,
-    ),
     (
         "the tag of a body of 32 bytes, made or checked",
         "instructions",
@@ -114,13 +99,8 @@ const SIGNED: &[Counted] = &[
     ),
 ];
 
+/// Of missions in flight.
 const UPLOADED: &[Counted] = &[
-    (
-        "`size_of::<Relay>()` with `upload`",
-        "bytes",
-        &["size_of_relay"],
-        None,
-    ),
     (
         "an offer of a new mission, taken",
         "instructions",

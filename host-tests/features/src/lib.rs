@@ -1,0 +1,209 @@
+//! A chain of relays on a virtual clock, of nothing but `uav-relay`: whatever features that was built with.
+#![cfg(not(target_os = "none"))]
+
+use std::collections::VecDeque;
+
+use uav_relay::channel::AirGround;
+use uav_relay::settings::SetupError;
+use uav_relay::wire::crc::Crc32c;
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{
+    Band, Channel, Duration, Identity, Instant, Interference, Interferer, Mission, MissionConfig,
+    Port, Profile, Relay, Settings, Wiring,
+};
+
+/// The paper's multi-hop scenario: 1 km, an interferer of 80 W beside its middle.
+///
+/// # Panics
+/// Never: its numbers are in range.
+#[expect(clippy::expect_used, reason = "numbers that are known to be in range")]
+pub fn paper(relays: u16) -> Mission {
+    Mission::try_new(MissionConfig {
+        relays,
+        distance_m: 1000.0,
+        min_separation_m: 4.0,
+        tx_power_w: 80.0,
+        common: Profile {
+            altitude_m: 20.0,
+            power_w: 1.0,
+        },
+        channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).expect("in range"),
+        band: Band::at(20.0),
+        lateral: Band::NONE,
+        interference: Interference::Source(Interferer {
+            power_w: 80.0,
+            x_m: 500.0,
+            y_m: 400.0,
+        }),
+        tolerance: 1e-4,
+    })
+    .expect("in range")
+}
+
+/// How long a frame is under way.
+const FLIGHT: Duration = Duration::from_millis(2);
+
+/// How far a shared channel reaches, in relays.
+const RANGE: usize = 4;
+
+/// Bytes under way: when they arrive, at which relay, through which port.
+struct Arrival {
+    at: Instant,
+    relay: usize,
+    port: Port,
+    bytes: Vec<u8>,
+}
+
+/// Relays, and what they say to each other.
+#[derive(Debug)]
+pub struct Chain {
+    relays: Vec<Relay>,
+    silent: Vec<bool>,
+    under_way: VecDeque<Arrival>,
+    now: Instant,
+    said: Crc32c,
+}
+
+impl core::fmt::Debug for Arrival {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} bytes for {}", self.bytes.len(), self.relay + 1)
+    }
+}
+
+impl Chain {
+    /// The relays of `mission`, switched on with `settings` each.
+    ///
+    /// # Errors
+    /// What the first of them refuses.
+    pub fn new(mission: Mission, settings: Settings) -> Result<Self, SetupError> {
+        let relay = |index| {
+            let identity = Identity { network: 7, index };
+            let seed = 1000 + u32::from(index);
+            Relay::new(mission, identity, settings, seed, Instant::ZERO)
+        };
+        let relays = (1..=mission.relays())
+            .map(relay)
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Self {
+            silent: vec![false; relays.len()],
+            relays,
+            under_way: VecDeque::new(),
+            now: Instant::ZERO,
+            said: Crc32c::new(),
+        })
+    }
+
+    /// Its relays.
+    pub fn relays(&self) -> &[Relay] {
+        &self.relays
+    }
+
+    /// The relays, for a firmware's inputs.
+    pub fn relays_mut(&mut self) -> &mut [Relay] {
+        &mut self.relays
+    }
+
+    /// What time it is.
+    pub const fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// Relay `index`, from 1, neither hears nor says anything from now on.
+    pub fn silence(&mut self, index: usize) {
+        if let Some(silent) = self.silent.get_mut(index.wrapping_sub(1)) {
+            *silent = true;
+        }
+    }
+
+    /// The check sequence of every byte that has been said, in the order that it was said.
+    pub fn said(&self) -> u32 {
+        self.said.clone().finish()
+    }
+
+    /// Lets so much time go by.
+    pub fn fly(&mut self, span: Duration) {
+        let end = self.now + span;
+        loop {
+            self.drain();
+            let arrival = self.under_way.front().map(|arrival| arrival.at);
+            let due = |(relay, silent): (&Relay, &bool)| relay.poll_timeout().filter(|_| !*silent);
+            let timeouts = self.relays.iter().zip(&self.silent).filter_map(due);
+            let Some(next) = timeouts.chain(arrival).min().filter(|next| *next <= end) else {
+                break;
+            };
+            self.now = next.max(self.now);
+            self.deliver();
+            for (relay, silent) in self.relays.iter_mut().zip(&self.silent) {
+                if !silent && relay.poll_timeout().is_some_and(|at| at <= self.now) {
+                    relay.handle_timeout(self.now);
+                }
+            }
+        }
+        self.now = end;
+    }
+
+    /// Puts everything that is to be said under way.
+    fn drain(&mut self) {
+        let mut frame = [0; MAX_FRAME];
+        let count = self.relays.len();
+        for (index, (relay, silent)) in self.relays.iter_mut().zip(&self.silent).enumerate() {
+            while let Some(transmit) = relay
+                .poll_transmit(self.now, &mut frame)
+                .filter(|_| !silent)
+            {
+                let bytes = frame.get(..transmit.len).unwrap_or_default();
+                self.said.update(bytes);
+                for (hearer, port) in hearers(index, transmit.port, count) {
+                    self.under_way.push_back(Arrival {
+                        at: self.now + FLIGHT,
+                        relay: hearer,
+                        port,
+                        bytes: bytes.to_vec(),
+                    });
+                }
+            }
+            while relay.poll_event().is_some() {}
+        }
+    }
+
+    /// Hands over what has arrived.
+    fn deliver(&mut self) {
+        let has_come = |arrival: &Arrival| arrival.at <= self.now;
+        while self.under_way.front().is_some_and(has_come) {
+            let Some(arrival) = self.under_way.pop_front() else {
+                return;
+            };
+            if let (Some(relay), Some(false)) = (
+                self.relays.get_mut(arrival.relay),
+                self.silent.get(arrival.relay),
+            ) {
+                relay.handle_bytes(self.now, arrival.port, &arrival.bytes);
+            }
+        }
+    }
+}
+
+/// Who hears what relay `index`, from 0, of `count` says through `port`, and where.
+fn hearers(index: usize, port: Port, count: usize) -> Vec<(usize, Port)> {
+    let next = |at: usize, port| (at < count).then_some((at, port));
+    match port {
+        Port::Upstream => index
+            .checked_sub(1)
+            .map(|at| (at, Port::Downstream))
+            .into_iter()
+            .collect(),
+        Port::Downstream => next(index + 1, Port::Upstream).into_iter().collect(),
+        Port::Shared => (index.saturating_sub(RANGE)..=index + RANGE)
+            .filter(|at| *at != index)
+            .filter_map(|at| next(at, port))
+            .collect(),
+    }
+}
+
+/// Settings of a chain whose relays share one channel.
+pub fn shared() -> Settings {
+    Settings {
+        wiring: Wiring::Shared,
+        ..Settings::default()
+    }
+}

@@ -1,0 +1,171 @@
+//! What every set of features has in common: the places, the bytes on the air, and that what is left out is refused.
+
+use uav_relay::mission::MissionError;
+use uav_relay::settings::SetupError;
+use uav_relay::{
+    Adjust, Duration, Field, FieldPoint, Interference, Measure, Method, Mission, MissionConfig,
+    Relay, Settings,
+};
+use uav_relay_features::{Chain, paper, shared};
+
+// What the full set says; `-- --nocapture` prints it, and after a change of the arithmetic or of the wire format that belongs here.
+/// x of five relays and of four, m, to the bit.
+const OF_FIVE: [u32; 5] = [
+    0x439b_7618,
+    0x43ac_5a98,
+    0x43bc_d291,
+    0x43cc_f747,
+    0x43dc_e1b0,
+];
+const OF_FOUR: [u32; 4] = [0x439f_cc32, 0x43b1_2a47, 0x43c2_1c40, 0x43d2_be13];
+
+/// The check sequences of all that is said in the flights below.
+const SAID_BY_WIRES: u32 = 0x63a4_ed03;
+const SAID_ON_A_CHANNEL: u32 = 0xea63_26ab;
+
+const MINUTE: Duration = Duration::from_millis(60_000);
+
+fn places(relays: &[Relay]) -> Vec<f32> {
+    let place = |relay: &Relay| {
+        let place = relay.setpoint().expect("it has a place");
+        assert_eq!((place.y_m, place.altitude_m), (0.0, 20.0));
+        place.x_m
+    };
+    relays.iter().map(place).collect()
+}
+
+fn bits(places: &[f32]) -> Vec<u32> {
+    places.iter().map(|x_m| x_m.to_bits()).collect()
+}
+
+/// The SIR of every hop, in f64 and by the paper's formulas: with line of sight in the air an excess loss of 0.1 dB, from the
+/// interferer to the receiver one of 21 dB.
+fn hops(places: &[f32]) -> Vec<f64> {
+    let squared = |x: f64, y: f64, h: f64| x * x + y * y + h * h;
+    let mut before = (0.0, 0.0, 80.0 / 80.0);
+    let mut hops = Vec::new();
+    for &x_m in places {
+        let x = f64::from(x_m);
+        let (from, low, gain) = before;
+        let quiet = squared(500.0 - x, 400.0, 20.0);
+        hops.push(gain * quiet / squared(x - from, 0.0, 20.0 - low));
+        before = (x, 20.0, 1.0 / 80.0);
+    }
+    let excess = 10_f64.powf(2.1) / 10_f64.powf(0.01);
+    let last = 1000.0 - before.0;
+    hops.push(excess / 80.0 * squared(500.0, 400.0, 0.0) / squared(last, 0.0, 20.0));
+    hops
+}
+
+#[test]
+fn five_find_the_best_places_on_the_same_bytes() {
+    let mut chain = Chain::new(paper(5), Settings::default()).unwrap();
+    chain.fly(MINUTE);
+    let places = places(chain.relays());
+    let hops = hops(&places);
+    println!(
+        "{places:?} {:#010x?} {hops:?}, said {:#010x}",
+        bits(&places),
+        chain.said()
+    );
+    // The best chain has hops that are all as good.
+    let (least, most) = hops.iter().fold((f64::MAX, 0.0_f64), |(least, most), hop| {
+        (least.min(*hop), most.max(*hop))
+    });
+    assert!(most / least < 1.0 + 2e-4, "{hops:?}");
+    assert_eq!(bits(&places), OF_FIVE);
+    assert_eq!(chain.said(), SAID_BY_WIRES);
+}
+
+#[test]
+fn four_go_on_without_the_third_on_the_same_bytes() {
+    let mut chain = Chain::new(paper(5), shared()).unwrap();
+    chain.fly(MINUTE);
+    assert_eq!(bits(&places(chain.relays())), OF_FIVE);
+    chain.silence(3);
+    chain.fly(MINUTE.times(3));
+    let mut left = chain.relays().to_vec();
+    left.remove(2);
+    let places = places(&left);
+    println!(
+        "{places:?} {:#010x?}, said {:#010x}",
+        bits(&places),
+        chain.said()
+    );
+    assert_eq!(bits(&places), OF_FOUR);
+    assert_eq!(chain.said(), SAID_ON_A_CHANNEL);
+}
+
+/// No error where the feature is there.
+fn unless<E>(there: bool, error: E) -> Option<E> {
+    (!there).then_some(error)
+}
+
+#[test]
+fn what_was_left_out_is_refused() {
+    let refused = |settings| Chain::new(paper(5), settings).err();
+    let by = |method| Settings {
+        method,
+        ..Settings::default()
+    };
+    assert_eq!(
+        refused(by(Method::Joint)),
+        unless(cfg!(feature = "altitude"), SetupError::Method)
+    );
+    assert_eq!(
+        refused(by(Method::Adjust(Adjust::default()))),
+        unless(cfg!(feature = "adjust"), SetupError::Method)
+    );
+    let measures = Settings {
+        measure: Some(Measure {
+            i_max_w: 1e-6,
+            samples: 1000,
+        }),
+        ..Settings::default()
+    };
+    assert_eq!(
+        refused(measures),
+        unless(cfg!(feature = "field"), SetupError::Measure)
+    );
+    static POINTS: [FieldPoint; 1] = [FieldPoint {
+        x_m: 0.0,
+        upsilon_per_w: 1e9,
+    }];
+    let field = Mission::try_new(MissionConfig {
+        interference: Interference::Field(Field::new(&POINTS)),
+        ..*paper(5).config()
+    });
+    assert_eq!(
+        field.err(),
+        unless(cfg!(feature = "field"), MissionError::Field)
+    );
+    let mission = paper(5);
+    let guarded = Settings {
+        guard: Some(uav_relay::guard::config::GuardConfig::of(
+            &mission,
+            mission.config().common,
+        )),
+        ..Settings::default()
+    };
+    assert_eq!(
+        refused(guarded),
+        unless(cfg!(feature = "guard"), SetupError::Guard)
+    );
+}
+
+/// The same places, when every frame is signed.
+#[cfg(feature = "auth")]
+#[test]
+fn five_that_sign_find_the_same_places() {
+    let auth = uav_relay::Auth {
+        key: uav_relay::Key::new([7; 32]),
+        epoch: 1,
+    };
+    let settings = Settings {
+        auth: Some(auth),
+        ..Settings::default()
+    };
+    let mut chain = Chain::new(paper(5), settings).unwrap();
+    chain.fly(MINUTE);
+    assert_eq!(bits(&places(chain.relays())), OF_FIVE);
+}
