@@ -5,26 +5,26 @@
 pub mod channel;
 #[cfg(doc)]
 pub mod docs;
-pub mod event;
+mod event;
 pub mod field;
 #[cfg(feature = "upload")]
 pub mod ground;
 pub mod guard;
 mod jitter;
 pub mod mission;
-pub mod node;
+mod node;
 pub mod optimiser;
 pub mod place;
 pub mod planning;
 pub mod pointing;
 pub mod power_ratio;
-pub mod relay;
+mod relay;
 mod root;
 pub mod serial;
-pub mod settings;
+mod settings;
 mod side;
 pub mod sir;
-pub mod stats;
+mod stats;
 pub mod time;
 pub mod wire;
 
@@ -40,7 +40,7 @@ pub use optimiser::local::Local;
 pub use optimiser::search::Schedule;
 pub use place::Placement;
 pub use relay::{Port, Relay, Transmit};
-pub use settings::{Adjust, Identity, Measure, Method, Settings, Wiring};
+pub use settings::{Adjust, Identity, Measure, Method, Settings, SetupError, Wiring};
 pub use side::Side;
 pub use stats::Stats;
 pub use time::{Duration, Instant};

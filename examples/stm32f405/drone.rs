@@ -2,7 +2,7 @@
 
 use embedded_hal::digital::OutputPin;
 use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
-use uav_relay::settings::SetupError;
+use uav_relay::SetupError;
 use uav_relay::wire::auth::Auth;
 #[cfg(feature = "auth")]
 use uav_relay::wire::auth::Key;

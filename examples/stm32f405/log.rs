@@ -2,7 +2,7 @@
 //! `--features rtt`.
 
 use uav_relay::serial::SerialStats;
-use uav_relay::settings::SetupError;
+use uav_relay::SetupError;
 use uav_relay::{Event, Relay};
 
 use super::clock;

@@ -29,7 +29,7 @@ pub(crate) mod neighbour;
 mod numbering;
 mod retransmit;
 pub(crate) mod round;
-pub mod sample;
+pub(crate) mod sample;
 mod steering;
 mod timing;
 pub(crate) mod view;

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use uav_relay::channel::AirGround;
-use uav_relay::settings::SetupError;
+use uav_relay::SetupError;
 use uav_relay::wire::crc::Crc32c;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{

@@ -1,7 +1,7 @@
 //! Counters and epochs at their limits, with frames that only somebody who has the key can make.
 
 use host_tests::fixtures::mission;
-use uav_relay::settings::SetupError;
+use uav_relay::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings, Stats, Wiring};
 

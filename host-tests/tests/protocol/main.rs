@@ -298,7 +298,7 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
 
 #[test]
 fn what_a_relay_is_set_to_is_checked() {
-    use uav_relay::settings::SetupError;
+    use uav_relay::SetupError;
     use uav_relay::{Profile, Schedule};
     let with = |index, change: fn(&mut Settings)| {
         let mut settings = Settings::default();

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::settings::SetupError;
+use uav_relay::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Instant, Method, Placement, Sample};
 

@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::settings::SetupError;
+use uav_relay::SetupError;
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::crc::Crc32c;
 use uav_relay::wire::deframe::Deframer;

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use uav_relay::optimiser::search::Infeasible;
-use uav_relay::settings::SetupError;
+use uav_relay::SetupError;
 
 use super::draw::NotDrawn;
 use uav_relay_sim::mission::Refusal;

@@ -1,6 +1,6 @@
 //! A relay of the run that is switched on.
 
-use uav_relay::settings::SetupError;
+use uav_relay::SetupError;
 use uav_relay::wire::upload::Upload;
 use uav_relay::{Identity, Instant, Relay, Settings};
 
