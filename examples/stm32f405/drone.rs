@@ -1,8 +1,8 @@
 //! The drone, whatever its links are: it reads its configuration, runs its relay, and flies where that says.
 
 use embedded_hal::digital::OutputPin;
-use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
 use uav_relay::SetupError;
+use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
 use uav_relay::wire::auth::Auth;
 #[cfg(feature = "auth")]
 use uav_relay::wire::auth::Key;

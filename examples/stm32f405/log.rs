@@ -1,8 +1,8 @@
 //! What is logged, with `--features defmt`. Where it goes is the business of `sink_uart.rs`, or of `sink_rtt.rs` with
 //! `--features rtt`.
 
-use uav_relay::serial::SerialStats;
 use uav_relay::SetupError;
+use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
 
 use super::clock;

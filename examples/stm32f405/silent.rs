@@ -1,7 +1,7 @@
 //! What `log.rs` is without `--features defmt`: nothing.
 
-use uav_relay::serial::SerialStats;
 use uav_relay::SetupError;
+use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
 
 use super::config::{Config, ConfigError};

@@ -157,7 +157,7 @@ impl<P, D> SerialLink<P, D> {
 }
 
 /// A link, whatever it is made of.
-pub(super) trait Link {
+pub(super) trait FrameLink {
     /// Takes in at most [`READ_LIMIT`] bytes as those of `port`.
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay);
     /// Whether one more frame of any length fits.
@@ -172,7 +172,7 @@ pub(super) trait Link {
     fn wake(&self, now: Instant) -> Option<Instant>;
 }
 
-impl<P: SerialPort, D: OutputPin> Link for SerialLink<P, D> {
+impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay) {
         let written = core::mem::take(&mut self.uncounted);
         if written > 0 {

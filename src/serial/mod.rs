@@ -99,7 +99,7 @@ pub use stats::SerialStats;
 use crate::relay::{Port, Relay, Transmit};
 use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
-use link::Link;
+use link::FrameLink;
 
 /// Two serial ports, one to each neighbour, full duplex unless a link has a pin.
 #[derive(Debug)]
@@ -166,7 +166,11 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
 }
 
 /// One round over all links.
-fn poll(now: Instant, relay: &mut Relay, links: &mut [(Port, &mut dyn Link)]) -> Option<Instant> {
+fn poll(
+    now: Instant,
+    relay: &mut Relay,
+    links: &mut [(Port, &mut dyn FrameLink)],
+) -> Option<Instant> {
     for (port, link) in &mut *links {
         link.receive(now, *port, relay);
     }

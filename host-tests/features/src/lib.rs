@@ -3,8 +3,8 @@
 
 use std::collections::VecDeque;
 
-use uav_relay::channel::AirGround;
 use uav_relay::SetupError;
+use uav_relay::channel::AirGround;
 use uav_relay::wire::crc::Crc32c;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{

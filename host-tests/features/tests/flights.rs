@@ -1,7 +1,7 @@
 //! What every set of features has in common: the places, the bytes on the air, and that what is left out is refused.
 
-use uav_relay::mission::MissionError;
 use uav_relay::SetupError;
+use uav_relay::mission::MissionError;
 use uav_relay::{
     Adjust, Duration, Field, FieldPoint, Interference, Measure, Method, Mission, MissionConfig,
     Relay, Settings,

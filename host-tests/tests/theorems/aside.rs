@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use uav_relay::planning::single::aside::{self, Case};
+use uav_relay::planning::single::aside::{self, AsideCase};
 use uav_relay::planning::single::{Found, free, given_altitude};
 use uav_relay::{Band, Mission, MissionConfig};
 use uav_relay_oracle::random::{self, log_uniform};
@@ -194,7 +194,7 @@ fn no_worse_than_brute_force(
     seed: u64,
     count: u64,
     band: impl Fn(&Scene) -> (f64, f64) + Sync,
-    best: impl Fn(&Scene) -> (Found, Case) + Sync,
+    best: impl Fn(&Scene) -> (Found, AsideCase) + Sync,
 ) -> BTreeMap<String, u32> {
     let first = random::seed(seed) << 32;
     let look = |number: u64| {
@@ -295,7 +295,7 @@ fn the_judge_of_three_dimensions_agrees() {
             right_m: roomy.lateral.1,
         };
         let Some(judged) = optimum(&roomy.scene.link, corridor, &[], Effort::usual(number)) else {
-            assert_eq!(case, Case::Drowned);
+            assert_eq!(case, AsideCase::Drowned);
             continue;
         };
         let short = 1.0 - roomy.sir_of(&found) / judged.sir;

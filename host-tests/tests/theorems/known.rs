@@ -138,20 +138,20 @@ fn counterexamples_and_degenerate_places() {
     // The interferer on Tx: SIR_1 is the same everywhere, so it is SIR_2 that counts.
     let (place, sir, case) = best(&link(100.0, 0.0, 0.0, 1.0, 2.0, 2.0), (5.0, 200.0));
     assert!(
-        case == free::Case::Lowest(given_altitude::Case::Level),
+        case == free::FreeCase::Lowest(given_altitude::PlaceCase::Level),
         "{case:?}"
     );
     assert!((sir - 1.0).abs() < 1e-12 && place.x_m > 99.9 && place.altitude_m < 5.1);
     // On Rx: nothing helps.
     let (_, sir, case) = best(&link(100.0, 100.0, 0.0, 1.0, 2.0, 2.0), (5.0, 200.0));
     assert!(
-        case == free::Case::Lowest(given_altitude::Case::Drowned) && sir <= 0.0,
+        case == free::FreeCase::Lowest(given_altitude::PlaceCase::Drowned) && sir <= 0.0,
         "{case:?}"
     );
     // Right beside Tx: SIR_1 only falls.
     let mut scene = Scene::new(&link(100.0, 0.0, 30.0, 1.0, 2.0, 2.0), (5.0, 5.0));
     let (found, case) = given_altitude::best_place(&scene.mission, scene.profile(5.0)).unwrap();
-    assert!(case == given_altitude::Case::Crossing, "{case:?}");
+    assert!(case == given_altitude::PlaceCase::Crossing, "{case:?}");
     let most = scene.brute((0.0, 100.0), (5.0, 5.0));
     assert!(scene.sir_of(&found) >= most * (1.0 - 1e-6));
     // Outside [0, D] there is no place to be given.

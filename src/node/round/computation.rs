@@ -21,7 +21,7 @@ pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 
 /// What the current pass carries.
 #[derive(Clone, Debug)]
-pub(super) enum Pass {
+pub(super) enum PassKind {
     Sweep(Sweeping),
     Course(Coursing),
     Turn(Turning),
@@ -60,7 +60,7 @@ impl Chosen {
 #[derive(Clone, Debug)]
 pub(crate) struct Computation {
     pub(super) state: RoundState,
-    pub(super) pass: Pass,
+    pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
     pub(super) sweeps: u32,
     /// What this relay was given.
@@ -82,7 +82,7 @@ impl Computation {
     pub(crate) const fn new(leader: bool, number: u16, profile: Profile) -> Self {
         Self {
             state: RoundState::new(if leader { Phase::Planning } else { Phase::Idle }, number),
-            pass: Pass::Sweep(Sweeping::new(Ladder::single(1.0))),
+            pass: PassKind::Sweep(Sweeping::new(Ladder::single(1.0))),
             task: LeaderTask::No,
             sweeps: 0,
             profile,
@@ -122,7 +122,7 @@ impl Computation {
     /// A view is proposed: what was under way is over.
     pub(crate) fn suspend(&mut self) {
         self.task.rest();
-        self.pass = Pass::Sweep(Sweeping::new(Ladder::single(1.0)));
+        self.pass = PassKind::Sweep(Sweeping::new(Ladder::single(1.0)));
         self.state.answer();
     }
 
@@ -146,14 +146,14 @@ impl Computation {
     pub(crate) fn work(&mut self, context: &Context<'_>) -> Action {
         if self.state.phase() == Phase::Waiting {
             match &self.pass {
-                Pass::Sweep(sweeping) if !sweeping.is_done() => {
+                PassKind::Sweep(sweeping) if !sweeping.is_done() => {
                     let unknown = ALTITUDE && sweeping.chosen && self.chosen.is_none();
                     if unknown && self.solve(context).is_none() {
                         return Action::Work { moved: false };
                     }
                     return self.go_on_with_sweep(context);
                 }
-                Pass::Turn(_) if ADJUST => return self.go_on_with_turn(context),
+                PassKind::Turn(_) if ADJUST => return self.go_on_with_turn(context),
                 _ => {}
             }
         }
@@ -174,8 +174,8 @@ impl Computation {
         }
         let (number, mission) = (self.state.number(), context.digest());
         match &self.pass {
-            Pass::Sweep(sweeping) if !sweeping.is_done() => None,
-            Pass::Sweep(sweeping) => Some(Message::Sweep(Sweep {
+            PassKind::Sweep(sweeping) if !sweeping.is_done() => None,
+            PassKind::Sweep(sweeping) => Some(Message::Sweep(Sweep {
                 number,
                 mission,
                 ladder: sweeping.ladder,
@@ -184,14 +184,14 @@ impl Computation {
                 measured_per_w: context.measured_per_w,
                 reaches: sweeping.reaches.clone(),
             })),
-            Pass::Course(coursing) if ALTITUDE => Some(Message::Course(Course {
+            PassKind::Course(coursing) if ALTITUDE => Some(Message::Course(Course {
                 number,
                 mission,
                 power_w: self.profile.power_w,
                 bar: coursing.bar,
                 trials: coursing.own.clone(),
             })),
-            Pass::Turn(turning) if ADJUST => self.setpoint.map(|place| {
+            PassKind::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Token(Token {
                     number,
                     mission,
@@ -213,8 +213,8 @@ impl Computation {
     /// Whether the current pass is one on which relays compute for a while.
     pub(crate) const fn is_slow(&self) -> bool {
         match &self.pass {
-            Pass::Turn(_) => true,
-            Pass::Sweep(sweeping) => sweeping.chosen,
+            PassKind::Turn(_) => true,
+            PassKind::Sweep(sweeping) => sweeping.chosen,
             _ => false,
         }
     }
@@ -226,14 +226,14 @@ impl Computation {
         }
         let (number, mission) = (self.state.number(), context.digest());
         match &self.pass {
-            Pass::Sweep(sweeping) => Some(Message::Verdict(Answer {
+            PassKind::Sweep(sweeping) => Some(Message::Verdict(Answer {
                 number,
                 mission,
                 verdict: sweeping.verdict.clone(),
                 stand: sweeping.stand(),
                 own: sweeping.own || self.differs(context),
             })),
-            Pass::Course(coursing) if ALTITUDE => {
+            PassKind::Course(coursing) if ALTITUDE => {
                 coursing.worth.map(|(trial, slack_m, outlook)| {
                     Message::Worth(Worth {
                         number,
@@ -244,7 +244,7 @@ impl Computation {
                     })
                 })
             }
-            Pass::Turn(turning) if ADJUST => self.setpoint.map(|place| {
+            PassKind::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Moved(Moved {
                     number,
                     mission,

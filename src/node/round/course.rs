@@ -3,7 +3,7 @@
 
 use core::task::Poll;
 
-use super::computation::{Chosen, Computation, Pass};
+use super::computation::{Chosen, Computation, PassKind};
 use super::state::Action;
 use super::task::{ChainSolver, LeaderTask, MOST_SOLVED};
 use crate::mission::Mission;
@@ -26,7 +26,7 @@ impl Computation {
 
     /// Whether the leader has to go on by messages: a relay differs, or nobody could solve the whole chain.
     pub(super) fn is_mixed(&self, context: &Context<'_>) -> bool {
-        let told = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.own);
+        let told = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.own);
         told || self.differs(context) || usize::from(context.mission().relays()) > MOST_SOLVED
     }
 
@@ -140,7 +140,7 @@ impl Computation {
         let sigma = libm::logf(target);
         self.task
             .ascend(Ascent::new(distance_m, sigma, 0.0, f32::NEG_INFINITY));
-        self.pass = Pass::Course(Coursing::new(Bar::FIRST));
+        self.pass = PassKind::Course(Coursing::new(Bar::FIRST));
     }
 
     fn courser<'a>(&self, context: &Context<'a>, power_in_w: Option<f32>) -> Courser<'a> {
@@ -163,7 +163,8 @@ impl Computation {
 
     /// A course from the relay before.
     pub(crate) fn on_course(&mut self, context: &Context<'_>, course: &Course) -> Action {
-        let same = matches!(&self.pass, Pass::Course(coursing) if coursing.told == course.trials);
+        let same =
+            matches!(&self.pass, PassKind::Course(coursing) if coursing.told == course.trials);
         let arrival = self.state.arrival(course.number, same);
         if let Some(next) = arrival.refused(self.state) {
             return next;
@@ -190,12 +191,12 @@ impl Computation {
         if begins {
             self.begin_again();
         }
-        if begins || !matches!(self.pass, Pass::Course(_)) {
-            self.pass = Pass::Course(Coursing::new(bar));
+        if begins || !matches!(self.pass, PassKind::Course(_)) {
+            self.pass = PassKind::Course(Coursing::new(bar));
         }
         let relay = self.courser(context, power_in_w);
         let wanted = self.station_for(true).at;
-        let Pass::Course(coursing) = &mut self.pass else {
+        let PassKind::Course(coursing) = &mut self.pass else {
             return Action::Stale;
         };
         self.state.wait();
@@ -210,7 +211,7 @@ impl Computation {
 
     /// What came of the course, from the relay after.
     pub(crate) fn on_worth(&mut self, context: &Context<'_>, worth: &Worth) -> Action {
-        if let Pass::Course(coursing) = &self.pass
+        if let PassKind::Course(coursing) = &self.pass
             && self.state.awaits(worth.number)
             && coursing.has(worth.trial)
         {
@@ -226,11 +227,11 @@ impl Computation {
         slack_m: f32,
         after: &Outlook,
     ) -> Action {
-        let Pass::Course(coursing) = &self.pass else {
+        let PassKind::Course(coursing) = &self.pass else {
             return Action::Stale;
         };
         let relay = self.courser(context, coursing.power_in_w);
-        let Pass::Course(coursing) = &mut self.pass else {
+        let PassKind::Course(coursing) = &mut self.pass else {
             return Action::Stale;
         };
         let outlook = coursing.conclude(relay, trial, after);

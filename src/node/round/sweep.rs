@@ -1,6 +1,6 @@
 //! A relay's share of a sweep (Algorithms 1 and 4), and of its verdict.
 
-use super::computation::{ADJUST, ALTITUDE, Computation, Pass};
+use super::computation::{ADJUST, ALTITUDE, Computation, PassKind};
 use super::state::Action;
 use super::sweeping::{Sweeping, fingerprint};
 use super::task::LeaderTask;
@@ -19,7 +19,7 @@ impl Computation {
             measured_per_w: sweep.measured_per_w,
         };
         let print = fingerprint(Some(behind), &sweep.reaches);
-        let same = matches!(&self.pass, Pass::Sweep(sweeping)
+        let same = matches!(&self.pass, PassKind::Sweep(sweeping)
             if sweeping.ladder == sweep.ladder
                 && sweeping.chosen == sweep.chosen
                 && sweeping.fingerprint == print);
@@ -49,10 +49,10 @@ impl Computation {
         behind: Option<Behind>,
         from: &PerTarget,
     ) -> Action {
-        if !matches!(self.pass, Pass::Sweep(_)) {
-            self.pass = Pass::Sweep(Sweeping::new(ladder));
+        if !matches!(self.pass, PassKind::Sweep(_)) {
+            self.pass = PassKind::Sweep(Sweeping::new(ladder));
         }
-        let Pass::Sweep(sweeping) = &mut self.pass else {
+        let PassKind::Sweep(sweeping) = &mut self.pass else {
             return Action::Stale;
         };
         sweeping.ladder = ladder;
@@ -68,13 +68,13 @@ impl Computation {
 
     /// Goes on with this relay's share of a sweep, as far as one call may.
     pub(super) fn go_on_with_sweep(&mut self, context: &Context<'_>) -> Action {
-        let is_chosen = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.chosen);
+        let is_chosen = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.chosen);
         if ALTITUDE && is_chosen && self.chosen.is_none() {
             // First it has to find out where it is to be.
             return Action::Work { moved: false };
         }
         let link = self.link(context, is_chosen);
-        let Pass::Sweep(sweeping) = &mut self.pass else {
+        let PassKind::Sweep(sweeping) = &mut self.pass else {
             return Action::Stale;
         };
         if !sweeping.go_on(link) {
@@ -89,9 +89,9 @@ impl Computation {
 
     /// A verdict from the relay after.
     pub(crate) fn on_verdict(&mut self, context: &Context<'_>, answer: &Answer) -> Action {
-        let is_chosen = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.chosen);
+        let is_chosen = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.chosen);
         let link = self.link(context, is_chosen);
-        if let Pass::Sweep(sweeping) = &mut self.pass
+        if let PassKind::Sweep(sweeping) = &mut self.pass
             && self.state.awaits(answer.number)
             && sweeping.take(link, answer)
         {
@@ -102,7 +102,7 @@ impl Computation {
 
     /// The verdict on the current sweep is known.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
-        let Pass::Sweep(sweeping) = &self.pass else {
+        let PassKind::Sweep(sweeping) = &self.pass else {
             return Action::Stale;
         };
         if let Some((x_m, target)) = sweeping.agreed() {
@@ -139,7 +139,7 @@ impl Computation {
             None => search.advance(&verdict.slacks),
         };
         if next.is_err() {
-            let chosen = matches!(&self.pass, Pass::Sweep(sweeping) if sweeping.chosen);
+            let chosen = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.chosen);
             if !chosen || self.search_given(context).is_err() {
                 return self.give_up();
             }

@@ -2,7 +2,7 @@
 
 use core::task::Poll;
 
-use super::computation::{Computation, PLACES_AT_ONCE, Pass};
+use super::computation::{Computation, PLACES_AT_ONCE, PassKind};
 use super::state::Action;
 use super::task::LeaderTask;
 use super::turning::Turning;
@@ -13,7 +13,7 @@ use crate::wire::message::{Moved, Token, Turn};
 impl Computation {
     /// The token, from the relay before.
     pub(crate) fn on_token(&mut self, context: &Context<'_>, token: &Token) -> Action {
-        let same = matches!(&self.pass, Pass::Turn(turning) if turning.turn == token.turn);
+        let same = matches!(&self.pass, PassKind::Turn(turning) if turning.turn == token.turn);
         let arrival = self.state.arrival(token.number, same);
         if let Some(next) = arrival.refused(self.state) {
             return next;
@@ -52,7 +52,7 @@ impl Computation {
             );
             searching = turning.begin(hops, at, (band.least_m, band.most_m));
         }
-        self.pass = Pass::Turn(turning);
+        self.pass = PassKind::Turn(turning);
         if searching {
             Action::Work { moved: false }
         } else {
@@ -62,7 +62,7 @@ impl Computation {
 
     /// Weighs some more places.
     pub(super) fn go_on_with_turn(&mut self, context: &Context<'_>) -> Action {
-        let Pass::Turn(turning) = &mut self.pass else {
+        let PassKind::Turn(turning) = &mut self.pass else {
             return Action::Stale;
         };
         match turning.step(PLACES_AT_ONCE) {
@@ -85,7 +85,7 @@ impl Computation {
 
     /// What a turn came to, from the relay after.
     pub(crate) fn on_moved(&mut self, context: &Context<'_>, moved: &Moved) -> Action {
-        if let Pass::Turn(turning) = &mut self.pass
+        if let PassKind::Turn(turning) = &mut self.pass
             && !turning.is_searching()
             && self.state.awaits(moved.number)
             && context.is_between(moved.place)
@@ -104,7 +104,7 @@ impl Computation {
         moved: bool,
         worst: f32,
     ) -> Action {
-        let (Pass::Turn(turning), Some(at), Some(interferer)) = (
+        let (PassKind::Turn(turning), Some(at), Some(interferer)) = (
             &mut self.pass,
             self.setpoint,
             context.mission().interferer(),

@@ -54,11 +54,11 @@
 //! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
 use super::Found;
-use super::edge::{Edge, Hops, narrow};
+use super::edge::{Edge, TwoHops, narrow};
 use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::place::Placement;
 
-pub use super::edge::Axis;
+pub use super::edge::Coordinate;
 
 /// Halvings of the distance from Rx, in f64: to far below an f32's own step.
 const HALVINGS: u8 = 48;
@@ -66,7 +66,7 @@ const HALVINGS: u8 = 48;
 /// Which case applied.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Case {
+pub enum AsideCase {
     /// Where the level circles of both SIRs touch, at the lowest altitude.
     Touching,
     /// The first hop is the worse one even where it is best: there, at the lowest altitude.
@@ -74,14 +74,14 @@ pub enum Case {
     /// The first hop is the better one even right above Rx, as low as may be: there.
     AboveRx,
     /// That place is outside the corridor: the best of the box's edges, on which this is free.
-    Edge(Axis),
+    Edge(Coordinate),
     /// The interferer stands at Tx (X = Y = 0), SIR_1 is the same everywhere: above Rx.
     Level,
     /// The interferer stands at Rx (X = D, Y = 0), and no place helps: SIR_2 is 0; above Rx.
     Drowned,
 }
 
-impl Case {
+impl AsideCase {
     /// Its number: 1 to 3 as above, then the edges along x, y and upward, 7 and 8.
     pub const fn number(self) -> u8 {
         match self {
@@ -99,20 +99,20 @@ impl Case {
 ///
 /// The mission's band of altitudes is not looked at. Work: 48 halvings in f64, and where they end outside the corridor at most
 /// 272 evaluations of both hops.
-pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, Case)> {
+pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
 
 /// Where a relay of `power_w` watts does best in [0, D], the mission's room to the side and its band, and why; `None` in a field.
 ///
 /// Work: 48 halvings in f64, and where they end outside the corridor at most 736 evaluations of both hops.
-pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, Case)> {
+pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)
 }
 
-fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, Case)> {
+fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, AsideCase)> {
     let interferer = mission.interferer()?;
-    let hops = Hops { mission, power_w };
+    let hops = TwoHops { mission, power_w };
     let (place, case) = without_limits(mission, interferer, band.least_m, power_w);
     let config = mission.config();
     let (along, across) = (
@@ -127,8 +127,8 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, Ca
     }
     // Above Rx is always within.
     let above_rx = Placement::on_line(config.distance_m, band.least_m);
-    let mut best = (hops.found(above_rx), Case::AboveRx);
-    let mut weigh = |free: Axis, room: Band, through: Placement| {
+    let mut best = (hops.found(above_rx), AsideCase::AboveRx);
+    let mut weigh = |free: Coordinate, room: Band, through: Placement| {
         let edge = Edge {
             free,
             through,
@@ -136,7 +136,7 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, Ca
         };
         let found = edge.best(&hops, interferer);
         if found.sir > best.0.sir {
-            best = (found, Case::Edge(free));
+            best = (found, AsideCase::Edge(free));
         }
     };
     let at = |x_m: f32, y_m: f32, altitude_m: f32| Placement {
@@ -146,16 +146,16 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, Ca
     };
     for h in both_ends(band) {
         for y in both_ends(across) {
-            weigh(Axis::Along, along, at(0.0, y, h));
+            weigh(Coordinate::Along, along, at(0.0, y, h));
         }
         for x in both_ends(along) {
-            weigh(Axis::Across, across, at(x, 0.0, h));
+            weigh(Coordinate::Across, across, at(x, 0.0, h));
         }
     }
     if !band.is_single() {
         for y in both_ends(across) {
             for x in both_ends(along) {
-                weigh(Axis::Upward, band, at(x, y, band.least_m));
+                weigh(Coordinate::Upward, band, at(x, y, band.least_m));
             }
         }
     }
@@ -178,7 +178,7 @@ fn without_limits(
     interferer: &Interferer,
     altitude_m: f32,
     power_w: f32,
-) -> (Placement, Case) {
+) -> (Placement, AsideCase) {
     let scene = Plane {
         d: f64::from(mission.config().distance_m),
         x: f64::from(interferer.x_m),
@@ -205,24 +205,24 @@ struct Plane {
 }
 
 impl Plane {
-    fn best(&self) -> ((f64, f64), Case) {
+    fn best(&self) -> ((f64, f64), AsideCase) {
         let above_rx = (self.d, 0.0);
         if !(self.g > 0.0) {
-            return (above_rx, Case::Drowned);
+            return (above_rx, AsideCase::Drowned);
         }
         let q = squared(self.x) + squared(self.y);
         if !(q > 0.0) {
-            return (above_rx, Case::Level);
+            return (above_rx, AsideCase::Level);
         }
         if self.first(above_rx) >= self.second(0.0) {
-            return (above_rx, Case::AboveRx);
+            return (above_rx, AsideCase::AboveRx);
         }
         let away = libm::sqrt(q);
         let t = 2.0 * self.h2 / (away + libm::sqrt(q + 4.0 * self.h2)) / away;
         let hill = (-self.x * t, -self.y * t);
         let far = libm::hypot(self.d - hill.0, hill.1);
         if self.first(hill) <= self.second(far) {
-            return (hill, Case::Hilltop);
+            return (hill, AsideCase::Hilltop);
         }
         let (mut low, mut high) = (0.0, far);
         for _ in 0..HALVINGS {
@@ -233,7 +233,7 @@ impl Plane {
                 high = s;
             }
         }
-        (self.loudest(high), Case::Touching)
+        (self.loudest(high), AsideCase::Touching)
     }
 
     /// SIR_1 / A.

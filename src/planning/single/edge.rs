@@ -19,7 +19,7 @@ use crate::sir::{self, Sender};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
-pub enum Axis {
+pub enum Coordinate {
     /// x, along the line from Tx to Rx.
     Along = 4,
     /// y, across it.
@@ -30,12 +30,12 @@ pub enum Axis {
 
 /// The two hops of the only relay of a mission, wherever it is.
 #[derive(Clone, Copy)]
-pub(super) struct Hops<'a> {
+pub(super) struct TwoHops<'a> {
     pub(super) mission: &'a Mission,
     pub(super) power_w: f32,
 }
 
-impl Hops<'_> {
+impl TwoHops<'_> {
     /// SIR_1 and SIR_2.
     fn both(&self, at: Placement) -> (f32, f32) {
         let first = Sender::transmitter(self.mission).sir_at(self.mission, 0.0, at);
@@ -54,7 +54,7 @@ impl Hops<'_> {
 /// An edge: `through` it, over `room`, m.
 #[derive(Clone, Copy)]
 pub(super) struct Edge {
-    pub(super) free: Axis,
+    pub(super) free: Coordinate,
     pub(super) through: Placement,
     pub(super) room: Band,
 }
@@ -63,9 +63,9 @@ impl Edge {
     fn place(&self, t: f32) -> Placement {
         let mut place = self.through;
         match self.free {
-            Axis::Along => place.x_m = t,
-            Axis::Across => place.y_m = t,
-            Axis::Upward => place.altitude_m = t,
+            Coordinate::Along => place.x_m = t,
+            Coordinate::Across => place.y_m = t,
+            Coordinate::Upward => place.altitude_m = t,
         }
         place
     }
@@ -78,19 +78,19 @@ impl Edge {
         let (x, y, h) = (wide(at.x_m), wide(at.y_m), wide(at.altitude_m));
         let (past, beside) = (wide(interferer.x_m), wide(interferer.y_m));
         let (p, a, b, end) = match self.free {
-            Axis::Along => (
+            Coordinate::Along => (
                 past,
                 squared(beside - y) + squared(h),
                 squared(y) + squared(h),
                 mission.config().distance_m,
             ),
-            Axis::Across => (
+            Coordinate::Across => (
                 beside,
                 squared(past - x) + squared(h),
                 squared(x) + squared(h),
                 0.0,
             ),
-            Axis::Upward => (
+            Coordinate::Upward => (
                 0.0,
                 squared(past - x) + squared(beside - y),
                 squared(x) + squared(y),
@@ -108,7 +108,7 @@ impl Edge {
     ///
     /// Work: at most 8 evaluations of both hops, and 40 more for each piece on which one SIR rises, the other falls, and they
     /// cross: one such piece for x and for the altitude, two for y.
-    pub(super) fn best(&self, hops: &Hops<'_>, interferer: &Interferer) -> Found {
+    pub(super) fn best(&self, hops: &TwoHops<'_>, interferer: &Interferer) -> Found {
         let Band {
             least_m: from,
             most_m: to,
@@ -127,7 +127,7 @@ impl Edge {
     }
 
     /// The best of the piece [`low`, `high`], on which each SIR only rises or only falls, but for its lower end.
-    fn best_of(&self, hops: &Hops<'_>, low: f32, high: f32) -> Found {
+    fn best_of(&self, hops: &TwoHops<'_>, low: f32, high: f32) -> Found {
         let both = |t: f32| hops.both(self.place(t));
         let (at_low, at_high) = (both(low), both(high));
         let end = hops.found(self.place(high));

@@ -17,19 +17,19 @@ use crate::mission::{Mission, Profile};
 /// On which edge of the box the best place lies, and which case applied there. On a corner it is the first of them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Case {
+pub enum FreeCase {
     /// At the lowest altitude, by Theorem 1.
-    Lowest(given_altitude::Case),
+    Lowest(given_altitude::PlaceCase),
     /// At the highest altitude, by Theorem 1.
-    Highest(given_altitude::Case),
+    Highest(given_altitude::PlaceCase),
     /// Right above Rx, by Theorem 2.
-    AboveRx(given_x::Case),
+    AboveRx(given_x::AltitudeCase),
 }
 
 /// Where a relay of `power_w` watts does best in [0, D] and the mission's band, and why; `None` in a field.
 ///
 /// Work: at most 190 evaluations of both hops and one of Lemma 1.
-pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, Case)> {
+pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
     let config = mission.config();
     let level = |altitude_m: f32| {
         let profile = Profile {
@@ -39,15 +39,15 @@ pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, Case)> {
         given_altitude::best_place(mission, profile)
     };
     let (found, case) = level(config.band.least_m)?;
-    let mut best = (found, Case::Lowest(case));
-    let mut weigh = |found: Found, case: Case| {
+    let mut best = (found, FreeCase::Lowest(case));
+    let mut weigh = |found: Found, case: FreeCase| {
         if found.sir > best.0.sir {
             best = (found, case);
         }
     };
     let (found, case) = level(config.band.most_m)?;
-    weigh(found, Case::Highest(case));
+    weigh(found, FreeCase::Highest(case));
     let (found, case) = given_x::best_place(mission, config.distance_m, power_w)?;
-    weigh(found, Case::AboveRx(case));
+    weigh(found, FreeCase::AboveRx(case));
     Some(best)
 }

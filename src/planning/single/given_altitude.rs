@@ -17,7 +17,7 @@ use crate::sir::{Turn, first_hop_turn};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
-pub enum Case {
+pub enum PlaceCase {
     /// The first hop is the worse one even right above Tx, p_t / p_u < C_1: x = 0.
     AboveTx = 1,
     /// SIR_1 falls all the way that counts and crosses SIR_2 once: x is there.
@@ -40,7 +40,7 @@ pub enum Case {
     Drowned = 10,
 }
 
-impl Case {
+impl PlaceCase {
     /// The number that Corollary 1 has for it, 1 to 5; 0 for the cases that it leaves out.
     pub const fn printed(self) -> u8 {
         let number = self as u8;
@@ -55,37 +55,37 @@ impl Case {
 /// Where a relay that holds `profile` does best between Tx and Rx, and why; `None` in a field.
 ///
 /// Any place of the interferer, any D and altitude that a mission takes. Work: at most 90 evaluations of both hops.
-pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, Case)> {
+pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
     let interferer = mission.interferer()?;
     let two = Two { mission, profile };
     let end_m = mission.config().distance_m;
     let above_rx = two.found(end_m);
     if !(two.second(end_m) > 0.0) {
-        return Some((above_rx, Case::Drowned));
+        return Some((above_rx, PlaceCase::Drowned));
     }
     let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
     // How far SIR_1 falls, and whether it rises again before Rx.
     let (to, valley) = match first_hop_turn(interferer, profile.altitude_m) {
-        Turn::Level => return Some((above_rx, Case::Level)),
+        Turn::Level => return Some((above_rx, PlaceCase::Level)),
         Turn::Hill(peak) => {
             return Some(if peak >= end_m || !worse_first(end_m) {
-                (above_rx, Case::HillAboveRx)
+                (above_rx, PlaceCase::HillAboveRx)
             } else if worse_first(peak) {
-                (two.found(peak), Case::Hilltop)
+                (two.found(peak), PlaceCase::Hilltop)
             } else {
-                (two.crossing(peak, end_m), Case::BeyondHill)
+                (two.crossing(peak, end_m), PlaceCase::BeyondHill)
             });
         }
         Turn::Valley(bottom) if bottom < end_m => (bottom, true),
         _ => (end_m, false),
     };
     if two.first(0.0) < two.second(0.0) {
-        return Some((two.found(0.0), Case::AboveTx));
+        return Some((two.found(0.0), PlaceCase::AboveTx));
     }
     Some(match (worse_first(to), valley) {
-        (true, false) => (two.crossing(0.0, to), Case::Crossing),
-        (true, true) => (two.crossing(0.0, to).or(above_rx), Case::BeforeValley),
-        (false, false) => (above_rx, Case::AboveRx),
-        (false, true) => (above_rx, Case::OverValley),
+        (true, false) => (two.crossing(0.0, to), PlaceCase::Crossing),
+        (true, true) => (two.crossing(0.0, to).or(above_rx), PlaceCase::BeforeValley),
+        (false, false) => (above_rx, PlaceCase::AboveRx),
+        (false, true) => (above_rx, PlaceCase::OverValley),
     })
 }

@@ -14,7 +14,7 @@ use crate::sir::square;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
-pub enum Case {
+pub enum AltitudeCase {
     /// Both SIRs fall with the altitude (x <= Psi^h, or X <= 0): the lowest.
     BothFall = 1,
     /// SIR_1 rises with the altitude, and is equal to SIR_2 within the band: there.
@@ -25,7 +25,7 @@ pub enum Case {
     Drowned = 4,
 }
 
-impl Case {
+impl AltitudeCase {
     /// The number that Theorem 2 has for it, 1 to 3; 0 for the case that it leaves out.
     pub const fn printed(self) -> u8 {
         match self {
@@ -38,7 +38,7 @@ impl Case {
 /// The altitude in the mission's band at which a relay of `power_w` watts at `x_m`, m in [0, D], does best, and why.
 ///
 /// `None` in a field, and for `x_m` outside [0, D]. Work: at most six evaluations of both hops and one of Lemma 1.
-pub fn best_place(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Case)> {
+pub fn best_place(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, AltitudeCase)> {
     let interferer = mission.interferer()?;
     if !(0.0..=mission.config().distance_m).contains(&x_m) {
         return None;
@@ -54,14 +54,14 @@ pub fn best_place(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, C
     let (lowest, highest) = (at(band.least_m), at(band.most_m));
     let low = lowest.found(x_m);
     if !(lowest.second(x_m) > 0.0) {
-        return Some((low, Case::Drowned));
+        return Some((low, AltitudeCase::Drowned));
     }
     let rises = 2.0 * interferer.x_m * x_m > square(interferer.x_m) + square(interferer.y_m);
     if !rises {
-        return Some((low, Case::BothFall));
+        return Some((low, AltitudeCase::BothFall));
     }
     if lowest.first(x_m) > lowest.second(x_m) || highest.first(x_m) < highest.second(x_m) {
-        return Some((low.or(highest.found(x_m)), Case::End));
+        return Some((low.or(highest.found(x_m)), AltitudeCase::End));
     }
     // Below it SIR_1 is the smaller, above it SIR_2: the larger root.
     let [_, crossing] = locus::altitudes(mission, x_m, power_w);
@@ -69,5 +69,5 @@ pub fn best_place(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, C
         .unwrap_or(band.least_m)
         .max(band.least_m)
         .min(band.most_m);
-    Some((at(altitude_m).found(x_m), Case::Crossing))
+    Some((at(altitude_m).found(x_m), AltitudeCase::Crossing))
 }

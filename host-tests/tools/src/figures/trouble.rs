@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use uav_relay::optimiser::search::Infeasible;
 use uav_relay::SetupError;
+use uav_relay::optimiser::search::Infeasible;
 
 use super::draw::NotDrawn;
 use uav_relay_sim::mission::Refusal;

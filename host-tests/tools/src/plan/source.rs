@@ -97,9 +97,9 @@ fn second(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Theorem)>
 fn third(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
     let (found, case) = free::best_place(mission, power_w)?;
     let (number, words) = match case {
-        free::Case::Lowest(case) => (1, format!("at the lowest altitude: {}", along_x(case))),
-        free::Case::Highest(case) => (2, format!("at the highest altitude: {}", along_x(case))),
-        free::Case::AboveRx(case) => (3, format!("right above Rx: {}", upward(case))),
+        free::FreeCase::Lowest(case) => (1, format!("at the lowest altitude: {}", along_x(case))),
+        free::FreeCase::Highest(case) => (2, format!("at the highest altitude: {}", along_x(case))),
+        free::FreeCase::AboveRx(case) => (3, format!("right above Rx: {}", upward(case))),
     };
     Some((
         found,
@@ -124,51 +124,55 @@ fn beside(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
 }
 
 /// A case of one relay aside in words.
-fn sideways(case: aside::Case) -> &'static str {
-    use aside::{Axis, Case};
+fn sideways(case: aside::AsideCase) -> &'static str {
+    use aside::{AsideCase, Coordinate};
     match case {
-        Case::Touching => {
+        AsideCase::Touching => {
             "where the circles of equal SIR of both hops touch, at the lowest altitude"
         }
-        Case::Hilltop => "the first hop is the worse one even at its best place",
-        Case::AboveRx => "the first hop is the better one even above Rx",
-        Case::Edge(Axis::Along) => "on an edge of the corridor along the line",
-        Case::Edge(Axis::Across) => "on an edge of the corridor across the line, at Tx or Rx",
-        Case::Edge(Axis::Upward) => "on an upright edge of the corridor, at Tx or Rx",
-        Case::Level => "the interferer stands at Tx: the first hop is the same everywhere",
-        Case::Drowned => "the interferer stands at Rx: nothing is heard",
+        AsideCase::Hilltop => "the first hop is the worse one even at its best place",
+        AsideCase::AboveRx => "the first hop is the better one even above Rx",
+        AsideCase::Edge(Coordinate::Along) => "on an edge of the corridor along the line",
+        AsideCase::Edge(Coordinate::Across) => {
+            "on an edge of the corridor across the line, at Tx or Rx"
+        }
+        AsideCase::Edge(Coordinate::Upward) => "on an upright edge of the corridor, at Tx or Rx",
+        AsideCase::Level => "the interferer stands at Tx: the first hop is the same everywhere",
+        AsideCase::Drowned => "the interferer stands at Rx: nothing is heard",
     }
 }
 
 /// A case of Theorem 1 in words.
-fn along_x(case: given_altitude::Case) -> &'static str {
-    use given_altitude::Case;
+fn along_x(case: given_altitude::PlaceCase) -> &'static str {
+    use given_altitude::PlaceCase;
     match case {
-        Case::AboveTx => "the first hop is the worse one even above Tx",
-        Case::Crossing => "where both hops have the same SIR",
-        Case::AboveRx => "the first hop is the better one even above Rx",
-        Case::BeforeValley => {
+        PlaceCase::AboveTx => "the first hop is the worse one even above Tx",
+        PlaceCase::Crossing => "where both hops have the same SIR",
+        PlaceCase::AboveRx => "the first hop is the better one even above Rx",
+        PlaceCase::BeforeValley => {
             "the hops cross before the worst place of the first: there, or above Rx"
         }
-        Case::OverValley => "the first hop is the better one even at its worst place",
-        Case::Hilltop => "the first hop is the worse one even at its best place",
-        Case::BeyondHill => "beyond the best place of the first hop, where both have the same SIR",
-        Case::HillAboveRx => {
+        PlaceCase::OverValley => "the first hop is the better one even at its worst place",
+        PlaceCase::Hilltop => "the first hop is the worse one even at its best place",
+        PlaceCase::BeyondHill => {
+            "beyond the best place of the first hop, where both have the same SIR"
+        }
+        PlaceCase::HillAboveRx => {
             "the interferer is behind Tx, and the first hop the better one even above Rx"
         }
-        Case::Level => "the interferer stands at Tx: the first hop is the same everywhere",
-        Case::Drowned => "the interferer stands at Rx: nothing is heard",
+        PlaceCase::Level => "the interferer stands at Tx: the first hop is the same everywhere",
+        PlaceCase::Drowned => "the interferer stands at Rx: nothing is heard",
     }
 }
 
 /// A case of Theorem 2 in words.
-fn upward(case: given_x::Case) -> &'static str {
-    use given_x::Case;
+fn upward(case: given_x::AltitudeCase) -> &'static str {
+    use given_x::AltitudeCase;
     match case {
-        Case::BothFall => "both hops fall with the altitude: the lowest",
-        Case::Crossing => "the altitude at which both hops have the same SIR",
-        Case::End => "the better end of the band",
-        Case::Drowned => "the interferer stands at Rx: nothing is heard",
+        AltitudeCase::BothFall => "both hops fall with the altitude: the lowest",
+        AltitudeCase::Crossing => "the altitude at which both hops have the same SIR",
+        AltitudeCase::End => "the better end of the band",
+        AltitudeCase::Drowned => "the interferer stands at Rx: nothing is heard",
     }
 }
 
