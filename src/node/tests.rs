@@ -193,7 +193,13 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     let mut node = relay_of(five, 3, true);
     let new = upload_to(&five, 1);
     assert!(node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(new)));
-    assert_eq!((node.update.latest(), node.neighbours.at(Side::Upstream).node()), (new.id(), 2));
+    assert_eq!(
+        (
+            node.update.latest(),
+            node.neighbours.at(Side::Upstream).node()
+        ),
+        (new.id(), 2)
+    );
     let told = said(&mut node);
     let hellos = told.iter().filter(|(to, _)| *to == 1);
     let hellos: heapless::Vec<_, 8> = hellos.collect();

@@ -1,0 +1,183 @@
+//! A turn of Algorithm 2, and what it came to, which travels back.
+
+use serde::{Deserialize, Serialize};
+
+use super::parts::{PassId, PlaceBody, profile};
+use crate::optimiser::local::Local;
+use crate::place::Placement;
+
+/// One turn of Algorithm 2.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Token {
+    /// Number of the pass, wrapping.
+    pub number: u16,
+    /// [`digest`](crate::wire::digest::digest) of the sender.
+    pub mission: u16,
+    /// Where the sender stands now.
+    pub place: Placement,
+    /// The sender's transmit power, W.
+    pub power_w: f32,
+    /// What this pass is for.
+    pub turn: Turn,
+    /// SIR of the chain before this pass, linear; 0 before it is known.
+    pub sir: f32,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct TokenBody {
+    pass: PassId,
+    at: PlaceBody,
+    power_w: f32,
+    turn: TurnBody,
+    sir: f32,
+}
+
+impl TokenBody {
+    pub(super) const LENGTH: usize = 28;
+
+    pub(super) const fn of(token: &Token) -> Self {
+        Self {
+            pass: PassId::new(token.number, token.mission),
+            at: PlaceBody::of(token.place),
+            power_w: token.power_w,
+            turn: TurnBody::of(token.turn),
+            sir: token.sir,
+        }
+    }
+
+    pub(super) fn checked(self) -> Option<Token> {
+        let place = self.at.checked()?;
+        Some(Token {
+            number: self.pass.number(),
+            mission: self.pass.mission(),
+            place,
+            power_w: profile(place.altitude_m, self.power_w)?.power_w,
+            turn: self.turn.checked()?,
+            sir: sir_in_range(self.sir)?,
+        })
+    }
+}
+
+/// What a relay does when the token comes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Turn {
+    /// It stays, and hears where its neighbours are.
+    Look,
+    /// It moves if that is better.
+    Move {
+        /// How far up or down it may, m: the paper's `epsilon_h`.
+        explore_m: f32,
+        /// How it looks for a better place.
+        local: Local,
+    },
+    /// It stays for good.
+    Stop,
+}
+
+/// A turn as one byte and three numbers, all of them 0 where they mean nothing.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct TurnBody {
+    kind: u8,
+    explore_m: f32,
+    columns: u8,
+    rows: u8,
+}
+
+impl TurnBody {
+    const fn of(turn: Turn) -> Self {
+        let (kind, explore_m, columns, rows) = match turn {
+            Turn::Look => (0, 0.0, 0, 0),
+            Turn::Stop => (1, 0.0, 0, 0),
+            Turn::Move {
+                explore_m,
+                local: Local::Fine,
+            } => (2, explore_m, 0, 0),
+            Turn::Move {
+                explore_m,
+                local: Local::Grid { columns, rows },
+            } => (2, explore_m, columns, rows),
+        };
+        Self {
+            kind,
+            explore_m,
+            columns,
+            rows,
+        }
+    }
+
+    /// The turn, if it could not be written otherwise and is in range.
+    fn checked(self) -> Option<Turn> {
+        let Self {
+            kind,
+            explore_m,
+            columns,
+            rows,
+        } = self;
+        let rest = explore_m.to_bits() == 0 && columns == 0 && rows == 0;
+        match kind {
+            0 if rest => Some(Turn::Look),
+            1 if rest => Some(Turn::Stop),
+            2 if (0.0..=1e5).contains(&explore_m) => {
+                let local = match (columns, rows) {
+                    (0, 0) => Local::Fine,
+                    (2.., 2..) => Local::Grid { columns, rows },
+                    _ => return None,
+                };
+                Some(Turn::Move { explore_m, local })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// What a turn came to, as it travels back.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Moved {
+    /// Number of the pass.
+    pub number: u16,
+    /// [`digest`](crate::wire::digest::digest) of the sender.
+    pub mission: u16,
+    /// Where the sender stands now.
+    pub place: Placement,
+    /// Whether it or any relay after it has moved.
+    pub any: bool,
+    /// SIR of the worst hop after the sender, linear.
+    pub worst: f32,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct MovedBody {
+    pass: PassId,
+    at: PlaceBody,
+    any: bool,
+    worst: f32,
+}
+
+impl MovedBody {
+    pub(super) const LENGTH: usize = 18;
+
+    pub(super) const fn of(moved: &Moved) -> Self {
+        Self {
+            pass: PassId::new(moved.number, moved.mission),
+            at: PlaceBody::of(moved.place),
+            any: moved.any,
+            worst: moved.worst,
+        }
+    }
+
+    pub(super) fn checked(self) -> Option<Moved> {
+        Some(Moved {
+            number: self.pass.number(),
+            mission: self.pass.mission(),
+            place: self.at.checked()?,
+            any: self.any,
+            worst: sir_in_range(self.worst)?,
+        })
+    }
+}
+
+/// A linear SIR, if it is one.
+fn sir_in_range(sir: f32) -> Option<f32> {
+    (0.0..=f32::MAX).contains(&sir).then_some(sir)
+}
