@@ -1,8 +1,7 @@
 //! A pass of the joint method, and what came of it, which travels back.
 
-use serde::{Deserialize, Serialize};
-
-use super::parts::{PassId, is_place, profile};
+use super::parts::{MessageError, PassId, is_place, profile, read, write};
+use super::tag;
 use crate::optimiser::joint::Outlook;
 use crate::optimiser::joint::outlook::PARTS;
 use crate::optimiser::joint::trial::{Bar, TRIALS, Trial, Trials};
@@ -23,19 +22,20 @@ pub struct Course {
     pub trials: Trials,
 }
 
-#[derive(Serialize, Deserialize)]
-pub(super) struct CourseBody {
-    pass: PassId,
-    /// Power, trust, slope and estimate.
-    numbers: [f32; 4],
-    /// For each trial target, penalty and place.
-    trials: heapless::Vec<[f32; 5], TRIALS>,
-}
+/// For each trial target, penalty and place.
+type Parts = heapless::Vec<[f32; 5], TRIALS>;
 
-impl CourseBody {
-    pub(super) fn of(course: &Course) -> Self {
-        let mut trials = heapless::Vec::new();
-        for trial in &course.trials {
+impl Course {
+    /// Power, trust, slope and estimate come before the trials.
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        let Bar {
+            trust,
+            slope,
+            estimate,
+        } = self.bar;
+        let mut trials = Parts::new();
+        for trial in &self.trials {
             let Trial {
                 target,
                 penalty_m,
@@ -43,36 +43,33 @@ impl CourseBody {
             } = *trial;
             _ = trials.push([target, penalty_m, place.x_m, place.y_m, place.altitude_m]);
         }
-        let Bar {
-            trust,
-            slope,
-            estimate,
-        } = course.bar;
-        Self {
-            pass: PassId::new(course.number, course.mission),
-            numbers: [course.power_w, trust, slope, estimate],
-            trials,
-        }
+        let numbers = [self.power_w, trust, slope, estimate];
+        write(&(tag::COURSE, pass, numbers, trials), buffer)
     }
 
-    pub(super) fn length(&self) -> usize {
-        22 + 20 * self.trials.len()
-    }
-
-    pub(super) fn checked(self) -> Option<Course> {
-        let [power_w, trust, slope, estimate] = self.numbers;
-        let mut course = Course {
-            number: self.pass.number(),
-            mission: self.pass.mission(),
-            power_w: profile(1.0, power_w)?.power_w,
-            bar: bar(trust, slope, estimate)?,
-            trials: Trials::new(),
-        };
-        for parts in self.trials {
-            course.trials.push(trial(parts)?).ok()?;
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let (pass, numbers, trials): (PassId, [f32; 4], Parts) = read(body)?;
+        // No empty varint bytes in the count of trials: see `take_targets`.
+        if body.len() != 21 + 20 * trials.len() {
+            return Err(MessageError::Encoding);
         }
-        Some(course)
+        checked(pass, numbers, trials).ok_or(MessageError::Value)
     }
+}
+
+fn checked(pass: PassId, numbers: [f32; 4], trials: Parts) -> Option<Course> {
+    let [power_w, trust, slope, estimate] = numbers;
+    let mut course = Course {
+        number: pass.number(),
+        mission: pass.mission(),
+        power_w: profile(1.0, power_w)?.power_w,
+        bar: bar(trust, slope, estimate)?,
+        trials: Trials::new(),
+    };
+    for parts in trials {
+        course.trials.push(trial(parts)?).ok()?;
+    }
+    Some(course)
 }
 
 /// What trials are judged by, if its numbers are in range.
@@ -119,36 +116,28 @@ pub struct Worth {
     pub outlook: Outlook,
 }
 
-#[derive(Serialize, Deserialize)]
-pub(super) struct WorthBody {
-    pass: PassId,
-    trial: Option<u8>,
-    slack_m: f32,
-    outlook: [f32; PARTS],
-}
+impl Worth {
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        let outlook = self.outlook.parts();
+        write(
+            &(tag::WORTH, pass, self.trial, self.slack_m, outlook),
+            buffer,
+        )
+    }
 
-impl WorthBody {
-    pub(super) fn of(worth: &Worth) -> Self {
-        Self {
-            pass: PassId::new(worth.number, worth.mission),
-            trial: worth.trial,
-            slack_m: worth.slack_m,
-            outlook: worth.outlook.parts(),
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let (pass, trial, slack_m, outlook): (PassId, Option<u8>, f32, [f32; PARTS]) = read(body)?;
+        let known = trial.is_none_or(|trial| usize::from(trial) < TRIALS);
+        if !(known && slack_m.is_finite()) {
+            return Err(MessageError::Value);
         }
-    }
-
-    pub(super) fn length(&self) -> usize {
-        58 + usize::from(self.trial.is_some())
-    }
-
-    pub(super) fn checked(self) -> Option<Worth> {
-        let known = self.trial.is_none_or(|trial| usize::from(trial) < TRIALS);
-        (known && self.slack_m.is_finite()).then_some(Worth {
-            number: self.pass.number(),
-            mission: self.pass.mission(),
-            trial: self.trial,
-            slack_m: self.slack_m,
-            outlook: Outlook::from_parts(self.outlook)?,
+        Ok(Self {
+            number: pass.number(),
+            mission: pass.mission(),
+            trial,
+            slack_m,
+            outlook: Outlook::from_parts(outlook).ok_or(MessageError::Value)?,
         })
     }
 }

@@ -1,42 +1,32 @@
 //! The fence between two neighbours, as [`Fence`] has it.
 
-use serde::{Deserialize, Serialize};
-
-use super::parts::PassId;
+use super::parts::{MessageError, PassId, read, write};
+use super::tag;
 use crate::guard::Fence;
 
-#[derive(Serialize, Deserialize)]
-pub(super) struct FenceBody {
-    /// The number is that of the association.
-    pass: PassId,
-    echo: [u8; 2],
-    number: [u8; 2],
-    x_m: f32,
-    target_m: f32,
+/// The number beside the mission is that of the association.
+pub(super) fn encode(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
+    let pass = PassId::new(fence.association, mission);
+    let numbers = [fence.echo.to_le_bytes(), fence.number.to_le_bytes()];
+    write(
+        &(tag::FENCE, pass, numbers, fence.x_m, fence.target_m),
+        buffer,
+    )
 }
 
-impl FenceBody {
-    pub(super) const LENGTH: usize = 17;
-
-    pub(super) const fn of(mission: u16, fence: &Fence) -> Self {
-        Self {
-            pass: PassId::new(fence.association, mission),
-            echo: fence.echo.to_le_bytes(),
-            number: fence.number.to_le_bytes(),
-            x_m: fence.x_m,
-            target_m: fence.target_m,
-        }
-    }
-
-    /// The mission of the sender, and the fence.
-    pub(super) fn checked(self) -> Option<(u16, Fence)> {
-        let fence = Fence {
-            association: self.pass.number(),
-            echo: u16::from_le_bytes(self.echo),
-            number: u16::from_le_bytes(self.number),
-            x_m: self.x_m,
-            target_m: self.target_m,
-        };
-        fence.is_valid().then_some((self.pass.mission(), fence))
+/// The mission of the sender, and the fence.
+pub(super) fn decode(body: &[u8]) -> Result<(u16, Fence), MessageError> {
+    let (pass, [echo, number], x_m, target_m): (PassId, [[u8; 2]; 2], f32, f32) = read(body)?;
+    let fence = Fence {
+        association: pass.number(),
+        echo: u16::from_le_bytes(echo),
+        number: u16::from_le_bytes(number),
+        x_m,
+        target_m,
+    };
+    if fence.is_valid() {
+        Ok((pass.mission(), fence))
+    } else {
+        Err(MessageError::Value)
     }
 }

@@ -1,6 +1,7 @@
 //! What one node tells another about the chain as it sees it.
 
-use super::parts::{PassId, ViewBody};
+use super::parts::{MessageError, PassId, ViewBody, read, write};
+use super::tag;
 use crate::wire::digest::MissionId;
 
 /// What one node tells another about the chain as it sees it.
@@ -34,19 +35,24 @@ pub struct Hello {
 impl Hello {
     /// The neighbour; digest and version of what it holds; flags from bit 0: asks for a hello, asks for a new view, fresh, ready,
     /// flies what it holds.
-    pub(super) fn body(&self) -> ViewBody {
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let flags = [self.ask, self.form, self.fresh, self.ready, self.flies]
             .into_iter()
             .rev()
             .fold(0, |flags, flag| flags << 1 | u8::from(flag));
-        ViewBody::new(
+        let body = ViewBody::new(
             PassId::new(self.newest, self.mission),
             [self.neighbour, 0, self.holds.digest, self.holds.version],
             flags,
-        )
+        );
+        write(&(tag::HELLO, body), buffer)
     }
 
-    pub(super) fn checked(body: ViewBody) -> Option<Self> {
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        Self::checked(read(body)?).ok_or(MessageError::Value)
+    }
+
+    fn checked(body: ViewBody) -> Option<Self> {
         let (neighbour, 0, held, flags @ 0..=0x1F) = body.parts()? else {
             return None;
         };

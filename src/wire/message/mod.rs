@@ -1,7 +1,8 @@
 //! What neighbours say to each other; `FORMAT.md` has the byte tables.
 //!
 //! For each kind of message there is one file, with the type, the one way to write it and the one way to read it, which checks
-//! its ranges. `parts` has what several kinds have in common.
+//! its ranges: what is read holds no number that a relay would have to doubt. A body is a byte, the `tag`, and postcard of a
+//! tuple, whose order is the format. `parts` has what several kinds have in common.
 
 mod course;
 mod fence;
@@ -10,28 +11,21 @@ mod hello;
 mod offer;
 mod parts;
 mod sweep;
+mod tag;
 mod turn;
 mod view;
 
-use serde::{Deserialize, Serialize};
-
 pub use self::course::{Course, Worth};
 pub use self::hello::Hello;
+pub use self::parts::MessageError;
 pub use self::sweep::{Answer, Sweep};
 pub use self::turn::{Moved, Token, Turn};
 pub use self::view::{Decision, PriorView, Proposal};
 
-use self::course::{CourseBody, WorthBody};
-use self::fence::FenceBody;
+use self::parts::{read, write};
 #[cfg(feature = "upload")]
-use self::offer::OfferBody;
-use self::parts::ViewBody;
-use self::sweep::{AnswerBody, SweepHead, SweepKind};
-use self::turn::{MovedBody, TokenBody};
-#[cfg(feature = "upload")]
-use super::upload::{LENGTH, Upload};
+use super::upload::Upload;
 use crate::guard::Fence;
-use crate::optimiser::PerTarget;
 
 /// The longest body: a sweep of sixteen targets with what was measured, or from aside of the line.
 pub const MAX_BODY: usize = 88;
@@ -128,145 +122,76 @@ impl Message {
     }
 }
 
-/// What becomes of a message on the wire: postcard of this, whose order of variants and fields is the format. It holds any
-/// numbers; what [`Message::decode`] makes of it holds none that a relay would have to doubt.
-#[derive(Serialize, Deserialize)]
-enum Body {
-    Sweep(SweepHead, PerTarget),
-    Verdict(AnswerBody),
-    Busy([u8; 2]),
-    Heartbeat([u8; 2], bool),
-    Measured(SweepHead, f32, PerTarget),
-    Aside(SweepHead, f32, PerTarget),
-    Course(CourseBody),
-    Worth(WorthBody),
-    Token(TokenBody),
-    Moved(MovedBody),
-    Hello(ViewBody),
-    Proposal(ViewBody),
-    Decision(ViewBody),
-    Fence(FenceBody),
-    #[cfg(feature = "upload")]
-    Offer(OfferBody),
-}
-
-impl Body {
-    fn of(message: &Message) -> Self {
-        match message {
-            Message::Sweep(sweep) => {
-                let (head, reaches) = (SweepHead::of(sweep), sweep.reaches.clone());
-                match SweepKind::of(sweep) {
-                    SweepKind::Plain => Self::Sweep(head, reaches),
-                    SweepKind::Measured(upsilon_per_w) => {
-                        Self::Measured(head, upsilon_per_w, reaches)
-                    }
-                    SweepKind::Aside(y_m) => Self::Aside(head, y_m, reaches),
-                }
-            }
-            Message::Verdict(answer) => Self::Verdict(AnswerBody::of(answer)),
-            Message::Busy { sweep } => Self::Busy(sweep.to_le_bytes()),
-            Message::Heartbeat { mission, answer } => {
-                Self::Heartbeat(mission.to_le_bytes(), *answer)
-            }
-            Message::Course(course) => Self::Course(CourseBody::of(course)),
-            Message::Worth(worth) => Self::Worth(WorthBody::of(worth)),
-            Message::Token(token) => Self::Token(TokenBody::of(token)),
-            Message::Moved(moved) => Self::Moved(MovedBody::of(moved)),
-            Message::Hello(hello) => Self::Hello(hello.body()),
-            Message::Proposal(proposal) => Self::Proposal(proposal.body()),
-            Message::Decision(decision) => Self::Decision(decision.body()),
-            Message::Fence { mission, fence } => Self::Fence(FenceBody::of(*mission, fence)),
-            #[cfg(feature = "upload")]
-            Message::Offer(upload) => Self::Offer(OfferBody::of(upload)),
-        }
-    }
-
-    /// Bytes of the shortest encoding. postcard reads longer ones too, whose tag or count is padded with empty varint bytes,
-    /// and how many it puts up with depends on the width of a usize: what one node took, another would refuse.
-    fn length(&self) -> usize {
-        match self {
-            Self::Sweep(_, reaches) => SweepKind::Plain.length(reaches),
-            Self::Verdict(body) => body.length(),
-            Self::Busy(_) => 3,
-            Self::Heartbeat(..) => 4,
-            Self::Measured(_, upsilon_per_w, reaches) => {
-                SweepKind::Measured(*upsilon_per_w).length(reaches)
-            }
-            Self::Aside(_, y_m, reaches) => SweepKind::Aside(*y_m).length(reaches),
-            Self::Course(body) => body.length(),
-            Self::Worth(body) => body.length(),
-            Self::Token(_) => TokenBody::LENGTH,
-            Self::Moved(_) => MovedBody::LENGTH,
-            Self::Hello(_) | Self::Proposal(_) | Self::Decision(_) => ViewBody::LENGTH,
-            Self::Fence(_) => FenceBody::LENGTH,
-            #[cfg(feature = "upload")]
-            Self::Offer(_) => LENGTH,
-        }
-    }
-
-    /// The message, if every number is in its range, and of a method that this relay was built with.
-    fn checked(self) -> Option<Message> {
-        Some(match self {
-            Self::Sweep(head, reaches) => Message::Sweep(head.checked(SweepKind::Plain, reaches)?),
-            Self::Measured(head, upsilon_per_w, reaches) if cfg!(feature = "field") => {
-                Message::Sweep(head.checked(SweepKind::Measured(upsilon_per_w), reaches)?)
-            }
-            Self::Aside(head, y_m, reaches) if cfg!(feature = "altitude") => {
-                Message::Sweep(head.checked(SweepKind::Aside(y_m), reaches)?)
-            }
-            Self::Verdict(body) => Message::Verdict(body.checked()?),
-            Self::Busy(number) => Message::Busy {
-                sweep: u16::from_le_bytes(number),
-            },
-            Self::Heartbeat(mission, answer) => Message::Heartbeat {
-                mission: u16::from_le_bytes(mission),
-                answer,
-            },
-            Self::Course(body) if cfg!(feature = "altitude") => Message::Course(body.checked()?),
-            Self::Worth(body) if cfg!(feature = "altitude") => Message::Worth(body.checked()?),
-            Self::Token(body) if cfg!(feature = "adjust") => Message::Token(body.checked()?),
-            Self::Moved(body) if cfg!(feature = "adjust") => Message::Moved(body.checked()?),
-            Self::Hello(body) if cfg!(feature = "membership") => {
-                Message::Hello(Hello::checked(body)?)
-            }
-            Self::Proposal(body) if cfg!(feature = "membership") => {
-                Message::Proposal(Proposal::checked(body)?)
-            }
-            Self::Decision(body) if cfg!(feature = "membership") => {
-                Message::Decision(Decision::checked(body)?)
-            }
-            Self::Fence(body) if cfg!(feature = "guard") => {
-                let (mission, fence) = body.checked()?;
-                Message::Fence { mission, fence }
-            }
-            #[cfg(feature = "upload")]
-            Self::Offer(body) => Message::Offer(body.checked()?),
-            _ => return None,
-        })
-    }
-}
-
 impl Message {
     /// Writes the body into `buffer` and returns how many bytes it takes, at most [`MAX_BODY`]; `None` if it does not fit.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        postcard::to_slice(&Body::of(self), buffer)
-            .ok()
-            .map(|written| written.len())
+        match self {
+            Self::Sweep(sweep) => sweep.encode(buffer),
+            Self::Verdict(answer) => answer.encode(buffer),
+            Self::Busy { sweep } => write(&(tag::BUSY, sweep.to_le_bytes()), buffer),
+            Self::Heartbeat { mission, answer } => {
+                write(&(tag::HEARTBEAT, mission.to_le_bytes(), answer), buffer)
+            }
+            Self::Course(course) => course.encode(buffer),
+            Self::Worth(worth) => worth.encode(buffer),
+            Self::Token(token) => token.encode(buffer),
+            Self::Moved(moved) => moved.encode(buffer),
+            Self::Hello(hello) => hello.encode(buffer),
+            Self::Proposal(proposal) => proposal.encode(buffer),
+            Self::Decision(decision) => decision.encode(buffer),
+            Self::Fence { mission, fence } => fence::encode(*mission, fence, buffer),
+            #[cfg(feature = "upload")]
+            Self::Offer(upload) => offer::encode(upload, buffer),
+        }
     }
 
     /// The message in `bytes`, with every number in its range. Work linear in their number, at most [`MAX_BODY`] of use.
     ///
     /// # Errors
     /// [`MessageError::Encoding`] if it is not one message in its shortest form and nothing else, [`MessageError::Value`] for
-    /// a number that is not finite or outside its range.
+    /// a number that is not finite or outside its range, and for a message of a method that this relay was built without.
     #[inline(never)]
     pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
-        let (body, rest): (Body, _) =
-            postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)?;
-        if !rest.is_empty() || bytes.len() != body.length() {
-            return Err(MessageError::Encoding);
+        let (tag, body) = bytes.split_first().ok_or(MessageError::Encoding)?;
+        match *tag {
+            tag::MEASURED if !cfg!(feature = "field") => Err(MessageError::Value),
+            tag::ASIDE | tag::COURSE | tag::WORTH if !cfg!(feature = "altitude") => {
+                Err(MessageError::Value)
+            }
+            tag::TOKEN | tag::MOVED if !cfg!(feature = "adjust") => Err(MessageError::Value),
+            tag::HELLO | tag::PROPOSAL | tag::DECISION if !cfg!(feature = "membership") => {
+                Err(MessageError::Value)
+            }
+            tag::FENCE if !cfg!(feature = "guard") => Err(MessageError::Value),
+            tag @ (tag::SWEEP | tag::MEASURED | tag::ASIDE) => {
+                Sweep::decode(tag, body).map(Self::Sweep)
+            }
+            tag::VERDICT => Answer::decode(body).map(Self::Verdict),
+            tag::BUSY => Ok(Self::Busy {
+                sweep: u16::from_le_bytes(read(body)?),
+            }),
+            tag::HEARTBEAT => {
+                let (mission, answer) = read(body)?;
+                Ok(Self::Heartbeat {
+                    mission: u16::from_le_bytes(mission),
+                    answer,
+                })
+            }
+            tag::COURSE => Course::decode(body).map(Self::Course),
+            tag::WORTH => Worth::decode(body).map(Self::Worth),
+            tag::TOKEN => Token::decode(body).map(Self::Token),
+            tag::MOVED => Moved::decode(body).map(Self::Moved),
+            tag::HELLO => Hello::decode(body).map(Self::Hello),
+            tag::PROPOSAL => Proposal::decode(body).map(Self::Proposal),
+            tag::DECISION => Decision::decode(body).map(Self::Decision),
+            tag::FENCE => {
+                let (mission, fence) = fence::decode(body)?;
+                Ok(Self::Fence { mission, fence })
+            }
+            #[cfg(feature = "upload")]
+            tag::OFFER => offer::decode(body).map(Self::Offer),
+            _ => Err(MessageError::Encoding),
         }
-        body.checked().ok_or(MessageError::Value)
     }
 }
 
@@ -287,25 +212,3 @@ impl Upload {
         }
     }
 }
-
-/// Why a body is no message.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum MessageError {
-    /// Not the one encoding of any message, or bytes are left over.
-    Encoding,
-    /// A number is not finite or outside its range.
-    Value,
-}
-
-impl core::fmt::Display for MessageError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Encoding => "the body is not a message",
-            Self::Value => "a number in the message is outside its range",
-        })
-    }
-}
-
-impl core::error::Error for MessageError {}

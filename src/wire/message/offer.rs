@@ -2,14 +2,24 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::parts::PassId;
+use super::parts::{MessageError, PassId, read, write};
+use super::tag;
 use crate::channel::Channel;
 use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
 use crate::wire::upload::Upload;
 
+pub(super) fn encode(upload: &Upload, buffer: &mut [u8]) -> Option<usize> {
+    write(&(tag::OFFER, OfferBody::of(upload)), buffer)
+}
+
+pub(super) fn decode(body: &[u8]) -> Result<Upload, MessageError> {
+    let body: OfferBody = read(body)?;
+    body.checked().ok_or(MessageError::Value)
+}
+
 /// The wire form: version and base, and the numbers in the order of the digest, the bands last.
 #[derive(Serialize, Deserialize)]
-pub(super) struct OfferBody {
+struct OfferBody {
     /// The number is the version, the mission the base.
     pass: PassId,
     relays: [u8; 2],
@@ -19,7 +29,7 @@ pub(super) struct OfferBody {
 }
 
 impl OfferBody {
-    pub(super) fn of(upload: &Upload) -> Self {
+    fn of(upload: &Upload) -> Self {
         let c = upload.config();
         let (power_w, x_m, y_m) = match c.interference {
             Interference::Source(at) => (at.power_w, at.x_m, at.y_m),
@@ -49,7 +59,7 @@ impl OfferBody {
         }
     }
 
-    pub(super) fn checked(self) -> Option<Upload> {
+    fn checked(self) -> Option<Upload> {
         let [mu_los, mu_nlos, eta] = self.factors;
         let [least_m, most_m, left_m, right_m] = self.bands;
         let [

@@ -4,8 +4,41 @@
 use serde::{Deserialize, Serialize};
 
 use crate::mission::{MAX_RELAYS, Profile};
+use crate::optimiser::PerTarget;
 use crate::place::Placement;
 use crate::wire::digest::MissionId;
+
+/// Writes `body` to the start of `buffer`, and how many bytes it takes; `None` if it does not fit.
+pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
+    postcard::to_slice(body, buffer)
+        .ok()
+        .map(|written| written.len())
+}
+
+/// Reads what the start of `bytes` is, and gives the rest.
+pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), MessageError> {
+    postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)
+}
+
+/// Reads what `bytes` are, with nothing left over.
+pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, MessageError> {
+    match take(bytes)? {
+        (body, []) => Ok(body),
+        _ => Err(MessageError::Encoding),
+    }
+}
+
+/// Reads numbers of targets, and gives the rest. postcard reads longer encodings too, whose count is padded with empty varint
+/// bytes, and how many it puts up with depends on the width of a usize: what one node took, another would refuse.
+#[inline(never)]
+pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
+    let (numbers, rest): (PerTarget, _) = take(bytes)?;
+    if rest.len() + 1 + 4 * numbers.len() == bytes.len() {
+        Ok((numbers, rest))
+    } else {
+        Err(MessageError::Encoding)
+    }
+}
 
 /// No slack or reach in metres is larger: a place is at most 1e6, a reach of the last hop is cut at 1e9.
 pub(super) const FARTHEST_M: f32 = 2e9;
@@ -56,7 +89,7 @@ impl PlaceBody {
     }
 }
 
-/// What a hello, a proposal and a decision are alike: a view's number, four numbers and a byte of flags. What the numbers mean
+/// The wire form of a hello, a proposal or a decision: a view's number, four numbers and a byte of flags. What the numbers mean
 /// depends, and those that mean nothing are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct ViewBody {
@@ -70,9 +103,6 @@ pub(super) struct ViewBody {
 }
 
 impl ViewBody {
-    /// Bytes of a body of this kind.
-    pub(super) const LENGTH: usize = 14;
-
     pub(super) const fn new(pass: PassId, numbers: [u16; 4], flags: u8) -> Self {
         let [one, other, more, version] = numbers;
         Self {
@@ -126,3 +156,25 @@ pub(super) fn in_range(numbers: &[f32], least: f32) -> bool {
         .iter()
         .all(|number| (least..=FARTHEST_M).contains(number))
 }
+
+/// Why a body is no message.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum MessageError {
+    /// Not the one encoding of any message, or bytes are left over.
+    Encoding,
+    /// A number is not finite or outside its range.
+    Value,
+}
+
+impl core::fmt::Display for MessageError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Encoding => "the body is not a message",
+            Self::Value => "a number in the message is outside its range",
+        })
+    }
+}
+
+impl core::error::Error for MessageError {}

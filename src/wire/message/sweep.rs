@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::parts::{FARTHEST_M, PassId, in_range, is_beside, profile};
+use super::parts::{
+    FARTHEST_M, MessageError, PassId, in_range, is_beside, profile, read, take, take_targets, write,
+};
+use super::tag;
 use crate::field::is_upsilon;
 use crate::optimiser::PerTarget;
 use crate::optimiser::ladder::{Ladder, TARGETS};
@@ -28,38 +31,9 @@ pub struct Sweep {
     pub reaches: PerTarget,
 }
 
-/// What a sweep says beside targets and reaches. Each kind is a message of its own on the wire.
-#[derive(Clone, Copy)]
-pub(super) enum SweepKind {
-    Plain,
-    /// Upsilon, 1/W.
-    Measured(f32),
-    /// How far from the line the sender is, m.
-    Aside(f32),
-}
-
-impl SweepKind {
-    pub(super) const fn of(sweep: &Sweep) -> Self {
-        match sweep.measured_per_w {
-            _ if sweep.chosen => Self::Aside(sweep.relay.at.y_m),
-            None => Self::Plain,
-            Some(upsilon_per_w) => Self::Measured(upsilon_per_w),
-        }
-    }
-
-    /// Bytes of the body of such a sweep.
-    pub(super) fn length(self, reaches: &PerTarget) -> usize {
-        let more = match self {
-            Self::Plain => 0,
-            Self::Measured(_) | Self::Aside(_) => 4,
-        };
-        20 + more + 4 * reaches.len()
-    }
-}
-
 /// What a sweep of each kind begins with; its reaches come last.
 #[derive(Clone, Copy, Serialize, Deserialize)]
-pub(super) struct SweepHead {
+struct SweepHead {
     pass: PassId,
     /// Below zero for a plain pass.
     anchor: f32,
@@ -70,7 +44,7 @@ pub(super) struct SweepHead {
 }
 
 impl SweepHead {
-    pub(super) fn of(sweep: &Sweep) -> Self {
+    fn of(sweep: &Sweep) -> Self {
         let (anchor, gap, growth) = sweep.ladder.parts();
         Self {
             pass: PassId::new(sweep.number, sweep.mission),
@@ -85,35 +59,63 @@ impl SweepHead {
             power_w: sweep.relay.power_w,
         }
     }
+}
 
-    pub(super) fn checked(self, kind: SweepKind, reaches: PerTarget) -> Option<Sweep> {
-        let (y_m, measured_per_w) = match kind {
-            SweepKind::Plain => (None, None),
-            SweepKind::Measured(upsilon_per_w) => (None, Some(upsilon_per_w)),
-            SweepKind::Aside(y_m) => (Some(y_m), None),
-        };
-        let ladder = Ladder::from_parts(self.anchor.abs(), self.gap, self.growth)?
-            .plainly(self.anchor < 0.0);
-        let fits = reaches.len() <= ladder.len() && in_range(&reaches, 0.0);
-        let measured = measured_per_w.is_none_or(is_upsilon);
-        let beside = y_m.is_none_or(is_beside);
-        let own = profile(self.altitude_m, self.power_w)?;
-        (fits && measured && beside).then_some(Sweep {
-            number: self.pass.number(),
-            mission: self.pass.mission(),
-            ladder,
-            relay: Station {
-                at: CrossSection {
-                    y_m: y_m.unwrap_or(0.0),
-                    altitude_m: own.altitude_m,
-                },
-                power_w: own.power_w,
-            },
-            chosen: y_m.is_some(),
-            measured_per_w,
-            reaches,
-        })
+impl Sweep {
+    /// Upsilon or the distance from the line comes between head and reaches.
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let (head, reaches) = (SweepHead::of(self), &self.reaches);
+        match self.measured_per_w {
+            _ if self.chosen => write(&(tag::ASIDE, head, self.relay.at.y_m, reaches), buffer),
+            None => write(&(tag::SWEEP, head, reaches), buffer),
+            Some(upsilon_per_w) => write(&(tag::MEASURED, head, upsilon_per_w, reaches), buffer),
+        }
     }
+
+    /// The sweep of this tag in `body`.
+    pub(super) fn decode(tag: u8, body: &[u8]) -> Result<Self, MessageError> {
+        let (head, rest): (SweepHead, _) = take(body)?;
+        let (between, rest) = match tag {
+            tag::SWEEP => (0.0, rest),
+            _ => take(rest)?,
+        };
+        let (reaches, []) = take_targets(rest)? else {
+            return Err(MessageError::Encoding);
+        };
+        let measured_per_w = (tag == tag::MEASURED).then_some(between);
+        let y_m = (tag == tag::ASIDE).then_some(between);
+        checked(head, y_m, measured_per_w, reaches).ok_or(MessageError::Value)
+    }
+}
+
+/// The sweep of these parts, if they are in range, at the cross-section chosen if there is a `y_m`.
+fn checked(
+    head: SweepHead,
+    y_m: Option<f32>,
+    measured_per_w: Option<f32>,
+    reaches: PerTarget,
+) -> Option<Sweep> {
+    let ladder =
+        Ladder::from_parts(head.anchor.abs(), head.gap, head.growth)?.plainly(head.anchor < 0.0);
+    let fits = reaches.len() <= ladder.len() && in_range(&reaches, 0.0);
+    let measured = measured_per_w.is_none_or(is_upsilon);
+    let beside = y_m.is_none_or(is_beside);
+    let own = profile(head.altitude_m, head.power_w)?;
+    (fits && measured && beside).then_some(Sweep {
+        number: head.pass.number(),
+        mission: head.pass.mission(),
+        ladder,
+        relay: Station {
+            at: CrossSection {
+                y_m: y_m.unwrap_or(0.0),
+                altitude_m: own.altitude_m,
+            },
+            power_w: own.power_w,
+        },
+        chosen: y_m.is_some(),
+        measured_per_w,
+        reaches,
+    })
 }
 
 /// The verdict on one sweep, as it travels back.
@@ -131,46 +133,29 @@ pub struct Answer {
     pub own: bool,
 }
 
-#[derive(Serialize, Deserialize)]
-pub(super) struct AnswerBody {
-    pass: PassId,
-    own: bool,
-    commit: Option<u8>,
-    slacks: PerTarget,
-    stand: Option<f32>,
-}
+impl Answer {
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        let Verdict { commit, slacks } = &self.verdict;
+        let body = (tag::VERDICT, pass, self.own, commit, slacks, self.stand);
+        write(&body, buffer)
+    }
 
-impl AnswerBody {
-    pub(super) fn of(answer: &Answer) -> Self {
-        Self {
-            pass: PassId::new(answer.number, answer.mission),
-            own: answer.own,
-            commit: answer.verdict.commit,
-            slacks: answer.verdict.slacks.clone(),
-            stand: answer.stand,
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let ((pass, own, commit), rest): ((PassId, bool, Option<u8>), _) = take(body)?;
+        let (slacks, rest) = take_targets(rest)?;
+        let stand: Option<f32> = read(rest)?;
+        let known = commit.is_none_or(|target| usize::from(target) < TARGETS);
+        let placed = stand.is_none_or(|x_m| (0.0..=1e6).contains(&x_m));
+        if !(in_range(&slacks, -FARTHEST_M) && known && placed) {
+            return Err(MessageError::Value);
         }
-    }
-
-    pub(super) fn length(&self) -> usize {
-        let stand = if self.stand.is_some() { 4 } else { 0 };
-        9 + usize::from(self.commit.is_some()) + 4 * self.slacks.len() + stand
-    }
-
-    pub(super) fn checked(self) -> Option<Answer> {
-        let known = self
-            .commit
-            .is_none_or(|target| usize::from(target) < TARGETS);
-        let placed = self.stand.is_none_or(|x_m| (0.0..=1e6).contains(&x_m));
-        let sound = in_range(&self.slacks, -FARTHEST_M) && known && placed;
-        sound.then_some(Answer {
-            number: self.pass.number(),
-            mission: self.pass.mission(),
-            verdict: Verdict {
-                commit: self.commit,
-                slacks: self.slacks,
-            },
-            own: self.own,
-            stand: self.stand,
+        Ok(Self {
+            number: pass.number(),
+            mission: pass.mission(),
+            verdict: Verdict { commit, slacks },
+            own,
+            stand,
         })
     }
 }

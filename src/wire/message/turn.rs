@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::parts::{PassId, PlaceBody, profile};
+use super::parts::{MessageError, PassId, PlaceBody, profile, read, write};
+use super::tag;
 use crate::optimiser::local::Local;
 use crate::place::Placement;
 
@@ -23,37 +24,37 @@ pub struct Token {
     pub sir: f32,
 }
 
-#[derive(Serialize, Deserialize)]
-pub(super) struct TokenBody {
-    pass: PassId,
-    at: PlaceBody,
-    power_w: f32,
-    turn: TurnBody,
-    sir: f32,
-}
-
-impl TokenBody {
-    pub(super) const LENGTH: usize = 28;
-
-    pub(super) const fn of(token: &Token) -> Self {
-        Self {
-            pass: PassId::new(token.number, token.mission),
-            at: PlaceBody::of(token.place),
-            power_w: token.power_w,
-            turn: TurnBody::of(token.turn),
-            sir: token.sir,
-        }
+impl Token {
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        let at = PlaceBody::of(self.place);
+        let turn = TurnBody::of(self.turn);
+        write(
+            &(tag::TOKEN, pass, at, self.power_w, turn, self.sir),
+            buffer,
+        )
     }
 
-    pub(super) fn checked(self) -> Option<Token> {
-        let place = self.at.checked()?;
-        Some(Token {
-            number: self.pass.number(),
-            mission: self.pass.mission(),
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let (pass, at, power_w, turn, sir) = read(body)?;
+        Self::checked(pass, at, power_w, turn, sir).ok_or(MessageError::Value)
+    }
+
+    fn checked(
+        pass: PassId,
+        at: PlaceBody,
+        power_w: f32,
+        turn: TurnBody,
+        sir: f32,
+    ) -> Option<Self> {
+        let place = at.checked()?;
+        Some(Self {
+            number: pass.number(),
+            mission: pass.mission(),
             place,
-            power_w: profile(place.altitude_m, self.power_w)?.power_w,
-            turn: self.turn.checked()?,
-            sir: sir_in_range(self.sir)?,
+            power_w: profile(place.altitude_m, power_w)?.power_w,
+            turn: turn.checked()?,
+            sir: sir_in_range(sir)?,
         })
     }
 }
@@ -146,33 +147,21 @@ pub struct Moved {
     pub worst: f32,
 }
 
-#[derive(Serialize, Deserialize)]
-pub(super) struct MovedBody {
-    pass: PassId,
-    at: PlaceBody,
-    any: bool,
-    worst: f32,
-}
-
-impl MovedBody {
-    pub(super) const LENGTH: usize = 18;
-
-    pub(super) const fn of(moved: &Moved) -> Self {
-        Self {
-            pass: PassId::new(moved.number, moved.mission),
-            at: PlaceBody::of(moved.place),
-            any: moved.any,
-            worst: moved.worst,
-        }
+impl Moved {
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        let at = PlaceBody::of(self.place);
+        write(&(tag::MOVED, pass, at, self.any, self.worst), buffer)
     }
 
-    pub(super) fn checked(self) -> Option<Moved> {
-        Some(Moved {
-            number: self.pass.number(),
-            mission: self.pass.mission(),
-            place: self.at.checked()?,
-            any: self.any,
-            worst: sir_in_range(self.worst)?,
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let (pass, at, any, worst): (PassId, PlaceBody, bool, f32) = read(body)?;
+        Ok(Self {
+            number: pass.number(),
+            mission: pass.mission(),
+            place: at.checked().ok_or(MessageError::Value)?,
+            any,
+            worst: sir_in_range(worst).ok_or(MessageError::Value)?,
         })
     }
 }

@@ -1,6 +1,7 @@
 //! The call for a new view of the chain, and what came of it, which travels back.
 
-use super::parts::{PassId, ViewBody};
+use super::parts::{MessageError, PassId, ViewBody, read, write};
+use super::tag;
 use crate::wire::digest::MissionId;
 
 /// The call for a new view, as one relay hands it to the next.
@@ -19,9 +20,9 @@ pub struct Proposal {
 
 impl Proposal {
     /// The sender's place; size and number of the view before; version of the mission; whether its leader is there.
-    pub(super) fn body(&self) -> ViewBody {
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let before = self.before;
-        ViewBody::new(
+        let body = ViewBody::new(
             PassId::new(self.view, self.mission_id.digest),
             [
                 self.place,
@@ -30,10 +31,15 @@ impl Proposal {
                 self.mission_id.version,
             ],
             u8::from(before.leader),
-        )
+        );
+        write(&(tag::PROPOSAL, body), buffer)
     }
 
-    pub(super) fn checked(body: ViewBody) -> Option<Self> {
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        Self::checked(read(body)?).ok_or(MessageError::Value)
+    }
+
+    fn checked(body: ViewBody) -> Option<Self> {
         let (place @ 1.., relays @ 1.., view, leader @ 0..=1) = body.parts()? else {
             return None;
         };
@@ -78,8 +84,8 @@ pub struct Decision {
 
 impl Decision {
     /// The sender's place; how many relays, 0 for too few; version of the mission.
-    pub(super) fn body(&self) -> ViewBody {
-        ViewBody::new(
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let body = ViewBody::new(
             PassId::new(self.view, self.mission_id.digest),
             [
                 self.place,
@@ -88,10 +94,15 @@ impl Decision {
                 self.mission_id.version,
             ],
             0,
-        )
+        );
+        write(&(tag::DECISION, body), buffer)
     }
 
-    pub(super) fn checked(body: ViewBody) -> Option<Self> {
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        Self::checked(read(body)?).ok_or(MessageError::Value)
+    }
+
+    fn checked(body: ViewBody) -> Option<Self> {
         let (place @ 1.., relays, 0, 0) = body.parts()? else {
             return None;
         };
