@@ -236,7 +236,7 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
 }
 
 /// COBS in place: the `len` bytes from the second on, fewer than 254, without their zeros, and the delimiter. Returns the
-/// length of all.
+/// length of all. The encoders of `cobs` write to a second buffer.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first, becomes the way to the next.
     let mut run: u8 = 1;

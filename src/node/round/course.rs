@@ -6,7 +6,7 @@ use core::task::Poll;
 use super::core::{Chosen, Own, Pass, Share};
 use super::state::Next;
 use super::task::{Chain, Lead, MOST_SOLVED};
-use crate::optimiser::joint::ascent::{Ascent, Turn};
+use crate::optimiser::joint::ascent::{Ascent, AscentStep as Turn};
 use crate::optimiser::joint::course::{Courser, Coursing};
 use crate::optimiser::joint::trial::{Bar, Trials};
 use crate::optimiser::joint::{Outlook, Seat};

@@ -5,7 +5,7 @@ use super::state::Next;
 use super::task::Lead;
 use super::turning::Turning;
 use crate::optimiser::ladder::Ladder;
-use crate::optimiser::local::Beside;
+use crate::optimiser::local::HopEnd as Beside;
 use crate::optimiser::pass::origins;
 use crate::optimiser::search::{Infeasible, Schedule, Search};
 use crate::place::Placement;

@@ -6,7 +6,7 @@ use crate::optimiser::joint::ascent::Ascent;
 use crate::optimiser::plan::Planner;
 use crate::optimiser::search::{Infeasible, Schedule, Search};
 use crate::settings::{Adjust, Method, Settings};
-use crate::wire::message::Turn;
+use crate::wire::message::AdjustStep as Turn;
 
 /// The most relays whose chain is solved in one relay, without a message; longer ones are solved by messages.
 pub(crate) const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };

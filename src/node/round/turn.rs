@@ -6,8 +6,8 @@ use super::core::{Own, PLACES_AT_ONCE, Pass, Share};
 use super::state::Next;
 use super::task::Lead;
 use super::turning::Turning;
-use crate::optimiser::local::Beside;
-use crate::wire::message::{Moved, Token, Turn};
+use crate::optimiser::local::HopEnd as Beside;
+use crate::wire::message::{AdjustStep as Turn, Moved, Token};
 
 impl Share {
     /// The token, from the relay before.

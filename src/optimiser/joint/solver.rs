@@ -6,10 +6,10 @@
 
 use core::task::Poll;
 
-use super::ascent::{Ascent, Turn};
+use super::ascent::{Ascent, AscentStep};
 use super::axis::Triple;
 use super::cells::Cell;
-use super::link::{self, Link, Room, minus, triple};
+use super::link::{self, Room, Site, minus, triple};
 use super::outlook::Outlook;
 use super::policy::Brief;
 use super::seek::Seek;
@@ -110,7 +110,7 @@ struct Stage {
 
 /// A pass forward.
 #[derive(Clone, Copy, Debug, Default)]
-struct Pass {
+struct ForwardPass {
     /// Relays that are behind it.
     done: u16,
     /// Where the last of them is, and where it was.
@@ -163,7 +163,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     again: bool,
     ascent: Ascent,
     work: Work,
-    pass: Pass,
+    pass: ForwardPass,
     /// The segment whose policies are at hand.
     held: Option<u8>,
     stages: [Stage; SEGMENT],
@@ -173,13 +173,13 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
 
 /// What the passes have in common.
 #[derive(Clone, Copy)]
-struct Chain<'a, F> {
+struct SolverContext<'a, F> {
     mission: &'a Mission,
     interferer: &'a Interferer,
     seat_of: &'a F,
 }
 
-impl<'a, F: Fn(u16) -> Seat> Chain<'a, F> {
+impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     fn distance_m(&self) -> f32 {
         self.mission.config().distance_m
     }
@@ -197,9 +197,9 @@ impl<'a, F: Fn(u16) -> Seat> Chain<'a, F> {
     }
 
     /// Relay `index`, fed from `from`.
-    fn link(&self, index: u16, from: Placement, room: Room) -> Link<'a> {
+    fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
-        Link::new(self.mission, self.interferer, sender, index <= 1, room)
+        Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
     /// The slack of the tail at `at`, and its outlook.
@@ -237,7 +237,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             again: false,
             ascent: Ascent::new(1.0, 0.0, 0.0, 0.0),
             work: Work::Begin,
-            pass: Pass::default(),
+            pass: ForwardPass::default(),
             held: None,
             stages: [Stage::default(); SEGMENT],
             marks: [Mark::default(); SEGMENTS],
@@ -268,7 +268,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let Some(interferer) = mission.interferer() else {
             return Poll::Ready(Err(Infeasible));
         };
-        let chain = Chain {
+        let chain = SolverContext {
             mission,
             interferer,
             seat_of: &seat_of,
@@ -293,7 +293,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// The next start, or the end.
-    fn begin(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>) -> Poll<Result<f32, Infeasible>> {
+    fn begin(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+    ) -> Poll<Result<f32, Infeasible>> {
         let room = (chain.seat_of)(1).room;
         let Some(start) = Start::number(self.number, room) else {
             // All have been tried.
@@ -329,13 +332,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// A pass begins at Tx.
     fn restart(&mut self) {
-        self.pass = Pass::default();
+        self.pass = ForwardPass::default();
     }
 
     /// Where relay `index` is wanted on a pass that changes nothing, or gives the chain its first shape.
     fn shaped(
         &self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         index: u16,
         room: Room,
         target: f32,
@@ -372,7 +375,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Goes on with a pass for `sigma`; ready with the slack at its end, `None` if a hop cannot meet the target.
     fn plain(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         sigma: f32,
         purpose: Purpose,
         kept: bool,
@@ -459,7 +462,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     fn seek(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         mut seek: Seek,
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
@@ -486,7 +489,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// Whether the chain meets the ceiling by the rules of the sweep; if not, its other hops have to be shorter.
-    fn probe(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>) {
+    fn probe(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) {
         let ceiling = chain.ceiling();
         let Poll::Ready(slack) = self.plain(chain, ceiling - CEILING, Purpose::Last, false) else {
             return;
@@ -512,7 +515,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     fn settle(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         sigma: f32,
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
@@ -577,20 +580,20 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Back(u8::try_from(last).unwrap_or(u8::MAX))
     }
 
-    fn next(&mut self, turn: Turn, mission: &Mission) -> Work {
+    fn next(&mut self, turn: AscentStep, mission: &Mission) -> Work {
         self.restart();
         match turn {
-            Turn::Try { share, sigma } => Work::Forward(share, sigma, false),
-            Turn::Raise if self.ascent.at_limit() => Work::Probe,
-            Turn::Raise => {
+            AscentStep::Try { share, sigma } => Work::Forward(share, sigma, false),
+            AscentStep::Raise if self.ascent.at_limit() => Work::Probe,
+            AscentStep::Raise => {
                 let Ascent { sigma, slack, .. } = self.ascent;
                 Work::Seek(Seek::up(sigma, slack, 0.02, 1e-5), Purpose::Raise)
             }
-            Turn::Again => self.look_back(mission),
-            Turn::Over if self.is_promising() && self.ascent.tighten() => {
+            AscentStep::Again => self.look_back(mission),
+            AscentStep::Over if self.is_promising() && self.ascent.tighten() => {
                 Work::Settle(self.ascent.sigma, Purpose::Tighten)
             }
-            Turn::Over => {
+            AscentStep::Over => {
                 let sigma = self.ascent.sigma;
                 Work::Seek(
                     Seek::down(sigma + JUDGED, JUDGED, 3.0, JUDGED),
@@ -612,7 +615,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Works out the policies of `segment`, whose relays come after one at `before`; what that one sees. Bounded by ten relays.
     fn recall(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         segment: u8,
         before: Placement,
     ) -> Option<Outlook> {
@@ -653,10 +656,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Some(outlook)
     }
 
-    fn back(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>, segment: u8) {
+    fn back(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, segment: u8) {
         let before = self.nominal_before(chain, segment);
         let Some(outlook) = self.recall(chain, segment, before) else {
-            self.work = self.next(Turn::Over, chain.mission);
+            self.work = self.next(AscentStep::Over, chain.mission);
             return;
         };
         self.ascent.add(&outlook);
@@ -672,7 +675,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// Where the relay before `segment` is.
-    fn nominal_before(&self, chain: &Chain<'_, impl Fn(u16) -> Seat>, segment: u8) -> Placement {
+    fn nominal_before(
+        &self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        segment: u8,
+    ) -> Placement {
         let index = u16::from(segment) * SEGMENT_RELAYS;
         if index == 0 {
             return Placement::default();
@@ -687,7 +694,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// One segment more of a pass with the policies, or what is needed for it.
     fn forward(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         share: f32,
         sigma: f32,
         kept: bool,
@@ -714,7 +721,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let segment = u8::try_from(usize::from(self.pass.done) / SEGMENT).unwrap_or(u8::MAX);
         if self.held != Some(segment) {
             if self.recall(chain, segment, self.pass.old).is_none() {
-                self.work = self.next(Turn::Over, chain.mission);
+                self.work = self.next(AscentStep::Over, chain.mission);
             }
             return;
         }
@@ -728,14 +735,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// The relays of `segment` take `share` of their steps.
     fn follow(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         segment: u8,
         target: f32,
         share: f32,
         kept: bool,
     ) -> Option<()> {
         for (k, index) in Self::relays_of(segment, chain.mission.relays()) {
-            let Pass { from, old, .. } = self.pass;
+            let ForwardPass { from, old, .. } = self.pass;
             let Seat { room, .. } = (chain.seat_of)(index);
             let Stage { x_m, policy } = *self.stages.get(k)?;
             let policy = policy.policy();
@@ -748,7 +755,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             if kept {
                 self.keep(index, from.x_m, cell);
             }
-            self.pass = Pass {
+            self.pass = ForwardPass {
                 done: index,
                 from: place,
                 old: nominal,
@@ -761,7 +768,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 }
 
 /// Where in `room`, right above Rx, a relay hears Tx best.
-fn far_off(chain: &Chain<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
+fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
     for y_m in [room.lateral.least_m, 0.0, room.lateral.most_m] {

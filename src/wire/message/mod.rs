@@ -19,7 +19,7 @@ pub use self::course::{Course, Worth};
 pub use self::hello::Hello;
 pub use self::parts::MessageError;
 pub use self::sweep::{Answer, Sweep};
-pub use self::turn::{Moved, Token, Turn};
+pub use self::turn::{AdjustStep, Moved, Token};
 pub use self::view::{Decision, PriorView, Proposal};
 
 use self::parts::{read, write};

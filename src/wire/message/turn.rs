@@ -19,7 +19,7 @@ pub struct Token {
     /// The sender's transmit power, W.
     pub power_w: f32,
     /// What this pass is for.
-    pub turn: Turn,
+    pub turn: AdjustStep,
     /// SIR of the chain before this pass, linear; 0 before it is known.
     pub sir: f32,
 }
@@ -28,7 +28,7 @@ impl Token {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.mission);
         let at = PlaceBody::of(self.place);
-        let turn = TurnBody::of(self.turn);
+        let turn = StepBody::of(self.turn);
         write(
             &(tag::TOKEN, pass, at, self.power_w, turn, self.sir),
             buffer,
@@ -44,7 +44,7 @@ impl Token {
         pass: PassId,
         at: PlaceBody,
         power_w: f32,
-        turn: TurnBody,
+        turn: StepBody,
         sir: f32,
     ) -> Option<Self> {
         let place = at.checked()?;
@@ -62,7 +62,7 @@ impl Token {
 /// What a relay does when the token comes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Turn {
+pub enum AdjustStep {
     /// It stays, and hears where its neighbours are.
     Look,
     /// It moves if that is better.
@@ -78,23 +78,23 @@ pub enum Turn {
 
 /// A turn as one byte and three numbers, all of them 0 where they mean nothing.
 #[derive(Clone, Copy, Serialize, Deserialize)]
-struct TurnBody {
+struct StepBody {
     kind: u8,
     explore_m: f32,
     columns: u8,
     rows: u8,
 }
 
-impl TurnBody {
-    const fn of(turn: Turn) -> Self {
+impl StepBody {
+    const fn of(turn: AdjustStep) -> Self {
         let (kind, explore_m, columns, rows) = match turn {
-            Turn::Look => (0, 0.0, 0, 0),
-            Turn::Stop => (1, 0.0, 0, 0),
-            Turn::Move {
+            AdjustStep::Look => (0, 0.0, 0, 0),
+            AdjustStep::Stop => (1, 0.0, 0, 0),
+            AdjustStep::Move {
                 explore_m,
                 local: Local::Fine,
             } => (2, explore_m, 0, 0),
-            Turn::Move {
+            AdjustStep::Move {
                 explore_m,
                 local: Local::Grid { columns, rows },
             } => (2, explore_m, columns, rows),
@@ -108,7 +108,7 @@ impl TurnBody {
     }
 
     /// The turn, if it could not be written otherwise and is in range.
-    fn checked(self) -> Option<Turn> {
+    fn checked(self) -> Option<AdjustStep> {
         let Self {
             kind,
             explore_m,
@@ -117,15 +117,15 @@ impl TurnBody {
         } = self;
         let rest = explore_m.to_bits() == 0 && columns == 0 && rows == 0;
         match kind {
-            0 if rest => Some(Turn::Look),
-            1 if rest => Some(Turn::Stop),
+            0 if rest => Some(AdjustStep::Look),
+            1 if rest => Some(AdjustStep::Stop),
             2 if (0.0..=1e5).contains(&explore_m) => {
                 let local = match (columns, rows) {
                     (0, 0) => Local::Fine,
                     (2.., 2..) => Local::Grid { columns, rows },
                     _ => return None,
                 };
-                Some(Turn::Move { explore_m, local })
+                Some(AdjustStep::Move { explore_m, local })
             }
             _ => None,
         }
