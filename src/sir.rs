@@ -72,7 +72,7 @@ pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
 /// How SIR_1 behaves along x beyond Tx, x >= 0, at one altitude: the paper's Lemma 2, for any place of the interferer.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Turn {
+pub enum Extremum {
     /// It falls up to there, m, the paper's Psi^x, and rises beyond: the interferer is ahead of Tx (X > 0).
     Valley(f32),
     /// It rises up to there, m, and falls beyond: the interferer is behind Tx (X < 0).
@@ -87,18 +87,18 @@ pub enum Turn {
 ///
 /// The stationary points of SIR_1 are (q +- sqrt(q^2 + 4 X^2 h^2)) / 2X with q = X^2 + Y^2, of which one lies beyond Tx; for
 /// X < 0 it is written without cancellation. Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems/`.
-pub fn first_hop_turn(interferer: &Interferer, altitude_m: f32) -> Turn {
+pub fn first_hop_turn(interferer: &Interferer, altitude_m: f32) -> Extremum {
     let x = interferer.x_m;
     let q = square(x) + square(interferer.y_m);
     let root = libm::hypotf(q, 2.0 * x * altitude_m);
     if x > 0.0 {
-        Turn::Valley((q + root) / (2.0 * x))
+        Extremum::Valley((q + root) / (2.0 * x))
     } else if x < 0.0 {
-        Turn::Hill(-2.0 * x * square(altitude_m) / (q + root))
+        Extremum::Hill(-2.0 * x * square(altitude_m) / (q + root))
     } else if q > 0.0 {
-        Turn::Falls
+        Extremum::Falls
     } else {
-        Turn::Level
+        Extremum::Level
     }
 }
 
@@ -111,7 +111,7 @@ pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
         return mission.tx_gain().value() / square(altitude_m);
     };
     let x_m = match first_hop_turn(interferer, altitude_m) {
-        Turn::Hill(peak) => peak.min(mission.config().distance_m),
+        Extremum::Hill(peak) => peak.min(mission.config().distance_m),
         _ => 0.0,
     };
     Sender::transmitter(mission).sir_at(mission, 0.0, Placement::on_line(x_m, altitude_m))

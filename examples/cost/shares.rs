@@ -5,9 +5,9 @@ use cortex_m_semihosting::hprintln;
 use uav_relay::Local;
 use uav_relay::Placement;
 use uav_relay::field::estimate::Estimator;
-use uav_relay::optimiser::local::Beside;
+use uav_relay::optimiser::local::HopEnd;
 use uav_relay::optimiser::local::Hops;
-use uav_relay::optimiser::local::Search;
+use uav_relay::optimiser::local::LocalSearch;
 
 use super::counter::instructions;
 use super::missions::{HIGH, INTERFERER};
@@ -15,7 +15,7 @@ use super::missions::{HIGH, INTERFERER};
 /// The local search of Algorithm 2, and an estimate of what is measured.
 pub(crate) fn shares() {
     let place = Placement::on_line;
-    let beside = |place| Beside {
+    let beside = |place| HopEnd {
         place,
         apart_m: 4.0,
     };
@@ -35,13 +35,13 @@ pub(crate) fn shares() {
         "evaluation {}",
         instructions(|| black_box(&hops).worse(black_box(at)))
     );
-    let mut search = Search::new(Local::Fine, hops, at, 10.0, (20.0, 300.0));
+    let mut search = LocalSearch::new(Local::Fine, hops, at, 10.0, (20.0, 300.0));
     let (mut all, mut over) = (0, false);
     while !over {
         all += instructions(|| over = search.step(240).is_ready());
     }
     hprintln!("search {}", all);
-    hprintln!("size_of_search {}", size_of::<Search>());
+    hprintln!("size_of_search {}", size_of::<LocalSearch>());
     let mut estimator = Estimator::new(1e-6);
     let mut push = 0;
     for at in 1..=1000_u16 {

@@ -5,7 +5,7 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use uav_relay::wire::crc::Crc32c;
+use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::upload::LENGTH;
 use uav_relay::{Mission, Upload};
@@ -60,7 +60,5 @@ pub(crate) fn store(file: &Path, upload: &Upload) -> Result<(), String> {
 }
 
 fn sum(bytes: &[u8]) -> [u8; 4] {
-    let mut crc = Crc32c::new();
-    crc.update(bytes);
-    crc.finish().to_le_bytes()
+    CRC_32C.checksum(bytes).to_le_bytes()
 }

@@ -48,7 +48,7 @@
 use uav_relay::channel::{AirGround, Channel, ChannelError};
 use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
-use uav_relay::wire::crc::Crc32c;
+use uav_relay::wire::crc::CRC_32C;
 use uav_relay::{
     Adjust, Band, Field, FieldPoint, Identity, Interference, Interferer, Local, Measure, Method,
     Mission, MissionConfig, Profile,
@@ -383,9 +383,7 @@ pub fn write(config: &Config, numbers: &ChannelNumbers, secret: Option<Secret>) 
 }
 
 fn crc(bytes: &[u8]) -> u32 {
-    let mut crc = Crc32c::new();
-    crc.update(bytes);
-    crc.finish()
+    CRC_32C.checksum(bytes)
 }
 
 /// What has not been read yet. Past the end there are zeros, which the table never asks for.

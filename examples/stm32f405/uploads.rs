@@ -9,7 +9,7 @@
 //! room for 1489 records, so at least as many uploads are kept from one start to the next; what comes after them is flown all the same.
 
 use uav_relay::Upload;
-use uav_relay::wire::crc::Crc32c;
+use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::upload::LENGTH;
 
@@ -83,10 +83,10 @@ pub fn upload(record: &Record, block: u32) -> Option<Upload> {
 }
 
 fn check(bytes: &[u8], block: u32) -> u32 {
-    let mut crc = Crc32c::new();
+    let mut crc = CRC_32C.digest();
     crc.update(bytes);
     crc.update(&block.to_le_bytes());
-    crc.finish()
+    crc.finalize()
 }
 
 impl Found {

@@ -4,7 +4,7 @@ use core::task::Poll;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::optimiser::local::{Beside, Hops, Search};
+use uav_relay::optimiser::local::{HopEnd, Hops, LocalSearch};
 use uav_relay::power_ratio::PowerRatio;
 use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig, Placement, Profile};
@@ -154,25 +154,25 @@ fn the_grid_moves_where_a_separate_program_moves() {
     let mut history = vec![chain(&places)];
     for _ in 0..5 {
         for at in 0..4 {
-            let (before, gain): (Beside, PowerRatio) = match at {
+            let (before, gain): (HopEnd, PowerRatio) = match at {
                 0 => (
-                    Beside {
+                    HopEnd {
                         place: Placement::default(),
                         apart_m: 0.0,
                     },
                     mission.tx_gain(),
                 ),
                 _ => (
-                    Beside {
+                    HopEnd {
                         place: places[at - 1],
                         apart_m,
                     },
                     mission.relay_gain(1.0),
                 ),
             };
-            let after = places.get(at + 1).map(|&place| Beside { place, apart_m });
+            let after = places.get(at + 1).map(|&place| HopEnd { place, apart_m });
             let hops = Hops::new(&mission, &interferer, before, gain, 1.0, after);
-            let mut search = Search::new(how, hops, places[at], 10.0, (20.0, 300.0));
+            let mut search = LocalSearch::new(how, hops, places[at], 10.0, (20.0, 300.0));
             let found = loop {
                 if let Poll::Ready(found) = search.step(100) {
                     break found;
@@ -222,11 +222,11 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
             Placement::on_line(rng.random_range(low..high), rng.random_range(30.0..200.0))
         };
         let (a, b, c) = (place(50.0, 250.0), place(380.0, 550.0), place(680.0, 950.0));
-        let beside = |place| Beside { place, apart_m };
+        let beside = |place| HopEnd { place, apart_m };
         let gain = mission.relay_gain(1.0);
         let hops = Hops::new(&mission, &interferer, beside(a), gain, 1.0, Some(beside(c)));
         let mut find = |local| {
-            let mut search = Search::new(local, hops, b, 20.0, (30.0, 200.0));
+            let mut search = LocalSearch::new(local, hops, b, 20.0, (30.0, 200.0));
             loop {
                 if let Poll::Ready(found) = search.step(500) {
                     let to = found.unwrap_or(b);
@@ -278,10 +278,10 @@ fn faults_change_nothing() {
 /// The hops of relay `at` (from 0) of a chain of relays of 1 W at `places`.
 fn hops_of(mission: &Mission, places: &[Placement], at: usize) -> Hops {
     let apart_m = mission.config().min_separation_m;
-    let beside = |place| Beside { place, apart_m };
+    let beside = |place| HopEnd { place, apart_m };
     let (before, gain) = match at.checked_sub(1) {
         None => (
-            Beside {
+            HopEnd {
                 place: Placement::default(),
                 apart_m: 0.0,
             },
@@ -331,7 +331,7 @@ fn it_ends_where_nobody_can_do_better() {
             .collect();
         for at in 0..relays {
             let hops = hops_of(&mission, &places, at);
-            let mut search = Search::new(local, hops, places[at], 10.0, (20.0, 300.0));
+            let mut search = LocalSearch::new(local, hops, places[at], 10.0, (20.0, 300.0));
             let better = loop {
                 if let Poll::Ready(found) = search.step(500) {
                     break found;

@@ -45,7 +45,7 @@ pub enum Local {
 
 /// One of the two neighbours, or the ground station in its place.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Beside {
+pub struct HopEnd {
     /// Where it stands; at altitude 0 for a ground station.
     pub place: Placement,
     /// The least distance to it, m; 0 for a ground station.
@@ -55,8 +55,8 @@ pub struct Beside {
 /// The two hops of a relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
-    before: Beside,
-    after: Beside,
+    before: HopEnd,
+    after: HopEnd,
     /// What the power of the node before is worth.
     gain_in: PowerRatio,
     /// What the relay's own is worth: on a hop to a relay, or K in m^2 to Rx.
@@ -72,12 +72,12 @@ impl Hops {
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
-        before: Beside,
+        before: HopEnd,
         gain_in: PowerRatio,
         power_w: f32,
-        after: Option<Beside>,
+        after: Option<HopEnd>,
     ) -> Self {
-        let rx = Beside {
+        let rx = HopEnd {
             place: Placement::on_line(mission.config().distance_m, 0.0),
             apart_m: 0.0,
         };
@@ -122,7 +122,7 @@ impl Hops {
 
     /// Whether the relay at `at` is between its neighbours, and far enough from both.
     fn is_clear(&self, at: Placement) -> bool {
-        let clear = |of: Beside| {
+        let clear = |of: HopEnd| {
             square(at.x_m - of.place.x_m) + square(at.altitude_m - of.place.altitude_m)
                 >= square(of.apart_m)
         };
@@ -132,7 +132,7 @@ impl Hops {
 
 /// A search under way.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Search {
+pub struct LocalSearch {
     how: Local,
     hops: Hops,
     /// The altitudes that may be taken.
@@ -151,7 +151,7 @@ pub struct Search {
     best_sir: f32,
 }
 
-impl Search {
+impl LocalSearch {
     /// A search by a relay at `at`, up to `explore_m` above and below within [`least_m`, `most_m`].
     pub fn new(how: Local, hops: Hops, at: Placement, explore_m: f32, band: (f32, f32)) -> Self {
         let low_m = (at.altitude_m - explore_m).max(band.0);
@@ -236,7 +236,7 @@ impl Search {
 
     /// The best of a row: where, going toward Rx, the hop into the relay stops being the better one.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
-        let gap = |of: Beside| {
+        let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;
             // What is left apart must still be so when the place has been rounded.
             sqrt(square(of.apart_m) - square(climb)) + ROUNDING * of.place.x_m
@@ -286,15 +286,15 @@ impl Search {
 mod tests {
     use core::task::Poll;
 
-    use super::{Beside, Hops, Local, Search};
+    use super::{HopEnd, Hops, Local, LocalSearch};
     use crate::mission::Interferer;
     use crate::place::Placement;
     use crate::power_ratio::PowerRatio;
 
     /// A relay at `altitude_m` in the middle of two that are 100 m apart at `beside_m`, who may go anywhere within the band.
-    fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> Search {
+    fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
-        let beside = |x_m| Beside {
+        let beside = |x_m| HopEnd {
             place: at(x_m, beside_m),
             apart_m,
         };
@@ -311,7 +311,7 @@ mod tests {
             },
             quiet_after: 1e6,
         };
-        Search::new(Local::Fine, hops, at(50.0, altitude_m), 1e5, band)
+        LocalSearch::new(Local::Fine, hops, at(50.0, altitude_m), 1e5, band)
     }
 
     #[test]

@@ -86,7 +86,7 @@ pub struct Search {
     /// The lowest target that no chain can meet, as far as known.
     most: Option<f32>,
     /// What is tried once somebody was held back to where it could not be.
-    trials: Option<Trials>,
+    trials: Option<StandTrials>,
 }
 
 impl Search {
@@ -303,7 +303,7 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
 
 /// Targets that are agreed on to see whether everybody can stand where the others need it.
 #[derive(Clone, Copy, Debug)]
-struct Trials {
+struct StandTrials {
     /// The lowest that was refused.
     high: f32,
     /// The highest that was not, and its pass.
@@ -357,7 +357,7 @@ impl Search {
         *self = Self {
             plain: true,
             most,
-            trials: Some(Trials {
+            trials: Some(StandTrials {
                 high: target,
                 best: None,
                 over: false,

@@ -1,7 +1,9 @@
 //! Keyed BLAKE2s (RFC 7693), for tags of eight bytes.
 //!
-//! Written out here because of the crates that were tried none can be linked without a panic and stays small: `blake2` and
-//! `hmac-sha256` index by tables, which the compiler does not see to be in bounds, and `hmac` with `sha2` takes several times
+//! Written out here because the crates leave a panic in the image, or take more flash than there is for `auth`. Of `blake2`
+//! 0.11 an `expect` in `block-buffer` stays reachable, and with `size_opt` bounds checks of its tables too. With `size_opt` and
+//! `opt-level = 3` it takes 1.6 KB more and makes the tag of a full sweep in 11 100 instructions instead of 12 800, without
+//! `size_opt` 3.7 KB more and 4800 instructions. `hmac-sha256` indexes by tables too, and `hmac` with `sha2` takes several times
 //! the flash. The tests hold this one against `blake2`. It has neither branches nor places in memory that depend on the key or
 //! the message.
 

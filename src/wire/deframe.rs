@@ -3,6 +3,9 @@
 //! The state depends on the bytes alone, so every way of cutting the stream into calls gives the same frames. A frame that
 //! is too long, or whose COBS is broken, latches: nothing is accepted until the next delimiter, so that its tail is never
 //! taken for a frame of its own.
+//!
+//! Written out here because with the streaming decoder of `cobs` 0.5.1 a full sweep takes 5.6 % more instructions, 13 241, and
+//! is above its budget of 13 000; flash grows by 64 to 288 bytes.
 
 use super::frame::MAX_DECODED;
 

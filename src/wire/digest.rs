@@ -1,6 +1,6 @@
 //! The 16-bit digest of a mission, by which relays tell whether they fly the same one.
 
-use super::crc::Crc32c;
+use super::crc::CRC_32C;
 use crate::mission::{Interference, Mission, MissionConfig};
 
 /// The low half of a CRC-32C over every parameter of `mission`; `FORMAT.md` has their order.
@@ -12,7 +12,7 @@ pub fn digest(mission: &Mission) -> u16 {
 
 /// The same of parameters alone.
 pub(super) fn of(c: &MissionConfig) -> u16 {
-    let mut crc = Crc32c::new();
+    let mut crc = CRC_32C.digest();
     crc.update(&c.relays.to_le_bytes());
     for number in [
         c.distance_m,
@@ -44,7 +44,7 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
         crc.update(&band.least_m.to_le_bytes());
         crc.update(&band.most_m.to_le_bytes());
     }
-    let [a, b, ..] = crc.finish().to_le_bytes();
+    let [a, b, ..] = crc.finalize().to_le_bytes();
     u16::from_le_bytes([a, b])
 }
 

@@ -1,7 +1,7 @@
 //! One frame: header, body, CRC; then COBS and a zero byte that ends it.
 
 use super::auth::{Signer, TAG};
-use super::crc::Crc32c;
+use super::crc::CRC_32C;
 use super::message::{MAX_BODY, Message, MessageError};
 
 /// Version of the format, in the top four bits of the first word.
@@ -145,9 +145,8 @@ fn close(
         let tag = signer.tag(plain.get(..checked).unwrap_or_default());
         checked = put(plain, checked, tag);
     }
-    let mut crc = Crc32c::new();
-    crc.update(plain.get(..checked).unwrap_or_default());
-    let len = put(plain, checked, crc.finish().to_le_bytes());
+    let crc = CRC_32C.checksum(plain.get(..checked).unwrap_or_default());
+    let len = put(plain, checked, crc.to_le_bytes());
     stuff(out, len)
 }
 
@@ -185,9 +184,7 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     let (head, rest) = checked
         .split_first_chunk::<HEADER>()
         .ok_or(FrameError::Short)?;
-    let mut crc = Crc32c::new();
-    crc.update(checked);
-    if crc.finish() != u32::from_le_bytes(*check) {
+    if CRC_32C.checksum(checked) != u32::from_le_bytes(*check) {
         return Err(FrameError::Crc);
     }
     let [a, b, c, d, e, f, g, h, i, j] = *head;
@@ -239,7 +236,7 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
 }
 
 /// COBS in place: the `len` bytes from the second on, fewer than 254, without their zeros, and the delimiter. Returns the
-/// length of all.
+/// length of all. The encoders of `cobs` write to a second buffer.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first, becomes the way to the next.
     let mut run: u8 = 1;

@@ -5,12 +5,9 @@
 pub mod auth;
 #[cfg(feature = "auth")]
 mod blake2s;
-mod body;
-mod checks;
 pub mod crc;
 pub mod deframe;
 pub mod digest;
-mod forming;
 pub mod frame;
 pub mod message;
 #[cfg(feature = "auth")]

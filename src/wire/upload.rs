@@ -4,15 +4,8 @@
 //! flight: relays that were loaded with another one refuse it. It keeps the number of relays, because that is what nodes are
 //! numbered by, and it is of one interferer: a field does not fit into a frame.
 
-use serde::{Deserialize, Serialize};
-
-use super::body::Pass;
 use super::digest::{MissionId, digest, of};
-use super::message::Message;
-use crate::channel::Channel;
-use crate::mission::{
-    Band, Interference, Interferer, Mission, MissionConfig, MissionError, Profile,
-};
+use crate::mission::{Interference, Mission, MissionConfig, MissionError};
 
 /// Bytes of an upload as it is stored; those of the body of an offer.
 pub const LENGTH: usize = 83;
@@ -86,7 +79,12 @@ impl Upload {
         Self::checked(version, digest(base), MissionConfig { channel, ..config })
     }
 
-    fn checked(version: u16, base: u16, config: MissionConfig) -> Result<Self, UploadError> {
+    /// Of parameters as they are.
+    pub(super) fn checked(
+        version: u16,
+        base: u16,
+        config: MissionConfig,
+    ) -> Result<Self, UploadError> {
         if version == 0 {
             return Err(UploadError::Version);
         }
@@ -122,101 +120,5 @@ impl Upload {
             version: self.version,
             digest: of(&self.config),
         }
-    }
-
-    /// Writes it as it is to be stored, [`LENGTH`] bytes, into `buffer`; `None` if it does not fit.
-    pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        Message::Offer(*self).encode(buffer)
-    }
-
-    /// Reads it back; `None` if `bytes` are anything but one upload in range. Whether they were stored whole is for a check
-    /// sequence around them to say.
-    pub fn decode(bytes: &[u8]) -> Option<Self> {
-        match Message::decode(bytes) {
-            Ok(Message::Offer(upload)) => Some(upload),
-            _ => None,
-        }
-    }
-}
-
-/// The wire form: version and base, and the numbers in the order of the digest, the bands last.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-pub(super) struct Terms {
-    /// The number is the version, the mission the base.
-    pass: Pass,
-    relays: [u8; 2],
-    numbers: [f32; 9],
-    factors: [f64; 3],
-    bands: [f32; 4],
-}
-
-impl Terms {
-    pub(super) fn of(upload: &Upload) -> Self {
-        let c = &upload.config;
-        let (power_w, x_m, y_m) = match c.interference {
-            Interference::Source(at) => (at.power_w, at.x_m, at.y_m),
-            Interference::Field(_) => (0.0, 0.0, 0.0),
-        };
-        Self {
-            pass: Pass::new(upload.version, upload.base),
-            relays: c.relays.to_le_bytes(),
-            numbers: [
-                c.distance_m,
-                c.min_separation_m,
-                c.tx_power_w,
-                c.common.altitude_m,
-                c.common.power_w,
-                power_w,
-                x_m,
-                y_m,
-                c.tolerance,
-            ],
-            factors: [c.channel.mu_los(), c.channel.mu_nlos(), c.channel.eta()],
-            bands: [
-                c.band.least_m,
-                c.band.most_m,
-                c.lateral.least_m,
-                c.lateral.most_m,
-            ],
-        }
-    }
-
-    pub(super) fn upload(self) -> Option<Upload> {
-        let [mu_los, mu_nlos, eta] = self.factors;
-        let [least_m, most_m, left_m, right_m] = self.bands;
-        let [
-            distance_m,
-            min_separation_m,
-            tx_power_w,
-            altitude_m,
-            power_w,
-            from_w,
-            x_m,
-            y_m,
-            tolerance,
-        ] = self.numbers;
-        let config = MissionConfig {
-            relays: u16::from_le_bytes(self.relays),
-            distance_m,
-            min_separation_m,
-            tx_power_w,
-            common: Profile {
-                altitude_m,
-                power_w,
-            },
-            band: Band { least_m, most_m },
-            lateral: Band {
-                least_m: left_m,
-                most_m: right_m,
-            },
-            channel: Channel::from_factors(mu_los, mu_nlos, eta)?,
-            interference: Interference::Source(Interferer {
-                power_w: from_w,
-                x_m,
-                y_m,
-            }),
-            tolerance,
-        };
-        Upload::checked(self.pass.number(), self.pass.mission(), config).ok()
     }
 }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use uav_relay::SetupError;
 use uav_relay::channel::AirGround;
-use uav_relay::wire::crc::Crc32c;
+use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Band, Channel, Duration, Identity, Instant, Interference, Interferer, Mission, MissionConfig,
@@ -61,7 +61,7 @@ pub struct Chain {
     silent: Vec<bool>,
     under_way: VecDeque<Arrival>,
     now: Instant,
-    said: Crc32c,
+    said: Vec<u8>,
 }
 
 impl core::fmt::Debug for Arrival {
@@ -89,7 +89,7 @@ impl Chain {
             relays,
             under_way: VecDeque::new(),
             now: Instant::ZERO,
-            said: Crc32c::new(),
+            said: Vec::new(),
         })
     }
 
@@ -117,7 +117,7 @@ impl Chain {
 
     /// The check sequence of every byte that has been said, in the order that it was said.
     pub fn said(&self) -> u32 {
-        self.said.clone().finish()
+        CRC_32C.checksum(&self.said)
     }
 
     /// Lets so much time go by.
@@ -152,7 +152,7 @@ impl Chain {
                 .filter(|_| !silent)
             {
                 let bytes = frame.get(..transmit.len).unwrap_or_default();
-                self.said.update(bytes);
+                self.said.extend_from_slice(bytes);
                 for (hearer, port) in hearers(index, transmit.port, count) {
                     self.under_way.push_back(Arrival {
                         at: self.now + FLIGHT,

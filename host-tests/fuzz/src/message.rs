@@ -4,7 +4,7 @@
 
 mod offer;
 
-use uav_relay::wire::crc::Crc32c;
+use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::digest::MissionId;
 
 use super::input::Input;
@@ -67,9 +67,7 @@ impl Header {
 
 /// Adds the check sequence.
 pub fn sealed(plain: &mut Vec<u8>) {
-    let mut crc = Crc32c::new();
-    crc.update(plain);
-    plain.extend_from_slice(&crc.finish().to_le_bytes());
+    plain.extend_from_slice(&CRC_32C.checksum(plain).to_le_bytes());
 }
 
 /// A body of any of the fifteen kinds, or of none.

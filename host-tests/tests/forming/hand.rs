@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, MAX_FRAME};
-use uav_relay::wire::message::{Message, Turn};
+use uav_relay::wire::message::{AdjustStep, Message};
 use uav_relay::{Band, Identity, Instant, Mission, MissionConfig, Phase, Port, Relay, Settings};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
@@ -20,7 +20,9 @@ pub(crate) struct Flying {
 impl Flying {
     /// Whether it is a message of Algorithm 2's last round.
     pub(crate) fn is_stop(&self) -> bool {
-        self.is(|message| matches!(message, Message::Token(token) if token.turn == Turn::Stop))
+        self.is(
+            |message| matches!(message, Message::Token(token) if token.turn == AdjustStep::Stop),
+        )
     }
 
     pub(crate) fn is(&self, what: impl Fn(&Message) -> bool) -> bool {

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::single::{given_altitude, guide, locus};
-use uav_relay::sir::{Turn, first_hop_turn};
+use uav_relay::sir::{Extremum, first_hop_turn};
 use uav_relay_oracle::random;
 
 use super::scene::Scene;
@@ -71,12 +71,12 @@ fn turns_agree_with_a_scan() {
         let rises = |x: f64, by: f64| sir(x * (1.0 + by)) > sir(x * (1.0 - by)) * (1.0 + 1e-14);
         match first_hop_turn(scene.mission.interferer().unwrap(), h as f32) {
             // So far away that f64 cannot tell the bottom from its surroundings.
-            Turn::Valley(x) if f64::from(x) > 100.0 * link.distance_m => {
+            Extremum::Valley(x) if f64::from(x) > 100.0 * link.distance_m => {
                 for part in [0.01, 0.3, 1.0, 3.0] {
                     assert!(!rises(link.distance_m * part, 1e-3), "{link:?}");
                 }
             }
-            Turn::Valley(x) => {
+            Extremum::Valley(x) => {
                 let x = f64::from(x);
                 assert!(
                     sir(x) <= sir(x * 0.999) && sir(x) <= sir(x * 1.001),
@@ -86,20 +86,20 @@ fn turns_agree_with_a_scan() {
                 assert!(rises(x * 1.1, 1e-3) || x > link.distance_m, "{link:?}");
                 seen[0] += 1;
             }
-            Turn::Hill(x) => {
+            Extremum::Hill(x) => {
                 let x = f64::from(x);
                 // Where the interferer is all but beside Tx the hill is flatter than f64 can tell.
                 let top = sir(x) * (1.0 + 1e-14);
                 assert!(top >= sir(x * 0.999) && top >= sir(x * 1.001), "{link:?}");
                 seen[1] += 1;
             }
-            Turn::Falls => {
+            Extremum::Falls => {
                 for part in [0.01, 0.3, 1.0, 3.0] {
                     assert!(!rises(link.distance_m * part, 1e-3), "{link:?}");
                 }
                 seen[2] += 1;
             }
-            Turn::Level => {
+            Extremum::Level => {
                 assert!((sir(0.0) / sir(link.distance_m) - 1.0).abs() < 1e-12);
                 seen[3] += 1;
             }

@@ -13,8 +13,8 @@ use uav_relay::place::{CrossSection, Station};
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{
-    Answer, Course, Decision, Hello, Message, MessageError, Moved, PriorView, Proposal, Sweep,
-    Token, Turn, Worth,
+    AdjustStep, Answer, Course, Decision, Hello, Message, MessageError, Moved, PriorView, Proposal,
+    Sweep, Token, Worth,
 };
 use uav_relay::{Local, Placement};
 
@@ -386,13 +386,13 @@ impl Said {
                 place: Placement::on_line(x_m, altitude_m),
                 power_w,
                 turn: match (turn, columns) {
-                    (0, _) => Turn::Look,
-                    (1, _) => Turn::Stop,
-                    (_, 0) => Turn::Move {
+                    (0, _) => AdjustStep::Look,
+                    (1, _) => AdjustStep::Stop,
+                    (_, 0) => AdjustStep::Move {
                         explore_m,
                         local: Local::Fine,
                     },
-                    _ => Turn::Move {
+                    _ => AdjustStep::Move {
                         explore_m,
                         local: Local::Grid { columns, rows },
                     },

@@ -8,7 +8,7 @@ use super::state::Action;
 use super::task::{ChainSolver, LeaderTask, MOST_SOLVED};
 use crate::mission::Mission;
 use crate::node::context::Context;
-use crate::optimiser::joint::ascent::{Ascent, Turn};
+use crate::optimiser::joint::ascent::{Ascent, AscentStep};
 use crate::optimiser::joint::course::{Courser, Coursing};
 use crate::optimiser::joint::trial::{Bar, Trials};
 use crate::optimiser::joint::{Outlook, Seat};
@@ -247,13 +247,13 @@ impl Computation {
             };
         };
         match ascent.heard(trial, slack_m, &outlook) {
-            Turn::Over => {
+            AscentStep::Over => {
                 let target = libm::expf(ascent.estimate());
                 if self.search_last(context, target).is_err() {
                     return self.give_up();
                 }
             }
-            Turn::Try { .. } | Turn::Raise | Turn::Again => {}
+            AscentStep::Try { .. } | AscentStep::Raise | AscentStep::Again => {}
         }
         Action::Work { moved: false }
     }

@@ -6,7 +6,7 @@ use super::task::LeaderTask;
 use super::turning::Turning;
 use crate::node::context::Context;
 use crate::optimiser::ladder::Ladder;
-use crate::optimiser::local::Beside;
+use crate::optimiser::local::HopEnd as Beside;
 use crate::optimiser::pass::origins;
 use crate::optimiser::plan::Planner;
 use crate::optimiser::search::{Infeasible, Schedule, Search};

@@ -5,7 +5,7 @@ use crate::optimiser::joint::ascent::Ascent;
 use crate::optimiser::plan::Planner;
 use crate::optimiser::search::Search;
 use crate::settings::Adjust;
-use crate::wire::message::Turn;
+use crate::wire::message::AdjustStep;
 
 /// The most relays whose chain is solved in one relay, without a message; longer ones are solved by messages.
 pub(crate) const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };
@@ -49,7 +49,7 @@ pub(crate) struct Rounds {
     adjust: Adjust,
     /// Rounds that are over; the first pass, which only looks, is not one.
     done: u16,
-    turn: Turn,
+    turn: AdjustStep,
     /// SIR of the chain after the last round.
     pub(crate) sir: f32,
 }
@@ -59,13 +59,13 @@ impl Rounds {
         Self {
             adjust,
             done: 0,
-            turn: Turn::Look,
+            turn: AdjustStep::Look,
             sir: 0.0,
         }
     }
 
     /// What the next pass is for.
-    pub(crate) const fn turn(&self) -> Turn {
+    pub(crate) const fn turn(&self) -> AdjustStep {
         self.turn
     }
 
@@ -78,17 +78,17 @@ impl Rounds {
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
         let idle = match self.turn {
-            Turn::Stop => return true,
-            Turn::Look => false,
-            Turn::Move { .. } => {
+            AdjustStep::Stop => return true,
+            AdjustStep::Look => false,
+            AdjustStep::Move { .. } => {
                 self.done = self.done.saturating_add(1);
                 !any
             }
         };
         self.turn = if idle || self.done >= self.adjust.rounds {
-            Turn::Stop
+            AdjustStep::Stop
         } else {
-            Turn::Move {
+            AdjustStep::Move {
                 explore_m: self.adjust.explore_m,
                 local: self.adjust.local,
             }

@@ -7,8 +7,8 @@ use super::state::Action;
 use super::task::LeaderTask;
 use super::turning::Turning;
 use crate::node::context::Context;
-use crate::optimiser::local::Beside;
-use crate::wire::message::{Moved, Token, Turn};
+use crate::optimiser::local::HopEnd;
+use crate::wire::message::{AdjustStep, Moved, Token};
 
 impl Computation {
     /// The token, from the relay before.
@@ -27,7 +27,7 @@ impl Computation {
             return Action::Stale;
         }
         self.state.take(token.number);
-        let before = Beside {
+        let before = HopEnd {
             place: token.place,
             apart_m: context.mission().config().min_separation_m,
         };
@@ -119,7 +119,7 @@ impl Computation {
         );
         let (incoming, outgoing) = hops.both(at);
         turning.worst = worst.min(outgoing).min(f32::MAX);
-        let stop = turning.turn == Turn::Stop;
+        let stop = turning.turn == AdjustStep::Stop;
         if stop {
             self.target = Some(turning.sir);
         }

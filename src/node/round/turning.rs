@@ -6,10 +6,10 @@
 use core::task::Poll;
 
 use crate::mission::{Interferer, Mission};
-use crate::optimiser::local::{Beside, Hops, Search};
+use crate::optimiser::local::{HopEnd as Beside, Hops, LocalSearch as Search};
 use crate::place::Placement;
 use crate::power_ratio::PowerRatio;
-use crate::wire::message::Turn;
+use crate::wire::message::AdjustStep as Turn;
 
 /// A token, as one relay sees it.
 #[derive(Clone, Debug)]

@@ -32,7 +32,7 @@ const ITERATIONS: u8 = 40;
 
 /// What to do next.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) enum Turn {
+pub(crate) enum AscentStep {
     /// Try this part of the step with this target, in ln gamma.
     Try { share: f32, sigma: f32 },
     /// Raise the target as far as the chain goes as it stands.
@@ -121,11 +121,11 @@ impl Ascent {
     }
 
     /// The nominal chain's slack is that.
-    pub(crate) const fn tightened(&mut self, slack: f32) -> Turn {
+    pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
         (self.idle, self.iterations) = (0, 0);
-        Turn::Again
+        AscentStep::Again
     }
 
     /// Whether there is no higher one for now.
@@ -134,11 +134,11 @@ impl Ascent {
     }
 
     /// The probe came to nothing: the chain has to have more to spare.
-    pub(crate) fn probed(&mut self) -> Turn {
+    pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
         self.trust = TRUST;
-        Turn::Again
+        AscentStep::Again
     }
 
     /// The target at which the nominal chain's slack would be zero.
@@ -159,19 +159,19 @@ impl Ascent {
     }
 
     /// The pass back has come to the leader.
-    pub(crate) fn weighed(&mut self) -> Turn {
+    pub(crate) fn weighed(&mut self) -> AscentStep {
         self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
         self.share = 0;
         self.iterations = self.iterations.saturating_add(1);
         if self.iterations > ITERATIONS || !(self.linear + self.square).is_finite() {
-            return Turn::Over;
+            return AscentStep::Over;
         }
         if self.at_limit() {
-            return Turn::Raise;
+            return AscentStep::Raise;
         }
         // More than enough, and no use for it but a higher target.
         if self.slack > 1e-4 * self.distance_m && self.linear + self.square < 0.1 * self.slack {
-            return Turn::Raise;
+            return AscentStep::Raise;
         }
         self.attempt()
     }
@@ -185,13 +185,13 @@ impl Ascent {
             .max(self.floor)
     }
 
-    fn attempt(&self) -> Turn {
+    fn attempt(&self) -> AscentStep {
         match SHARES.get(usize::from(self.share)) {
-            Some(&share) => Turn::Try {
+            Some(&share) => AscentStep::Try {
                 share,
                 sigma: self.sigma_for(share),
             },
-            None => Turn::Again,
+            None => AscentStep::Again,
         }
     }
 
@@ -210,20 +210,20 @@ impl Ascent {
     }
 
     /// The current trial came to nothing: the next part, or less trust.
-    pub(crate) fn failed(&mut self) -> Turn {
+    pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
-        if turn == Turn::Again {
+        if turn == AscentStep::Again {
             self.trust *= 0.2;
             if self.trust < LEAST_TRUST {
-                return Turn::Over;
+                return AscentStep::Over;
             }
         }
         turn
     }
 
     /// The trial with `share` is the nominal chain from now on.
-    pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> Turn {
+    pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
         self.idle = if self.merit(sigma, slack) - before < CLOSE {
@@ -235,9 +235,9 @@ impl Ascent {
             self.trust = (2.0 * self.trust).min(1.0);
         }
         if self.idle >= 2 {
-            Turn::Over
+            AscentStep::Over
         } else {
-            Turn::Again
+            AscentStep::Again
         }
     }
 
@@ -263,11 +263,11 @@ impl Ascent {
     }
 
     /// What came of it.
-    pub(crate) fn heard(&mut self, trial: Option<u8>, slack: f32, outlook: &Outlook) -> Turn {
+    pub(crate) fn heard(&mut self, trial: Option<u8>, slack: f32, outlook: &Outlook) -> AscentStep {
         let turn = match trial.map(usize::from) {
             Some(_) if self.iterations == 0 => {
                 self.slack = slack;
-                Turn::Again
+                AscentStep::Again
             }
             Some(at) => {
                 let share = SHARES.get(at).copied().unwrap_or(1.0);
@@ -277,26 +277,30 @@ impl Ascent {
             None => {
                 self.trust *= 0.2;
                 if self.trust < LEAST_TRUST {
-                    Turn::Over
+                    AscentStep::Over
                 } else {
-                    Turn::Again
+                    AscentStep::Again
                 }
             }
         };
         self.look_back();
         self.add(outlook);
         match self.weighed() {
-            _ if turn == Turn::Over => turn,
-            Turn::Over => Turn::Over,
-            _ => Turn::Again,
+            _ if turn == AscentStep::Over => turn,
+            AscentStep::Over => AscentStep::Over,
+            _ => AscentStep::Again,
         }
     }
 
     /// The target has been raised as far as the chain goes.
-    pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> Turn {
+    pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);
         self.trust = TRUST;
-        if gained { Turn::Again } else { Turn::Over }
+        if gained {
+            AscentStep::Again
+        } else {
+            AscentStep::Over
+        }
     }
 }

@@ -5,7 +5,7 @@
 
 /// A coordinate.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub(crate) enum Axis {
+pub(crate) enum Coordinate {
     #[default]
     X,
     Y,
@@ -15,7 +15,7 @@ pub(crate) enum Axis {
 /// (x, y, h), or any three numbers of which each belongs to one coordinate.
 pub(crate) type Triple = [f32; 3];
 
-impl Axis {
+impl Coordinate {
     /// This coordinate first, then the other two in their order.
     pub(crate) const fn first(self, [x, y, h]: Triple) -> Triple {
         match self {

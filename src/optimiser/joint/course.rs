@@ -3,7 +3,7 @@
 //! A course goes from the leader to the last relay with a few trials, each of a target and of a part of the step; every relay works out where
 //! it is in each of them. The last relay says which one is gone by, and on the way back every relay works out its next step.
 
-use super::link::{Link, Room, minus, tail, triple};
+use super::link::{Room, Site, minus, tail, triple};
 use super::outlook::Outlook;
 use super::policy::Policy;
 use super::trial::{Bar, SHARES, Trial, Trials};
@@ -39,13 +39,13 @@ pub(crate) struct Courser<'a> {
 }
 
 impl<'a> Courser<'a> {
-    fn link(&self, from: Placement) -> Option<Link<'a>> {
+    fn link(&self, from: Placement) -> Option<Site<'a>> {
         let sender = Sender {
             at: from.cross_section(),
             gain: self.gain_in,
         };
         let interferer = self.mission.interferer()?;
-        Some(Link::new(
+        Some(Site::new(
             self.mission,
             interferer,
             sender,

@@ -7,7 +7,7 @@
 //! 2 F = |p' - m|^2 - c |p' - p|^2 = 0
 //! ```
 //!
-//! and one coordinate of p' follows from the other two, w, and from p (see [`Axis`]): p'_1 = R(z), z = (p_1, p_2, p_3, w_2, w_3).
+//! and one coordinate of p' follows from the other two, w, and from p (see [`Coordinate`]): p'_1 = R(z), z = (p_1, p_2, p_3, w_2, w_3).
 //! F is quadratic, so its derivatives are products of two numbers, or constants; those of R follow by differentiating
 //! F(R(z), z) = 0 once and twice, with a = -dF/dp'_1 = (m - p')_1 + c (p' - p)_1:
 //!

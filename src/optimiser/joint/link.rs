@@ -1,6 +1,6 @@
 //! One relay of a chain under trial, with the hop into it: where it goes, and what that is worth to the relay before.
 
-use super::axis::{Axis, Triple};
+use super::axis::{Coordinate, Triple};
 use super::hop::Reach;
 use super::outlook::Outlook;
 use super::policy::Policy;
@@ -58,7 +58,7 @@ pub(super) const MARGIN: f32 = 1.0005;
 
 /// A relay, as its place is chosen.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Link<'a> {
+pub(crate) struct Site<'a> {
     interferer: &'a Interferer,
     sender: Sender,
     room: Room,
@@ -69,7 +69,7 @@ pub(crate) struct Link<'a> {
     most: f32,
 }
 
-impl<'a> Link<'a> {
+impl<'a> Site<'a> {
     /// The relay that `sender` feeds and `room` is left to; `first` if that is Tx, from which it may stand as near as it likes.
     pub(crate) fn new(
         mission: &'a Mission,
@@ -168,7 +168,7 @@ impl<'a> Link<'a> {
         let [_, a, b] = policy.axis.first(triple(nominal));
         let (a, b) = (a + by[0], b + by[1]);
         match policy.axis {
-            Axis::X => {
+            Coordinate::X => {
                 let wanted = self.room.nearest(CrossSection {
                     y_m: a,
                     altitude_m: b,
@@ -183,7 +183,7 @@ impl<'a> Link<'a> {
                     _ => wanted,
                 }
             }
-            Axis::Y => {
+            Coordinate::Y => {
                 let b = self.room.band.nearest(b);
                 let y = self.along(
                     policy,
@@ -196,7 +196,7 @@ impl<'a> Link<'a> {
                     altitude_m: b,
                 }
             }
-            Axis::H => {
+            Coordinate::H => {
                 let b = self.room.lateral.nearest(b);
                 let h = self.along(
                     policy,
@@ -296,11 +296,11 @@ impl<'a> Link<'a> {
         let spare = square(dx) + square(dy) + square(dh) - reached;
         let loose = at_end && spare > TIGHT * reached;
         let (axis, normal) = if loose {
-            (Axis::X, 0.0)
+            (Coordinate::X, 0.0)
         } else {
             self.axis(c, from, to, low, high)
         };
-        let hop = if at_end && axis == Axis::X {
+        let hop = if at_end && axis == Coordinate::X {
             Reach::FIXED
         } else {
             let [source, from, place] = [source, triple(from), place].map(|p| axis.first(p));
@@ -329,20 +329,21 @@ impl<'a> Link<'a> {
         to: Placement,
         low: Triple,
         high: Triple,
-    ) -> (Axis, f32) {
+    ) -> (Coordinate, f32) {
         let rounding = EDGE * self.distance_m;
         let [dx, dy, dh] = minus(triple(to), self.source());
         let [hx, hy, hh] = minus(triple(to), triple(from));
         let [nx, ny, nh] = [dx - c * hx, dy - c * hy, dh - c * hh];
         let ([lx, ly, lh], [ux, uy, uh]) = (low, high);
-        let mut best = (Axis::X, nx);
+        let mut best = (Coordinate::X, nx);
         // Rather x, by which the chain gets on.
         let mut steepest = if lx >= -rounding || ux <= rounding {
             0.0
         } else {
             1.5 * nx.abs()
         };
-        for (axis, normal, low, high) in [(Axis::Y, ny, ly, uy), (Axis::H, nh, lh, uh)] {
+        for (axis, normal, low, high) in [(Coordinate::Y, ny, ly, uy), (Coordinate::H, nh, lh, uh)]
+        {
             // What a leap does not reach is within a ball, and a relay at its foot may rise from there.
             let rises = c <= 1.0 && ux <= rounding;
             let free = (low < -rounding || rises) && high > rounding;

@@ -5,7 +5,7 @@
 //! principle, and with second derivatives differential dynamic programming (Jacobson and Mayne 1970; within a box: Tassa, Mansard
 //! and Todorov 2014).
 
-use super::axis::{Axis, Triple};
+use super::axis::{Coordinate, Triple};
 use super::hop::Reach;
 use super::policy::Policy;
 use crate::place::Placement;
@@ -106,7 +106,7 @@ impl Outlook {
     /// from where it is, by the two coordinates that do not follow.
     pub(super) fn pass(
         &mut self,
-        axis: Axis,
+        axis: Coordinate,
         hop: &Reach,
         low: [f32; 2],
         high: [f32; 2],

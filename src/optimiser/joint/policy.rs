@@ -1,12 +1,12 @@
 //! What a relay does in one iteration of the joint method: its step, and how it follows what changed before it.
 
-use super::axis::{Axis, Triple};
+use super::axis::{Coordinate, Triple};
 
 /// A relay's step, by the two coordinates that do not follow from the hop.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     /// The coordinate that does.
-    pub(super) axis: Axis,
+    pub(super) axis: Coordinate,
     /// Whether it is the larger one of the two that the hop allows.
     pub(super) rising: bool,
     /// Where nothing before has changed, m.
@@ -21,7 +21,7 @@ const FLATTEST: f32 = 1e-6;
 impl Policy {
     /// To stay.
     pub(super) const NONE: Self = Self {
-        axis: Axis::X,
+        axis: Coordinate::X,
         rising: true,
         step: [0.0; 2],
         follow: [[0.0; 3]; 2],
@@ -57,7 +57,7 @@ impl Policy {
                     *fh = (-ah * yy + ay * yh) / det;
                 }
                 return Self {
-                    axis: Axis::X,
+                    axis: Coordinate::X,
                     rising: true,
                     step: [y, h],
                     follow,
@@ -91,7 +91,7 @@ impl Policy {
             }
         }
         Self {
-            axis: Axis::X,
+            axis: Coordinate::X,
             rising: true,
             step: [y, h],
             follow,
@@ -130,7 +130,7 @@ fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
 /// A [`Policy`] as it is kept for a while: how a step follows needs no more than three digits.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(super) struct Brief {
-    axis: Axis,
+    axis: Coordinate,
     rising: bool,
     step: [f32; 2],
     follow: [[u16; 3]; 2],

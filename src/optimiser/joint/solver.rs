@@ -6,10 +6,10 @@
 
 use core::task::Poll;
 
-use super::ascent::{Ascent, Turn};
+use super::ascent::{Ascent, AscentStep};
 use super::axis::Triple;
 use super::cells::Cell;
-use super::link::{self, Link, MARGIN, Room, minus, triple};
+use super::link::{self, MARGIN, Room, Site, minus, triple};
 use super::outlook::Outlook;
 use super::policy::Brief;
 use super::seek::Seek;
@@ -129,7 +129,7 @@ struct Stage {
 
 /// A pass forward.
 #[derive(Clone, Copy, Debug, Default)]
-struct Pass {
+struct ForwardPass {
     /// Relays that are behind it.
     done: u16,
     /// Where the last of them is, and where it was.
@@ -197,7 +197,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     again: bool,
     ascent: Ascent,
     work: Work,
-    pass: Pass,
+    pass: ForwardPass,
     /// Whether relays have to hold back for what was found.
     holds_back: bool,
     /// Whether any start came up against the least separation.
@@ -215,7 +215,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
 
 /// What the passes have in common.
 #[derive(Clone, Copy)]
-struct Chain<'a, F> {
+struct SolverContext<'a, F> {
     mission: &'a Mission,
     interferer: &'a Interferer,
     seat_of: &'a F,
@@ -223,7 +223,7 @@ struct Chain<'a, F> {
     gain: PowerRatio,
 }
 
-impl<'a, F: Fn(u16) -> Seat> Chain<'a, F> {
+impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     fn distance_m(&self) -> f32 {
         self.mission.config().distance_m
     }
@@ -246,9 +246,9 @@ impl<'a, F: Fn(u16) -> Seat> Chain<'a, F> {
     }
 
     /// Relay `index`, fed from `from`.
-    fn link(&self, index: u16, from: Placement, room: Room) -> Link<'a> {
+    fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
-        Link::new(self.mission, self.interferer, sender, index <= 1, room)
+        Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
     /// The slack of the last relay at `at`, and its outlook.
@@ -286,7 +286,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             again: false,
             ascent: Ascent::new(1.0, 0.0, 0.0, 0.0),
             work: Work::Begin,
-            pass: Pass::default(),
+            pass: ForwardPass::default(),
             holds_back: false,
             walled: false,
             moving: 0,
@@ -322,7 +322,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let Some(interferer) = mission.interferer() else {
             return Poll::Ready(Err(Infeasible));
         };
-        let chain = Chain {
+        let chain = SolverContext {
             mission,
             interferer,
             seat_of: &seat_of,
@@ -348,7 +348,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// The next start, or the end.
-    fn begin(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>) -> Poll<Result<f32, Infeasible>> {
+    fn begin(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+    ) -> Poll<Result<f32, Infeasible>> {
         let room = (chain.seat_of)(1).room;
         let Some(start) = Start::number(self.number, room) else {
             // All have been tried.
@@ -398,13 +401,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// A pass begins at Tx.
     fn restart(&mut self) {
-        self.pass = Pass::default();
+        self.pass = ForwardPass::default();
     }
 
     /// Where relay `index` is wanted on a pass that changes nothing, or gives the chain its first shape.
     fn shaped(
         &self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         index: u16,
         room: Room,
         target: f32,
@@ -441,7 +444,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Goes on with a pass for `sigma`; ready with the slack at its end, `None` if a hop cannot meet the target.
     fn plain(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         sigma: f32,
         purpose: Purpose,
         kept: bool,
@@ -523,11 +526,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Relay `index`, fed from `from`, as the start has it.
     fn link<'a>(
         &self,
-        chain: &Chain<'a, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'a, impl Fn(u16) -> Seat>,
         index: u16,
         from: Placement,
         room: Room,
-    ) -> Link<'a> {
+    ) -> Site<'a> {
         let link = chain.link(index, from, room);
         match self.start {
             Start::Through { .. } => link.unparted(),
@@ -536,7 +539,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// The hop to relay `index` of the chain as it is, by the rules of the sweep; no farther than `end_m`.
-    fn hop(&self, chain: &Chain<'_, impl Fn(u16) -> Seat>, index: u16, end_m: f32) -> Hop {
+    fn hop(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16, end_m: f32) -> Hop {
         let at = |index| self.at(index, (chain.seat_of)(index));
         let before = if index > 1 {
             at(index - 1)
@@ -586,7 +589,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     fn seek(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         seek: Seek,
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
@@ -606,7 +609,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// stand at `place_m`. Bounded by twenty relays.
     fn stand(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         segment: u8,
         place_m: f32,
         seek: Seek,
@@ -627,7 +630,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Where the relay before `segment` is to stand.
     fn stands(
         &self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         segment: u8,
         mut place_m: f32,
         target: f32,
@@ -662,7 +665,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// What came of a target: that it is `met`, and whether relays have to hold back.
     fn tried(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         mut seek: Seek,
         purpose: Purpose,
         met: Option<bool>,
@@ -729,7 +732,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// the derivatives do not see, since something else binds there, it may.
     fn polish(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         sigma: f32,
     ) -> Poll<Result<f32, Infeasible>> {
         let (index, way, halved) = self.move_of(chain.mission);
@@ -777,7 +780,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     fn settle(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         sigma: f32,
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
@@ -845,23 +848,23 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         u8::try_from(last).unwrap_or(u8::MAX)
     }
 
-    fn next(&mut self, turn: Turn, chain: &Chain<'_, impl Fn(u16) -> Seat>) -> Work {
+    fn next(&mut self, turn: AscentStep, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Work {
         self.restart();
         match turn {
-            Turn::Try { share, sigma } => Work::Forward(share, sigma, false),
-            Turn::Raise if self.ascent.at_limit() => {
+            AscentStep::Try { share, sigma } => Work::Forward(share, sigma, false),
+            AscentStep::Raise if self.ascent.at_limit() => {
                 let sigma = chain.ceiling() - CEILING;
                 Work::Seek(Seek::down(sigma, 1e-5, 2.0, 1e-6), Purpose::Probe)
             }
-            Turn::Raise => {
+            AscentStep::Raise => {
                 let Ascent { sigma, .. } = self.ascent;
                 Work::Seek(Seek::up(sigma, false, 0.02, 1e-5), Purpose::Raise)
             }
-            Turn::Again => self.look_back(chain.mission),
-            Turn::Over if self.is_promising() && self.ascent.tighten() => {
+            AscentStep::Again => self.look_back(chain.mission),
+            AscentStep::Over if self.is_promising() && self.ascent.tighten() => {
                 Work::Settle(self.ascent.sigma, Purpose::Tighten)
             }
-            Turn::Over => {
+            AscentStep::Over => {
                 self.walled |= self.ascent.penalty > 0.0;
                 let sigma = self.ascent.sigma;
                 Work::Seek(
@@ -884,7 +887,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Works out the policies of `segment`, whose relays come after one at `before`; what that one sees. Bounded by ten relays.
     fn recall(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         segment: u8,
         before: Placement,
     ) -> Option<Outlook> {
@@ -926,10 +929,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Some(outlook)
     }
 
-    fn back(&mut self, chain: &Chain<'_, impl Fn(u16) -> Seat>, segment: u8) {
+    fn back(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, segment: u8) {
         let before = self.nominal_before(chain, segment);
         let Some(outlook) = self.recall(chain, segment, before) else {
-            self.work = self.next(Turn::Over, chain);
+            self.work = self.next(AscentStep::Over, chain);
             return;
         };
         self.ascent.add(&outlook);
@@ -945,7 +948,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// Where the relay before `segment` is.
-    fn nominal_before(&self, chain: &Chain<'_, impl Fn(u16) -> Seat>, segment: u8) -> Placement {
+    fn nominal_before(
+        &self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        segment: u8,
+    ) -> Placement {
         let index = u16::from(segment) * SEGMENT_RELAYS;
         if index == 0 {
             return Placement::default();
@@ -960,7 +967,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// One segment more of a pass with the policies, or what is needed for it.
     fn forward(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         share: f32,
         sigma: f32,
         kept: bool,
@@ -987,7 +994,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let segment = u8::try_from(usize::from(self.pass.done) / SEGMENT).unwrap_or(u8::MAX);
         if self.held != Some(segment) {
             if self.recall(chain, segment, self.pass.old).is_none() {
-                self.work = self.next(Turn::Over, chain);
+                self.work = self.next(AscentStep::Over, chain);
             }
             return;
         }
@@ -1001,14 +1008,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// The relays of `segment` take `share` of their steps.
     fn follow(
         &mut self,
-        chain: &Chain<'_, impl Fn(u16) -> Seat>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         segment: u8,
         target: f32,
         share: f32,
         kept: bool,
     ) -> Option<()> {
         for (k, index) in Self::relays_of(segment, chain.mission.relays()) {
-            let Pass { from, old, .. } = self.pass;
+            let ForwardPass { from, old, .. } = self.pass;
             let Seat { room, .. } = (chain.seat_of)(index);
             let Stage { x_m, policy } = *self.stages.get(k)?;
             let policy = policy.policy();
@@ -1021,7 +1028,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             if kept {
                 self.keep(index, from.x_m, cell);
             }
-            self.pass = Pass {
+            self.pass = ForwardPass {
                 done: index,
                 from: place,
                 old: nominal,
@@ -1034,7 +1041,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 }
 
 /// Where in `room`, right above Rx, a relay hears Tx best.
-fn far_off(chain: &Chain<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
+fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
     for y_m in [room.lateral.least_m, 0.0, room.lateral.most_m] {

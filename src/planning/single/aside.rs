@@ -41,7 +41,7 @@
 //! **Limits.** If that place is in [0, D] x [left, right], it is the best. If not, the best is on an edge of that rectangle: within
 //! it, a place that cannot be improved would be one of the three. An edge is a problem of one dimension: `edge`.
 //!
-//! **With the altitude free** the lowest is the best wherever there is room. Turn a place about the line on the ground that joins
+//! **With the altitude free** the lowest is the best wherever there is room. Extremum a place about the line on the ground that joins
 //! the middles of its two spheres. Neither SIR changes, and the relay sinks to one side or the other. So no place above is better
 //! than the best of the lowest plane without limits; and if that is within the corridor, it is the best of all. In numbers: at the
 //! same distance r from the line, and so with the same signal at both ends, y = -r is further from the interferer than h = r, by

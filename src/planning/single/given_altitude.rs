@@ -11,7 +11,7 @@
 
 use super::{Found, Two};
 use crate::mission::{Mission, Profile};
-use crate::sir::{Turn, first_hop_turn};
+use crate::sir::{Extremum, first_hop_turn};
 
 /// Which case applied; the first five are Corollary 1's, for X >= 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -66,8 +66,8 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCa
     let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
     // How far SIR_1 falls, and whether it rises again before Rx.
     let (to, valley) = match first_hop_turn(interferer, profile.altitude_m) {
-        Turn::Level => return Some((above_rx, PlaceCase::Level)),
-        Turn::Hill(peak) => {
+        Extremum::Level => return Some((above_rx, PlaceCase::Level)),
+        Extremum::Hill(peak) => {
             return Some(if peak >= end_m || !worse_first(end_m) {
                 (above_rx, PlaceCase::HillAboveRx)
             } else if worse_first(peak) {
@@ -76,7 +76,7 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCa
                 (two.crossing(peak, end_m), PlaceCase::BeyondHill)
             });
         }
-        Turn::Valley(bottom) if bottom < end_m => (bottom, true),
+        Extremum::Valley(bottom) if bottom < end_m => (bottom, true),
         _ => (end_m, false),
     };
     if two.first(0.0) < two.second(0.0) {

@@ -5,7 +5,7 @@
 
 use super::Two;
 use crate::mission::{Mission, Profile};
-use crate::sir::{Turn, first_hop_turn};
+use crate::sir::{Extremum, first_hop_turn};
 
 /// Ratios p_t / p_u, linear.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -37,7 +37,7 @@ pub fn ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
         c1: equal_at(0.0),
         c2: equal_at(config.distance_m),
         c3: match first_hop_turn(interferer, altitude_m) {
-            Turn::Valley(bottom) if bottom < 1e18 => Some(equal_at(bottom)),
+            Extremum::Valley(bottom) if bottom < 1e18 => Some(equal_at(bottom)),
             _ => None,
         },
     })

@@ -4,7 +4,7 @@ use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::SetupError;
 use uav_relay::wire::auth::TAG;
-use uav_relay::wire::crc::Crc32c;
+use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::digest::{MissionId, digest};
 use uav_relay::wire::frame::{self, HEADER, Header, MAX_FRAME};
@@ -273,8 +273,6 @@ fn sealed(plain: Vec<u8>) -> Vec<u8> {
 
 /// A frame with its CRC.
 fn with_check(mut plain: Vec<u8>) -> Vec<u8> {
-    let mut crc = Crc32c::new();
-    crc.update(&plain);
-    plain.extend(crc.finish().to_le_bytes());
+    plain.extend(CRC_32C.checksum(&plain).to_le_bytes());
     plain
 }

@@ -1,0 +1,211 @@
+//! What neighbours say to each other; `FORMAT.md` has the byte tables.
+//!
+//! For each kind of message there is one file, with the type, the one way to write it and the one way to read it, which checks
+//! its ranges: what is read holds no number that a relay would have to doubt. A body is a byte, the `tag`, and postcard of a
+//! tuple, whose order is the format. `parts` has what several kinds have in common.
+
+mod course;
+mod fence;
+mod hello;
+#[cfg(feature = "upload")]
+mod offer;
+mod parts;
+mod sweep;
+mod tag;
+mod turn;
+mod view;
+
+pub use self::course::{Course, Worth};
+pub use self::hello::Hello;
+pub use self::parts::MessageError;
+pub use self::sweep::{Answer, Sweep};
+pub use self::turn::{AdjustStep, Moved, Token};
+pub use self::view::{Decision, PriorView, Proposal};
+
+use self::parts::{read, write};
+#[cfg(feature = "upload")]
+use super::upload::Upload;
+use crate::guard::Fence;
+
+/// The longest body: a sweep of sixteen targets with what was measured, or from aside of the line.
+pub const MAX_BODY: usize = 88;
+
+/// One message between neighbours. *Onward* is the way a pass goes: toward Rx, or toward Tx in a field.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Message {
+    /// Onward: targets, and how far the sender reaches for each.
+    Sweep(Sweep),
+    /// Back: what became of them. It acknowledges the sweep of the same number.
+    Verdict(Answer),
+    /// Back: the pass of this number has arrived, what became of it is not known yet. Sent for a repeated one only.
+    Busy {
+        /// The number of the pass.
+        sweep: u16,
+    },
+    /// Either way: a sign of life from a link that would be silent otherwise.
+    Heartbeat {
+        /// The sender's mission digest, so that a wrong configuration shows before take-off.
+        mission: u16,
+        /// Whether the sender asks for a heartbeat in return.
+        answer: bool,
+    },
+    /// Onward: where the sender would be in each of a few trials.
+    Course(Course),
+    /// Back: which of them is gone by, and what the rest of the chain is worth about it.
+    Worth(Worth),
+    /// Onward: whose turn it is to move.
+    Token(Token),
+    /// Back: who has moved where.
+    Moved(Moved),
+    /// Either way, also to nodes that are no neighbours: who the sender takes for its neighbour, and which view it holds.
+    Hello(Hello),
+    /// Onward: who is there, for a new view of the chain.
+    Proposal(Proposal),
+    /// Back: how many there are.
+    Decision(Decision),
+    /// Either way: the fence between two neighbours.
+    Fence {
+        /// [`digest`](super::digest::digest) of the sender's mission, as it was loaded.
+        mission: u16,
+        /// What the sender says of it.
+        fence: Fence,
+    },
+    /// Either way, also from the ground: a mission that is newer than the one that the receiver holds.
+    #[cfg(feature = "upload")]
+    Offer(Upload),
+}
+
+impl Message {
+    /// The digest of the sender's mission; a [`Message::Busy`] bears none.
+    pub const fn mission(&self) -> Option<u16> {
+        match self {
+            Self::Sweep(sweep) => Some(sweep.mission),
+            Self::Verdict(answer) => Some(answer.mission),
+            Self::Busy { .. } => None,
+            Self::Heartbeat { mission, .. } | Self::Fence { mission, .. } => Some(*mission),
+            Self::Course(course) => Some(course.mission),
+            Self::Worth(worth) => Some(worth.mission),
+            Self::Token(token) => Some(token.mission),
+            Self::Moved(moved) => Some(moved.mission),
+            Self::Hello(hello) => Some(hello.mission),
+            Self::Proposal(proposal) => Some(proposal.mission_id.digest),
+            Self::Decision(count) => Some(count.mission_id.digest),
+            #[cfg(feature = "upload")]
+            Self::Offer(upload) => Some(upload.base()),
+        }
+    }
+
+    /// Whether it is said of a pass that places come of: then its digest is that of a view of the chain.
+    pub(crate) const fn is_of_a_view(&self) -> bool {
+        matches!(
+            self,
+            Self::Sweep(_)
+                | Self::Verdict(_)
+                | Self::Course(_)
+                | Self::Worth(_)
+                | Self::Token(_)
+                | Self::Moved(_)
+        )
+    }
+
+    /// Whether it is said of the call for a view: then its digest is that of the mission to be flown in it.
+    pub(crate) const fn is_of_a_call(&self) -> bool {
+        matches!(self, Self::Proposal(_) | Self::Decision(_))
+    }
+
+    /// Whether it is a pass, which goes onward.
+    pub const fn is_onward(&self) -> bool {
+        matches!(
+            self,
+            Self::Sweep(_) | Self::Course(_) | Self::Token(_) | Self::Proposal(_)
+        )
+    }
+}
+
+impl Message {
+    /// Writes the body into `buffer` and returns how many bytes it takes, at most [`MAX_BODY`]; `None` if it does not fit.
+    pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        match self {
+            Self::Sweep(sweep) => sweep.encode(buffer),
+            Self::Verdict(answer) => answer.encode(buffer),
+            Self::Busy { sweep } => write(&(tag::BUSY, sweep.to_le_bytes()), buffer),
+            Self::Heartbeat { mission, answer } => {
+                write(&(tag::HEARTBEAT, mission.to_le_bytes(), answer), buffer)
+            }
+            Self::Course(course) => course.encode(buffer),
+            Self::Worth(worth) => worth.encode(buffer),
+            Self::Token(token) => token.encode(buffer),
+            Self::Moved(moved) => moved.encode(buffer),
+            Self::Hello(hello) => hello.encode(buffer),
+            Self::Proposal(proposal) => proposal.encode(buffer),
+            Self::Decision(decision) => decision.encode(buffer),
+            Self::Fence { mission, fence } => fence::encode(*mission, fence, buffer),
+            #[cfg(feature = "upload")]
+            Self::Offer(upload) => offer::encode(upload, buffer),
+        }
+    }
+
+    /// The message in `bytes`, with every number in its range. Work linear in their number, at most [`MAX_BODY`] of use.
+    ///
+    /// # Errors
+    /// [`MessageError::Encoding`] if it is not one message in its shortest form and nothing else, [`MessageError::Value`] for
+    /// a number that is not finite or outside its range, and for a message of a method that this relay was built without.
+    #[inline(never)]
+    pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
+        let (tag, body) = bytes.split_first().ok_or(MessageError::Encoding)?;
+        match *tag {
+            tag::MEASURED if !cfg!(feature = "field") => Err(MessageError::Value),
+            tag::ASIDE | tag::COURSE | tag::WORTH if !cfg!(feature = "altitude") => {
+                Err(MessageError::Value)
+            }
+            tag::TOKEN | tag::MOVED if !cfg!(feature = "adjust") => Err(MessageError::Value),
+            tag::FENCE if !cfg!(feature = "guard") => Err(MessageError::Value),
+            tag @ (tag::SWEEP | tag::MEASURED | tag::ASIDE) => {
+                Sweep::decode(tag, body).map(Self::Sweep)
+            }
+            tag::VERDICT => Answer::decode(body).map(Self::Verdict),
+            tag::BUSY => Ok(Self::Busy {
+                sweep: u16::from_le_bytes(read(body)?),
+            }),
+            tag::HEARTBEAT => {
+                let (mission, answer) = read(body)?;
+                Ok(Self::Heartbeat {
+                    mission: u16::from_le_bytes(mission),
+                    answer,
+                })
+            }
+            tag::COURSE => Course::decode(body).map(Self::Course),
+            tag::WORTH => Worth::decode(body).map(Self::Worth),
+            tag::TOKEN => Token::decode(body).map(Self::Token),
+            tag::MOVED => Moved::decode(body).map(Self::Moved),
+            tag::HELLO => Hello::decode(body).map(Self::Hello),
+            tag::PROPOSAL => Proposal::decode(body).map(Self::Proposal),
+            tag::DECISION => Decision::decode(body).map(Self::Decision),
+            tag::FENCE => {
+                let (mission, fence) = fence::decode(body)?;
+                Ok(Self::Fence { mission, fence })
+            }
+            #[cfg(feature = "upload")]
+            tag::OFFER => offer::decode(body).map(Self::Offer),
+            _ => Err(MessageError::Encoding),
+        }
+    }
+}
+
+/// Stored, an upload is the body of its offer.
+#[cfg(feature = "upload")]
+impl Upload {
+    /// Writes it as it is to be stored, [`LENGTH`] bytes, into `buffer`; `None` if it does not fit.
+    pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        Message::Offer(*self).encode(buffer)
+    }
+
+    /// Reads it back; `None` if `bytes` are anything but one upload in range. Whether they were stored whole is for a check
+    /// sequence around them to say.
+    pub fn decode(bytes: &[u8]) -> Option<Self> {
+        match Message::decode(bytes) {
+            Ok(Message::Offer(upload)) => Some(upload),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! A mission that is newer than the one that the receiver holds, as [`Upload`] has it.
+
+use serde::{Deserialize, Serialize};
+
+use super::parts::{MessageError, PassId, read, write};
+use super::tag;
+use crate::channel::Channel;
+use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
+use crate::wire::upload::Upload;
+
+pub(super) fn encode(upload: &Upload, buffer: &mut [u8]) -> Option<usize> {
+    write(&(tag::OFFER, OfferBody::of(upload)), buffer)
+}
+
+pub(super) fn decode(body: &[u8]) -> Result<Upload, MessageError> {
+    let body: OfferBody = read(body)?;
+    body.checked().ok_or(MessageError::Value)
+}
+
+/// The wire form: version and base, and the numbers in the order of the digest, the bands last.
+#[derive(Serialize, Deserialize)]
+struct OfferBody {
+    /// The number is the version, the mission the base.
+    pass: PassId,
+    relays: [u8; 2],
+    numbers: [f32; 9],
+    factors: [f64; 3],
+    bands: [f32; 4],
+}
+
+impl OfferBody {
+    fn of(upload: &Upload) -> Self {
+        let c = upload.config();
+        let (power_w, x_m, y_m) = match c.interference {
+            Interference::Source(at) => (at.power_w, at.x_m, at.y_m),
+            Interference::Field(_) => (0.0, 0.0, 0.0),
+        };
+        Self {
+            pass: PassId::new(upload.version(), upload.base()),
+            relays: c.relays.to_le_bytes(),
+            numbers: [
+                c.distance_m,
+                c.min_separation_m,
+                c.tx_power_w,
+                c.common.altitude_m,
+                c.common.power_w,
+                power_w,
+                x_m,
+                y_m,
+                c.tolerance,
+            ],
+            factors: [c.channel.mu_los(), c.channel.mu_nlos(), c.channel.eta()],
+            bands: [
+                c.band.least_m,
+                c.band.most_m,
+                c.lateral.least_m,
+                c.lateral.most_m,
+            ],
+        }
+    }
+
+    fn checked(self) -> Option<Upload> {
+        let [mu_los, mu_nlos, eta] = self.factors;
+        let [least_m, most_m, left_m, right_m] = self.bands;
+        let [
+            distance_m,
+            min_separation_m,
+            tx_power_w,
+            altitude_m,
+            power_w,
+            from_w,
+            x_m,
+            y_m,
+            tolerance,
+        ] = self.numbers;
+        let config = MissionConfig {
+            relays: u16::from_le_bytes(self.relays),
+            distance_m,
+            min_separation_m,
+            tx_power_w,
+            common: Profile {
+                altitude_m,
+                power_w,
+            },
+            band: Band { least_m, most_m },
+            lateral: Band {
+                least_m: left_m,
+                most_m: right_m,
+            },
+            channel: Channel::from_factors(mu_los, mu_nlos, eta)?,
+            interference: Interference::Source(Interferer {
+                power_w: from_w,
+                x_m,
+                y_m,
+            }),
+            tolerance,
+        };
+        Upload::checked(self.pass.number(), self.pass.mission(), config).ok()
+    }
+}

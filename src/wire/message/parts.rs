@@ -1,0 +1,180 @@
+//! What bodies of several kinds have in common, and the ranges of their numbers. A type of its own costs no byte, and saves
+//! the code to read it once more.
+
+use serde::{Deserialize, Serialize};
+
+use crate::mission::{MAX_RELAYS, Profile};
+use crate::optimiser::PerTarget;
+use crate::place::Placement;
+use crate::wire::digest::MissionId;
+
+/// Writes `body` to the start of `buffer`, and how many bytes it takes; `None` if it does not fit.
+pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
+    postcard::to_slice(body, buffer)
+        .ok()
+        .map(|written| written.len())
+}
+
+/// Reads what the start of `bytes` is, and gives the rest.
+pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), MessageError> {
+    postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)
+}
+
+/// Reads what `bytes` are, with nothing left over.
+pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, MessageError> {
+    match take(bytes)? {
+        (body, []) => Ok(body),
+        _ => Err(MessageError::Encoding),
+    }
+}
+
+/// Reads numbers of targets, and gives the rest. postcard reads longer encodings too, whose count is padded with empty varint
+/// bytes, and how many it puts up with depends on the width of a usize: what one node took, another would refuse.
+#[inline(never)]
+pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
+    let (numbers, rest): (PerTarget, _) = take(bytes)?;
+    if rest.len() + 1 + 4 * numbers.len() == bytes.len() {
+        Ok((numbers, rest))
+    } else {
+        Err(MessageError::Encoding)
+    }
+}
+
+/// No slack or reach in metres is larger: a place is at most 1e6, a reach of the last hop is cut at 1e9.
+pub(super) const FARTHEST_M: f32 = 2e9;
+
+/// Which pass, of which mission.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(super) struct PassId {
+    number: [u8; 2],
+    mission: [u8; 2],
+}
+
+impl PassId {
+    pub(super) const fn new(number: u16, mission: u16) -> Self {
+        Self {
+            number: number.to_le_bytes(),
+            mission: mission.to_le_bytes(),
+        }
+    }
+
+    pub(super) const fn number(self) -> u16 {
+        u16::from_le_bytes(self.number)
+    }
+
+    pub(super) const fn mission(self) -> u16 {
+        u16::from_le_bytes(self.mission)
+    }
+}
+
+/// A place above the line.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(super) struct PlaceBody {
+    x_m: f32,
+    altitude_m: f32,
+}
+
+impl PlaceBody {
+    pub(super) const fn of(place: Placement) -> Self {
+        Self {
+            x_m: place.x_m,
+            altitude_m: place.altitude_m,
+        }
+    }
+
+    /// The place, if a relay may be there.
+    pub(super) fn checked(self) -> Option<Placement> {
+        let place = Placement::on_line(self.x_m, self.altitude_m);
+        is_place(place).then_some(place)
+    }
+}
+
+/// The wire form of a hello, a proposal or a decision: a view's number, four numbers and a byte of flags. What the numbers mean
+/// depends, and those that mean nothing are 0.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(super) struct ViewBody {
+    /// The number is that of a view.
+    pub(super) pass: PassId,
+    one: [u8; 2],
+    other: [u8; 2],
+    more: [u8; 2],
+    version: [u8; 2],
+    flags: u8,
+}
+
+impl ViewBody {
+    pub(super) const fn new(pass: PassId, numbers: [u16; 4], flags: u8) -> Self {
+        let [one, other, more, version] = numbers;
+        Self {
+            pass,
+            one: one.to_le_bytes(),
+            other: other.to_le_bytes(),
+            more: more.to_le_bytes(),
+            version: version.to_le_bytes(),
+            flags,
+        }
+    }
+
+    /// The numbers, of which the first two are of relays, the third one of a view or a digest, and the flags.
+    pub(super) fn parts(self) -> Option<(u16, u16, u16, u8)> {
+        let one = u16::from_le_bytes(self.one);
+        let other = u16::from_le_bytes(self.other);
+        let more = u16::from_le_bytes(self.more);
+        (one <= MAX_RELAYS && other <= MAX_RELAYS).then_some((one, other, more, self.flags))
+    }
+
+    pub(super) const fn mission_id(self, digest: u16) -> MissionId {
+        MissionId {
+            version: u16::from_le_bytes(self.version),
+            digest,
+        }
+    }
+}
+
+/// Whether a relay may be there.
+pub(super) fn is_place(at: Placement) -> bool {
+    (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
+}
+
+/// Whether a relay may be so far from the line, m.
+pub(super) fn is_beside(y_m: f32) -> bool {
+    (-1e5..=1e5).contains(&y_m)
+}
+
+/// The profile of these numbers, if they are in range.
+pub(super) fn profile(altitude_m: f32, power_w: f32) -> Option<Profile> {
+    let profile = Profile {
+        altitude_m,
+        power_w,
+    };
+    profile.is_valid().then_some(profile)
+}
+
+/// Whether all numbers are within [`least`, `FARTHEST_M`].
+pub(super) fn in_range(numbers: &[f32], least: f32) -> bool {
+    numbers
+        .iter()
+        .all(|number| (least..=FARTHEST_M).contains(number))
+}
+
+/// Why a body is no message.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum MessageError {
+    /// Not the one encoding of any message, or bytes are left over.
+    Encoding,
+    /// A number is not finite or outside its range.
+    Value,
+}
+
+impl core::fmt::Display for MessageError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Encoding => "the body is not a message",
+            Self::Value => "a number in the message is outside its range",
+        })
+    }
+}
+
+impl core::error::Error for MessageError {}
