@@ -96,8 +96,9 @@ pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> 
     }
 }
 
-/// The relay, unless this image was built without what it is asked for, in a place of its own in RAM: the stack would have to hold it, and the copy it is made from. What
-/// [`Relay::new`] gives is kept whole, since to take it apart on the way would be one more copy.
+/// The relay, unless this image was built without what it is asked for. It has a place of its own in RAM: the stack would have to
+/// hold it, and the copy it is made from. What [`Relay::new`] gives is kept whole, since to take it apart on the way would be
+/// one more copy.
 #[inline(never)]
 fn switch_on(
     config: &config::Config,

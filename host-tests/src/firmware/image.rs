@@ -9,11 +9,12 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// The profile that what is flashed is built with.
 pub const PROFILE: &str = "firmware";
 
-/// Builds `examples`, with everything and the log, and says in which folder they are.
+/// Builds `examples` with the log and everything else, or with `smallest` nothing else, and says in which folder they are: until
+/// they are built otherwise.
 ///
 /// # Errors
 /// What cargo has to say, if it fails.
-pub fn build(examples: &[&str]) -> Result<PathBuf, String> {
+pub fn build(examples: &[&str], smallest: bool) -> Result<PathBuf, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .ok_or("the workspace is not where it was when this was built")?;
@@ -28,6 +29,9 @@ pub fn build(examples: &[&str]) -> Result<PathBuf, String> {
         .args(["--profile", PROFILE, "--target", TARGET])
         .args(["--features", "defmt", "--target-dir"])
         .arg(&folder);
+    if smallest {
+        command.arg("--no-default-features");
+    }
     for example in examples {
         command.args(["--example", example]);
     }

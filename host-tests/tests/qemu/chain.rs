@@ -1,5 +1,6 @@
 //! Chains of emulated drones with a wire to each neighbour, held against the simulated chain.
 
+use uav_relay::Method;
 use uav_relay_sim::scenario::Scenario;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
@@ -75,6 +76,36 @@ fn five_settle_there_through_a_bad_day() {
         assert!(injected.lost > 0 && injected.corrupted > 0, "{injected:?}");
         assert!(damaged > 0, "no drone has met a damaged frame");
     }
+}
+
+/// Built with no feature but the log.
+#[test]
+fn five_of_the_smallest_image_settle_there_too() {
+    let flight = paper(5);
+    for faults in [Faults::default(), BAD_DAY] {
+        let mut fleet = Fleet::of(Image::Smallest, &flight, faults, 1);
+        assert_eq!(fleet.places(), simulated(&flight));
+        for drone in 1..=5 {
+            let counters = fleet.counters(drone);
+            for name in ["malformed", "misaddressed"] {
+                assert_eq!(counters.counter(name), Some(0), "{}", counters.text);
+            }
+        }
+    }
+}
+
+/// Asked for a method that it was built without, a drone says so, and does not fly.
+#[test]
+fn the_smallest_image_refuses_what_it_cannot_do() {
+    let flight = paper(2).by(Method::Joint);
+    let mut fleet = Fleet::of(Image::Smallest, &flight, Faults::default(), 1);
+    fleet.wait("refusals", |lines| {
+        [1, 2].iter().all(|drone| {
+            let mut lines = lines.iter().filter(|line| line.drone == *drone);
+            lines.any(|line| line.text == "configuration refused: this image cannot do it, Method")
+        })
+    });
+    assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));
 }
 
 #[test]

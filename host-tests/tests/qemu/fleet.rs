@@ -25,11 +25,12 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 /// And for each drone of the fleet, since all share this machine.
 const PATIENCE_A_DRONE: Duration = Duration::from_secs(10);
 
-/// What is flashed: the two variants.
+/// What is flashed: the two variants, and the first of them with Algorithm 1 alone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Image {
     Wires,
     Radio,
+    Smallest,
 }
 
 impl Image {
@@ -37,6 +38,7 @@ impl Image {
         match self {
             Self::Wires => "stm32f405",
             Self::Radio => "stm32f405_radio",
+            Self::Smallest => "smallest",
         }
     }
 }
@@ -45,15 +47,21 @@ impl Image {
 pub(crate) fn image(example: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
-        let names = [Image::Wires.name(), Image::Radio.name(), "golden"];
-        image::build(&names).unwrap_or_else(|error| panic!("{error}"))
+        let build = |names: &[&str], smallest| {
+            image::build(names, smallest).unwrap_or_else(|error| panic!("{error}"))
+        };
+        let wires = Image::Wires.name();
+        // Built otherwise, an example has the same name: the smallest is put aside first.
+        let folder = build(&[wires], true);
+        std::fs::copy(folder.join(wires), folder.join(Image::Smallest.name())).unwrap();
+        build(&[wires, Image::Radio.name(), "golden"], false)
     });
     folder.join(example)
 }
 
 /// The strings of the log of an image.
 fn table(which: Image) -> &'static Table {
-    static TABLES: [OnceLock<Table>; 2] = [OnceLock::new(), OnceLock::new()];
+    static TABLES: [OnceLock<Table>; 3] = [const { OnceLock::new() }; 3];
     TABLES[which as usize].get_or_init(|| log::table(&image(which.name())))
 }
 
@@ -116,7 +124,7 @@ impl Fleet {
                     .unwrap_or_else(|error| panic!("{error}"));
             drones.push(emulator);
             ports.push(usart2);
-            if which == Image::Wires {
+            if which != Image::Radio {
                 ports.push(usart3);
             }
             consoles.push(console.try_clone().unwrap());
@@ -124,7 +132,7 @@ impl Fleet {
             std::thread::spawn(move || log::listen(console, drone, table, &lines));
         }
         let (mut hearers, in_range) = match which {
-            Image::Wires => (network::chain(blocks.len()), 1),
+            Image::Wires | Image::Smallest => (network::chain(blocks.len()), 1),
             Image::Radio => (network::radio(blocks.len(), 2), 2),
         };
         if let Some(socket) = transmitter {
