@@ -134,8 +134,17 @@ pub(crate) struct Effects {
     pub(crate) proposed_by: Option<Proposer>,
     /// The neighbour toward the leader is to be asked for a view.
     pub(crate) ask: bool,
-    /// What came of a proposal: how many relays the view has, `None` for too few.
-    pub(crate) decided: Option<Option<u16>>,
+    /// What came of a proposal.
+    pub(crate) decided: Option<Decided>,
+}
+
+/// What came of a proposal.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Decided {
+    /// A view of so many relays.
+    Granted(u16),
+    /// They are too few.
+    Refused,
 }
 
 /// Who hands a proposal to a relay.

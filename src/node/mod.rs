@@ -47,7 +47,7 @@ use crate::wire::message::{Hello, Message};
 #[cfg(feature = "upload")]
 use crate::wire::upload::{Upload, UploadError};
 
-use context::{Context, Effects, Member};
+use context::{Context, Decided, Effects, Member};
 use mission_update::{MissionUpdate, takes_uploads};
 use neighbour::Neighbours;
 use neighbour::state::CANDIDATES;
@@ -233,8 +233,8 @@ impl Node {
             let to = self.neighbours.at(back).node();
             self.owe_hello(back, to, true);
         }
-        if let Some(granted) = effects.decided {
-            self.decided(now, granted);
+        if let Some(decided) = effects.decided {
+            self.decided(now, decided);
         }
         if effects.converged {
             self.raise(Event::Converged);
@@ -653,7 +653,11 @@ impl Node {
     }
 
     /// What came of a proposal is known: how many relays there are, or that they are too few.
-    fn decided(&mut self, now: Instant, granted: Option<u16>) {
+    fn decided(&mut self, now: Instant, decided: Decided) {
+        let granted = match decided {
+            Decided::Granted(relays) => Some(relays),
+            Decided::Refused => None,
+        };
         let Some(proposed) = self.view.proposed() else {
             return;
         };

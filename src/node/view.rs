@@ -24,7 +24,7 @@
 //!
 //! While a view is proposed no pass goes on. One that was decided against leaves the places where they are.
 
-use super::context::{Context, Effects, Proposer};
+use super::context::{Context, Decided, Effects, Proposer};
 use super::numbering::Stragglers;
 use super::retransmit::{Retransmit, Trip};
 use super::timing::{PAUSE, earliest};
@@ -318,7 +318,7 @@ impl ViewChange {
         self.asks = false;
         self.ask_at = None;
         Effects {
-            decided: Some(relays),
+            decided: Some(relays.map_or(Decided::Refused, Decided::Granted)),
             ..Effects::NONE
         }
     }
@@ -450,7 +450,7 @@ mod tests {
     use super::{Proposed, ViewChange, ViewState};
     use crate::mission::Mission;
     use crate::mission::tests::paper;
-    use crate::node::context::{Context, Effects, Member, Proposer};
+    use crate::node::context::{Context, Decided, Effects, Member, Proposer};
     use crate::settings::Settings;
     use crate::time::Instant;
     use crate::wire::digest::MissionId;
@@ -549,7 +549,7 @@ mod tests {
         let decision = relay.decision(1, other);
         assert_eq!(view.handle(&relay.context(), &decision), Effects::STALE);
         let decided = Effects {
-            decided: Some(Some(3)),
+            decided: Some(Decided::Granted(3)),
             ..Effects::NONE
         };
         let decision = relay.decision(1, relay.latest);

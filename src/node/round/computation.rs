@@ -215,7 +215,7 @@ impl Computation {
         match &self.pass {
             PassKind::Turn(_) => true,
             PassKind::Sweep(sweeping) => sweeping.chosen,
-            _ => false,
+            PassKind::Course(_) => false,
         }
     }
 

@@ -90,7 +90,7 @@ impl Round {
         let resent =
             self.retransmit.is_due(context.now) && self.computation.phase() == Phase::Waiting;
         self.due.onward |= resent;
-        if !self.work_at.is_some_and(|at| at <= context.now) {
+        if self.work_at.is_none_or(|at| at > context.now) {
             return Effects {
                 resent,
                 ..Effects::NONE

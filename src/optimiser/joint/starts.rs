@@ -153,7 +153,11 @@ impl Start {
         let Room { lateral, band } = room;
         let left =
             (interferer.y_m - lateral.least_m).abs() > (interferer.y_m - lateral.most_m).abs();
-        let off = if index % 2 > 0 { apart_m } else { 0.0 };
+        let off = if index.is_multiple_of(2) {
+            0.0
+        } else {
+            apart_m
+        };
         room.nearest(CrossSection {
             y_m: if left {
                 lateral.least_m + off
