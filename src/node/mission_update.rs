@@ -55,12 +55,19 @@ impl MissionUpdate {
 
     /// The mission of that number, if it is the one flown or the one held.
     pub(crate) fn mission_of(&self, member: &Member, id: MissionId) -> Option<Mission> {
-        #[cfg(feature = "upload")]
-        if id != member.active {
-            let upload = self.upload.filter(|upload| upload.id() == id)?;
-            return Mission::try_new(*upload.config()).ok();
+        if id == member.active {
+            return Some(member.mission);
         }
-        (id == member.active).then_some(member.mission)
+        if id != self.latest {
+            return None;
+        }
+        #[cfg(feature = "upload")]
+        let held = self
+            .upload
+            .and_then(|upload| Mission::try_new(*upload.config()).ok());
+        #[cfg(not(feature = "upload"))]
+        let held = None;
+        held
     }
 }
 
