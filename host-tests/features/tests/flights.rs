@@ -26,12 +26,15 @@ const SAID_ON_A_CHANNEL: u32 = 0xea63_26ab;
 const MINUTE: Duration = Duration::from_millis(60_000);
 
 fn places(relays: &[Relay]) -> Vec<f32> {
-    let place = |relay: &Relay| {
-        let place = relay.setpoint().expect("it has a place");
-        assert_eq!((place.y_m, place.altitude_m), (0.0, 20.0));
-        place.x_m
-    };
-    relays.iter().map(place).collect()
+    let places: Vec<_> = relays.iter().filter_map(Relay::setpoint).collect();
+    assert_eq!(places.len(), relays.len(), "all have one");
+    for place in &places {
+        assert_eq!(
+            [place.y_m, place.altitude_m].map(f32::to_bits),
+            [0.0, 20.0].map(f32::to_bits)
+        );
+    }
+    places.iter().map(|place| place.x_m).collect()
 }
 
 fn bits(places: &[f32]) -> Vec<u32> {
@@ -42,7 +45,7 @@ fn bits(places: &[f32]) -> Vec<u32> {
 /// interferer to the receiver one of 21 dB.
 fn hops(places: &[f32]) -> Vec<f64> {
     let squared = |x: f64, y: f64, h: f64| x * x + y * y + h * h;
-    let mut before = (0.0, 0.0, 80.0 / 80.0);
+    let mut before = (0.0, 0.0, 1.0);
     let mut hops = Vec::new();
     for &x_m in places {
         let x = f64::from(x_m);
@@ -96,6 +99,11 @@ fn four_go_on_without_the_third_on_the_same_bytes() {
     assert_eq!(chain.said(), SAID_ON_A_CHANNEL);
 }
 
+static POINTS: [FieldPoint; 1] = [FieldPoint {
+    x_m: 0.0,
+    upsilon_per_w: 1e9,
+}];
+
 /// No error where the feature is there.
 fn unless<E>(there: bool, error: E) -> Option<E> {
     (!there).then_some(error)
@@ -127,10 +135,6 @@ fn what_was_left_out_is_refused() {
         refused(measures),
         unless(cfg!(feature = "field"), SetupError::Measure)
     );
-    static POINTS: [FieldPoint; 1] = [FieldPoint {
-        x_m: 0.0,
-        upsilon_per_w: 1e9,
-    }];
     let field = Mission::try_new(MissionConfig {
         interference: Interference::Field(Field::new(&POINTS)),
         ..*paper(5).config()

@@ -1,0 +1,236 @@
+//! The steps, in order.
+
+use std::process::Command;
+
+use uav_relay_xtask::FUZZ_TARGETS;
+
+use super::prepare::succeeds;
+
+/// The target the firmware is built for.
+pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The oldest compiler the crate promises to build with, as `rust-version` in Cargo.toml has it.
+pub(crate) const OLDEST: &str = env!("CARGO_PKG_RUST_VERSION");
+
+/// Sets of features that the library is tested with and a chain flies with, beside the full one of all other tests.
+const SETS: [&str; 5] = [
+    "",
+    "guard",
+    "altitude,adjust",
+    "field,guard,auth",
+    "guard,upload",
+];
+
+/// Tests that are done in seconds, one or two of each part: placements, the chain, what goes on the air, the links, the flash,
+/// the guard.
+const QUICK_TESTS: [&str; 9] = [
+    "exact",
+    "flash",
+    "flights",
+    "forming",
+    "placement",
+    "protocol",
+    "serial",
+    "single",
+    "wire",
+];
+
+/// One command that must succeed.
+pub(crate) struct Step {
+    pub(crate) name: String,
+    pub(crate) command: String,
+    environment: &'static [(&'static str, &'static str)],
+    /// What it is left out without.
+    pub(crate) needs: Option<Tool>,
+}
+
+/// A program that is too much to add to a machine unasked.
+#[derive(Clone, Copy)]
+pub(crate) struct Tool {
+    check: &'static [&'static str],
+    pub(crate) get: &'static str,
+}
+
+const DENY: Tool = Tool {
+    check: &["cargo", "deny", "--version"],
+    get: "cargo install cargo-deny --locked",
+};
+
+const FUZZ: Tool = Tool {
+    check: &["rustup", "run", "nightly", "cargo", "fuzz", "--version"],
+    get: "rustup toolchain install nightly --profile minimal && cargo install cargo-fuzz --locked",
+};
+
+const MIRI: Tool = Tool {
+    check: &["rustup", "run", "nightly", "cargo", "miri", "--version"],
+    get: "rustup toolchain install nightly --profile minimal --component miri,rust-src",
+};
+
+impl Tool {
+    pub(crate) fn is_there(self) -> bool {
+        match self.check {
+            [program, arguments @ ..] => succeeds(program, arguments),
+            [] => true,
+        }
+    }
+}
+
+fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
+    Step {
+        name: name.into(),
+        command: command.into(),
+        environment: &[],
+        needs: None,
+    }
+}
+
+impl Step {
+    pub(crate) fn run(&self) -> bool {
+        let mut words = self.command.split_whitespace();
+        let status = Command::new(words.next().unwrap_or("cargo"))
+            .args(words)
+            .envs(self.environment.iter().copied())
+            .status();
+        status.is_ok_and(|status| status.success())
+    }
+}
+
+/// What every edit needs.
+pub(crate) fn quick() -> Vec<Step> {
+    let tests: Vec<String> = QUICK_TESTS.map(|test| format!("--test {test}")).into();
+    let mut steps = first();
+    steps.push(step(
+        "the library's tests, and the quick ones",
+        format!(
+            "cargo test --workspace --no-fail-fast --locked --lib {}",
+            tests.join(" ")
+        ),
+    ));
+    steps
+}
+
+/// Everything.
+pub(crate) fn all() -> Vec<Step> {
+    let mut steps = first();
+    steps.extend(clippy());
+    steps.push(step(
+        "tests",
+        "cargo test --workspace --no-fail-fast --locked",
+    ));
+    steps.extend(SETS.map(with_features));
+    steps.push(Step {
+        environment: &[("RUSTDOCFLAGS", "-D warnings")],
+        ..step("documentation", "cargo doc --workspace --no-deps --locked")
+    });
+    steps.extend(firmware());
+    steps.push(step("cost, and no panic", "cargo cost"));
+    for (name, features) in [
+        ("oldest compiler", "--features=defmt"),
+        ("oldest compiler, no features", "--no-default-features"),
+    ] {
+        let check = "cargo check -p uav-relay --locked --target-dir target/oldest";
+        steps.push(step(
+            name,
+            format!("rustup run {OLDEST} {check} {features}"),
+        ));
+    }
+    steps.push(step(
+        "licences",
+        "cargo run --quiet --package uav-relay-xtask --bin licences",
+    ));
+    steps.push(Step {
+        needs: Some(DENY),
+        ..step(
+            "advisories and duplicates",
+            "cargo deny --locked check --config .cargo/deny.toml",
+        )
+    });
+    steps.extend(nightly());
+    steps
+}
+
+fn first() -> Vec<Step> {
+    vec![
+        step("formatting", "cargo fmt --all --check"),
+        step(
+            "clippy, host",
+            "cargo clippy --workspace --all-targets --locked -- -D warnings",
+        ),
+    ]
+}
+
+fn clippy() -> Vec<Step> {
+    let on_target = |name, features| {
+        let check = "cargo clippy -p uav-relay --lib --examples --locked";
+        let command = format!("{check} --target {TARGET} {features} -- -D warnings");
+        step(name, command)
+    };
+    vec![
+        on_target("clippy, target", ""),
+        on_target("clippy, target, no features", "--no-default-features"),
+        on_target("clippy, target, its log", "--features defmt"),
+    ]
+}
+
+/// The library and a chain, with these features alone.
+fn with_features(set: &str) -> Step {
+    let features: Vec<String> = set
+        .split_terminator(',')
+        .map(|feature| format!("uav-relay-features/{feature}"))
+        .collect();
+    let name = if set.is_empty() {
+        "tests and a flight, no features".to_owned()
+    } else {
+        format!("tests and a flight, {set}")
+    };
+    let test = "cargo test -p uav-relay -p uav-relay-features --lib --tests --locked";
+    let command = format!(
+        "{test} --no-default-features --features={}",
+        features.join(",")
+    );
+    step(name, command)
+}
+
+fn firmware() -> Vec<Step> {
+    let build = |name, features| {
+        let build = "cargo build -p uav-relay --examples --locked";
+        let command = format!("{build} --profile firmware --target {TARGET} {features}");
+        step(name, command)
+    };
+    vec![
+        build("firmware", ""),
+        build("firmware, no features", "--no-default-features"),
+        build("firmware, its log by the probe", "--features rtt"),
+    ]
+}
+
+/// What needs more than a stable compiler: every fuzz target for some seconds from its corpus on, the corpora under Miri.
+fn nightly() -> Vec<Step> {
+    let mut steps = Vec::new();
+    for target in FUZZ_TARGETS {
+        // What is found goes where it is not taken for a part of the corpus; of a missing folder libFuzzer makes an error.
+        let found = format!("target/fuzz/{target}");
+        _ = std::fs::create_dir_all(&found);
+        let fuzz =
+            "cargo fuzz run --fuzz-dir host-tests/fuzz/harness --target-dir target/fuzz/build";
+        let corpora = format!("{found} host-tests/fuzz/corpus/{target}");
+        let command = format!(
+            "rustup run nightly {fuzz} --sanitizer none {target} {corpora} -- -max_total_time=10"
+        );
+        steps.push(Step {
+            needs: Some(FUZZ),
+            ..step(format!("fuzz smoke, {target}"), command)
+        });
+    }
+    // With the width of the target's pointers; for x86 libm takes square roots in assembly, which Miri does not read. Isolated,
+    // it would not read the corpora either.
+    steps.push(Step {
+        needs: Some(MIRI),
+        environment: &[("MIRIFLAGS", "-Zmiri-disable-isolation")],
+        ..step(
+            "miri",
+            "rustup run nightly cargo miri test -p host-tests --test fuzz --target armv7-unknown-linux-gnueabihf --target-dir target/miri",
+        )
+    });
+    steps
+}
