@@ -6,7 +6,7 @@ use super::task::LeaderTask;
 use super::turning::Turning;
 use crate::node::context::Context;
 use crate::optimiser::ladder::Ladder;
-use crate::optimiser::local::HopEnd as Beside;
+use crate::optimiser::local::HopEnd;
 use crate::optimiser::pass::origins;
 use crate::optimiser::plan::Planner;
 use crate::optimiser::search::{Infeasible, Schedule, Search};
@@ -133,7 +133,7 @@ impl Computation {
             LeaderTask::Adjusting(rounds) if ADJUST => {
                 let (turn, sir) = (rounds.turn(), rounds.sir);
                 self.begin();
-                let tx = Beside {
+                let tx = HopEnd {
                     place: Placement::default(),
                     apart_m: 0.0,
                 };

@@ -6,28 +6,33 @@
 use core::task::Poll;
 
 use crate::mission::{Interferer, Mission};
-use crate::optimiser::local::{HopEnd as Beside, Hops, LocalSearch as Search};
+use crate::optimiser::local::{HopEnd, Hops, LocalSearch};
 use crate::place::Placement;
 use crate::power_ratio::PowerRatio;
-use crate::wire::message::AdjustStep as Turn;
+use crate::wire::message::AdjustStep;
 
 /// A token, as one relay sees it.
 #[derive(Clone, Debug)]
 pub(crate) struct Turning {
     /// What this pass is for, and the SIR of the chain before it.
-    pub(crate) turn: Turn,
+    pub(crate) turn: AdjustStep,
     pub(crate) sir: f32,
     /// The node before this relay, and what its power is worth.
-    pub(crate) before: Beside,
+    pub(crate) before: HopEnd,
     pub(crate) gain_in: PowerRatio,
-    search: Option<Search>,
+    search: Option<LocalSearch>,
     /// Whether this relay or one after it has moved; the worst SIR from here on.
     pub(crate) any: bool,
     pub(crate) worst: f32,
 }
 
 impl Turning {
-    pub(crate) const fn new(turn: Turn, sir: f32, before: Beside, gain_in: PowerRatio) -> Self {
+    pub(crate) const fn new(
+        turn: AdjustStep,
+        sir: f32,
+        before: HopEnd,
+        gain_in: PowerRatio,
+    ) -> Self {
         Self {
             turn,
             sir,
@@ -47,7 +52,7 @@ impl Turning {
         power_w: f32,
         after: Option<Placement>,
     ) -> Hops {
-        let after = after.map(|place| Beside {
+        let after = after.map(|place| HopEnd {
             place,
             apart_m: mission.config().min_separation_m,
         });
@@ -63,8 +68,8 @@ impl Turning {
 
     /// Begins to look for a better place than `at`, within `band`, m; whether this turn is one to move.
     pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
-        if let Turn::Move { explore_m, local } = self.turn {
-            self.search = Some(Search::new(local, hops, at, explore_m, band));
+        if let AdjustStep::Move { explore_m, local } = self.turn {
+            self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));
         }
         self.search.is_some()
     }

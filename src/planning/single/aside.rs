@@ -58,7 +58,7 @@ use super::edge::{Edge, TwoHops, narrow};
 use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::place::Placement;
 
-pub use super::edge::Coordinate;
+pub use super::edge::EdgeCoordinate;
 
 /// Halvings of the distance from Rx, in f64: to far below an f32's own step.
 const HALVINGS: u8 = 48;
@@ -74,7 +74,7 @@ pub enum AsideCase {
     /// The first hop is the better one even right above Rx, as low as may be: there.
     AboveRx,
     /// That place is outside the corridor: the best of the box's edges, on which this is free.
-    Edge(Coordinate),
+    Edge(EdgeCoordinate),
     /// The interferer stands at Tx (X = Y = 0), SIR_1 is the same everywhere: above Rx.
     Level,
     /// The interferer stands at Rx (X = D, Y = 0), and no place helps: SIR_2 is 0; above Rx.
@@ -128,7 +128,7 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
     // Above Rx is always within.
     let above_rx = Placement::on_line(config.distance_m, band.least_m);
     let mut best = (hops.found(above_rx), AsideCase::AboveRx);
-    let mut weigh = |free: Coordinate, room: Band, through: Placement| {
+    let mut weigh = |free: EdgeCoordinate, room: Band, through: Placement| {
         let edge = Edge {
             free,
             through,
@@ -146,16 +146,16 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
     };
     for h in both_ends(band) {
         for y in both_ends(across) {
-            weigh(Coordinate::Along, along, at(0.0, y, h));
+            weigh(EdgeCoordinate::Along, along, at(0.0, y, h));
         }
         for x in both_ends(along) {
-            weigh(Coordinate::Across, across, at(x, 0.0, h));
+            weigh(EdgeCoordinate::Across, across, at(x, 0.0, h));
         }
     }
     if !band.is_single() {
         for y in both_ends(across) {
             for x in both_ends(along) {
-                weigh(Coordinate::Upward, band, at(x, y, band.least_m));
+                weigh(EdgeCoordinate::Upward, band, at(x, y, band.least_m));
             }
         }
     }

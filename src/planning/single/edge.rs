@@ -19,7 +19,7 @@ use crate::sir::{self, Sender};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
-pub enum Coordinate {
+pub enum EdgeCoordinate {
     /// x, along the line from Tx to Rx.
     Along = 4,
     /// y, across it.
@@ -54,7 +54,7 @@ impl TwoHops<'_> {
 /// An edge: `through` it, over `room`, m.
 #[derive(Clone, Copy)]
 pub(super) struct Edge {
-    pub(super) free: Coordinate,
+    pub(super) free: EdgeCoordinate,
     pub(super) through: Placement,
     pub(super) room: Band,
 }
@@ -63,9 +63,9 @@ impl Edge {
     fn place(&self, t: f32) -> Placement {
         let mut place = self.through;
         match self.free {
-            Coordinate::Along => place.x_m = t,
-            Coordinate::Across => place.y_m = t,
-            Coordinate::Upward => place.altitude_m = t,
+            EdgeCoordinate::Along => place.x_m = t,
+            EdgeCoordinate::Across => place.y_m = t,
+            EdgeCoordinate::Upward => place.altitude_m = t,
         }
         place
     }
@@ -78,19 +78,19 @@ impl Edge {
         let (x, y, h) = (wide(at.x_m), wide(at.y_m), wide(at.altitude_m));
         let (past, beside) = (wide(interferer.x_m), wide(interferer.y_m));
         let (p, a, b, end) = match self.free {
-            Coordinate::Along => (
+            EdgeCoordinate::Along => (
                 past,
                 squared(beside - y) + squared(h),
                 squared(y) + squared(h),
                 mission.config().distance_m,
             ),
-            Coordinate::Across => (
+            EdgeCoordinate::Across => (
                 beside,
                 squared(past - x) + squared(h),
                 squared(x) + squared(h),
                 0.0,
             ),
-            Coordinate::Upward => (
+            EdgeCoordinate::Upward => (
                 0.0,
                 squared(past - x) + squared(beside - y),
                 squared(x) + squared(y),

@@ -125,18 +125,20 @@ fn beside(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
 
 /// A case of one relay aside in words.
 fn sideways(case: aside::AsideCase) -> &'static str {
-    use aside::{AsideCase, Coordinate};
+    use aside::{AsideCase, EdgeCoordinate};
     match case {
         AsideCase::Touching => {
             "where the circles of equal SIR of both hops touch, at the lowest altitude"
         }
         AsideCase::Hilltop => "the first hop is the worse one even at its best place",
         AsideCase::AboveRx => "the first hop is the better one even above Rx",
-        AsideCase::Edge(Coordinate::Along) => "on an edge of the corridor along the line",
-        AsideCase::Edge(Coordinate::Across) => {
+        AsideCase::Edge(EdgeCoordinate::Along) => "on an edge of the corridor along the line",
+        AsideCase::Edge(EdgeCoordinate::Across) => {
             "on an edge of the corridor across the line, at Tx or Rx"
         }
-        AsideCase::Edge(Coordinate::Upward) => "on an upright edge of the corridor, at Tx or Rx",
+        AsideCase::Edge(EdgeCoordinate::Upward) => {
+            "on an upright edge of the corridor, at Tx or Rx"
+        }
         AsideCase::Level => "the interferer stands at Tx: the first hop is the same everywhere",
         AsideCase::Drowned => "the interferer stands at Rx: nothing is heard",
     }

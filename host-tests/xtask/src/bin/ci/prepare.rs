@@ -1,8 +1,8 @@
 //! What the steps need, and how it is added where it is missing.
 
-use std::process::{Command, Stdio};
+use std::process::Command;
 
-use uav_relay_xtask::toolchain::llvm_tool;
+use uav_relay_xtask::toolchain::{llvm_tool, succeeds};
 
 use super::steps::{OLDEST, TARGET};
 
@@ -12,16 +12,6 @@ const QEMU: &str = "qemu-system-arm";
 /// What to type where it is missing.
 const MISSING: &str =
     "qemu-system-arm is missing; type: sudo apt-get install --yes qemu-system-arm";
-
-/// Whether a command succeeds, unseen.
-pub(crate) fn succeeds(program: &str, arguments: &[&str]) -> bool {
-    let status = Command::new(program)
-        .args(arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status();
-    status.is_ok_and(|status| status.success())
-}
 
 /// What it is called, a command that tells whether it is there, and what rustup adds it by.
 type Needed = (

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use uav_relay_xtask::FUZZ_TARGETS;
 
-use super::prepare::succeeds;
+use uav_relay_xtask::toolchain::succeeds;
 
 /// The target the firmware is built for.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
