@@ -496,15 +496,15 @@ mod tests {
                 },
             })
         }
+    }
 
-        fn decision(&self, view: u16, mission_id: MissionId) -> Message {
-            Message::Decision(Decision {
-                mission_id,
-                view,
-                place: 3,
-                relays: Some(3),
-            })
-        }
+    fn decision_on(view: u16, mission_id: MissionId) -> Message {
+        Message::Decision(Decision {
+            mission_id,
+            view,
+            place: 3,
+            relays: Some(3),
+        })
     }
 
     const FROM: Effects = Effects {
@@ -546,13 +546,13 @@ mod tests {
             version: 5,
             ..relay.latest
         };
-        let decision = relay.decision(1, other);
+        let decision = decision_on(1, other);
         assert_eq!(view.handle(&relay.context(), &decision), Effects::STALE);
         let decided = Effects {
             decided: Some(Decided::Granted(3)),
             ..Effects::NONE
         };
-        let decision = relay.decision(1, relay.latest);
+        let decision = decision_on(1, relay.latest);
         assert_eq!(view.handle(&relay.context(), &decision), decided);
     }
 
@@ -562,7 +562,7 @@ mod tests {
         let mut relay = Second::new();
         let mut view = ViewChange::new(1);
         view.handle(&relay.context(), &relay.proposal(1));
-        let decision = relay.decision(1, relay.latest);
+        let decision = decision_on(1, relay.latest);
         relay.latest.version = 5;
         assert_eq!(view.handle(&relay.context(), &decision), Effects::FOREIGN);
         assert_eq!(view.state, ViewState::Proposed);

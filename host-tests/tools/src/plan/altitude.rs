@@ -101,10 +101,12 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
         places.push(own_of(index).at.at(*reaches.first()?));
     }
     for index in (2..=mission.relays()).rev() {
-        let at = usize::from(index) - 1;
-        let (from_m, place_m) = (places[at - 1].x_m, places[at].x_m);
-        if let Stand::At(x_m) = link_of(index).stand(target, from_m, place_m)? {
-            places[at - 1].x_m = x_m;
+        let before = usize::from(index) - 2;
+        let [from, place] = places.get_mut(before..before + 2)? else {
+            return None;
+        };
+        if let Stand::At(x_m) = link_of(index).stand(target, from.x_m, place.x_m)? {
+            from.x_m = x_m;
         }
     }
     Some(places)
