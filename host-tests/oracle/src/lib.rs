@@ -3,7 +3,7 @@
 //!
 //! | module | one idea |
 //! | --- | --- |
-//! | [`reference`] | the judges |
+//! | [`mod@reference`] | the judges |
 //! | [`cases`] | values of an independent program, as data |
 //! | [`random`] | random scenarios |
 //! | [`mission`] | from a judge's link to the mission that relays fly |

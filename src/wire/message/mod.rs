@@ -195,7 +195,7 @@ impl Message {
 /// Stored, an upload is the body of its offer.
 #[cfg(feature = "upload")]
 impl Upload {
-    /// Writes it as it is to be stored, [`LENGTH`] bytes, into `buffer`; `None` if it does not fit.
+    /// Writes it as it is to be stored, [`LENGTH`](crate::wire::upload::LENGTH) bytes, into `buffer`; `None` if it does not fit.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         Message::Offer(*self).encode(buffer)
     }

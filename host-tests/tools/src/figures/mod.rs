@@ -2,7 +2,7 @@
 //!
 //! Every figure is a file here with a pure `data`, which gives typed rows, and a `sheet`, which draws them. The numbers come
 //! from `uav_relay` or from the simulated chain that runs it; the baselines from [`baseline`](crate::baseline). The f64
-//! judge in [`reference`](uav_relay_oracle::reference) is what the tests hold them against.
+//! judge in `uav_relay_oracle` is what the tests hold them against.
 //!
 //! | file | one idea |
 //! | --- | --- |
