@@ -24,6 +24,8 @@ pub enum Event {
     /// The chain has agreed on a new view of who is in it: `Relay::view`, `Relay::index` and the relays of `Relay::mission` have new
     /// values, and new places follow.
     Reformed,
+    /// It is not certain any more that all relays of the view hold what was agreed on: this one holds its place, and asks for a new view.
+    LeaseLapsed,
     /// A new view was refused: too few relays can be reached to go on without the others. This part of the chain holds its places.
     NoQuorum,
     /// A newer mission has come: `Relay::upload`. Store it, and hand it to `Relay::resume` when the relay is next switched on.
@@ -32,7 +34,7 @@ pub enum Event {
     Adopted,
 }
 
-const ALL: [Event; 13] = [
+const ALL: [Event; 14] = [
     Event::SetpointChanged,
     Event::Converged,
     Event::Infeasible,
@@ -43,6 +45,7 @@ const ALL: [Event; 13] = [
     Event::MissionMismatch(Side::Upstream),
     Event::MissionMismatch(Side::Downstream),
     Event::Reformed,
+    Event::LeaseLapsed,
     Event::NoQuorum,
     Event::Uploaded,
     Event::Adopted,

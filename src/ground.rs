@@ -13,6 +13,7 @@ use crate::relay::signed::{greeting, say};
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
+use crate::view::ViewId;
 use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
@@ -45,8 +46,8 @@ pub enum Progress {
     Flown {
         /// Node number of the relay that says so.
         by: u16,
-        /// Number of the newest view of the chain.
-        view: u16,
+        /// The latest view of the chain that it has heard of.
+        view: ViewId,
     },
     /// The chain has a newer mission.
     Outdated {
@@ -312,7 +313,8 @@ impl Ground {
         let message = if self.holds == Some(upload.id()) {
             Message::Hello(Hello {
                 mission: self.base,
-                newest: 0,
+                newest: ViewId::LOADED,
+                hears: 0,
                 neighbour: 0,
                 ask: true,
                 form: false,

@@ -1,5 +1,7 @@
 //! The one source of jitter: numbers that only timing and the numbering of talks depend on, never a placement.
 
+use crate::time::Duration;
+
 /// A xorshift generator (Marsaglia 2003, 13-17-5).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Jitter(u32);
@@ -22,6 +24,14 @@ impl Jitter {
         state ^= state << 5;
         self.0 = state;
         state
+    }
+
+    /// `span` and up to an eighth more, so that relays on a shared channel do not go on in step.
+    pub(crate) fn spread(&mut self, span: Duration) -> Duration {
+        // A part of the eighth by multiplication: there is no division of this width on a Cortex-M.
+        let eighth = (span.as_micros() / 8 + 1).min(u64::from(u32::MAX));
+        let random = (u64::from(self.draw()) * eighth) >> 32;
+        Duration::from_micros(span.as_micros().saturating_add(random))
     }
 
     /// The next number, 1 to 65535.

@@ -26,6 +26,7 @@ mod side;
 pub mod sir;
 mod stats;
 pub mod time;
+mod view;
 pub mod wire;
 
 pub use channel::Channel;
@@ -44,6 +45,7 @@ pub use settings::{Adjust, Identity, Measure, Method, Settings, SetupError, Wiri
 pub use side::Side;
 pub use stats::Stats;
 pub use time::{Duration, Instant};
+pub use view::{View, ViewId};
 #[cfg(feature = "auth")]
 pub use wire::auth::{Auth, Key};
 pub use wire::frame::FrameBuf;

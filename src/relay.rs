@@ -18,6 +18,7 @@ use crate::settings::{Identity, Settings, SetupError, Wiring, check};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::Instant;
+use crate::view::ViewId;
 use crate::wire::deframe::{DeframeError, Deframer};
 use crate::wire::frame::{self, FrameBuf, Header};
 #[cfg(feature = "auth")]
@@ -302,9 +303,15 @@ impl Relay {
         self.node.member().index
     }
 
-    /// The number of the view of the chain that it has agreed to; 0 is the chain as the mission has it.
-    pub fn view(&self) -> u16 {
+    /// The view of the chain that it has accepted last.
+    pub fn view(&self) -> ViewId {
         self.node.member().view
+    }
+
+    /// Until when it may hold what was agreed on without hearing more: by then nobody else flies anything else. `None` before that is
+    /// known, and when the time is over.
+    pub fn lease(&self) -> Option<Instant> {
+        self.node.lease()
     }
 
     /// The node numbers of its neighbours toward the transmitter and toward the receiver, `None` where it has none. A node number is

@@ -4,6 +4,7 @@ use crate::mission::{Band, Mission};
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
 use crate::time::Instant;
+use crate::view::ViewId;
 use crate::wire::digest::{MissionId, digest};
 
 /// The relay as a member of its chain.
@@ -20,8 +21,8 @@ pub(crate) struct Member {
     pub(crate) digest: u16,
     /// The mission that it flies.
     pub(crate) active: MissionId,
-    /// Number of the view agreed on.
-    pub(crate) view: u16,
+    /// The view accepted last.
+    pub(crate) view: ViewId,
     /// Its place in the view, from 1 next to Tx.
     pub(crate) index: u16,
 }
@@ -35,7 +36,7 @@ impl Member {
             all: mission.relays(),
             digest,
             active: MissionId { version: 0, digest },
-            view: 0,
+            view: ViewId::LOADED,
             index: node,
             mission,
         }
@@ -43,7 +44,7 @@ impl Member {
 
     /// The digest that passes bear in the view agreed on.
     pub(crate) const fn pass_digest(&self) -> u16 {
-        self.active.digest.wrapping_add(self.view)
+        self.active.digest.wrapping_add(self.view.mark())
     }
 }
 
@@ -56,6 +57,8 @@ pub(crate) struct Context<'a> {
     pub(crate) latest: MissionId,
     /// Whether nobody comes after it on a pass.
     pub(crate) end: bool,
+    /// How long members of its view may still rely on it, in tenths of a second.
+    pub(crate) lease_left: u16,
     /// Upsilon as it measures it where it stands, 1/W.
     pub(crate) measured_per_w: Option<f32>,
 }
@@ -84,6 +87,11 @@ impl<'a> Context<'a> {
         let config = self.mission().config();
         let free = !(config.band.is_single() && config.lateral.is_single());
         cfg!(feature = "altitude") && self.settings().method == Method::Joint && free
+    }
+
+    /// Whether passes begin here.
+    pub(crate) fn leads(&self) -> bool {
+        self.index() == self.mission().leader()
     }
 
     pub(crate) fn is_last(&self) -> bool {
@@ -128,6 +136,11 @@ pub(crate) struct Effects {
     pub(crate) infeasible: bool,
     /// A new view is needed.
     pub(crate) view_needed: bool,
+    /// What was agreed on is not held any more.
+    pub(crate) lapsed: bool,
+    /// The neighbour onward, or the one back, was there at that time or later.
+    pub(crate) heard_onward: Option<Instant>,
+    pub(crate) heard_back: Option<Instant>,
     /// A proposal is under way: no pass goes on until it is decided.
     pub(crate) view_proposed: bool,
     /// It came from the neighbour before, or begins here.
@@ -141,8 +154,10 @@ pub(crate) struct Effects {
 /// What came of a proposal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Decided {
-    /// A view of so many relays.
-    Granted(u16),
+    /// The view proposed, of so many relays; its places are not to be taken for so many tenths of a second.
+    Granted { relays: u16, lease_left: u16 },
+    /// An earlier view, of others perhaps: the next one follows it.
+    Earlier,
     /// They are too few.
     Refused,
 }
@@ -164,6 +179,9 @@ impl Effects {
         converged: false,
         infeasible: false,
         view_needed: false,
+        lapsed: false,
+        heard_onward: None,
+        heard_back: None,
         view_proposed: false,
         proposed_by: None,
         ask: false,

@@ -1,6 +1,6 @@
 //! The protocol of one relay, on messages and without bytes: what it does with a message, and with silence.
 //!
-//! Four layers, each a machine of its own beside its state table, with the same verbs: `handle` takes a message, `take_...` gives what
+//! Five layers, each a machine of its own beside its state table, with the same verbs: `handle` takes a message, `take_...` gives what
 //! there is to send, `handle_timeout` and `next_timeout` keep the time. None knows another: each is handed a `context` and gives back
 //! effects, which `Node` passes on.
 //!
@@ -8,6 +8,7 @@
 //! | --- | --- |
 //! | `neighbour` | which node is taken for the neighbour on each side, and when it counts as lost |
 //! | `view` | the view change: how the chain comes to a new view of who is in it |
+//! | `lease` | how long what was agreed on may be held |
 //! | `mission_update` | a newer mission, in flight |
 //! | `round` | a round of agreement: sweeps, courses of the joint method, turns |
 //!
@@ -24,6 +25,7 @@
 //! message sent twice is harmless.
 
 pub(crate) mod context;
+mod lease;
 pub(crate) mod mission_update;
 pub(crate) mod neighbour;
 mod numbering;
@@ -41,13 +43,15 @@ use crate::place::Placement;
 use crate::settings::{Identity, Method, Settings, Wiring};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
+use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Hello, Message};
 #[cfg(feature = "upload")]
 use crate::wire::upload::{Upload, UploadError};
 
 use context::{Context, Decided, Effects, Member};
+use lease::Lease;
 use mission_update::{MissionUpdate, takes_uploads};
 use neighbour::Neighbours;
 use neighbour::state::CANDIDATES;
@@ -56,9 +60,6 @@ use round::state::Phase;
 use sample::{Meter, Sample};
 use steering::Steering;
 use view::ViewChange;
-
-/// A pass whose digest is so many views off is of the same mission.
-const VIEWS: u16 = 64;
 
 /// What the firmware is told.
 #[derive(Clone, Debug, Default)]
@@ -73,6 +74,7 @@ pub(crate) struct Node {
     member: Member,
     neighbours: Neighbours,
     view: ViewChange,
+    lease: Lease,
     update: MissionUpdate,
     round: Round,
     steering: Steering,
@@ -87,6 +89,7 @@ fn of<'a>(
     neighbours: &Neighbours,
     update: &MissionUpdate,
     meter: &Meter,
+    lease_left: u16,
 ) -> Context<'a> {
     let onward = Side::onward(member.mission.heading());
     Context {
@@ -94,8 +97,15 @@ fn of<'a>(
         member,
         latest: update.latest(),
         end: neighbours.at(onward).has_no_peer(),
+        lease_left,
         measured_per_w: meter.published(),
     }
+}
+
+/// Whether node `other`, which hears the nodes of `mask` on that side, hears node `own`.
+const fn hears(own: u16, other: u16, mask: u8) -> bool {
+    let distance = own.abs_diff(other);
+    distance >= 1 && distance <= CANDIDATES && mask >> (distance - 1) & 1 == 1
 }
 
 impl Node {
@@ -116,7 +126,8 @@ impl Node {
         let neighbours = Neighbours::new(identity.index, member.all, now, &settings);
         let mut node = Self {
             update: MissionUpdate::new(member.active),
-            view: ViewChange::new(!seed),
+            view: ViewChange::new(member.all, mission.leader(), !seed),
+            lease: Lease::new(!seed.rotate_left(16), now, &settings),
             round: Round::new(leads, number, profile, seed),
             steering: Steering::new(&settings, neighbours.nodes(), seed, now),
             meter: Meter::new(settings.measure),
@@ -151,6 +162,7 @@ impl Node {
             &self.neighbours,
             &self.update,
             &self.meter,
+            self.lease.left(now),
         )
     }
 
@@ -222,6 +234,15 @@ impl Node {
             let back = self.back();
             self.neighbours.at_mut(back).proposed_by(proposer);
         }
+        let (back, onward) = (self.back(), self.onward());
+        for (side, at) in [(onward, effects.heard_onward), (back, effects.heard_back)] {
+            if let Some(at) = at {
+                self.confirm(now, side, at);
+            }
+        }
+        if effects.lapsed {
+            self.raise(Event::LeaseLapsed);
+        }
         if effects.view_proposed {
             self.round.suspend();
         }
@@ -238,6 +259,9 @@ impl Node {
         }
         if effects.converged {
             self.raise(Event::Converged);
+            if self.context(now).leads() {
+                self.lease.begin(now);
+            }
         }
         if effects.infeasible {
             self.raise(Event::Infeasible);
@@ -258,7 +282,7 @@ impl Node {
     /// Node `from` at `side` has made itself known, for the first time if `first`: then what waits for an answer from there is
     /// said again.
     #[cfg(feature = "auth")]
-    pub(crate) fn meet(&mut self, now: Instant, side: Side, from: u16, first: bool) {
+    pub(crate) fn meet(&mut self, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
         }
@@ -269,7 +293,6 @@ impl Node {
             }
             return;
         }
-        self.hear(now, side);
         if first && side == self.onward() {
             self.resend();
         }
@@ -296,9 +319,13 @@ impl Node {
             return self.on_ground(now, side, message);
         }
         let taken = self.neighbours.at(side).node() == from;
-        if taken {
-            self.hear(now, side);
-        }
+        let distance = from.abs_diff(self.member.node);
+        let Self {
+            member, neighbours, ..
+        } = self;
+        neighbours
+            .at_mut(side)
+            .heard(distance, taken, now, &member.settings);
         if let Message::Hello(hello) = message {
             if self.is_of_mission(side, hello.mission) {
                 self.on_hello(now, side, from, *hello);
@@ -325,7 +352,7 @@ impl Node {
             // Nobody says anything else to a node that it has not taken.
             self.told(now, side, true);
         }
-        if !self.is_of_this_view(now, side, from, message) {
+        if !self.is_of_this_view(side, from, message) {
             return true;
         }
         self.dispatch(now, side, from, message);
@@ -335,12 +362,12 @@ impl Node {
 
     /// Whether `message` from the neighbour `from` is of the mission and, if it is of one, of the view that this relay is in.
     /// What is not is counted, and answered by a hello if the two may have to come to one view.
-    fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
+    fn is_of_this_view(&mut self, side: Side, from: u16, message: &Message) -> bool {
         let Some(digest) = message.mission() else {
             return true;
         };
         let (active, latest) = (self.member.active, self.update.latest());
-        let proposes = message.is_of_a_call();
+        let proposes = message.is_of_a_proposal();
         if !proposes && !message.is_of_a_view() {
             return self.is_of_mission(side, digest);
         }
@@ -349,27 +376,12 @@ impl Node {
             Message::Decision(decision) => [active, latest].contains(&decision.mission_id),
             _ => digest == self.member.pass_digest(),
         };
-        if known {
-            return true;
+        if !known {
+            // What it flies, and in which view, it says in a hello.
+            bump(&mut self.telemetry.stats.view);
+            self.owe_hello(side, from, true);
         }
-        let off = digest.wrapping_sub(self.member.pass_digest());
-        let near = !proposes && off.min(off.wrapping_neg()) <= VIEWS;
-        // It was loaded with the same mission, so it flies an older or a newer one.
-        let takes = takes_uploads(&self.member);
-        let kin = takes && self.neighbours.at(side).holds.is_some();
-        if !(near || kin) {
-            self.refuse_mission(side);
-            if takes {
-                self.owe_hello(side, from, false);
-            }
-            return false;
-        }
-        bump(&mut self.telemetry.stats.view);
-        if near && message.is_onward() {
-            self.view.ask(now);
-        }
-        self.owe_hello(side, from, false);
-        false
+        known
     }
 
     fn is_of_mission(&mut self, side: Side, digest: u16) -> bool {
@@ -385,12 +397,15 @@ impl Node {
         self.raise(Event::MissionMismatch(side));
     }
 
-    /// A sign of life from the neighbour at `side`.
-    fn hear(&mut self, now: Instant, side: Side) {
+    /// The neighbour at `side` was there `at` that time or later: it has answered what this relay said then.
+    fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
         let Self {
             member, neighbours, ..
         } = self;
-        if neighbours.at_mut(side).heard(now, &member.settings) {
+        if neighbours
+            .at_mut(side)
+            .confirmed(now, at, &member.settings)
+        {
             self.raise(Event::NeighbourBack(side));
         }
     }
@@ -398,9 +413,11 @@ impl Node {
     /// A message of this mission, and of this view if it is of one, from the neighbour `from` at `side`.
     fn dispatch(&mut self, now: Instant, side: Side, from: u16, message: &Message) {
         match message {
-            Message::Heartbeat { answer, .. } => {
-                if *answer {
-                    self.neighbours.at_mut(side).owe_heartbeat();
+            Message::Heartbeat { ask, answer, .. } => {
+                let neighbour = self.neighbours.at_mut(side);
+                neighbour.asked(*ask);
+                if let Some(at) = neighbour.answered(*answer, &self.member.settings) {
+                    self.confirm(now, side, at);
                 }
                 return;
             }
@@ -430,12 +447,22 @@ impl Node {
             &self.neighbours,
             &self.update,
             &self.meter,
+            self.lease.left(now),
         );
         let effects = match message {
             Message::Proposal(_) | Message::Decision(_) => self.view.handle(&context, message),
             Message::Busy { sweep } if self.view.on_busy(&context, *sweep) => Effects::NONE,
             // No pass goes on while a view is proposed.
             _ if self.view.awaited().is_some() => Effects::STALE,
+            Message::Pulsed(_) => self.lease.handle(&context, message),
+            Message::Pulse(_) => {
+                self.view.commit(self.member.view);
+                self.lease.handle(&context, message)
+            }
+            _ if message.is_of_a_view() && message.is_onward() => {
+                self.view.commit(self.member.view);
+                self.round.handle(&context, message)
+            }
             _ => self.round.handle(&context, message),
         };
         self.apply(now, effects);
@@ -460,8 +487,19 @@ impl Node {
             &self.neighbours,
             &self.update,
             &self.meter,
+            self.lease.left(now),
         );
         let effects = self.round.handle_timeout(&context);
+        self.apply(now, effects);
+        let context = of(
+            now,
+            &self.member,
+            &self.neighbours,
+            &self.update,
+            &self.meter,
+            self.lease.left(now),
+        );
+        let effects = self.lease.handle_timeout(&context);
         self.apply(now, effects);
         if solved && !self.is_solving(now) {
             self.solved(now);
@@ -484,6 +522,7 @@ impl Node {
                 &self.neighbours,
                 &self.update,
                 &self.meter,
+                self.lease.left(now),
             );
             let effects = self.view.handle_timeout(&context, leads, fresh);
             self.apply(now, effects);
@@ -511,6 +550,7 @@ impl Node {
             member,
             neighbours,
             steering,
+            lease,
             ..
         } = self;
         let settings = &member.settings;
@@ -518,7 +558,7 @@ impl Node {
         if solving && neighbour.excuse(now, settings) {
             return;
         }
-        let lost = neighbour.handle_timeout(now, settings, searches);
+        let lost = neighbour.handle_timeout(now, settings, lease.span(settings), searches);
         steering.link(side, Some(neighbour.node()).filter(|node| *node != 0));
         if lost {
             self.raise(Event::NeighbourLost(side));
@@ -539,6 +579,7 @@ impl Node {
                 &self.neighbours,
                 &self.update,
                 &self.meter,
+                self.lease.left(now),
             );
             let effects = self.view.decide(&context);
             self.apply(now, effects);
@@ -552,7 +593,7 @@ impl Node {
     }
 
     /// The next hello that is owed: at which side, to which node.
-    fn next_hello(&mut self) -> Option<(Side, u16, Hello)> {
+    fn next_hello(&mut self, now: Instant) -> Option<(Side, u16, Hello)> {
         let (own, all) = (self.member.node, self.member.all);
         for side in [Side::Upstream, Side::Downstream] {
             for _ in 0..CANDIDATES {
@@ -564,14 +605,14 @@ impl Node {
                     Side::Downstream => own.saturating_add(distance),
                 };
                 if to >= 1 && to <= all && self.side_of(to).is_some() {
-                    return Some((side, to, self.hello(side, ask)));
+                    return Some((side, to, self.hello(now, side, ask)));
                 }
             }
         }
         None
     }
 
-    fn hello(&self, side: Side, ask: bool) -> Hello {
+    fn hello(&self, now: Instant, side: Side, ask: bool) -> Hello {
         let latest = self.update.latest();
         Hello {
             mission: self.member.digest,
@@ -581,6 +622,7 @@ impl Node {
             form: self.view.asks() && side == self.back(),
             fresh: self.round.is_fresh(),
             ready: self.neighbours.at(side.other()).is_ready(),
+            hears: self.neighbours.at(side).hears(now, &self.member.settings),
             holds: latest,
             flies: self.member.active == latest,
         }
@@ -599,7 +641,8 @@ impl Node {
             self.compare(side, from, hello.holds);
             self.neighbours.at_mut(side).holds = Some(hello.holds);
             if self.searches() {
-                self.told(now, side, hello.neighbour == own);
+                let mutual = hello.neighbour == own && hears(own, from, hello.hears);
+                self.told(now, side, mutual);
             }
             let waits = self.view.awaited().is_some();
             if hello.form && (hello.newest >= known || hello.fresh && !waits) {
@@ -612,6 +655,8 @@ impl Node {
     }
 
     /// A hello from node `from` at `side`, which is not taken for the neighbour there.
+    ///
+    /// One that does not hear this relay is none: nothing can be agreed on with it.
     fn consider(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let Self {
@@ -622,7 +667,8 @@ impl Node {
         } = self;
         let neighbour = neighbours.at_mut(side);
         neighbour.notice(now, &member.settings);
-        if hello.neighbour != own && hello.neighbour != 0 {
+        let taken = hello.neighbour != own && hello.neighbour != 0;
+        if taken || !hears(own, from, hello.hears) {
             return;
         }
         let pairs = hello.neighbour == own;
@@ -654,20 +700,28 @@ impl Node {
 
     /// What came of a proposal is known: how many relays there are, or that they are too few.
     fn decided(&mut self, now: Instant, decided: Decided) {
-        let granted = match decided {
-            Decided::Granted(relays) => Some(relays),
-            Decided::Refused => None,
-        };
         let Some(proposed) = self.view.proposed() else {
             return;
         };
         let (place, id) = (proposed.place, proposed.mission_id);
         let leads = place == 1;
-        let mission = self.update.mission_of(&self.member, id).zip(granted);
-        let mission = mission.and_then(|(mission, relays)| mission.with_relays(relays).ok());
-        let (Some(relays), Some(mission)) = (granted, mission) else {
-            self.raise(Event::NoQuorum);
-            return self.neighbours.refuse();
+        let (relays, lease_left) = match decided {
+            Decided::Granted { relays, lease_left } => (relays, lease_left),
+            Decided::Earlier => {
+                if leads {
+                    self.view.ask(now);
+                }
+                return;
+            }
+            Decided::Refused => {
+                self.raise(Event::NoQuorum);
+                return self.neighbours.refuse();
+            }
+        };
+        let mission = self.update.mission_of(&self.member, id);
+        let mission = mission.and_then(|mission| mission.with_relays(relays).ok());
+        let Some(mission) = mission else {
+            return self.view.ask(now);
         };
         self.member.index = match mission.heading() {
             Heading::TowardRx => place,
@@ -679,8 +733,10 @@ impl Node {
         let (back, onward) = (self.back(), self.onward());
         self.neighbours.at_mut(back).agree_with_proposer();
         self.neighbours.at_mut(onward).agree(place == relays);
+        self.lease.renew();
         let works = self.member.settings.method == Method::Joint;
-        self.round.renew(now, leads, works);
+        let rest = Duration::from_millis(100).times(u32::from(lease_left));
+        self.round.renew(now + rest, leads, works);
         bump(&mut self.telemetry.stats.views);
         self.raise(Event::Reformed);
         if id != self.update.latest() {
@@ -720,6 +776,7 @@ impl Node {
                 &self.neighbours,
                 &self.update,
                 &self.meter,
+                self.lease.left(now),
             );
             let effects = self.round.restart(&context);
             self.apply(now, effects);
@@ -744,10 +801,15 @@ impl Node {
             return Some(message);
         }
         let mission = self.member.digest;
-        if let Some((side, to, answer)) = self.neighbours.take_heartbeat() {
-            return Some((side, to, Message::Heartbeat { mission, answer }));
+        if let Some((side, to, ask, answer)) = self.neighbours.take_heartbeat(now) {
+            let beat = Message::Heartbeat {
+                mission,
+                ask,
+                answer,
+            };
+            return Some((side, to, beat));
         }
-        if let Some((side, to, hello)) = self.next_hello() {
+        if let Some((side, to, hello)) = self.next_hello(now) {
             return Some((side, to, Message::Hello(hello)));
         }
         #[cfg(feature = "upload")]
@@ -755,7 +817,7 @@ impl Node {
             if let Some((to, message)) = self.next_offer(side) {
                 return Some((side, to, message));
             }
-            if let Some((to, hello)) = self.next_report(side) {
+            if let Some((to, hello)) = self.next_report(now, side) {
                 return Some((side, to, Message::Hello(hello)));
             }
         }
@@ -779,6 +841,7 @@ impl Node {
             &self.neighbours,
             &self.update,
             &self.meter,
+            self.lease.left(now),
         );
         if let Some(message) = self.view.take_onward(&context)
             && let Some((to, _)) = next
@@ -795,6 +858,20 @@ impl Node {
             return Some((back, to, message));
         }
         let agreed = |peer: Option<(u16, bool)>| peer.is_some_and(|(_, agreed)| agreed);
+        if self.view.awaited().is_none() {
+            if agreed(next)
+                && let Some(message) = self.lease.take_onward(&context)
+                && let Some((to, _)) = next
+            {
+                return Some((onward, to, message));
+            }
+            if agreed(before)
+                && let Some(message) = self.lease.take_back(&context)
+                && let Some((to, _)) = before
+            {
+                return Some((back, to, message));
+            }
+        }
         if let Some(message) = self.round.take_onward(&context, agreed(next))
             && let Some((to, _)) = next
         {
@@ -813,6 +890,7 @@ impl Node {
         [
             self.neighbours.next_timeout(),
             self.view.next_timeout(),
+            self.lease.next_timeout(),
             self.round.next_timeout(),
             self.steering.next_timeout(),
         ]
@@ -834,6 +912,11 @@ impl Node {
     /// What keeps the relay from its place at `side`.
     pub(crate) fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.steering.hold_reason(side)
+    }
+
+    /// Until when it may hold what was agreed on.
+    pub(crate) const fn lease(&self) -> Option<Instant> {
+        self.lease.until()
     }
 
     pub(crate) fn phase(&self) -> Phase {
@@ -892,7 +975,7 @@ impl Node {
     }
 
     /// What the ground at `side` is told, once it is owed: to which node.
-    fn next_report(&mut self, side: Side) -> Option<(u16, Hello)> {
+    fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Hello)> {
         if !core::mem::take(&mut self.neighbours.at_mut(side).ground) {
             return None;
         }
@@ -903,7 +986,7 @@ impl Node {
         let hello = Hello {
             neighbour: 0,
             form: false,
-            ..self.hello(side, false)
+            ..self.hello(now, side, false)
         };
         Some((to, hello))
     }
@@ -954,7 +1037,7 @@ impl Node {
 
     /// A relay that has just been switched on flies `upload`, which it held before.
     pub(crate) fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
-        let untouched = self.view.newest() == 0 && self.round.is_untouched();
+        let untouched = self.view.newest() == ViewId::LOADED && self.round.is_untouched();
         let mission = self.update.resume(&self.member, upload, untouched)?;
         self.member.mission = mission;
         self.member.active = upload.id();

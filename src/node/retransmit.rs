@@ -54,11 +54,7 @@ impl Retransmit {
             0 => answer,
             again => answer.min(2 << u32::from(again).min(16)),
         };
-        let patience = trip.hop_time.times(hops).as_micros();
-        // A part of the eighth by multiplication: there is no division of this width on a Cortex-M.
-        let eighth = (patience / 8 + 1).min(u64::from(u32::MAX));
-        let random = (u64::from(self.jitter.draw()) * eighth) >> 32;
-        self.at = Some(now + Duration::from_micros(patience.saturating_add(random)));
+        self.at = Some(now + self.jitter.spread(trip.hop_time.times(hops)));
     }
 
     /// Nothing is awaited any more.

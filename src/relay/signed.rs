@@ -19,12 +19,12 @@ pub(super) fn receive(
 ) {
     match session.check(frame.header.sender, frame) {
         Checked::Fresh { first } => {
-            node.meet(now, side, frame.header.sender, first);
+            node.meet(side, frame.header.sender, first);
             read(node, now, side, frame);
         }
         Checked::Handshake { first } => {
             bump(&mut node.stats_mut().handshakes);
-            node.meet(now, side, frame.header.sender, first);
+            node.meet(side, frame.header.sender, first);
         }
         Checked::Unproven => bump(&mut node.stats_mut().handshakes),
         Checked::Unsigned => bump(&mut node.stats_mut().unsigned),

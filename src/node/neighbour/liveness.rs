@@ -1,7 +1,9 @@
 //! When a neighbour counts as lost.
 //!
-//! Any intact frame from it is a sign of life. After `Settings::probe_after` without one it is asked for a heartbeat, sixteen times
-//! over until `Settings::dead_after` has passed; then it is lost, and asked every `probe_after` from there on.
+//! A sign of life answers something that this relay said: a heartbeat with the number of its question, or what comes back of a pulse. It counts
+//! from when that was said, so what was recorded and is played later is none. After `Settings::probe_after` without one the neighbour
+//! is asked, sixteen times over until it counts as lost, and every `probe_after` from there on. It is lost after
+//! `Settings::dead_after`, or after the span of the lease where that is longer.
 //!
 //! Relays of one view that choose their places jointly solve the same chain at the same time, and have nothing to say until they
 //! are done. So while a relay solves, the silence of a neighbour that it is in one view with is excused: both times count from the end
@@ -22,14 +24,20 @@ pub(crate) fn tick(settings: &Settings) -> Duration {
     Duration::from_micros((span / QUESTIONS).max(1))
 }
 
+/// Questions that may still be answered.
+const OPEN: u16 = 4;
+
 /// What is known of a neighbour's being alive.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// When it was heard last, or when this relay was switched on.
+    /// When it is known to have been there, or when this relay was switched on.
     heard: Instant,
     lost: bool,
     /// Whether it has been heard at all.
     met: bool,
+    /// The last question, 0 before any, and when it was asked.
+    question: u16,
+    asked: Instant,
 }
 
 /// What follows from a silence.
@@ -47,6 +55,8 @@ impl Liveness {
             heard: now,
             lost: false,
             met: false,
+            question: 0,
+            asked: now,
         }
     }
 
@@ -55,11 +65,37 @@ impl Liveness {
         self.met && !self.lost
     }
 
-    /// A frame has come; whether it had been lost until then.
-    pub(crate) fn heard(&mut self, now: Instant) -> bool {
-        self.heard = now;
+    /// A frame has come.
+    pub(crate) const fn met(&mut self) {
+        self.met = true;
+    }
+
+    /// It was there `at` that time or later; whether it had been lost until now.
+    pub(crate) fn confirmed(&mut self, at: Instant) -> bool {
+        self.heard = self.heard.max(at);
         self.met = true;
         core::mem::take(&mut self.lost)
+    }
+
+    /// The number of a new question.
+    pub(crate) const fn ask(&mut self, now: Instant) -> u16 {
+        self.question = match self.question.wrapping_add(1) {
+            0 => 1,
+            number => number,
+        };
+        self.asked = now;
+        self.question
+    }
+
+    /// When a question of that number was asked, if it is one of the last few.
+    pub(crate) fn answered(&self, number: u16, settings: &Settings) -> Option<Instant> {
+        let before = self.question.wrapping_sub(number);
+        if number == 0 || self.question == 0 || before >= OPEN {
+            return None;
+        }
+        let since = tick(settings).times(u32::from(before)).as_micros();
+        let asked = self.asked.as_micros().saturating_sub(since);
+        Some(Instant::from_micros(asked))
     }
 
     /// Its silence so far says nothing; whether it is not lost already.
@@ -71,14 +107,14 @@ impl Liveness {
     }
 
     /// Nothing has come for a while.
-    pub(crate) fn silent(&mut self, now: Instant, settings: &Settings) -> Silence {
-        let gone = now.since(self.heard) >= settings.dead_after;
+    pub(crate) fn silent(&mut self, now: Instant, dead: Duration, settings: &Settings) -> Silence {
+        let gone = now.since(self.heard) >= dead;
         let lost = gone && !self.lost;
         self.lost |= gone;
         let look_again = if self.lost {
             now + settings.probe_after
         } else {
-            (now + tick(settings)).min(self.heard + settings.dead_after)
+            (now + tick(settings)).min(self.heard + dead)
         };
         Silence { lost, look_again }
     }

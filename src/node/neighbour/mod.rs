@@ -66,13 +66,13 @@ impl Neighbours {
         self.downstream.refuse();
     }
 
-    /// The next heartbeat that is owed: at which side, to which node, and whether it asks for one in return.
-    pub(crate) fn take_heartbeat(&mut self) -> Option<(Side, u16, bool)> {
+    /// The next heartbeat that is owed: at which side, to which node, the number of its question and that of the one it answers.
+    pub(crate) fn take_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()
             .find_map(|side| {
-                let (to, asks) = self.at_mut(side).take_heartbeat()?;
-                Some((side, to, asks))
+                let (to, ask, answer) = self.at_mut(side).take_heartbeat(now)?;
+                Some((side, to, ask, answer))
             })
     }
 

@@ -17,7 +17,7 @@
 use super::liveness::{Liveness, tick};
 use crate::node::context::Proposer;
 use crate::settings::Settings;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
 
 /// Nodes on one side that are sent a hello.
@@ -48,13 +48,35 @@ struct HoldDown {
     heard: Instant,
 }
 
+/// Which nodes on one side can be heard.
+#[derive(Clone, Copy, Debug)]
+struct Hearing {
+    since: Instant,
+    now: u8,
+    before: u8,
+}
+
+impl Hearing {
+    /// Forgets who was not heard for two spans of `probe_after`.
+    fn age(&mut self, now: Instant, settings: &Settings) {
+        let span = now.since(self.since);
+        if span < settings.probe_after {
+            return;
+        }
+        let old = span >= settings.probe_after.times(2);
+        self.before = if old { 0 } else { self.now };
+        self.now = 0;
+        self.since = now;
+    }
+}
+
 /// What waits to be sent to the neighbour, apart from passes and what comes back of them.
 #[derive(Clone, Copy, Debug, Default)]
 struct Signs {
-    /// A heartbeat that asks for one in return.
+    /// A question whether it is there.
     ask: bool,
-    /// A heartbeat in return.
-    answer: bool,
+    /// The answer to its question of that number, 0 for none.
+    answer: u16,
 }
 
 /// One side.
@@ -75,6 +97,8 @@ pub(crate) struct Neighbour {
     hold_down: Option<HoldDown>,
     /// When a node that is not taken was heard last.
     near: Option<Instant>,
+    /// The nodes heard since `since`, and in the span before: bit 0 is the nearest one.
+    hearing: Hearing,
     losses: u8,
     signs: Signs,
     /// The newest mission that the node taken holds, as far as it has said.
@@ -115,10 +139,15 @@ impl Neighbour {
             liveness: Liveness::new(now),
             hold_down: None,
             near: None,
+            hearing: Hearing {
+                since: now,
+                now: 0,
+                before: 0,
+            },
             losses: 0,
             signs: Signs {
                 ask: false,
-                answer: false,
+                answer: 0,
             },
             holds: None,
             #[cfg(feature = "upload")]
@@ -193,13 +222,44 @@ impl Neighbour {
         self.counted = self.agreed;
     }
 
-    /// A frame from the neighbour; whether it had been lost until then.
-    pub(crate) fn heard(&mut self, now: Instant, settings: &Settings) -> bool {
-        let back = self.liveness.heard(now);
+    /// An intact frame from the node `distance` nodes away, which is the one `taken` or not.
+    pub(crate) fn heard(&mut self, distance: u16, taken: bool, now: Instant, settings: &Settings) {
+        self.hearing.age(now, settings);
+        if distance >= 1 && distance <= CANDIDATES {
+            self.hearing.now |= 1 << (distance - 1);
+        }
+        if taken {
+            self.liveness.met();
+        }
+    }
+
+    /// The nodes that were heard lately: bit 0 is the nearest one.
+    pub(crate) fn hears(&self, now: Instant, settings: &Settings) -> u8 {
+        let mut hearing = self.hearing;
+        hearing.age(now, settings);
+        hearing.now | hearing.before
+    }
+
+    /// The neighbour was there `at` that time or later; whether it had been lost until now.
+    pub(crate) fn confirmed(&mut self, now: Instant, at: Instant, settings: &Settings) -> bool {
+        let back = self.liveness.confirmed(at);
         if self.is_mutual() {
-            self.look_at = Some(now + settings.probe_after);
+            let next = at + settings.probe_after;
+            self.look_at = Some(next.max(now + tick(settings)));
         }
         back
+    }
+
+    /// The neighbour asks for a sign of life, with a question of that number.
+    pub(crate) const fn asked(&mut self, number: u16) {
+        if number != 0 {
+            self.signs.answer = number;
+        }
+    }
+
+    /// The neighbour has answered the question of that number: when that was asked.
+    pub(crate) fn answered(&self, number: u16, settings: &Settings) -> Option<Instant> {
+        self.liveness.answered(number, settings)
     }
 
     /// Whether somebody is there, and takes this relay for its neighbour, too, as far as it has said.
@@ -242,12 +302,13 @@ impl Neighbour {
         self.look_at
     }
 
-    /// Nothing has come for a while; whether the neighbour counts as lost since this moment. `searches` tells whether others could be
-    /// heard here.
+    /// Nothing has come for a while; whether the neighbour counts as lost since this moment, as it does after `dead`. `searches` tells
+    /// whether others could be heard here.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
         settings: &Settings,
+        dead: Duration,
         searches: bool,
     ) -> bool {
         let step = tick(settings);
@@ -260,7 +321,7 @@ impl Neighbour {
         let mut look_again = now + step;
         match self.state {
             NeighbourState::Linked => {
-                let silence = self.liveness.silent(now, settings);
+                let silence = self.liveness.silent(now, dead, settings);
                 lost = silence.lost;
                 self.signs.ask = true;
                 if lost && searches {
@@ -271,7 +332,7 @@ impl Neighbour {
                 }
             }
             NeighbourState::Pairing { since } => {
-                lost = self.liveness.silent(now, settings).lost;
+                lost = self.liveness.silent(now, settings.dead_after, settings).lost;
                 self.hello_all();
                 if lost || is_over(since) {
                     self.search(now);
@@ -343,7 +404,7 @@ impl Neighbour {
         self.node = node;
         self.state = NeighbourState::Pairing { since: now };
         self.liveness = Liveness::new(now);
-        self.liveness.heard(now);
+        self.liveness.met();
         self.hold_down = None;
         self.look_at = Some(now + tick(settings));
         true
@@ -366,15 +427,14 @@ impl Neighbour {
         now.since(since) >= settings.dead_after.times(times)
     }
 
-    /// The neighbour has asked for a sign of life.
-    pub(crate) const fn owe_heartbeat(&mut self) {
-        self.signs.answer = true;
-    }
-
-    /// A heartbeat that is owed: to which node, and whether it asks for one in return.
-    pub(crate) fn take_heartbeat(&mut self) -> Option<(u16, bool)> {
+    /// A heartbeat that is owed: to which node, the number of its question and that of the one it answers.
+    pub(crate) fn take_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let Signs { ask, answer } = core::mem::take(&mut self.signs);
-        ((ask || answer) && self.node != 0).then_some((self.node, ask))
+        if !(ask || answer != 0) || self.node == 0 {
+            return None;
+        }
+        let question = if ask { self.liveness.ask(now) } else { 0 };
+        Some((self.node, question, answer))
     }
 
     /// Owes a hello to the candidate `distance` nodes away, which may be one that asks.

@@ -1,7 +1,9 @@
 //! What one node tells another about the chain as it sees it.
 
-use super::parts::{MessageError, PassId, ViewBody, read, write};
+use super::parts::{MessageError, read, write};
 use super::tag;
+use crate::mission::MAX_RELAYS;
+use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 
 /// What one node tells another about the chain as it sees it.
@@ -14,8 +16,8 @@ use crate::wire::digest::MissionId;
 pub struct Hello {
     /// [`digest`](crate::wire::digest::digest) of the sender's mission, as it was loaded.
     pub mission: u16,
-    /// The largest number of a view that the sender has heard of.
-    pub newest: u16,
+    /// The latest view that the sender has heard of.
+    pub newest: ViewId,
     /// The node that it takes for its neighbour on this side; 0 for none.
     pub neighbour: u16,
     /// Whether it asks for a hello in return.
@@ -26,46 +28,58 @@ pub struct Hello {
     pub fresh: bool,
     /// Whether it can hear a node on its other side, or needs none there.
     pub ready: bool,
+    /// The nodes on this side that it hears, bit 0 for the nearest: 0 to 15.
+    pub hears: u8,
     /// The newest mission that it holds.
     pub holds: MissionId,
     /// Whether that is the one it flies.
     pub flies: bool,
 }
 
+type Word = [u8; 2];
+
 impl Hello {
-    /// The neighbour; digest and version of what it holds; flags from bit 0: asks for a hello, asks for a new view, fresh, ready,
-    /// flies what it holds.
+    /// The mission; the newest view; the neighbour; digest and version of what it holds; whom it hears; flags from bit 0: asks for
+    /// a hello, asks for a new view, fresh, ready, flies what it holds.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let flags = [self.ask, self.form, self.fresh, self.ready, self.flies]
             .into_iter()
             .rev()
-            .fold(0, |flags, flag| flags << 1 | u8::from(flag));
-        let body = ViewBody::new(
-            PassId::new(self.newest, self.mission),
-            [self.neighbour, 0, self.holds.digest, self.holds.version],
-            flags,
-        );
-        write(&(tag::HELLO, body), buffer)
+            .fold(0_u8, |flags, flag| flags << 1 | u8::from(flag));
+        let [digest, version] = [self.holds.digest, self.holds.version].map(u16::to_le_bytes);
+        let newest = self.newest.bits().to_le_bytes();
+        let near = [self.mission, self.neighbour].map(u16::to_le_bytes);
+        write(
+            &(tag::HELLO, near, newest, [digest, version], [self.hears, flags]),
+            buffer,
+        )
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        Self::checked(read(body)?).ok_or(MessageError::Value)
-    }
-
-    fn checked(body: ViewBody) -> Option<Self> {
-        let (neighbour, 0, held, flags @ 0..=0x1F) = body.parts()? else {
-            return None;
-        };
-        Some(Self {
-            mission: body.pass.mission(),
-            newest: body.pass.number(),
+        let ([mission, neighbour], newest, [digest, version], [hears, flags]): (
+            [Word; 2],
+            [u8; 4],
+            [Word; 2],
+            [u8; 2],
+        ) = read(body)?;
+        let neighbour = u16::from_le_bytes(neighbour);
+        if neighbour > MAX_RELAYS || hears > 0x0F || flags > 0x1F {
+            return Err(MessageError::Value);
+        }
+        Ok(Self {
+            mission: u16::from_le_bytes(mission),
+            newest: ViewId::from_bits(u32::from_le_bytes(newest)),
             neighbour,
             ask: flags & 1 != 0,
             form: flags & 2 != 0,
             fresh: flags & 4 != 0,
             ready: flags & 8 != 0,
             flies: flags & 16 != 0,
-            holds: body.mission_id(held),
+            hears,
+            holds: MissionId {
+                version: u16::from_le_bytes(version),
+                digest: u16::from_le_bytes(digest),
+            },
         })
     }
 }

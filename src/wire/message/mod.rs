@@ -10,6 +10,7 @@ mod hello;
 #[cfg(feature = "upload")]
 mod offer;
 mod parts;
+mod pulse;
 mod sweep;
 mod tag;
 mod turn;
@@ -18,9 +19,10 @@ mod view;
 pub use self::course::{Course, Worth};
 pub use self::hello::Hello;
 pub use self::parts::MessageError;
+pub use self::pulse::{Pulse, Pulsed};
 pub use self::sweep::{Answer, Sweep};
 pub use self::turn::{AdjustStep, Moved, Token};
-pub use self::view::{Decision, PriorView, Proposal};
+pub use self::view::{Decision, Poll, Proposal, Successor};
 
 use self::parts::{read, write};
 #[cfg(feature = "upload")]
@@ -42,12 +44,14 @@ pub enum Message {
         /// The number of the pass.
         sweep: u16,
     },
-    /// Either way: a sign of life from a link that would be silent otherwise.
+    /// Either way: a question whether the other one is there, an answer to one, or both.
     Heartbeat {
         /// The sender's mission digest, so that a wrong configuration shows before take-off.
         mission: u16,
-        /// Whether the sender asks for a heartbeat in return.
-        answer: bool,
+        /// The number of the sender's question, 0 for none.
+        ask: u16,
+        /// The number of the question that it answers, 0 for none.
+        answer: u16,
     },
     /// Onward: where the sender would be in each of a few trials.
     Course(Course),
@@ -57,6 +61,10 @@ pub enum Message {
     Token(Token),
     /// Back: who has moved where.
     Moved(Moved),
+    /// Onward: the leader of the view still holds it.
+    Pulse(Pulse),
+    /// Back: so do all that the pulse has come to.
+    Pulsed(Pulsed),
     /// Either way, also to nodes that are no neighbours: who the sender takes for its neighbour, and which view it holds.
     Hello(Hello),
     /// Onward: who is there, for a new view of the chain.
@@ -83,6 +91,8 @@ impl Message {
             Self::Verdict(answer) => Some(answer.mission),
             Self::Busy { .. } => None,
             Self::Heartbeat { mission, .. } | Self::Fence { mission, .. } => Some(*mission),
+            Self::Pulse(pulse) => Some(pulse.mission),
+            Self::Pulsed(pulsed) => Some(pulsed.mission),
             Self::Course(course) => Some(course.mission),
             Self::Worth(worth) => Some(worth.mission),
             Self::Token(token) => Some(token.mission),
@@ -105,11 +115,13 @@ impl Message {
                 | Self::Worth(_)
                 | Self::Token(_)
                 | Self::Moved(_)
+                | Self::Pulse(_)
+                | Self::Pulsed(_)
         )
     }
 
-    /// Whether it is said of the call for a view: then its digest is that of the mission to be flown in it.
-    pub(crate) const fn is_of_a_call(&self) -> bool {
+    /// Whether it is said of a proposal: then its digest is that of the mission to be flown in it.
+    pub(crate) const fn is_of_a_proposal(&self) -> bool {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
@@ -117,7 +129,11 @@ impl Message {
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,
-            Self::Sweep(_) | Self::Course(_) | Self::Token(_) | Self::Proposal(_)
+            Self::Sweep(_)
+                | Self::Course(_)
+                | Self::Token(_)
+                | Self::Proposal(_)
+                | Self::Pulse(_)
         )
     }
 }
@@ -129,9 +145,16 @@ impl Message {
             Self::Sweep(sweep) => sweep.encode(buffer),
             Self::Verdict(answer) => answer.encode(buffer),
             Self::Busy { sweep } => write(&(tag::BUSY, sweep.to_le_bytes()), buffer),
-            Self::Heartbeat { mission, answer } => {
-                write(&(tag::HEARTBEAT, mission.to_le_bytes(), answer), buffer)
+            Self::Heartbeat {
+                mission,
+                ask,
+                answer,
+            } => {
+                let numbers = [*mission, *ask, *answer].map(u16::to_le_bytes);
+                write(&(tag::HEARTBEAT, numbers), buffer)
             }
+            Self::Pulse(pulse) => pulse.encode(buffer),
+            Self::Pulsed(pulsed) => pulsed.encode(buffer),
             Self::Course(course) => course.encode(buffer),
             Self::Worth(worth) => worth.encode(buffer),
             Self::Token(token) => token.encode(buffer),
@@ -168,12 +191,15 @@ impl Message {
                 sweep: u16::from_le_bytes(read(body)?),
             }),
             tag::HEARTBEAT => {
-                let (mission, answer) = read(body)?;
+                let [mission, ask, answer]: [[u8; 2]; 3] = read(body)?;
                 Ok(Self::Heartbeat {
                     mission: u16::from_le_bytes(mission),
-                    answer,
+                    ask: u16::from_le_bytes(ask),
+                    answer: u16::from_le_bytes(answer),
                 })
             }
+            tag::PULSE => Pulse::decode(body).map(Self::Pulse),
+            tag::PULSED => Pulsed::decode(body).map(Self::Pulsed),
             tag::COURSE => Course::decode(body).map(Self::Course),
             tag::WORTH => Worth::decode(body).map(Self::Worth),
             tag::TOKEN => Token::decode(body).map(Self::Token),

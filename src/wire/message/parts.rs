@@ -3,10 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::mission::{MAX_RELAYS, Profile};
+use crate::mission::Profile;
 use crate::optimiser::PerTarget;
 use crate::place::Placement;
-use crate::wire::digest::MissionId;
 
 /// Writes `body` to the start of `buffer`, and how many bytes it takes; `None` if it does not fit.
 pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
@@ -86,48 +85,6 @@ impl PlaceBody {
     pub(super) fn checked(self) -> Option<Placement> {
         let place = Placement::on_line(self.x_m, self.altitude_m);
         is_place(place).then_some(place)
-    }
-}
-
-/// The wire form of a hello, a proposal or a decision: a view's number, four numbers and a byte of flags. What the numbers mean
-/// depends, and those that mean nothing are 0.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-pub(super) struct ViewBody {
-    /// The number is that of a view.
-    pub(super) pass: PassId,
-    one: [u8; 2],
-    other: [u8; 2],
-    more: [u8; 2],
-    version: [u8; 2],
-    flags: u8,
-}
-
-impl ViewBody {
-    pub(super) const fn new(pass: PassId, numbers: [u16; 4], flags: u8) -> Self {
-        let [one, other, more, version] = numbers;
-        Self {
-            pass,
-            one: one.to_le_bytes(),
-            other: other.to_le_bytes(),
-            more: more.to_le_bytes(),
-            version: version.to_le_bytes(),
-            flags,
-        }
-    }
-
-    /// The numbers, of which the first two are of relays, the third one of a view or a digest, and the flags.
-    pub(super) fn parts(self) -> Option<(u16, u16, u16, u8)> {
-        let one = u16::from_le_bytes(self.one);
-        let other = u16::from_le_bytes(self.other);
-        let more = u16::from_le_bytes(self.more);
-        (one <= MAX_RELAYS && other <= MAX_RELAYS).then_some((one, other, more, self.flags))
-    }
-
-    pub(super) const fn mission_id(self, digest: u16) -> MissionId {
-        MissionId {
-            version: u16::from_le_bytes(self.version),
-            digest,
-        }
     }
 }
 

@@ -16,3 +16,5 @@ pub(super) const DECISION: u8 = 12;
 pub(super) const FENCE: u8 = 13;
 #[cfg(feature = "upload")]
 pub(super) const OFFER: u8 = 14;
+pub(super) const PULSE: u8 = 15;
+pub(super) const PULSED: u8 = 16;

@@ -1,116 +1,237 @@
-//! The call for a new view of the chain, and what came of it, which travels back.
+//! The proposal of a new view of the chain, and the decision on it, which travels back.
 
-use super::parts::{MessageError, PassId, ViewBody, read, write};
+use serde::{Deserialize, Serialize};
+
+use super::parts::{MessageError, read, write};
 use super::tag;
+use crate::mission::MAX_RELAYS;
+use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 
-/// The call for a new view, as one relay hands it to the next.
+/// The proposal of a new view, as one relay hands it to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {
     /// The mission that the view is to fly: the one that every relay up to the sender holds.
     pub mission_id: MissionId,
-    /// The number of the new view, above that of every agreed one.
-    pub view: u16,
+    /// The new view, after every one that its proposer has heard of.
+    pub view: ViewId,
     /// How many relays it has come through, the sender included: 1 to 1000.
     pub place: u16,
-    /// The newest view that any of them has agreed to.
-    pub before: PriorView,
+    /// What it has gathered from them.
+    pub poll: Poll,
+}
+
+/// What a proposal has gathered.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Poll {
+    /// The newest view that any relay on the way knows to be agreed on.
+    pub agreed: View,
+    /// How many of its members were on the way, 0 to 1000.
+    pub votes: u16,
+    /// Whether one of them is the one that proposed it: of two halves, theirs is the larger.
+    pub proposer: bool,
+    /// How long members of it that are elsewhere may still hold it, in tenths of a second.
+    pub lease_left: u16,
+    /// The latest successor of it that a member has accepted, which may have been agreed on.
+    pub successor: Option<Successor>,
+}
+
+impl Poll {
+    /// Of the members of `agreed`, before any has been asked.
+    pub(crate) const fn of(agreed: View) -> Self {
+        Self {
+            agreed,
+            votes: 0,
+            proposer: false,
+            lease_left: u16::MAX,
+            successor: None,
+        }
+    }
+}
+
+/// A view that was decided on, and may have been agreed on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Successor {
+    /// The proposal that the decision was on.
+    pub proposal: ViewId,
+    /// The view: the one proposed, or one that was found to be decided on before.
+    pub view: View,
+}
+
+/// What came of a proposal, as it travels back.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Decision {
+    /// The mission that was proposed.
+    pub mission_id: MissionId,
+    /// The view that was proposed.
+    pub proposal: ViewId,
+    /// The sender's place, from 1 at the one that has proposed: 1 to 1000.
+    pub place: u16,
+    /// The view to be accepted: the one proposed, or one that was decided on before; `None` if too few members are there.
+    pub view: Option<View>,
+    /// How long its places are not to be taken, for the sake of members of the view before that are elsewhere, in tenths of a second.
+    pub lease_left: u16,
+}
+
+type Word = [u8; 2];
+
+/// A mission, a proposal and a place.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct CallBody {
+    digest: Word,
+    version: Word,
+    proposal: [u8; 4],
+    place: Word,
+}
+
+impl CallBody {
+    const fn new(mission_id: MissionId, proposal: ViewId, place: u16) -> Self {
+        Self {
+            digest: mission_id.digest.to_le_bytes(),
+            version: mission_id.version.to_le_bytes(),
+            proposal: proposal.bits().to_le_bytes(),
+            place: place.to_le_bytes(),
+        }
+    }
+
+    /// The numbers, if they are in range.
+    fn checked(self) -> Option<(MissionId, ViewId, u16)> {
+        let mission_id = MissionId {
+            version: u16::from_le_bytes(self.version),
+            digest: u16::from_le_bytes(self.digest),
+        };
+        let proposal = ViewId::from_bits(u32::from_le_bytes(self.proposal));
+        let place = u16::from_le_bytes(self.place);
+        let known = is_proposed(proposal) && is_size(place);
+        known.then_some((mission_id, proposal, place))
+    }
+}
+
+/// A view and its size.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct SizedBody {
+    id: [u8; 4],
+    relays: Word,
+}
+
+impl SizedBody {
+    const fn of(view: View) -> Self {
+        Self {
+            id: view.id.bits().to_le_bytes(),
+            relays: view.relays.to_le_bytes(),
+        }
+    }
+
+    fn view(self) -> View {
+        View {
+            id: ViewId::from_bits(u32::from_le_bytes(self.id)),
+            relays: u16::from_le_bytes(self.relays),
+        }
+    }
+}
+
+/// Whether a node can have proposed that.
+fn is_proposed(id: ViewId) -> bool {
+    is_size(id.proposer()) && id.number() > 0
+}
+
+fn is_size(relays: u16) -> bool {
+    (1..=MAX_RELAYS).contains(&relays)
 }
 
 impl Proposal {
-    /// The sender's place; size and number of the view before; version of the mission; whether its leader is there.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        let before = self.before;
-        let body = ViewBody::new(
-            PassId::new(self.view, self.mission_id.digest),
-            [
-                self.place,
-                before.relays,
-                before.view,
-                self.mission_id.version,
-            ],
-            u8::from(before.leader),
-        );
-        write(&(tag::PROPOSAL, body), buffer)
+        let Poll {
+            agreed,
+            votes,
+            proposer,
+            lease_left,
+            successor,
+        } = self.poll;
+        let successor = successor.map(|successor| {
+            let proposal = successor.proposal.bits().to_le_bytes();
+            (proposal, SizedBody::of(successor.view))
+        });
+        let call = CallBody::new(self.mission_id, self.view, self.place);
+        let numbers = [votes.to_le_bytes(), lease_left.to_le_bytes()];
+        let agreed = SizedBody::of(agreed);
+        write(
+            &(tag::PROPOSAL, call, agreed, numbers, proposer, successor),
+            buffer,
+        )
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        Self::checked(read(body)?).ok_or(MessageError::Value)
-    }
-
-    fn checked(body: ViewBody) -> Option<Self> {
-        let (place @ 1.., relays @ 1.., view, leader @ 0..=1) = body.parts()? else {
-            return None;
+        let (call, agreed, [votes, lease_left], proposer, successor): Body = read(body)?;
+        let agreed: View = SizedBody::view(agreed);
+        let successor = successor.map(|(proposal, view)| Successor {
+            proposal: ViewId::from_bits(u32::from_le_bytes(proposal)),
+            view: view.view(),
+        });
+        let poll = Poll {
+            agreed,
+            votes: u16::from_le_bytes(votes),
+            proposer,
+            lease_left: u16::from_le_bytes(lease_left),
+            successor,
         };
-        Some(Self {
-            mission_id: body.mission_id(body.pass.mission()),
-            view: body.pass.number(),
+        let known = (agreed.id == ViewId::LOADED || is_proposed(agreed.id))
+            && is_size(agreed.relays)
+            && poll.votes <= agreed.relays
+            && successor.is_none_or(|successor| {
+                is_proposed(successor.proposal)
+                    && is_proposed(successor.view.id)
+                    && is_size(successor.view.relays)
+            });
+        let (mission_id, view, place) = call
+            .checked()
+            .filter(|_| known)
+            .ok_or(MessageError::Value)?;
+        Ok(Self {
+            mission_id,
+            view,
             place,
-            before: PriorView {
-                view,
-                relays,
-                leader: leader == 1,
-            },
+            poll,
         })
     }
 }
 
-/// A view of the chain that a new one follows.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct PriorView {
-    /// Its number; 0 is the chain as the mission has it.
-    pub view: u16,
-    /// How many relays were in it, 1 to 1000.
-    pub relays: u16,
-    /// Whether its leader is among those that the call has come through.
-    pub leader: bool,
-}
-
-/// What came of the call for a new view, as it travels back.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Decision {
-    /// The mission that the view flies.
-    pub mission_id: MissionId,
-    /// The number of the view.
-    pub view: u16,
-    /// The sender's place, from 1 at the one that has called: 1 to 1000.
-    pub place: u16,
-    /// How many relays there are, 1 to 1000; `None` if they are too few to go on without the others.
-    pub relays: Option<u16>,
-}
+type Body = (
+    CallBody,
+    SizedBody,
+    [Word; 2],
+    bool,
+    Option<([u8; 4], SizedBody)>,
+);
 
 impl Decision {
-    /// The sender's place; how many relays, 0 for too few; version of the mission.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        let body = ViewBody::new(
-            PassId::new(self.view, self.mission_id.digest),
-            [
-                self.place,
-                self.relays.unwrap_or(0),
-                0,
-                self.mission_id.version,
-            ],
-            0,
-        );
-        write(&(tag::DECISION, body), buffer)
+        let call = CallBody::new(self.mission_id, self.proposal, self.place);
+        let view = self.view.map(SizedBody::of);
+        write(
+            &(tag::DECISION, call, view, self.lease_left.to_le_bytes()),
+            buffer,
+        )
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        Self::checked(read(body)?).ok_or(MessageError::Value)
-    }
-
-    fn checked(body: ViewBody) -> Option<Self> {
-        let (place @ 1.., relays, 0, 0) = body.parts()? else {
-            return None;
-        };
-        Some(Self {
-            mission_id: body.mission_id(body.pass.mission()),
-            view: body.pass.number(),
+        let (call, view, lease_left): (CallBody, Option<SizedBody>, Word) = read(body)?;
+        let view = view.map(SizedBody::view);
+        let known = view.is_none_or(|view| is_proposed(view.id) && is_size(view.relays));
+        let (mission_id, proposal, place) = call
+            .checked()
+            .filter(|_| known)
+            .ok_or(MessageError::Value)?;
+        Ok(Self {
+            mission_id,
+            proposal,
             place,
-            relays: (relays > 0).then_some(relays),
+            view,
+            lease_left: u16::from_le_bytes(lease_left),
         })
     }
 }

@@ -145,7 +145,7 @@ fn targets(outcome: &Outcome) -> impl Iterator<Item = u32> {
 
 /// How many views of the chain anybody agreed to.
 fn formed(outcome: &Outcome) -> u64 {
-    let views: BTreeSet<u16> = outcome
+    let views: BTreeSet<u32> = outcome
         .moments
         .iter()
         .filter_map(|moment| match moment.what {

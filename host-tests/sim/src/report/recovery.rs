@@ -13,7 +13,7 @@ use crate::simulator::outcome::{Moment, Turning};
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RecoveryReport {
     /// The number of the view.
-    pub view: u16,
+    pub view: u32,
     /// How many relays it has.
     pub relays: u16,
     /// The relays that are in it no more.
@@ -44,7 +44,7 @@ pub struct RecoveryReport {
 
 /// A view that all its relays have agreed to.
 struct View {
-    number: u16,
+    number: u32,
     members: BTreeSet<u16>,
     /// Where in the story its first relay agreed, and the last.
     span: (usize, usize),
@@ -94,7 +94,7 @@ pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport>
 }
 
 fn views(moments: &[Moment]) -> Vec<View> {
-    let mut views: BTreeMap<u16, (u16, View)> = BTreeMap::new();
+    let mut views: BTreeMap<u32, (u16, View)> = BTreeMap::new();
     for (place, moment) in moments.iter().enumerate() {
         if let Turning::Reformed { view, relays, .. } = moment.what {
             let (_, known) = views.entry(view).or_insert_with(|| {

@@ -28,7 +28,7 @@ pub struct MomentReport {
     pub other: Option<u16>,
     /// Number of the view that was formed.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub view: Option<u16>,
+    pub view: Option<u32>,
     /// How many relays it has.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relays: Option<u16>,

@@ -207,7 +207,7 @@ impl Chain {
                 killed: member.killed,
                 index: member.relay.index(),
                 relays: member.relay.mission().relays(),
-                view: member.relay.view(),
+                view: member.relay.view().number(),
                 version: member.relay.version(),
             })
             .collect();

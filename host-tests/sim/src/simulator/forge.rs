@@ -8,7 +8,8 @@ use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::digest::{MissionId, digest};
 use uav_relay::wire::frame::{self, HEADER, Header, MAX_FRAME};
-use uav_relay::wire::message::{Decision, Hello, Message, PriorView, Proposal};
+use uav_relay::wire::message::{Decision, Hello, Message, Poll, Proposal};
+use uav_relay::{View, ViewId};
 use uav_relay::{
     Auth, Identity, Instant, Interference, Interferer, Key, Mission, MissionConfig, Relay,
     Settings, Upload, Wiring,
@@ -123,11 +124,17 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
 fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let digest = digest(mission);
     let mission_id = MissionId { version: 0, digest };
-    let view = rng.random_range(1..=40);
+    let view = ViewId::from_bits(rng.random_range(1..=40) << 10 | u32::from(way.from.clamp(1, 1000)));
+    let loaded = View {
+        id: ViewId::LOADED,
+        relays: mission.relays(),
+    };
+    let place = rng.random_range(1..=mission.relays());
     let message = match (rng.random_range(0..6), better(mission, rng)) {
         (0, _) => Message::Heartbeat {
             mission: digest,
-            answer: true,
+            ask: rng.random(),
+            answer: rng.random(),
         },
         (1, _) => Message::Busy {
             sweep: rng.random(),
@@ -140,27 +147,32 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
             form: true,
             fresh: rng.random(),
             ready: true,
+            hears: 0x0F,
             holds: mission_id,
             flies: true,
         }),
         (3, _) => Message::Proposal(Proposal {
             mission_id,
             view,
-            place: rng.random_range(1..=mission.relays()),
-            before: PriorView {
-                view: 0,
-                relays: mission.relays(),
-                leader: true,
+            place,
+            poll: Poll {
+                agreed: loaded,
+                votes: place,
+                proposer: true,
+                lease_left: 0,
+                successor: None,
             },
         }),
         (4, Some(offer)) => Message::Offer(offer),
         _ => Message::Decision(Decision {
             mission_id,
-            view,
-            place: rng.random_range(1..=mission.relays()),
-            relays: rng
-                .random::<bool>()
-                .then(|| rng.random_range(1..=mission.relays())),
+            proposal: view,
+            place,
+            view: rng.random::<bool>().then_some(View {
+                id: view,
+                relays: rng.random_range(1..=mission.relays()),
+            }),
+            lease_left: 0,
         }),
     };
     let mut frame = [0; MAX_FRAME];

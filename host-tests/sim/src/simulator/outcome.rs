@@ -21,7 +21,7 @@ pub enum Turning {
     /// It agreed to a new view: its number, its place there, how many relays there are, and what they fly.
     Reformed {
         /// Number of the view.
-        view: u16,
+        view: u32,
         /// The relay's place, from 1 at Tx.
         index: u16,
         /// How many relays.
@@ -99,7 +99,7 @@ pub struct RelayEnd {
     /// How many relays there are.
     pub relays: u16,
     /// Number of the view.
-    pub view: u16,
+    pub view: u32,
     /// Version of the mission that it flies.
     pub version: u16,
 }

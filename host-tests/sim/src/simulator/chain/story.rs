@@ -33,7 +33,7 @@ impl Chain {
                     // What Algorithm 2 had come to was another chain's.
                     self.outcome.rounds.clear();
                     let what = Turning::Reformed {
-                        view: member.relay.view(),
+                        view: member.relay.view().number(),
                         index: member.relay.index(),
                         relays: member.relay.mission().relays(),
                         version: member.relay.version(),

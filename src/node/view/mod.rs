@@ -1,7 +1,7 @@
 //! The view change: how the chain comes to a new view of who is in it.
 //!
 //! A *view* is the chain as it was agreed on last: how many relays there are, and the place of each. View 0 is the chain as the
-//! mission has it. Every pass bears its view's number in its digest, so none is taken up in another view. When a relay finds
+//! mission has it. Every pass bears its view in its digest, so none is taken up in another view. When a relay finds
 //! somebody else beside it than in its view, or gets a pass that it cannot take part in, it asks toward the leader for a new
 //! one, hop by hop, until it comes. The leader is whoever has nobody before it: it proposes the view, the proposal goes onward and
 //! counts who is there, and the decision travels back.
@@ -13,25 +13,35 @@
 //! | no pass for a while after it was switched on | asks for a view |
 //! | a hello that asks, of a neighbour that knows as new a view, or has just been switched on | asks for a view |
 //! | a newer mission than the one it flies | asks for a view, which flies it if all hold it |
-//! | a proposal, when it is the last | decides: more than half of the view before, or half with its leader, are a chain |
+//! | a proposal, when it is the last | decides, by the rules of [`electorate`] |
+//! | the lease of its view has run out, or a view was refused | asks for a view, less and less often |
 //!
-//! | state | a newer proposal comes | the same again | the decision comes | nobody is after it any more |
+//! | state | a newer proposal comes | the same again | the decision comes | nobody is after it any more, and nobody was handed it |
 //! | --- | --- | --- | --- | --- |
 //! | `Settled` | hand on: `Proposed` | - | stale | - |
 //! | `Proposed` | hand on | say busy | hand back: `Decided` | decide: `Decided` |
 //! | `Decided` | hand on: `Proposed` | hand back again | stale | - |
-//! | `NoQuorum` (leader) | hand on: `Proposed` | - | stale | - |
 //!
-//! While a view is proposed no pass goes on. One that was decided against leaves the places where they are.
+//! While a view is proposed no pass goes on. One that was refused leaves the places where they are; its leader proposes again every
+//! `probe_after`.
+
+pub(crate) mod electorate;
 
 use super::context::{Context, Decided, Effects, Proposer};
 use super::numbering::Stragglers;
 use super::retransmit::{Retransmit, Trip};
 use super::timing::{PAUSE, earliest};
+use crate::jitter::Jitter;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
+use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
-use crate::wire::message::{Decision, Message, PriorView, Proposal};
+use crate::wire::message::{Decision, Message, Poll, Proposal};
+
+use electorate::{Electorate, Outcome};
+
+/// How far ahead of all it has heard of a view may be that a relay hears of.
+const LEAP: u32 = 256;
 
 /// Where the view change is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -39,22 +49,23 @@ enum ViewState {
     Settled,
     Proposed,
     Decided,
-    NoQuorum,
 }
 
 /// A proposal, as one relay sees it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Proposed {
-    /// Number of the new view.
-    pub(crate) view: u16,
+    /// The new view.
+    pub(crate) view: ViewId,
     /// The mission that it is to fly.
     pub(crate) mission_id: MissionId,
     /// This relay's place in it, from 1 at the leader.
     pub(crate) place: u16,
-    /// The newest view that a relay up to this one has agreed to.
-    before: PriorView,
-    /// How many relays there are, once that is known; `None` if too few.
-    relays: Option<u16>,
+    /// What it has gathered, this relay's voice included.
+    poll: Poll,
+    handed_on: bool,
+    /// What was decided on, once that is known; `None` if too few are there.
+    decided: Option<View>,
+    lease_left: u16,
 }
 
 /// What is to be sent.
@@ -70,28 +81,36 @@ struct ViewDue {
 pub(crate) struct ViewChange {
     state: ViewState,
     proposed: Option<Proposed>,
-    /// The largest number of a view heard of.
-    newest: u16,
+    electorate: Electorate,
+    /// The latest view heard of.
+    newest: ViewId,
     /// Whether this relay asks for a new view, and how often it has since.
     asks: bool,
     tries: u8,
     ask_at: Option<Instant>,
+    /// Whether the last decision was that too few are there.
+    refused: bool,
     stragglers: Stragglers,
     retransmit: Retransmit,
+    jitter: Jitter,
     due: ViewDue,
 }
 
 impl ViewChange {
-    pub(crate) const fn new(seed: u32) -> Self {
+    /// Of a chain of so many relays, led by node `elder`.
+    pub(crate) const fn new(relays: u16, elder: u16, seed: u32) -> Self {
         Self {
+            electorate: Electorate::new(relays, elder),
             state: ViewState::Settled,
             proposed: None,
-            newest: 0,
+            newest: ViewId::LOADED,
             asks: false,
             tries: 0,
             ask_at: None,
+            refused: false,
             stragglers: Stragglers::NONE,
             retransmit: Retransmit::new(seed),
+            jitter: Jitter::new(seed),
             due: ViewDue {
                 proposal: false,
                 decision: false,
@@ -100,15 +119,23 @@ impl ViewChange {
         }
     }
 
-    /// The largest number of a view heard of.
-    pub(crate) const fn newest(&self) -> u16 {
+    /// The latest view heard of.
+    pub(crate) const fn newest(&self) -> ViewId {
         self.newest
     }
 
-    /// A view of this number is known to somebody.
-    pub(crate) const fn heard_of(&mut self, view: u16) {
-        if view > self.newest {
+    /// Somebody knows that view. One too far ahead is not believed: it could be the last there can be.
+    pub(crate) fn heard_of(&mut self, view: ViewId) {
+        let near = view.number() <= self.newest.number().saturating_add(LEAP);
+        if view > self.newest && near {
             self.newest = view;
+        }
+    }
+
+    /// What was agreed on in `view`, the one accepted last, has come: all have accepted it.
+    pub(crate) fn commit(&mut self, view: ViewId) {
+        if self.electorate.awaits(view) {
+            self.electorate.commit();
         }
     }
 
@@ -146,9 +173,18 @@ impl ViewChange {
         self.proposed
     }
 
-    /// Whether this relay leads a part of the chain that is too small.
-    pub(crate) fn has_no_quorum(&self) -> bool {
-        self.state == ViewState::NoQuorum
+    /// Whether this relay is in a part of the chain that is too small.
+    pub(crate) const fn has_no_quorum(&self) -> bool {
+        self.refused
+    }
+
+    /// The relay that a proposal was handed on to is not there any more: what comes of it can not be known. A later one can be.
+    pub(crate) fn abandon(&mut self, context: &Context<'_>) -> Effects {
+        if let Some(later) = self.newest.next_by(context.member.node) {
+            self.heard_of(later);
+        }
+        self.ask(context.now);
+        Effects::NONE
     }
 
     /// A proposal or a decision from the neighbour before or after, of a mission that this relay holds.
@@ -159,7 +195,7 @@ impl ViewChange {
             Message::Proposal(proposal) if proposal.place < all => {
                 self.on_proposal(context, proposal)
             }
-            Message::Decision(decision) if decision.relays.is_none_or(|relays| relays <= all) => {
+            Message::Decision(decision) if decision.view.is_none_or(|view| view.relays <= all) => {
                 self.on_decision(context, decision)
             }
             _ => Effects::STALE,
@@ -188,70 +224,60 @@ impl ViewChange {
                 ..from
             };
         }
-        let agreed = context.member.view;
-        let newest = self
-            .awaited()
-            .map_or(agreed, |known| known.view.max(agreed));
-        if proposal.view <= newest {
-            // Late, or from a leader that has missed something.
-            if self.stragglers.one_more() {
-                // Whoever proposes has to take a higher number.
-                self.heard_of(self.newest.saturating_add(1));
-                return Effects {
-                    proposed_by: from.proposed_by,
-                    ..Effects::FOREIGN
-                };
-            }
-            return Effects {
-                stale: true,
-                ..from
-            };
-        }
-        let before = Some(proposal.before);
+        let told = Some(proposal.poll);
         let effects = self.propose(
             context,
             proposal.view,
             proposal.mission_id,
             proposal.place,
-            before,
+            told,
         );
+        if let Some(effects) = effects {
+            return Effects {
+                proposed_by: from.proposed_by,
+                ..effects
+            };
+        }
+        // Late, or from a leader that has missed something.
+        if self.stragglers.one_more() {
+            // Whoever proposes has to take a later one.
+            if let Some(later) = self.newest.next_by(context.member.node) {
+                self.heard_of(later);
+            }
+            return Effects {
+                proposed_by: from.proposed_by,
+                ..Effects::FOREIGN
+            };
+        }
         Effects {
-            proposed_by: from.proposed_by,
-            ..effects
+            stale: true,
+            ..from
         }
     }
 
-    /// A proposal has come through `place` relays before this one.
+    /// A proposal has come through `place` relays before this one; `None` if a later one has.
     fn propose(
         &mut self,
         context: &Context<'_>,
-        view: u16,
+        view: ViewId,
         mission_id: MissionId,
         place: u16,
-        before: Option<PriorView>,
-    ) -> Effects {
-        let mission = &context.member.mission;
-        let known = PriorView {
-            view: context.member.view,
-            relays: mission.relays(),
-            leader: context.member.index == mission.leader(),
-        };
-        let before = match before {
-            Some(told) if told.view > known.view => told,
-            Some(told) if told.view == known.view => PriorView {
-                leader: told.leader || known.leader,
-                ..told
-            },
-            _ => known,
-        };
+        told: Option<Poll>,
+    ) -> Option<Effects> {
+        let node = context.member.node;
+        let poll = self
+            .electorate
+            .vote(node, view, told, context.lease_left)?;
         self.state = ViewState::Proposed;
         self.stragglers = Stragglers::NONE;
         self.proposed = Some(Proposed {
             view,
             mission_id,
             place: place.saturating_add(1),
-            before,
-            relays: None,
+            poll,
+            handed_on: false,
+            decided: None,
+            lease_left: 0,
         });
         self.retransmit.heard();
         self.retransmit.stop();
@@ -262,10 +288,10 @@ impl ViewChange {
             self.due.proposal = true;
             Effects::NONE
         };
-        Effects {
+        Some(Effects {
             view_proposed: true,
             ..effects
-        }
+        })
     }
 
     /// The chain ends here: if a proposal has come so far, everybody is counted.
@@ -273,27 +299,51 @@ impl ViewChange {
         let Some(proposed) = self.awaited() else {
             return Effects::NONE;
         };
-        // Of two halves the one with the leader is the larger.
-        let there = 2 * u32::from(proposed.place) + u32::from(proposed.before.leader);
-        let enough = !context.member.settings.quorum || there > u32::from(proposed.before.relays);
-        self.conclude(context, enough.then_some(proposed.place))
+        if proposed.handed_on {
+            return self.abandon(context);
+        }
+        let Proposed {
+            view, place, poll, ..
+        } = proposed;
+        let outcome = if context.member.settings.quorum {
+            electorate::decide(&poll, view, place)
+        } else {
+            Outcome::View(View {
+                id: view,
+                relays: place,
+            })
+        };
+        let all = poll.votes == poll.agreed.relays;
+        let lease_left = if all { 0 } else { poll.lease_left };
+        let decided = match outcome {
+            Outcome::Refused => None,
+            Outcome::View(view) => Some(view),
+        };
+        self.conclude(context, decided, lease_left)
     }
 
     fn on_decision(&mut self, context: &Context<'_>, decision: &Decision) -> Effects {
         match self.awaited() {
             Some(proposed)
-                if proposed.view == decision.view
+                if proposed.view == decision.proposal
                     && proposed.mission_id == decision.mission_id
                     && proposed.place.saturating_add(1) == decision.place
-                    && decision.relays.is_none_or(|relays| relays > proposed.place) =>
+                    && decision.view.is_none_or(|view| {
+                        view.id != proposed.view || view.relays > proposed.place
+                    }) =>
             {
-                self.conclude(context, decision.relays)
+                self.conclude(context, decision.view, decision.lease_left)
             }
             _ => Effects::STALE,
         }
     }
 
-    fn conclude(&mut self, context: &Context<'_>, relays: Option<u16>) -> Effects {
+    fn conclude(
+        &mut self,
+        context: &Context<'_>,
+        decided: Option<View>,
+        lease_left: u16,
+    ) -> Effects {
         let Some(proposed) = &mut self.proposed else {
             return Effects::NONE;
         };
@@ -302,23 +352,42 @@ impl ViewChange {
             // A newer mission has taken its place since: the others come to hold that one, too.
             return Effects::FOREIGN;
         }
-        proposed.relays = relays;
+        let proposal = proposed.view;
+        if decided.is_some_and(|view| !self.electorate.accept(proposal, view)) {
+            return Effects::STALE;
+        }
+        proposed.decided = decided;
+        proposed.lease_left = lease_left;
         let leads = proposed.place == 1;
-        self.state = if relays.is_none() && leads {
-            ViewState::NoQuorum
-        } else {
-            ViewState::Decided
-        };
+        if leads && decided.is_some() {
+            // So have all the others.
+            self.electorate.commit();
+        }
+        self.state = ViewState::Decided;
+        self.refused = decided.is_none();
         self.retransmit.stop();
         self.due = ViewDue {
             decision: !leads,
             ..ViewDue::default()
         };
-        // Until somebody else is found there is nothing to ask again.
         self.asks = false;
         self.ask_at = None;
+        if leads && decided.is_none() {
+            // Somebody may be back who could not be heard.
+            self.asks = true;
+            let wait = context.member.settings.probe_after;
+            self.ask_at = Some(context.now + self.jitter.spread(wait));
+        }
+        let came = match decided {
+            Some(view) if view.id == proposal => Decided::Granted {
+                relays: view.relays,
+                lease_left,
+            },
+            Some(_) => Decided::Earlier,
+            None => Decided::Refused,
+        };
         Effects {
-            decided: Some(relays.map_or(Decided::Refused, Decided::Granted)),
+            decided: Some(came),
             ..Effects::NONE
         }
     }
@@ -327,7 +396,7 @@ impl ViewChange {
     pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
         let known = self
             .awaited()
-            .is_some_and(|proposed| proposed.view == number);
+            .is_some_and(|proposed| proposed.view.mark() == number);
         if known {
             // What is missing is the decision, and that may take its time.
             self.retransmit.heard();
@@ -381,11 +450,15 @@ impl ViewChange {
         let under_way = self.awaited().is_some_and(|proposed| {
             proposed.view >= self.newest && proposed.mission_id == context.latest
         });
-        let Some(view) = self.newest.checked_add(1).filter(|_| !under_way) else {
+        let newest = self.newest.max(self.electorate.promised());
+        let next = newest.next_by(context.member.node);
+        let Some(view) = next.filter(|_| !under_way) else {
             return Effects::NONE;
         };
         self.heard_of(view);
-        let effects = self.propose(context, view, context.latest, 0, None);
+        let Some(effects) = self.propose(context, view, context.latest, 0, None) else {
+            return Effects::NONE;
+        };
         Effects {
             began: true,
             proposed_by: Some(Proposer::Itself),
@@ -402,16 +475,18 @@ impl ViewChange {
 
     /// Whether the proposal is to be sent onward; it is taken for sent then.
     pub(crate) fn take_onward(&mut self, context: &Context<'_>) -> Option<Message> {
-        let proposed = self.awaited()?;
+        self.awaited()?;
         if !core::mem::take(&mut self.due.proposal) {
             return None;
         }
+        let proposed = self.proposed.as_mut()?;
+        proposed.handed_on = true;
         self.retransmit.sent(context.now, trip(context));
         Some(Message::Proposal(Proposal {
             mission_id: proposed.mission_id,
             view: proposed.view,
             place: proposed.place,
-            before: proposed.before,
+            poll: proposed.poll,
         }))
     }
 
@@ -421,13 +496,14 @@ impl ViewChange {
         if core::mem::take(&mut self.due.decision) && self.state != ViewState::Proposed {
             return Some(Message::Decision(Decision {
                 mission_id: proposed.mission_id,
-                view: proposed.view,
+                proposal: proposed.view,
                 place: proposed.place,
-                relays: proposed.relays,
+                view: proposed.decided,
+                lease_left: proposed.lease_left,
             }));
         }
         core::mem::take(&mut self.due.busy).then_some(Message::Busy {
-            sweep: proposed.view,
+            sweep: proposed.view.mark(),
         })
     }
 
@@ -445,127 +521,3 @@ const fn trip(context: &Context<'_>) -> Trip {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::{Proposed, ViewChange, ViewState};
-    use crate::mission::Mission;
-    use crate::mission::tests::paper;
-    use crate::node::context::{Context, Decided, Effects, Member, Proposer};
-    use crate::settings::Settings;
-    use crate::time::Instant;
-    use crate::wire::digest::MissionId;
-    use crate::wire::message::{Decision, Message, PriorView, Proposal};
-
-    /// Relay 2 of 3, which holds mission 4 and flies the one it was loaded with.
-    struct Second {
-        member: Member,
-        latest: MissionId,
-    }
-
-    impl Second {
-        fn new() -> Self {
-            let mission = Mission::try_new(paper(3)).unwrap();
-            Self {
-                member: Member::new(mission, Settings::default(), 2),
-                latest: MissionId {
-                    version: 4,
-                    digest: 0x1234,
-                },
-            }
-        }
-
-        fn context(&self) -> Context<'_> {
-            Context {
-                now: Instant::ZERO,
-                member: &self.member,
-                latest: self.latest,
-                end: false,
-                measured_per_w: None,
-            }
-        }
-
-        fn proposal(&self, view: u16) -> Message {
-            Message::Proposal(Proposal {
-                mission_id: self.latest,
-                view,
-                place: 1,
-                before: PriorView {
-                    view: 0,
-                    relays: 3,
-                    leader: true,
-                },
-            })
-        }
-    }
-
-    fn decision_on(view: u16, mission_id: MissionId) -> Message {
-        Message::Decision(Decision {
-            mission_id,
-            view,
-            place: 3,
-            relays: Some(3),
-        })
-    }
-
-    const FROM: Effects = Effects {
-        proposed_by: Some(Proposer::Neighbour),
-        ..Effects::NONE
-    };
-
-    /// The leader was switched on again in the midst of a proposal, and has been offered another mission.
-    #[test]
-    fn a_proposal_of_the_same_view_with_another_mission_is_another() {
-        let mut relay = Second::new();
-        let mut view = ViewChange::new(1);
-        let first = relay.proposal(1);
-        let proposed = Effects {
-            view_proposed: true,
-            ..FROM
-        };
-        assert_eq!(view.handle(&relay.context(), &first), proposed);
-        let repeated = Effects {
-            repeated: true,
-            ..FROM
-        };
-        assert_eq!(view.handle(&relay.context(), &first), repeated);
-        relay.latest.version = 5;
-        let stale = Effects {
-            stale: true,
-            ..FROM
-        };
-        let again = relay.proposal(1);
-        assert_eq!(view.handle(&relay.context(), &again), stale);
-    }
-
-    #[test]
-    fn a_decision_is_of_the_mission_that_was_proposed() {
-        let relay = Second::new();
-        let mut view = ViewChange::new(1);
-        view.handle(&relay.context(), &relay.proposal(1));
-        let other = MissionId {
-            version: 5,
-            ..relay.latest
-        };
-        let decision = decision_on(1, other);
-        assert_eq!(view.handle(&relay.context(), &decision), Effects::STALE);
-        let decided = Effects {
-            decided: Some(Decided::Granted(3)),
-            ..Effects::NONE
-        };
-        let decision = decision_on(1, relay.latest);
-        assert_eq!(view.handle(&relay.context(), &decision), decided);
-    }
-
-    /// A newer mission has taken the place of the one proposed: it cannot be flown any more.
-    #[test]
-    fn who_has_lost_the_mission_has_no_part_in_its_view() {
-        let mut relay = Second::new();
-        let mut view = ViewChange::new(1);
-        view.handle(&relay.context(), &relay.proposal(1));
-        let decision = decision_on(1, relay.latest);
-        relay.latest.version = 5;
-        assert_eq!(view.handle(&relay.context(), &decision), Effects::FOREIGN);
-        assert_eq!(view.state, ViewState::Proposed);
-        assert!(matches!(view.proposed, Some(Proposed { relays: None, .. })));
-    }
-}

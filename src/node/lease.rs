@@ -1,0 +1,314 @@
+//! The lease of a view: how long a relay may hold what was agreed on, by its own clock, before the others may fly something else.
+//!
+//! From the first agreement on the leader sends a *pulse* through the view, again and again. It goes onward to the last relay and back; one
+//! that has come back to the leader is over, and only then the next one begins. So the next one is the proof that all took part in the one
+//! before, and renews the lease.
+//!
+//! | who | what happens | what it does |
+//! | --- | --- | --- |
+//! | leader | it is time, and none is under way | a pulse: hand it on |
+//! | any | the next pulse | the lease counts from when it handed on the one before; hand it on |
+//! | any | the same again | say whether it has come back |
+//! | last | a pulse | it has come back: say so |
+//! | any | it has come back | say so; at the leader the lease counts from when it began, and the next one is due after a period |
+//! | any | the lease has run out | ask for a new view, and hold nothing that was agreed on |
+//!
+//! *Why it is safe.* Let all have taken part in pulse n, and relay r have handed it on at t: r holds the view until t + span. Any other
+//! relay q said that pulse n had come back not before t: nearer to the leader after r said so, farther from it after r had handed it on.
+//! Who votes for a view without members of this one says until when they may hold it, span after it last said so; that is never
+//! before r lets go.
+//!
+//! The span is `dead_after`, or four times as long as a pulse took lately and two periods, at most eight times `dead_after`: where many
+//! frames are lost a silence says less. The period is half of `probe_after`, or as long as a pulse takes.
+
+use super::context::{Context, Effects};
+use super::retransmit::{Retransmit, Trip};
+use super::timing::{PAUSE, earliest};
+use crate::mission::Heading;
+use crate::settings::Settings;
+use crate::time::{Duration, Instant};
+use crate::wire::message::{Message, Pulse, Pulsed};
+
+/// Of a lease.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum LeaseState {
+    /// Nothing has been agreed on in this view, or not all know it yet.
+    Open,
+    Until(Instant),
+    Lapsed,
+}
+
+/// What is to be sent.
+#[derive(Clone, Copy, Debug, Default)]
+struct LeaseDue {
+    onward: bool,
+    back: bool,
+}
+
+/// The last pulse that a relay took part in.
+#[derive(Clone, Copy, Debug)]
+struct Current {
+    number: u16,
+    /// In tenths of a second.
+    span: u16,
+    handed_on: Instant,
+    /// When it had come back.
+    done: Option<Instant>,
+}
+
+/// The lease of one relay.
+#[derive(Clone, Debug)]
+pub(crate) struct Lease {
+    state: LeaseState,
+    current: Option<Current>,
+    /// Until when others may count on this relay.
+    relied_on: Instant,
+    /// At the leader: when the next pulse begins, and how long they took lately.
+    next_at: Option<Instant>,
+    slowest: Duration,
+    retransmit: Retransmit,
+    due: LeaseDue,
+}
+
+/// Tenths of a second, rounded up.
+fn tenths(span: Duration) -> u16 {
+    u16::try_from(span.as_micros().div_ceil(100_000)).unwrap_or(u16::MAX)
+}
+
+const fn from_tenths(tenths: u16) -> Duration {
+    Duration::from_millis(100 * tenths as u64)
+}
+
+impl Lease {
+    /// A relay that was switched on at `now`: it may have been in a view that it does not remember.
+    pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
+        Self {
+            state: LeaseState::Open,
+            current: None,
+            relied_on: now + settings.dead_after,
+            next_at: None,
+            slowest: Duration::from_micros(0),
+            retransmit: Retransmit::new(seed),
+            due: LeaseDue::default(),
+        }
+    }
+
+    /// Until when this relay may hold what was agreed on; `None` where that is not known, or has run out.
+    pub(crate) const fn until(&self) -> Option<Instant> {
+        match self.state {
+            LeaseState::Until(at) => Some(at),
+            LeaseState::Open | LeaseState::Lapsed => None,
+        }
+    }
+
+    /// How long a silence has to be until it says something.
+    pub(crate) fn span(&self, settings: &Settings) -> Duration {
+        let told = self.current.map_or(0, |current| current.span);
+        from_tenths(told).max(settings.dead_after)
+    }
+
+    /// How long members of its view may still rely on this relay, in tenths of a second.
+    pub(crate) fn left(&self, now: Instant) -> u16 {
+        tenths(self.relied_on.since(now))
+    }
+
+    /// A new view is accepted.
+    pub(crate) fn renew(&mut self) {
+        self.state = LeaseState::Open;
+        self.current = None;
+        self.next_at = None;
+        self.due = LeaseDue::default();
+        self.retransmit.stop();
+    }
+
+    /// The leader has heard that all agree on their places: there is something to hold from now on.
+    pub(crate) fn begin(&mut self, now: Instant) {
+        if self.current.is_none() && self.next_at.is_none() {
+            self.next_at = Some(now + PAUSE);
+        }
+    }
+
+    /// A pulse, or what came back of it, of the view that this relay is in, from the neighbour that has it to say.
+    pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
+        match message {
+            Message::Pulse(pulse) => self.on_pulse(context, *pulse),
+            Message::Pulsed(pulsed) => self.on_pulsed(context, *pulsed),
+            _ => Effects::STALE,
+        }
+    }
+
+    fn on_pulse(&mut self, context: &Context<'_>, pulse: Pulse) -> Effects {
+        let mut effects = Effects::NONE;
+        if let Some(current) = self.current {
+            match pulse.number.wrapping_sub(current.number) {
+                0 => {
+                    self.due.back = true;
+                    return Effects::REPEATED;
+                }
+                1 if current.done.is_some() => {
+                    self.grant(current);
+                    effects.heard_back = current.done;
+                }
+                // The leader has begun anew, or this relay was not asked for long.
+                2..=0x7FFF => {}
+                _ => return Effects::STALE,
+            }
+        }
+        self.take(context, pulse.number, pulse.lease);
+        effects
+    }
+
+    /// All took part in `pulse`.
+    fn grant(&mut self, pulse: Current) {
+        let until = pulse.handed_on + from_tenths(pulse.span);
+        self.state = match self.state {
+            LeaseState::Until(at) => LeaseState::Until(at.max(until)),
+            LeaseState::Open | LeaseState::Lapsed => LeaseState::Until(until),
+        };
+    }
+
+    fn take(&mut self, context: &Context<'_>, number: u16, span: u16) {
+        self.current = Some(Current {
+            number,
+            span,
+            handed_on: context.now,
+            done: None,
+        });
+        self.retransmit.heard();
+        self.retransmit.stop();
+        self.due = LeaseDue::default();
+        if context.is_last() {
+            self.finish(context);
+        } else {
+            self.due.onward = true;
+        }
+    }
+
+    /// The current pulse has come back from the last relay.
+    fn finish(&mut self, context: &Context<'_>) {
+        let Some(current) = &mut self.current else {
+            return;
+        };
+        current.done = Some(context.now);
+        let current = *current;
+        self.relied_on = self
+            .relied_on
+            .max(context.now + from_tenths(current.span));
+        self.retransmit.stop();
+        if !context.leads() {
+            self.due.back = true;
+            return;
+        }
+        // The first two follow each other at once: nobody else has a lease before the second.
+        let first = self.state == LeaseState::Open;
+        self.grant(current);
+        let took = context.now.since(current.handed_on);
+        let eighth = self.slowest.as_micros() / 8;
+        let lately = self.slowest.as_micros().saturating_sub(eighth);
+        self.slowest = took.max(Duration::from_micros(lately));
+        let wait = if first {
+            PAUSE
+        } else {
+            self.period(context.settings())
+        };
+        self.next_at = Some(context.now + wait);
+    }
+
+    fn period(&self, settings: &Settings) -> Duration {
+        Duration::from_micros(settings.probe_after.as_micros() / 2).max(self.slowest)
+    }
+
+    /// What the leader gives the others, in tenths of a second.
+    fn given(&self, settings: &Settings) -> u16 {
+        let slow = self.slowest.times(4).as_micros();
+        let wanted = slow.saturating_add(self.period(settings).times(2).as_micros());
+        let most = settings.dead_after.times(8);
+        let span = Duration::from_micros(wanted)
+            .min(most)
+            .max(settings.dead_after);
+        tenths(span)
+    }
+
+    fn on_pulsed(&mut self, context: &Context<'_>, pulsed: Pulsed) -> Effects {
+        let Some(current) = self
+            .current
+            .filter(|current| current.number == pulsed.number && current.done.is_none())
+        else {
+            return Effects::STALE;
+        };
+        if pulsed.done {
+            self.finish(context);
+        } else {
+            self.retransmit.heard();
+            self.retransmit.sent(context.now, trip(context));
+        }
+        Effects {
+            heard_onward: Some(current.handed_on),
+            ..Effects::NONE
+        }
+    }
+
+    /// Does what is due: a pulse at the leader, one more time, or nothing any more.
+    pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
+        let now = context.now;
+        let mut effects = Effects::NONE;
+        if self.retransmit.is_due(now) {
+            self.due.onward = true;
+            effects.resent = true;
+        }
+        if self.next_at.is_some_and(|at| at <= now) {
+            self.next_at = None;
+            let number = self.current.map_or(0, |current| current.number);
+            let span = self.given(context.settings());
+            self.take(context, number.wrapping_add(1), span);
+        }
+        if self.until().is_some_and(|at| at <= now) {
+            self.state = LeaseState::Lapsed;
+            effects.lapsed = true;
+            effects.view_needed = true;
+        }
+        effects
+    }
+
+    /// What is to be sent onward; it is taken for sent then.
+    pub(crate) fn take_onward(&mut self, context: &Context<'_>) -> Option<Message> {
+        let due = core::mem::take(&mut self.due.onward);
+        let current = self.current.filter(|current| due && current.done.is_none())?;
+        self.retransmit.sent(context.now, trip(context));
+        Some(Message::Pulse(Pulse {
+            number: current.number,
+            mission: context.digest(),
+            lease: current.span,
+        }))
+    }
+
+    /// What is to be sent back; it is taken for sent then.
+    pub(crate) fn take_back(&mut self, context: &Context<'_>) -> Option<Message> {
+        let due = core::mem::take(&mut self.due.back);
+        let current = self.current.filter(|_| due)?;
+        Some(Message::Pulsed(Pulsed {
+            number: current.number,
+            mission: context.digest(),
+            done: current.done.is_some(),
+        }))
+    }
+
+    pub(crate) fn next_timeout(&self) -> Option<Instant> {
+        let pulse = earliest(self.next_at, self.retransmit.next_timeout());
+        earliest(pulse, self.until())
+    }
+}
+
+/// What an answer has to travel: to the last relay of the view and back.
+fn trip(context: &Context<'_>) -> Trip {
+    let mission = context.mission();
+    let hops = match mission.heading() {
+        Heading::TowardRx => mission.relays().saturating_sub(context.index()),
+        Heading::TowardTx => context.index().saturating_sub(1),
+    };
+    Trip {
+        hop_time: context.settings().hop_time,
+        hops,
+        slow: false,
+    }
+}

@@ -1,0 +1,87 @@
+//! Which view of the chain: who is in it, as it was agreed.
+
+/// The name of a view, in the order of proposals: a number, and the node that proposed it, so that no two nodes propose one view.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ViewId(u32);
+
+/// Bits of the node that proposed: a chain has at most 1000 relays.
+const NODE: u32 = 10;
+
+impl ViewId {
+    /// The chain as the mission has it, which nobody proposed.
+    pub const LOADED: Self = Self(0);
+
+    /// As it is written: the node in the low ten bits, the number above.
+    pub const fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    /// The same, to be written.
+    pub const fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// The number, 0 to 4 194 303.
+    pub const fn number(self) -> u32 {
+        self.0 >> NODE
+    }
+
+    /// The node that proposed it, 0 for none.
+    pub const fn proposer(self) -> u16 {
+        (self.0 & ((1 << NODE) - 1)) as u16
+    }
+
+    /// The first view after this one that `node`, 1 to 1000, may propose; `None` after four million.
+    pub(crate) const fn next_by(self, node: u16) -> Option<Self> {
+        let number = self.number() + 1;
+        if number >> (32 - NODE) == 0 {
+            Some(Self(number << NODE | node as u32))
+        } else {
+            None
+        }
+    }
+
+    /// What is added to the digest of a mission for the passes of a view: views of one number, and some thousand in a row, differ.
+    pub(crate) const fn mark(self) -> u16 {
+        let [a, b, c, d] = self.0.to_le_bytes();
+        u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
+    }
+}
+
+/// A view and its size.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct View {
+    /// Which one.
+    pub id: ViewId,
+    /// Relays in it, 1 to 1000.
+    pub relays: u16,
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::ViewId;
+
+    #[test]
+    fn views_are_ordered_by_number_and_told_apart_by_who_proposed_them() {
+        let first = ViewId::LOADED.next_by(1000).unwrap();
+        let other = ViewId::LOADED.next_by(3).unwrap();
+        let second = first.next_by(1).unwrap();
+        assert!(ViewId::LOADED < other && other < first && first < second);
+        assert_eq!((second.number(), second.proposer()), (2, 1));
+        assert_eq!(ViewId::from_bits(u32::MAX).next_by(1), None);
+    }
+
+    #[test]
+    fn the_passes_of_near_views_differ_in_their_mark() {
+        let mut marks: std::vec::Vec<u16> = (0..16)
+            .flat_map(|number| (1..=1000).map(move |node| ViewId(number << 10 | node).mark()))
+            .collect();
+        marks.sort_unstable();
+        marks.dedup();
+        assert_eq!(marks.len(), 16_000);
+    }
+}
