@@ -1,18 +1,21 @@
 //! The report of a simulated chain.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 use uav_relay::{Interference, Mission};
 
+use super::air::AirReport;
 use super::attack::AttackReport;
+use super::failure::error;
 use super::flown::version;
 use super::hops::{self, RelayReport, db, hop_sirs};
 use super::left::{LostReport, left, lost};
 use super::recovery::{self, RecoveryReport, recoveries};
+use super::silences::{SilenceReport, silences};
 use super::timeline::{self, MomentReport, seconds};
-use crate::simulator::outcome::{Ending, Outcome, Turning};
+use super::watched::WatchedReport;
+use crate::simulator::outcome::{Ending, Outcome};
 use crate::simulator::setup::Setup;
 
 /// What happened to frames.
@@ -28,17 +31,6 @@ pub struct FaultReport {
     pub reordered: u64,
     /// Frames the relays refused, for whatever reason.
     pub rejected: u64,
-}
-
-/// A relay whose silence was noticed.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct SilenceReport {
-    /// The relay that went silent.
-    pub silent: u16,
-    /// The neighbour that noticed.
-    pub noticed_by: u16,
-    /// When it had been silent for long enough, s of virtual time.
-    pub at_s: f64,
 }
 
 /// The result of `cargo chain`.
@@ -96,6 +88,12 @@ pub struct ChainReport {
     /// `shared` where the relays talk by one radio channel; absent where each has a link to either neighbour.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<&'static str>,
+    /// What happened on that channel, unless it is ideal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub air: Option<AirReport>,
+    /// What the run was like over its whole time, where that was watched.
+    #[serde(flatten)]
+    pub watched: WatchedReport,
     /// How many relays are in the chain at the end, where that is not what it began with, or might not have been.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<u16>,
@@ -181,6 +179,8 @@ impl ChainReport {
             },
             silences: silences(outcome),
             channel: None,
+            air: None,
+            watched: outcome.watched.map(WatchedReport::of).unwrap_or_default(),
             left: (!timeline.is_empty()).then_some(flown),
             lost: lost(outcome, &chain),
             recovery: recoveries(&outcome.moments, mission.relays()),
@@ -220,6 +220,8 @@ impl ChainReport {
             },
             silences: Vec::new(),
             channel: None,
+            air: None,
+            watched: WatchedReport::default(),
             left: None,
             lost: Vec::new(),
             timeline: Vec::new(),
@@ -299,6 +301,10 @@ impl ChainReport {
                 self.seed
             );
         }
+        if let Some(air) = &self.air {
+            text += &air.text(self.virtual_s);
+        }
+        text += &self.watched.text();
         if let Some(attack) = &self.attack {
             text += &attack.text();
         }
@@ -313,79 +319,5 @@ impl ChainReport {
             Some(left) if left < self.uavs => format!("{left} of {}", self.uavs),
             _ => self.uavs.to_string(),
         }
-    }
-}
-
-/// Who noticed the relays that really went silent; over a bad link a living one may be missed for a while as well.
-fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
-    let killed = |index: u16| {
-        let at = usize::from(index).checked_sub(1);
-        at.and_then(|at| outcome.relays.get(at))
-            .is_some_and(|relay| relay.killed.is_some())
-    };
-    let mut silences: BTreeMap<(u16, u16), f64> = BTreeMap::new();
-    for moment in &outcome.moments {
-        let Some(other) = moment.other else {
-            continue;
-        };
-        match moment.what {
-            Turning::Lost(_) if killed(other) => {
-                silences.insert((moment.relay, other), seconds(moment.at));
-            }
-            Turning::Found(_) => {
-                silences.remove(&(moment.relay, other));
-            }
-            _ => {}
-        }
-    }
-    let reports = silences
-        .into_iter()
-        .map(|((noticed_by, silent), at_s)| SilenceReport {
-            silent,
-            noticed_by,
-            at_s,
-        });
-    reports.collect()
-}
-
-fn error(method: &str, outcome: &Outcome) -> Option<String> {
-    let error = ended(method, outcome)?;
-    let missing = outcome
-        .offered()
-        .filter(|newest| *newest > version(outcome));
-    Some(match missing {
-        Some(version) => format!("{error}; mission {version} was not adopted"),
-        None => error,
-    })
-}
-
-/// Why a run has not ended well.
-fn ended(method: &str, outcome: &Outcome) -> Option<String> {
-    match outcome.ending {
-        Ending::Settled => None,
-        Ending::Infeasible if method.ends_with("-step") => Some(
-            "none of the targets that the fixed step takes can be met; a smaller one may find one"
-                .to_owned(),
-        ),
-        Ending::Infeasible => Some("no placement gives every hop an SIR above 0".to_owned()),
-        Ending::Broken => {
-            let silent: Vec<String> = (1..)
-                .zip(&outcome.relays)
-                .filter(|(_, relay): &(u16, _)| relay.killed.is_some())
-                .map(|(index, _)| index.to_string())
-                .collect();
-            Some(format!(
-                "the chain is broken: relay {} went silent",
-                silent.join(", ")
-            ))
-        }
-        Ending::Cut => Some(
-            "the chain is cut: too few relays can reach each other to go on without the others"
-                .to_owned(),
-        ),
-        Ending::OutOfTime => Some(format!(
-            "the chain had not settled after {:.0} s",
-            seconds(outcome.ended)
-        )),
     }
 }

@@ -1,13 +1,18 @@
 //! What a run or a plan came to, as people and programs read it.
 
+pub mod air;
 pub mod attack;
 pub mod chain;
+mod failure;
 pub mod flown;
 pub mod hops;
 pub mod left;
 pub mod recovery;
+pub mod silences;
 pub mod timeline;
+pub mod watched;
 
+pub use air::AirReport;
 pub use attack::AttackReport;
 pub use chain::ChainReport;
 pub use flown::flown;

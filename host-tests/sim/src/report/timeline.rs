@@ -20,10 +20,10 @@ pub struct MomentReport {
     /// Whose, by its number in the mission, from 1. Of a partition it is the last relay before it; of an upload that begins, 0 is the
     /// transmitter, and the receiver comes after the last relay.
     pub relay: u16,
-    /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted`, `healed`, `offered`, `held` or
-    /// `adopted`.
+    /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted`, `healed`, `deaf`, `hears`, `offered`,
+    /// `held` or `adopted`.
     pub what: &'static str,
-    /// The neighbour that was lost or found.
+    /// The neighbour that was lost or found, or the relay that is not heard.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other: Option<u16>,
     /// Number of the view that was formed.
@@ -53,6 +53,8 @@ impl MomentReport {
             Turning::Infeasible => "infeasible",
             Turning::Parted => "parted",
             Turning::Healed => "healed",
+            Turning::Deaf => "deaf",
+            Turning::Hears => "hears",
             Turning::Offered(_) => "offered",
             Turning::Uploaded(_) => "held",
             Turning::Adopted(_) => "adopted",
@@ -176,6 +178,8 @@ impl Group {
             "converged" => format!("SIR {:.3}", one.sir.unwrap_or_default()),
             "parted" => format!("parted after {}", one.relay),
             "healed" => format!("joined after {}", one.relay),
+            "deaf" => format!("{} deaf to {}", one.relay, one.other.unwrap_or_default()),
+            "hears" => format!("{} hears {}", one.relay, one.other.unwrap_or_default()),
             "offered" | "held" | "adopted" => {
                 format!("mission {} {}", one.version.unwrap_or_default(), one.what)
             }
@@ -214,6 +218,8 @@ impl Group {
             ),
             "parted" => format!("relays 1 to {relay} and the others do not hear each other"),
             "healed" => format!("relays 1 to {relay} and the others hear each other again"),
+            "deaf" => format!("{who} does not hear relay {other}"),
+            "hears" => format!("{who} hears relay {other} again"),
             "offered" if relay == 0 => format!("the transmitter uploads mission {version}"),
             "offered" => format!("the receiver uploads mission {version}"),
             "held" => format!(

@@ -1,9 +1,12 @@
 //! The relays, connected, run until they hold their places.
 
 mod air;
+mod channel;
 mod ending;
 mod flight;
 mod ground;
+mod hearing;
+mod judge;
 mod start;
 mod state;
 mod station;
@@ -18,18 +21,22 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Instant, Method, Placement, Sample};
+use uav_relay::{Instant, Method, Placement, Sample, Wiring};
 
+use judge::Touched;
 use start::{Start, switched_on};
 use state::Member;
 use station::stations;
 
 use super::attack::Struck;
+use super::bursts::Bursts;
 use super::faults::Injected;
 use super::link::Line;
+use super::medium::{Access, AirCounts, Medium};
 use super::outcome::{Ending, Outcome, RelayEnd, Turning};
 use super::queue::{Happening, Queue};
 use super::setup::Setup;
+use super::watch::Watch;
 
 /// After this many happenings the run is given up: some minutes of computing.
 const MOST_HAPPENINGS: u64 = 400_000_000;
@@ -64,6 +71,13 @@ impl Chain {
             });
         }
         let mut queue = Queue::default();
+        let stations = stations(&setup);
+        let bursts = (setup.burst > 1.0).then(|| Bursts::new(setup.faults.loss, setup.burst));
+        let shared = setup.settings.wiring == Wiring::Shared;
+        let medium = (shared && setup.access != Access::Ideal).then(|| {
+            let nodes = members.len() + stations.len();
+            Medium::new(setup.access, setup.link, nodes, setup.seed)
+        });
         for &(index, at) in &setup.kills {
             queue.put(at, usize::from(index.saturating_sub(1)), Happening::Kill);
         }
@@ -74,17 +88,16 @@ impl Chain {
             queue.put(spec.at, which, Happening::Upload);
         }
         let mut ahead = setup.kills.len() + setup.boots.len() + setup.uploads.len();
-        for partition in &setup.partitions {
-            for at in [Some(partition.from), partition.until]
-                .into_iter()
-                .flatten()
-            {
+        let parts = setup.partitions.iter().map(|part| (part.from, part.until));
+        let deaf = setup.deaf.iter().map(|deaf| (deaf.from, deaf.until));
+        for (from, until) in parts.chain(deaf) {
+            for at in [Some(from), until].into_iter().flatten() {
                 queue.put(at, 0, Happening::Part);
                 ahead += 1;
             }
         }
         let mut chain = Self {
-            stations: stations(&setup),
+            stations,
             setup,
             members,
             queue,
@@ -103,6 +116,8 @@ impl Chain {
                 moments: Vec::new(),
                 nearest_m: f64::INFINITY,
                 unsafe_setpoints: 0,
+                air: AirCounts::default(),
+                watched: None,
             },
             now: Instant::ZERO,
             happenings: 0,
@@ -110,12 +125,19 @@ impl Chain {
             ahead,
             attacker: None,
             flight: None,
+            medium,
+            bursts,
+            watch: Watch::default(),
         };
+        if shared || chain.setup.soak.is_some() {
+            chain.begin_watch();
+        }
         chain.expect_an_attack();
         chain.take_off();
         for index in 0..chain.members.len() {
             chain.drain(index);
         }
+        chain.look(Touched::All);
         Ok(chain)
     }
 
@@ -135,11 +157,14 @@ impl Chain {
                 return true;
             };
             if at > self.setup.deadline || self.happenings >= MOST_HAPPENINGS {
+                self.end_soak(at);
                 return true;
             }
             self.happenings += 1;
             self.now = at;
+            let touched = Touched::by(&happening, relay);
             self.happen(relay, happening);
+            self.look(touched);
         }
         false
     }
@@ -195,6 +220,15 @@ impl Chain {
     pub fn finish(mut self) -> Outcome {
         self.outcome.ended = self.now;
         self.outcome.sweeps = self.progress().0;
+        self.outcome.air = self
+            .medium
+            .map_or_else(AirCounts::default, |it| it.counts());
+        if self.watch.is_on {
+            let flown_m = self.flight.map(|_| self.outcome.nearest_m);
+            let is_judged = self.setup.soak.is_some();
+            let watched = self.watch.end(self.now, is_judged, flown_m);
+            self.outcome.watched = Some(watched);
+        }
         self.outcome.relays = self
             .members
             .into_iter()
@@ -228,6 +262,7 @@ impl Chain {
         match happening {
             Happening::Fly => self.fly(),
             Happening::Part => self.tell_of_partitions(),
+            Happening::Air(event) => self.on_air(event),
             Happening::Strike(kind) => self.strike(kind),
             Happening::Upload => self.begin_upload(index),
             Happening::Heard { bytes } => self.hear(index, &bytes),
@@ -264,6 +299,9 @@ impl Chain {
             _ if member.killed.is_some() => return,
             Happening::Kill => {
                 member.killed = Some(now);
+                if let Some(medium) = &mut self.medium {
+                    medium.switch_off(index);
+                }
                 self.tell(index, Turning::Silent, None);
                 return;
             }

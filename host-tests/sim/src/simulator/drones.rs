@@ -3,7 +3,7 @@
 use uav_relay::Duration;
 
 /// A place in the air: x, y and altitude, m.
-pub(super) type Point = [f64; 3];
+pub type Point = [f64; 3];
 
 /// How drones fly.
 #[derive(Clone, PartialEq, Debug)]

@@ -3,19 +3,32 @@
 //! | file | one idea |
 //! | --- | --- |
 //! | [`link`] | one direction of a serial link: baud rate, latency |
-//! | [`faults`] | what may happen to a frame on its way |
+//! | [`medium`] | one half-duplex radio channel that all share |
+//! | [`faults`], [`bursts`] | what may happen to a frame on its way; losses in runs |
+//! | [`deaf`] | a relay that does not hear another one |
 //! | [`attack`], [`forge`] | what an attacker does, and the frames it makes up |
 //! | [`queue`] | what happens when, in order |
 //! | [`setup`], [`outcome`] | what a chain is run with, and what came of it |
 //! | [`drones`] | drones that fly straight to where they are told |
+//! | [`flying`] | groups of relays with an agreement of their own |
+//! | [`optimum`] | where exactly these relays would be if nothing had happened |
+//! | [`watch`] | how much of the time the chain is right |
+//! | [`many`] | the same run with many seeds |
 //! | [`chain`] | the relays, connected, run until they hold their places |
 
 pub mod attack;
+pub mod bursts;
 pub mod chain;
+pub mod deaf;
 pub mod drones;
 pub mod faults;
+pub mod flying;
 pub mod forge;
 pub mod link;
+pub mod many;
+pub mod medium;
+pub mod optimum;
 pub mod outcome;
 pub mod queue;
 pub mod setup;
+pub mod watch;

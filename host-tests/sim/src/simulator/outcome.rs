@@ -6,6 +6,8 @@ use uav_relay::{Instant, Placement, Profile, Side, Stats};
 
 use super::attack::Struck;
 use super::faults::Injected;
+use super::medium::AirCounts;
+use super::watch::Watched;
 
 /// Something worth a line in the story of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -39,6 +41,10 @@ pub enum Turning {
     Parted,
     /// They hear each other again.
     Healed,
+    /// From here on it does not hear the other one.
+    Deaf,
+    /// It hears it again.
+    Hears,
     /// The ground begins to upload a mission of this version: the transmitter as relay 0, the receiver as the one after the last.
     Offered(u16),
     /// It holds a newer mission, of this version.
@@ -56,7 +62,7 @@ pub struct Moment {
     pub relay: u16,
     /// What.
     pub what: Turning,
-    /// The neighbour that was lost or found, from 1.
+    /// The neighbour that was lost or found, or the relay that is not heard, from 1.
     pub other: Option<u16>,
     /// The target that the relay holds its place for, linear.
     pub target: Option<f32>,
@@ -75,6 +81,8 @@ pub enum Ending {
     Broken,
     /// No part of the chain is large enough to go on without the others.
     Cut,
+    /// It went on for as long as it was meant to ([`Setup::soak`](super::setup::Setup::soak)).
+    Soaked,
     /// The deadline, or the limit on the work of a run.
     OutOfTime,
 }
@@ -133,6 +141,10 @@ pub struct Outcome {
     pub nearest_m: f64,
     /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.
     pub unsafe_setpoints: u64,
+    /// What happened on the air, where relays shared it.
+    pub air: AirCounts,
+    /// What the run was like over its whole time; of a soak, and of relays on a shared channel.
+    pub watched: Option<Watched>,
 }
 
 impl Outcome {

@@ -6,6 +6,7 @@ use std::collections::BinaryHeap;
 use uav_relay::{Instant, Port};
 
 use super::attack::Strike;
+use super::medium::AirEvent;
 
 /// Something that happens to one relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -34,8 +35,10 @@ pub enum Happening {
     Kill,
     /// It is switched on again.
     Boot,
-    /// A partition begins or ends.
+    /// A partition begins or ends, or a relay ceases to hear another one or hears it again.
     Part,
+    /// Something is due on the shared channel; the relay is of no account.
+    Air(AirEvent),
     /// The attacker sends a frame to one of the relays.
     Strike(Strike),
 }

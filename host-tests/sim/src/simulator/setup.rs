@@ -5,9 +5,11 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::{Auth, Instant, Key, Mission, Profile, Settings, Side, Upload, Wiring};
 
 use super::attack::Attack;
+use super::deaf::Deaf;
 use super::drones::FlightSpec;
 use super::faults::Faults;
 use super::link::LinkSpec;
+use super::medium::access::{self, Access};
 
 /// A time in which relays 1 to `after` and the others do not hear each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -37,6 +39,17 @@ pub struct UploadSpec {
     pub at: Instant,
     /// What.
     pub upload: Upload,
+}
+
+/// What a link or a channel carries, and for how many.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Channel {
+    /// Bits per second.
+    pub baud: u32,
+    /// Relays that share it at one place at most: all that one relay hears, and itself. One where a relay has a line of its own.
+    pub in_range: usize,
+    /// What a frame costs beside its bytes, in bytes.
+    pub overhead: usize,
 }
 
 /// The stream of random numbers that keys are drawn from.
@@ -75,6 +88,15 @@ pub struct Setup {
     pub flight: Option<FlightSpec>,
     /// On a shared channel: how many relays away a relay is heard.
     pub radio_reach: usize,
+    /// On a shared channel: how the radios come by it.
+    pub access: Access,
+    /// Mean length of a run of losses, frames: 1 for losses that are independent, else at least [`Bursts::shortest`](
+    /// super::bursts::Bursts::shortest) of `faults.loss`.
+    pub burst: f64,
+    /// Relays that do not hear another one for a time.
+    pub deaf: Vec<Deaf>,
+    /// The run goes on until then whatever has come of it before, and is judged all the time.
+    pub soak: Option<Instant>,
     /// After this time frames get through, if there is one.
     pub faults_end: Option<Instant>,
     /// Seed of every random draw.
@@ -105,17 +127,54 @@ impl Setup {
             attack: None,
             flight: None,
             radio_reach: Self::RADIO_REACH,
+            access: Access::Ideal,
+            burst: 1.0,
+            deaf: Vec::new(),
+            soak: None,
             faults_end: None,
             seed: 1,
             deadline: Instant::from_millis(1_000 * 3_600 * 24 * 30),
         }
     }
 
-    /// The same on one channel that all hear.
+    /// The same on one ideal channel: frames are in nobody's way ([`Access::Ideal`]).
     pub fn on_shared_channel(mission: Mission) -> Self {
+        Self::on_air(mission, Access::Ideal)
+    }
+
+    /// The same on one channel that the radios come by as `access` says.
+    pub fn on_air(mission: Mission, access: Access) -> Self {
         let mut setup = Self::new(mission);
         setup.settings.wiring = Wiring::Shared;
+        setup.access = access;
         setup
+    }
+
+    /// Has the run go on until `until`, judged all the time.
+    pub fn soaked(mut self, until: Instant) -> Self {
+        self.soak = Some(until);
+        self.deadline = until;
+        self
+    }
+
+    /// What a timing has to be made of: what the link carries, and how many share it.
+    pub fn channel(&self) -> Channel {
+        let near = match self.settings.wiring {
+            Wiring::Pair => 1,
+            Wiring::Shared => {
+                let relays = usize::from(self.mission.relays());
+                relays.min(2 * self.radio_reach + 1)
+            }
+        };
+        let overhead = match (self.settings.wiring, self.access) {
+            (Wiring::Pair, _) | (_, Access::Ideal) => 0,
+            _ => access::HEADER + access::TURNAROUND,
+        };
+        Channel {
+            baud: self.link.baud,
+            in_range: near,
+            overhead,
+        }
     }
 
     /// How a relay that is switched on for the `start`th time, from 1, proves who it is.

@@ -6,7 +6,8 @@ use uav_relay_sim::command::Failure;
 use uav_relay_sim::simulator::attack::Attack;
 use uav_relay_sim::simulator::setup::{Partition, Setup};
 
-use crate::times::instant;
+use crate::air::Air;
+use crate::times::{instant, span};
 use crate::upload::Uploads;
 
 /// The options for that.
@@ -42,12 +43,14 @@ pub(crate) struct Hostile {
     #[arg(long)]
     no_auth: bool,
     /// All relays talk by one radio, which those up to four away hear; so they do with any of --kill, --boot, --partition,
-    /// --forge, --replay and --upload
+    /// --deaf, --soak, --air, --forge, --replay and --upload
     #[arg(long, conflicts_with = "wires")]
     shared: bool,
     /// Each relay has a wire to either neighbour, even then; there a break is reported, not closed
     #[arg(long)]
     wires: bool,
+    #[command(flatten)]
+    pub(crate) air: Air,
 }
 
 /// A relay, and when something happens to it.
@@ -69,6 +72,7 @@ impl Hostile {
         !(self.kill.is_empty() && self.boot.is_empty() && self.partition.is_empty())
             || self.is_attack()
             || self.uploads.are_planned()
+            || self.air.is_eventful()
     }
 
     fn is_attack(&self) -> bool {
@@ -82,7 +86,10 @@ impl Hostile {
             .partition
             .iter()
             .map(|part| part.until.unwrap_or(part.from));
-        let all = ones.chain(parts).chain(self.uploads.times());
+        let all = ones
+            .chain(parts)
+            .chain(self.uploads.times())
+            .chain(self.air.times());
         all.max().unwrap_or(Instant::ZERO)
     }
 
@@ -109,8 +116,9 @@ impl Hostile {
             };
             return Err(Failure::input(line));
         }
+        self.air.agree(uavs)?;
         if self.is_eventful() && is_loop {
-            let line = "--closed-loop goes with none of --kill, --boot, --partition, --forge, --replay and --upload";
+            let line = "--closed-loop goes with none of --kill, --boot, --partition, --deaf, --soak, --forge, --replay and --upload";
             return Err(Failure::input(line));
         }
         if self.uploads.are_planned() && self.no_auth {
@@ -128,7 +136,7 @@ impl Hostile {
         setup.partitions.clone_from(&self.partition);
         let after =
             |seconds: u64| Instant::from_micros(self.last().as_micros() + seconds * 1_000_000);
-        if self.shared || self.is_eventful() && !self.wires {
+        if self.shared || self.air.is_chosen() || self.is_eventful() && !self.wires {
             setup.settings.wiring = Wiring::Shared;
         }
         if self.is_attack() {
@@ -164,25 +172,9 @@ fn partition(text: &str) -> Result<Partition, String> {
     let form = "must be K@S or K@S-T, a relay (1 to N - 1) and seconds after the start (0 to 1e6)";
     let (after, times) = text.split_once('@').ok_or(form)?;
     let after = after.parse().map_err(|_| form)?;
-    if let Some(from) = instant(times) {
-        return Ok(Partition {
-            after,
-            from,
-            until: None,
-        });
-    }
-    // A minus sign may also stand in an exponent.
-    let cuts = times.match_indices('-').filter_map(|(at, _)| {
-        let (from, until) = times.split_at_checked(at)?;
-        Some((instant(from)?, instant(until.get(1..)?)?))
-    });
-    let (from, until) = cuts.into_iter().next().ok_or(form)?;
-    if until <= from {
+    let (from, until) = span(times).ok_or(form)?;
+    if until.is_some_and(|until| until <= from) {
         return Err("must be K@S-T with T after S".to_owned());
     }
-    Ok(Partition {
-        after,
-        from,
-        until: Some(until),
-    })
+    Ok(Partition { after, from, until })
 }

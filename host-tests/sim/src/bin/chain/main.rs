@@ -1,5 +1,6 @@
 //! `cargo chain`: simulated relays, each running the on-board code, find their places over simulated serial links.
 
+mod air;
 mod hostile;
 mod options;
 mod times;
@@ -15,7 +16,7 @@ use uav_relay::{Measure, Mission, Placement, Schedule, Wiring};
 use uav_relay_sim::beta::beta_w;
 use uav_relay_sim::command::{self, Failure, narrow};
 use uav_relay_sim::mission::{self, Refusal};
-use uav_relay_sim::report::{self, AttackReport, ChainReport, timeline};
+use uav_relay_sim::report::{self, AirReport, AttackReport, ChainReport, timeline};
 use uav_relay_sim::scenario::{Interference, Scenario};
 use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::faults::Faults;
@@ -64,6 +65,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     let flown = report::flown(&setup, &outcome);
     let mut report = ChainReport::new(&method, &flown, &outcome, options.seed);
     report.channel = (setup.settings.wiring == Wiring::Shared).then_some("shared");
+    report.air = AirReport::of(&setup, &outcome);
     if setup.attack.take().is_some() {
         let auth = setup.auth;
         let attack = AttackReport::new(auth, &outcome, &fly(options, &scenario, setup)?);
@@ -146,6 +148,7 @@ fn setup(options: &Options, mission: Mission) -> Result<Setup, Failure> {
     setup.settings.predict = !options.no_predict;
     setup.seed = options.seed;
     options.hostile.prepare(&mut setup)?;
+    options.hostile.air.prepare(&mut setup, options.loss)?;
     setup.faults = Faults {
         loss: options.loss,
         corrupt: options.corrupt,

@@ -14,3 +14,16 @@ pub(crate) fn instant(text: &str) -> Option<Instant> {
     let micros = (seconds * 1e6) as u64;
     Some(Instant::from_micros(micros))
 }
+
+/// From one time to another: `S-E`; or from a time on: `S`.
+pub(crate) fn span(text: &str) -> Option<(Instant, Option<Instant>)> {
+    if let Some(from) = instant(text) {
+        return Some((from, None));
+    }
+    // A minus sign may also stand in an exponent.
+    let mut cuts = text.match_indices('-').filter_map(|(at, _)| {
+        let (from, until) = text.split_at_checked(at)?;
+        Some((instant(from)?, Some(instant(until.get(1..)?)?)))
+    });
+    cuts.next()
+}

@@ -15,17 +15,11 @@ pub(super) enum Receiver {
 }
 
 impl Chain {
-    /// Whether relays `one` and `other` (from 0) cannot hear each other now.
-    pub(super) fn are_parted(&self, one: usize, other: usize) -> bool {
-        let of = |index: usize| u16::try_from(index + 1).unwrap_or(u16::MAX);
-        let parts = &self.setup.partitions;
-        parts
-            .iter()
-            .any(|part| part.parts(of(one), of(other), self.now))
-    }
-
     /// Puts a frame on a link.
     pub(super) fn transmit(&mut self, index: usize, port: Port, frame: &[u8]) {
+        if port == Port::Shared && self.broadcast(index, frame) {
+            return;
+        }
         self.outcome.messages += 1;
         self.outcome.bytes += frame.len() as u64;
         let Some(member) = self.members.get_mut(index) else {
@@ -37,26 +31,28 @@ impl Chain {
             &mut member.lines[0]
         };
         let arrives = line.send(self.now, frame.len(), &self.setup.link);
-        let reach = self.setup.radio_reach;
-        let (receivers, into) = match port {
-            Port::Upstream => (index.saturating_sub(1)..index, Port::Downstream),
-            Port::Downstream => (index + 1..index + 2, Port::Upstream),
-            Port::Shared => (index.saturating_sub(reach)..index + reach + 1, Port::Shared),
+        let (near, into) = match port {
+            Port::Upstream => (index.checked_sub(1), Port::Downstream),
+            Port::Downstream => (Some(index + 1), Port::Upstream),
+            Port::Shared => (None, Port::Shared),
         };
-        let relays = receivers
-            .filter(|receiver| *receiver != index)
-            .filter(|receiver| *receiver < self.members.len() && !self.are_parted(index, *receiver))
-            .map(Receiver::Relay);
+        let near = near.filter(|by| *by < self.members.len() && self.hears(*by, index));
+        let relays = match port {
+            Port::Shared => self.in_range(index),
+            _ => near.into_iter().collect(),
+        };
         let grounds = (0..self.stations.len())
             .filter(|at| self.reaches_ground(index, port, *at))
             .map(Receiver::Ground);
+        let relays = relays.into_iter().map(Receiver::Relay);
         let receivers: Vec<Receiver> = relays.chain(grounds).collect();
-        self.send(frame, into, arrives, receivers);
+        self.send(index, frame, into, arrives, receivers);
     }
 
-    /// Puts `frame` into the queues of all that hear it, each with what happens to it on its way.
+    /// Puts `frame` of node `from` into the queues of all that hear it, each with what happens to it on its way.
     pub(super) fn send(
         &mut self,
+        from: usize,
         frame: &[u8],
         into: Port,
         arrives: Instant,
@@ -70,11 +66,19 @@ impl Chain {
             });
         }
         let late_by = self.setup.link.hop_time();
-        let faults = match self.setup.faults_end {
+        let mut faults = match self.setup.faults_end {
             Some(end) if self.now >= end => Faults::default(),
             _ => self.setup.faults,
         };
+        let in_runs = self.bursts.is_some() && faults.loss > 0.0;
+        if in_runs {
+            faults.loss = 0.0;
+        }
         for receiver in receivers {
+            if in_runs && self.loses(from, receiver) {
+                self.outcome.injected.lost += 1;
+                continue;
+            }
             let arrivals = faults.inject(frame, &mut self.rng, &mut self.outcome.injected);
             for arrival in arrivals {
                 let late = late_by.times(u32::try_from(arrival.late).unwrap_or(u32::MAX));
@@ -86,5 +90,16 @@ impl Chain {
                 self.queue.put(arrives + late, at, happening);
             }
         }
+    }
+
+    /// Whether a frame falls into a run of losses.
+    fn loses(&mut self, from: usize, receiver: Receiver) -> bool {
+        let to = match receiver {
+            Receiver::Relay(at) => at,
+            Receiver::Ground(at) => self.members.len() + at,
+        };
+        self.bursts
+            .as_mut()
+            .is_some_and(|bursts| bursts.loses(from, to, &mut self.rng))
     }
 }

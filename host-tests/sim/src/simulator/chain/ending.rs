@@ -1,6 +1,6 @@
 //! When a run is over.
 
-use uav_relay::{Phase, Side, Wiring};
+use uav_relay::{Instant, Phase, Side, Wiring};
 
 use super::super::outcome::Ending;
 use super::state::{Chain, Member};
@@ -8,7 +8,7 @@ use super::station::Station;
 
 impl Chain {
     pub(super) fn ending(&self) -> Option<Ending> {
-        if self.ahead > 0 {
+        if self.ahead > 0 || self.setup.soak.is_some() {
             return None;
         }
         let killed = self.members.iter().any(|member| member.killed.is_some());
@@ -49,6 +49,16 @@ impl Chain {
             .filter(|part| !std::ptr::eq(*part, largest))
             .all(|part| is_in(part, Phase::NoQuorum));
         (settled && others).then_some(Ending::Settled)
+    }
+
+    /// A run that goes on to its deadline has got there: nothing but `next` is to come.
+    pub(super) fn end_soak(&mut self, next: Instant) {
+        if let Some(until) = self.setup.soak
+            && next > until
+        {
+            self.now = until;
+            self.outcome.ending = Ending::Soaked;
+        }
     }
 
     /// The living relays that can hear each other, part by part.

@@ -55,15 +55,19 @@ impl Chain {
         while let Some(station) = self.stations.get_mut(at)
             && let Some(len) = station.ground.poll_transmit(&mut frame)
         {
+            let bytes = frame.get(..len).unwrap_or_default();
+            if self.broadcast(self.members.len() + at, bytes) {
+                continue;
+            }
+            let Some(station) = self.stations.get_mut(at) else {
+                return;
+            };
             let end = station.end;
             let arrives = station.line.send(now, len, &self.setup.link);
             self.outcome.messages += 1;
             self.outcome.bytes += len as u64;
             let relays = self.members.len();
-            let reach = match self.setup.settings.wiring {
-                Wiring::Pair => 1,
-                Wiring::Shared => self.setup.radio_reach,
-            };
+            let reach = self.reach();
             let (receivers, port) = match end {
                 Side::Upstream => (0..reach.min(relays), Port::Upstream),
                 Side::Downstream => (relays.saturating_sub(reach)..relays, Port::Downstream),
@@ -72,8 +76,8 @@ impl Chain {
                 Wiring::Pair => port,
                 Wiring::Shared => Port::Shared,
             };
-            let bytes = frame.get(..len).unwrap_or_default().to_vec();
-            self.send(&bytes, into, arrives, receivers.map(Receiver::Relay));
+            let from = relays + at;
+            self.send(from, bytes, into, arrives, receivers.map(Receiver::Relay));
         }
         if let Some(station) = self.stations.get_mut(at)
             && let Some(again) = station.ground.poll_timeout()

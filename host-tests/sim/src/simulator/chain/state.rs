@@ -5,11 +5,14 @@ use uav_relay::wire::upload::Upload;
 use uav_relay::{Instant, Placement, Relay};
 
 use super::super::attack::Attacker;
+use super::super::bursts::Bursts;
 use super::super::drones::Flight;
 use super::super::link::Line;
+use super::super::medium::Medium;
 use super::super::outcome::Outcome;
 use super::super::queue::Queue;
 use super::super::setup::Setup;
+use super::super::watch::Watch;
 use super::station::Station;
 
 /// One relay in the run.
@@ -52,4 +55,9 @@ pub struct Chain {
     pub(super) stations: Vec<Station>,
     pub(super) attacker: Option<Attacker>,
     pub(super) flight: Option<Flight>,
+    /// The channel that all share, unless each has a line of its own.
+    pub(super) medium: Option<Medium>,
+    /// Where losses come in runs.
+    pub(super) bursts: Option<Bursts>,
+    pub(super) watch: Watch,
 }

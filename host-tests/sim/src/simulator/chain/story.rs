@@ -75,8 +75,16 @@ impl Chain {
         });
     }
 
-    /// A partition begins or ends now.
+    /// A partition begins or ends now, or a relay does not hear another one from here on, or hears it again.
     pub(super) fn tell_of_partitions(&mut self) {
+        for deaf in self.setup.deaf.clone() {
+            let by = usize::from(deaf.by).saturating_sub(1);
+            if deaf.from == self.now {
+                self.tell(by, Turning::Deaf, Some(deaf.of));
+            } else if deaf.until == Some(self.now) {
+                self.tell(by, Turning::Hears, Some(deaf.of));
+            }
+        }
         let relays = self.setup.mission.relays();
         for partition in self.setup.partitions.clone() {
             if !(1..relays).contains(&partition.after) {

@@ -1,0 +1,128 @@
+//! The medium: how radios share it, how fast it is, how it loses frames, who does not hear whom, and for how long that is watched.
+
+use clap::{Args, ValueEnum};
+use uav_relay::{Instant, Wiring};
+use uav_relay_sim::command::{Failure, number};
+use uav_relay_sim::simulator::bursts::Bursts;
+use uav_relay_sim::simulator::deaf::Deaf;
+use uav_relay_sim::simulator::medium::Access;
+use uav_relay_sim::simulator::setup::Setup;
+
+use crate::times::{instant, span};
+
+/// The options for that.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Links and the air")]
+pub(crate) struct Air {
+    /// How the radios share one channel, which those up to four away hear; csma unless said otherwise
+    #[arg(long, value_name = "A", value_enum, conflicts_with = "wires")]
+    air: Option<Sharing>,
+    /// Bits per second of every link, or of the channel, 300 to 10000000; a byte takes ten
+    #[arg(long, value_name = "B", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..=10_000_000))]
+    baud: u32,
+    /// Losses come in runs of L frames on average, 1 to 1e6, each direction of a link by itself (Gilbert-Elliott), with --loss P as
+    /// the mean share; 1 is for independent losses, anything else at least 1 / (1 - P)
+    #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 1.0, 1e6))]
+    burst: f64,
+    /// Relay J does not hear relay I from S seconds on, until E or for good. Repeatable
+    #[arg(long, value_name = "J:I@S[-E]", value_parser = deaf)]
+    deaf: Vec<Deaf>,
+    /// The run goes on for S seconds, 1 to 1e6, with all that happens in it, and says how much of the time the chain was right
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = soak)]
+    soak: Option<Instant>,
+}
+
+/// How radios share a channel.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Sharing {
+    /// Half duplex: each listens before it sends, and waits a random time
+    Csma,
+    /// Half duplex: each sends at once
+    Aloha,
+    /// A line for every sender: nobody is in another's way
+    Ideal,
+}
+
+impl Air {
+    /// Whether a shared channel is asked for.
+    pub(crate) fn is_chosen(&self) -> bool {
+        self.air.is_some()
+    }
+
+    /// Whether relays may be lost by it.
+    pub(crate) fn is_eventful(&self) -> bool {
+        !self.deaf.is_empty() || self.soak.is_some()
+    }
+
+    /// When something happens.
+    pub(crate) fn times(&self) -> impl Iterator<Item = Instant> {
+        self.deaf
+            .iter()
+            .map(|deaf| deaf.until.unwrap_or(deaf.from))
+            .chain(self.soak)
+    }
+
+    /// Whether this goes together with a chain of `uavs`.
+    pub(crate) fn agree(&self, uavs: u16) -> Result<(), Failure> {
+        let wrong = self.deaf.iter().find(|deaf| {
+            !(1..=uavs).contains(&deaf.by.min(deaf.of)) || deaf.by.max(deaf.of) > uavs
+        });
+        if let Some(Deaf { by, of, .. }) = wrong {
+            let line = format!("--deaf {by}:{of}@..: relays must be within 1 to {uavs}");
+            return Err(Failure::input(line));
+        }
+        Ok(())
+    }
+
+    /// Puts all of it into a run that loses `loss` of the frames, once it is known how the relays talk.
+    pub(crate) fn prepare(&self, setup: &mut Setup, loss: f64) -> Result<(), Failure> {
+        let least = Bursts::shortest(loss);
+        if self.burst > 1.0 && self.burst < least {
+            let line = format!(
+                "--burst {}: must be 1, or {least:.4} to 1e6 with --loss {loss}: independent losses come in runs as long",
+                self.burst
+            );
+            return Err(Failure::input(line));
+        }
+        setup.burst = self.burst;
+        setup.link.baud = self.baud;
+        setup.deaf.clone_from(&self.deaf);
+        setup.access = match (setup.settings.wiring, self.air) {
+            (Wiring::Pair, _) | (_, Some(Sharing::Ideal)) => Access::Ideal,
+            (_, Some(Sharing::Aloha)) => Access::Aloha,
+            (_, Some(Sharing::Csma) | None) => Access::Csma,
+        };
+        if let Some(until) = self.soak {
+            setup.soak = Some(until);
+            setup.deadline = until;
+        }
+        Ok(())
+    }
+}
+
+fn deaf(text: &str) -> Result<Deaf, String> {
+    let form =
+        "must be J:I@S or J:I@S-E, two relays (1 to N) and seconds after the start (0 to 1e6)";
+    let (relays, times) = text.split_once('@').ok_or(form)?;
+    let (by, of) = relays.split_once(':').ok_or(form)?;
+    let by: u16 = by.parse().map_err(|_| form)?;
+    let of: u16 = of.parse().map_err(|_| form)?;
+    let (from, until) = span(times).ok_or(form)?;
+    if until.is_some_and(|until| until <= from) {
+        return Err("must be J:I@S-E with E after S".to_owned());
+    }
+    if by == of {
+        return Err("must be J:I@S-E with two different relays".to_owned());
+    }
+    Ok(Deaf {
+        by,
+        of,
+        from,
+        until,
+    })
+}
+
+fn soak(text: &str) -> Result<Instant, String> {
+    number(text, 1.0, 1e6)?;
+    instant(text).ok_or_else(|| "must be a number within 1.0 to 1e6".to_owned())
+}

@@ -1,0 +1,48 @@
+//! Why a run has not ended well, in words.
+
+use super::flown::version;
+use super::timeline::seconds;
+use crate::simulator::outcome::{Ending, Outcome};
+
+/// Why a run by `method` has not ended well, and what else it lacks.
+pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
+    let error = ended(method, outcome)?;
+    let missing = outcome
+        .offered()
+        .filter(|newest| *newest > version(outcome));
+    Some(match missing {
+        Some(version) => format!("{error}; mission {version} was not adopted"),
+        None => error,
+    })
+}
+
+/// Why a run has not ended well.
+fn ended(method: &str, outcome: &Outcome) -> Option<String> {
+    match outcome.ending {
+        Ending::Settled | Ending::Soaked => None,
+        Ending::Infeasible if method.ends_with("-step") => Some(
+            "none of the targets that the fixed step takes can be met; a smaller one may find one"
+                .to_owned(),
+        ),
+        Ending::Infeasible => Some("no placement gives every hop an SIR above 0".to_owned()),
+        Ending::Broken => {
+            let silent: Vec<String> = (1..)
+                .zip(&outcome.relays)
+                .filter(|(_, relay): &(u16, _)| relay.killed.is_some())
+                .map(|(index, _)| index.to_string())
+                .collect();
+            Some(format!(
+                "the chain is broken: relay {} went silent",
+                silent.join(", ")
+            ))
+        }
+        Ending::Cut => Some(
+            "the chain is cut: too few relays can reach each other to go on without the others"
+                .to_owned(),
+        ),
+        Ending::OutOfTime => Some(format!(
+            "the chain had not settled after {:.0} s",
+            seconds(outcome.ended)
+        )),
+    }
+}

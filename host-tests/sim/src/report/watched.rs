@@ -1,0 +1,70 @@
+//! What a run was like over its whole time.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use super::timeline::seconds;
+use crate::simulator::watch::Watched;
+
+/// What a run was like over its whole time; empty where that was not watched.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
+pub struct WatchedReport {
+    /// When all relays of a view held their places for the first time, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_agreement_s: Option<f64>,
+    /// The share of the time since then in which all relays that can be in one chain held its optimum.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub availability: Option<f64>,
+    /// The longest time since then in which they did not, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub longest_outage_s: Option<f64>,
+    /// The largest number of separate groups that flew an agreement of their own at once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub most_flying: Option<usize>,
+    /// The least distance that two relays ever had, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_separation_m: Option<f64>,
+}
+
+impl WatchedReport {
+    /// The report of it.
+    pub fn of(watched: Watched) -> Self {
+        let longest = watched.longest_wrong;
+        Self {
+            first_agreement_s: watched.first_agreement.map(seconds),
+            availability: watched.availability,
+            longest_outage_s: longest.map(|span| span.as_micros() as f64 / 1e6),
+            most_flying: Some(watched.most_flying),
+            least_separation_m: watched.least_separation_m.filter(|least| least.is_finite()),
+        }
+    }
+
+    /// The same as lines of text.
+    pub(super) fn text(&self) -> String {
+        let mut text = String::new();
+        if let Some(availability) = self.availability {
+            let outage = self.longest_outage_s.unwrap_or(0.0);
+            _ = match self.first_agreement_s {
+                Some(first) => writeln!(
+                    text,
+                    "availability: {availability:.6} since the first agreement at {first:.3} s; the longest outage took {outage:.3} s"
+                ),
+                None => writeln!(
+                    text,
+                    "availability: {availability:.6}, for want of any agreement"
+                ),
+            };
+        }
+        if let Some(most) = self.most_flying {
+            _ = writeln!(
+                text,
+                "most groups that flew an agreement of their own at once: {most}"
+            );
+        }
+        if let Some(least) = self.least_separation_m {
+            _ = writeln!(text, "least separation of two relays: {least:.3} m");
+        }
+        text
+    }
+}

@@ -1,0 +1,282 @@
+//! One half-duplex radio channel: a frame takes its time on the air, who sends does not hear, and frames that overlap where both are
+//! heard are lost there.
+//!
+//! A medium has no clock of its own: each call says what is due when (an [`Agenda`]), and its user calls [`Medium::happen`] then.
+
+pub mod access;
+mod counts;
+mod radio;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::{Duration, Instant};
+
+use super::link::LinkSpec;
+pub use access::Access;
+pub use counts::AirCounts;
+use radio::{Radio, State};
+
+/// Something that is due at a node.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum AirEvent {
+    /// It has waited and listens whether the channel is free.
+    Sense(usize),
+    /// Its frame begins.
+    Begin(usize),
+    /// Its frame ends.
+    End(usize),
+}
+
+/// What is due when.
+pub type Agenda = Vec<(Instant, AirEvent)>;
+
+/// A frame that is over.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Sent {
+    /// Who has sent it.
+    pub from: usize,
+    /// The frame.
+    pub frame: Vec<u8>,
+    /// The nodes that it has reached unharmed.
+    pub heard_by: Vec<usize>,
+}
+
+/// What becomes of a frame at one node.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Fate {
+    Clean,
+    Collided,
+    /// The node was sending itself.
+    Unheard,
+}
+
+/// A frame on the air.
+#[derive(Debug)]
+struct OnAir {
+    from: usize,
+    frame: Vec<u8>,
+    ends: Instant,
+    hearers: Vec<(usize, Fate)>,
+}
+
+/// The channel, and a radio for every node.
+#[derive(Debug)]
+pub struct Medium {
+    access: Access,
+    link: LinkSpec,
+    radios: Vec<Radio>,
+    on_air: Vec<OnAir>,
+    /// Its own: what it draws changes nothing in what others draw.
+    rng: ChaCha8Rng,
+    counts: AirCounts,
+}
+
+/// The stream of random numbers that back-offs are drawn from.
+const BACKOFFS: u64 = 3;
+
+impl Medium {
+    /// A quiet channel of the data rate of `link` with `nodes` radios. [`Access::Ideal`] is no channel: it is treated as ALOHA.
+    pub fn new(access: Access, link: LinkSpec, nodes: usize, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(BACKOFFS);
+        Self {
+            access,
+            link,
+            radios: (0..nodes).map(|_| Radio::default()).collect(),
+            on_air: Vec::new(),
+            rng,
+            counts: AirCounts::default(),
+        }
+    }
+
+    /// What has happened so far.
+    pub fn counts(&self) -> AirCounts {
+        self.counts
+    }
+
+    /// How long a frame of `bytes` bytes is on the air.
+    pub fn air_time(&self, bytes: usize) -> Duration {
+        self.link.line_time(access::HEADER + bytes)
+    }
+
+    /// Hands a frame to the radio of `node`; whether there was room for it.
+    pub fn offer(&mut self, now: Instant, node: usize, frame: &[u8], agenda: &mut Agenda) -> bool {
+        let Some(radio) = self.radios.get_mut(node) else {
+            return false;
+        };
+        if radio.held() >= access::QUEUE {
+            self.counts.dropped += 1;
+            return false;
+        }
+        radio.queue.push_back(frame.to_vec());
+        if radio.state == State::Idle {
+            self.next(now, node, agenda);
+        }
+        true
+    }
+
+    /// Something is due; a frame that is over with it. `hearers` tells who is in range of a node that begins to send.
+    pub fn happen(
+        &mut self,
+        now: Instant,
+        event: AirEvent,
+        hearers: impl FnOnce(usize) -> Vec<usize>,
+        agenda: &mut Agenda,
+    ) -> Option<Sent> {
+        match event {
+            AirEvent::Sense(node) => self.sense(now, node, agenda),
+            AirEvent::Begin(node) => self.begin(now, node, hearers, agenda),
+            AirEvent::End(node) => return self.end(now, node, agenda),
+        }
+        None
+    }
+
+    /// The radio of `node` is switched off: what it holds is gone, what it sends is cut short.
+    pub fn switch_off(&mut self, node: usize) {
+        if let Some(radio) = self.radios.get_mut(node) {
+            radio.queue.clear();
+            if radio.state != State::Sending {
+                radio.state = State::Idle;
+            }
+        }
+        for frame in self.on_air.iter_mut().filter(|frame| frame.from == node) {
+            for (_, fate) in &mut frame.hearers {
+                *fate = Fate::Unheard;
+            }
+        }
+    }
+
+    /// The radio of `node` is free for the next frame, if it has one.
+    fn next(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
+        let Some(radio) = self.radios.get_mut(node) else {
+            return;
+        };
+        radio.state = State::Idle;
+        if radio.queue.is_empty() {
+            return;
+        }
+        if self.access == Access::Csma {
+            self.back_off(now, node, access::LEAST_EXPONENT, agenda);
+        } else {
+            self.turn(now, node, agenda);
+        }
+    }
+
+    /// Waits a random number of slots below 2^`exponent`.
+    fn back_off(&mut self, now: Instant, node: usize, exponent: u32, agenda: &mut Agenda) {
+        let slots = self.rng.random_range(0..1_u32 << exponent);
+        let until = now + self.link.line_time(access::SLOT).times(slots);
+        if let Some(radio) = self.radios.get_mut(node) {
+            radio.state = State::Waiting { until, exponent };
+            agenda.push((until, AirEvent::Sense(node)));
+        }
+    }
+
+    /// Listens whether somebody sends whom `node` hears.
+    fn sense(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
+        let Some(State::Waiting { until, exponent }) = self.radios.get(node).map(|it| it.state)
+        else {
+            return;
+        };
+        if until != now {
+            return;
+        }
+        if self.on_air.iter().any(|frame| frame.is_heard(node, now)) {
+            self.counts.deferred += 1;
+            let exponent = (exponent + 1).min(access::MOST_EXPONENT);
+            self.back_off(now, node, exponent, agenda);
+        } else {
+            self.turn(now, node, agenda);
+        }
+    }
+
+    /// Turns from receiving to sending: what the node was receiving is lost to it.
+    fn turn(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
+        let until = now + self.link.line_time(access::TURNAROUND);
+        if let Some(radio) = self.radios.get_mut(node) {
+            radio.state = State::Turning { until };
+            agenda.push((until, AirEvent::Begin(node)));
+        }
+        for frame in &mut self.on_air {
+            frame.spoil(node, now, Fate::Unheard);
+        }
+    }
+
+    fn begin(
+        &mut self,
+        now: Instant,
+        node: usize,
+        hearers: impl FnOnce(usize) -> Vec<usize>,
+        agenda: &mut Agenda,
+    ) {
+        let Some(radio) = self.radios.get_mut(node) else {
+            return;
+        };
+        if radio.state != (State::Turning { until: now }) {
+            return;
+        }
+        let frame = radio.queue.pop_front().unwrap_or_default();
+        let ends = now + self.link.line_time(access::HEADER + frame.len());
+        radio.state = State::Sending;
+        let mut heard = Vec::new();
+        for by in hearers(node) {
+            let mut fate = Fate::Clean;
+            for other in &mut self.on_air {
+                if other.is_heard(by, now) {
+                    other.spoil(by, now, Fate::Collided);
+                    fate = Fate::Collided;
+                }
+            }
+            if self.radios.get(by).is_some_and(Radio::is_deaf) {
+                fate = Fate::Unheard;
+            }
+            heard.push((by, fate));
+        }
+        self.counts.sent += 1;
+        self.counts.air_time_us += ends.since(now).as_micros();
+        self.on_air.push(OnAir {
+            from: node,
+            frame,
+            ends,
+            hearers: heard,
+        });
+        agenda.push((ends, AirEvent::End(node)));
+    }
+
+    fn end(&mut self, now: Instant, node: usize, agenda: &mut Agenda) -> Option<Sent> {
+        let at = self
+            .on_air
+            .iter()
+            .position(|frame| frame.from == node && frame.ends == now)?;
+        let over = self.on_air.swap_remove(at);
+        let count = |fate| over.hearers.iter().filter(|(_, it)| *it == fate).count() as u64;
+        self.counts.collided += count(Fate::Collided);
+        self.counts.unheard += count(Fate::Unheard);
+        self.next(now, node, agenda);
+        let clean = over.hearers.iter().filter(|(_, fate)| *fate == Fate::Clean);
+        Some(Sent {
+            from: node,
+            frame: over.frame,
+            heard_by: clean.map(|(by, _)| *by).collect(),
+        })
+    }
+}
+
+impl OnAir {
+    /// Whether `node` hears it now: a frame that ends at this moment is in nobody's way.
+    fn is_heard(&self, node: usize, now: Instant) -> bool {
+        self.ends > now && self.hearers.iter().any(|(by, _)| *by == node)
+    }
+
+    /// It is lost to `node`, if it was not before.
+    fn spoil(&mut self, node: usize, now: Instant, how: Fate) {
+        if self.ends <= now {
+            return;
+        }
+        for (by, fate) in &mut self.hearers {
+            if *by == node && *fate == Fate::Clean {
+                *fate = how;
+            }
+        }
+    }
+}

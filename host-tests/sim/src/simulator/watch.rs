@@ -1,0 +1,130 @@
+//! How much of the time the chain is right, how many groups fly at once, and how near relays come to each other.
+
+use uav_relay::{Duration, Instant};
+
+use super::drones::{Point, apart};
+use super::flying::{self, Seen};
+use super::optimum::Optima;
+
+/// What a run was like over its whole time.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Watched {
+    /// When all relays of a view held their places for the first time.
+    pub first_agreement: Option<Instant>,
+    /// The share of the time since then in which all relays that can be in one chain held its optimum; 0 without an agreement.
+    pub availability: Option<f64>,
+    /// The longest time since then in which they did not.
+    pub longest_wrong: Option<Duration>,
+    /// The most separate groups that flew an agreement of their own at once.
+    pub most_flying: usize,
+    /// The least distance that two relays ever had, m.
+    pub least_separation_m: Option<f64>,
+}
+
+/// What has been seen of a run so far.
+#[derive(Debug, Default)]
+pub struct Watch {
+    /// Whether anything is watched.
+    pub is_on: bool,
+    pub(super) seen: Vec<Seen>,
+    pub(super) optima: Optima,
+    /// Where each relay was told to fly last, whatever has become of it since.
+    stood: Vec<Option<Point>>,
+    until: Instant,
+    first: Option<Instant>,
+    is_right: bool,
+    right: Duration,
+    wrong: Duration,
+    longest_wrong: Duration,
+    most_flying: usize,
+    least_m: Option<f64>,
+}
+
+impl Watch {
+    /// Begins to watch these relays.
+    pub fn new(seen: Vec<Seen>) -> Self {
+        Self {
+            is_on: true,
+            stood: vec![None; seen.len()],
+            seen,
+            ..Self::default()
+        }
+    }
+
+    /// Time goes on to `now`, with all as it was seen last.
+    pub fn go_on(&mut self, now: Instant) {
+        let span = now.since(self.until);
+        self.until = now;
+        if self.first.is_none() {
+            return;
+        }
+        let add = |one: Duration| Duration::from_micros(one.as_micros() + span.as_micros());
+        if self.is_right {
+            self.right = add(self.right);
+        } else {
+            self.wrong = add(self.wrong);
+            self.longest_wrong = self.longest_wrong.max(self.wrong);
+        }
+    }
+
+    /// Relay `at` (from 0) is seen; whether anything about it is new.
+    pub fn see(&mut self, at: usize, seen: Seen) -> bool {
+        let Some(known) = self.seen.get_mut(at) else {
+            return false;
+        };
+        if *known == seen {
+            return false;
+        }
+        *known = seen;
+        let before = self.stood.get(at).copied().flatten();
+        if seen.place.is_some() && seen.place != before {
+            self.move_to(at, seen.place);
+        }
+        true
+    }
+
+    fn move_to(&mut self, at: usize, place: Option<Point>) {
+        if let Some(stood) = self.stood.get_mut(at) {
+            *stood = place;
+        }
+        for (other, stood) in self.stood.iter().enumerate() {
+            if let (Some(one), Some(two)) = (place, stood)
+                && other != at
+            {
+                let apart = apart(one, *two);
+                self.least_m = Some(self.least_m.map_or(apart, |least| least.min(apart)));
+            }
+        }
+    }
+
+    /// All that has changed at this moment was seen: what does it come to?
+    pub fn take_in(&mut self, now: Instant) {
+        self.most_flying = self.most_flying.max(flying::groups(&self.seen));
+        if self.first.is_none() && flying::has_agreed(&self.seen) {
+            self.first = Some(now);
+        }
+    }
+
+    /// From now on the chain is right, or not.
+    pub fn judge(&mut self, is_right: bool) {
+        if self.is_right && !is_right {
+            self.wrong = Duration::from_micros(0);
+        }
+        self.is_right = is_right;
+    }
+
+    /// What it came to by `now`; with `flown_m`, the least distance of drones that were simulated.
+    pub fn end(mut self, now: Instant, is_judged: bool, flown_m: Option<f64>) -> Watched {
+        self.go_on(now);
+        let share = self.first.map_or(0.0, |first| {
+            self.right.as_micros() as f64 / now.since(first).as_micros().max(1) as f64
+        });
+        Watched {
+            first_agreement: self.first,
+            availability: is_judged.then_some(share),
+            longest_wrong: is_judged.then_some(self.longest_wrong),
+            most_flying: self.most_flying,
+            least_separation_m: flown_m.or(self.least_m),
+        }
+    }
+}
