@@ -146,7 +146,7 @@ impl Lease {
                     return Effects::REPEATED;
                 }
                 1 if current.done.is_some() => {
-                    self.grant(current);
+                    self.grant(context.now, current);
                     effects.heard_back = current.done;
                 }
                 // The leader has begun anew, or this relay was not asked for long.
@@ -158,9 +158,12 @@ impl Lease {
         effects
     }
 
-    /// All took part in `pulse`.
-    fn grant(&mut self, pulse: Current) {
+    /// All took part in `pulse`. It may have taken longer than the lease.
+    fn grant(&mut self, now: Instant, pulse: Current) {
         let until = pulse.handed_on + from_tenths(pulse.span);
+        if until <= now {
+            return;
+        }
         self.state = match self.state {
             LeaseState::Until(at) => LeaseState::Until(at.max(until)),
             LeaseState::Open | LeaseState::Lapsed => LeaseState::Until(until),
@@ -201,7 +204,7 @@ impl Lease {
         }
         // The first two follow each other at once: nobody else has a lease before the second.
         let first = self.state == LeaseState::Open;
-        self.grant(current);
+        self.grant(context.now, current);
         let took = context.now.since(current.handed_on);
         let eighth = self.slowest.as_micros() / 8;
         let lately = self.slowest.as_micros().saturating_sub(eighth);

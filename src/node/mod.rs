@@ -123,7 +123,7 @@ impl Node {
         let [a, b, ..] = seed.wrapping_mul(0x9E37_79B1).to_le_bytes();
         let number = u16::from_le_bytes([a, b]);
         let member = Member::new(mission, settings, identity.index);
-        let neighbours = Neighbours::new(identity.index, member.all, now, &settings);
+        let neighbours = Neighbours::new(identity.index, member.all, seed.rotate_left(8), now, &settings);
         let mut node = Self {
             update: MissionUpdate::new(member.active),
             view: ViewChange::new(member.all, mission.leader(), !seed),
@@ -416,7 +416,7 @@ impl Node {
             Message::Heartbeat { ask, answer, .. } => {
                 let neighbour = self.neighbours.at_mut(side);
                 neighbour.asked(*ask);
-                if let Some(at) = neighbour.answered(*answer, &self.member.settings) {
+                if let Some(at) = neighbour.answered(*answer) {
                     self.confirm(now, side, at);
                 }
                 return;

@@ -7,6 +7,9 @@ use crate::time::{Duration, Instant};
 /// a relay's share of it takes up to thirty portions.
 const SLOW: u32 = 4;
 
+/// A message of which nothing is heard is repeated every eight hops' time: a run of lost frames is over the sooner.
+const LOG_MOST: u32 = 2;
+
 /// What is known of the current message's getting through.
 #[derive(Clone, Debug)]
 pub(crate) struct Retransmit {
@@ -45,14 +48,14 @@ impl Retransmit {
     ///
     /// The answer may take as long as there and back over the hops that are left, and two to spare; [`SLOW`] times as long where relays
     /// compute on the way. The relay next to a lost frame runs out of patience first, so one loss costs one repetition. From then on it is
-    /// known that frames get lost here, and the message is repeated sooner, first after four hops' time and then after twice
-    /// as long each, until a neighbour says that it has arrived. A random eighth keeps relays on a shared channel from
+    /// known that frames get lost here, and the message is repeated sooner, first after four hops' time and then after
+    /// eight, until a neighbour says that it has arrived. A random eighth keeps relays on a shared channel from
     /// repeating in step.
     pub(crate) fn sent(&mut self, now: Instant, trip: Trip) {
         let answer = (2 * u32::from(trip.hops) + 2) * if trip.slow { SLOW } else { 1 };
         let hops = match self.unheard {
             0 => answer,
-            again => answer.min(2 << u32::from(again).min(16)),
+            again => answer.min(2 << u32::from(again).min(LOG_MOST)),
         };
         self.at = Some(now + self.jitter.spread(trip.hop_time.times(hops)));
     }

@@ -2,8 +2,14 @@
 //!
 //! A sign of life answers something that this relay said: a heartbeat with the number of its question, or what comes back of a pulse. It counts
 //! from when that was said, so what was recorded and is played later is none. After `Settings::probe_after` without one the neighbour
-//! is asked, sixteen times over until it counts as lost, and every `probe_after` from there on. It is lost after
-//! `Settings::dead_after`, or after the span of the lease where that is longer.
+//! is asked again and again. It is lost once all of this holds:
+//!
+//! | | lost not before | because |
+//! | --- | --- | --- |
+//! | 1 | `Settings::dead_after`, or the span of the lease where that is longer, since it was known to be there | - |
+//! | 2 | sixteen questions without an answer, or three times as many as there were before an answer lately | a run of lost frames is no death |
+//!
+//! and at the latest after eight times `dead_after`. From there on it is asked every `probe_after`.
 //!
 //! Relays of one view that choose their places jointly solve the same chain at the same time, and have nothing to say until they
 //! are done. So while a relay solves, the silence of a neighbour that it is in one view with is excused: both times count from the end
@@ -12,16 +18,22 @@
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Questions between `probe_after` and `dead_after`.
-const QUESTIONS: u64 = 16;
+/// Questions that a neighbour has to leave open at least until it is lost.
+const QUESTIONS: u16 = 16;
 
-/// How long after one question the next one is asked, while an answer is urgent.
-pub(crate) fn tick(settings: &Settings) -> Duration {
+/// How many times as many as lately.
+const MARGIN: u16 = 3;
+
+/// How long after one question the next one is asked, while an answer is urgent: sixteen times or more within `dead_after`, as often as all
+/// of a chain of `all` relays can do on one channel.
+pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     let span = settings
         .dead_after
         .as_micros()
         .saturating_sub(settings.probe_after.as_micros());
-    Duration::from_micros((span / QUESTIONS).max(1))
+    let round = settings.hop_time.times(2 * u32::from(all));
+    let most = (span / u64::from(QUESTIONS)).max(1);
+    Duration::from_micros(round.as_micros().clamp(span / 64 + 1, most.max(span / 64 + 1)))
 }
 
 /// Questions that may still be answered.
@@ -38,6 +50,9 @@ pub(crate) struct Liveness {
     /// The last question, 0 before any, and when it was asked.
     question: u16,
     asked: Instant,
+    /// Questions since it was known to be there, and the most of them before an answer lately.
+    unanswered: u16,
+    longest: u16,
 }
 
 /// What follows from a silence.
@@ -57,6 +72,8 @@ impl Liveness {
             met: false,
             question: 0,
             asked: now,
+            unanswered: 0,
+            longest: QUESTIONS,
         }
     }
 
@@ -74,6 +91,9 @@ impl Liveness {
     pub(crate) fn confirmed(&mut self, at: Instant) -> bool {
         self.heard = self.heard.max(at);
         self.met = true;
+        let lately = self.longest.saturating_sub(self.longest.div_ceil(8));
+        self.longest = self.unanswered.max(lately);
+        self.unanswered = 0;
         core::mem::take(&mut self.lost)
     }
 
@@ -84,16 +104,17 @@ impl Liveness {
             number => number,
         };
         self.asked = now;
+        self.unanswered = self.unanswered.saturating_add(1);
         self.question
     }
 
     /// When a question of that number was asked, if it is one of the last few.
-    pub(crate) fn answered(&self, number: u16, settings: &Settings) -> Option<Instant> {
+    pub(crate) fn answered(&self, number: u16, tick: Duration) -> Option<Instant> {
         let before = self.question.wrapping_sub(number);
         if number == 0 || self.question == 0 || before >= OPEN {
             return None;
         }
-        let since = tick(settings).times(u32::from(before)).as_micros();
+        let since = tick.times(u32::from(before)).as_micros();
         let asked = self.asked.as_micros().saturating_sub(since);
         Some(Instant::from_micros(asked))
     }
@@ -106,15 +127,24 @@ impl Liveness {
         !self.lost
     }
 
-    /// Nothing has come for a while.
-    pub(crate) fn silent(&mut self, now: Instant, dead: Duration, settings: &Settings) -> Silence {
-        let gone = now.since(self.heard) >= dead;
+    /// Nothing has come for a while. It does not count as lost before `dead`.
+    pub(crate) fn silent(
+        &mut self,
+        now: Instant,
+        dead: Duration,
+        tick: Duration,
+        settings: &Settings,
+    ) -> Silence {
+        let silent = now.since(self.heard);
+        let run = if self.met { self.longest } else { 0 };
+        let enough = self.unanswered >= run.saturating_mul(MARGIN).max(QUESTIONS);
+        let gone = silent >= dead && (enough || silent >= settings.dead_after.times(8));
         let lost = gone && !self.lost;
         self.lost |= gone;
         let look_again = if self.lost {
             now + settings.probe_after
         } else {
-            (now + tick(settings)).min(self.heard + dead)
+            now + tick
         };
         Silence { lost, look_again }
     }

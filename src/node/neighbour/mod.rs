@@ -24,15 +24,15 @@ pub(crate) struct Neighbours {
 
 impl Neighbours {
     /// Of node `node` of a chain of `all`.
-    pub(crate) fn new(node: u16, all: u16, now: Instant, settings: &Settings) -> Self {
+    pub(crate) fn new(node: u16, all: u16, seed: u32, now: Instant, settings: &Settings) -> Self {
         let after = if node < all {
             node.saturating_add(1)
         } else {
             0
         };
         Self {
-            upstream: Neighbour::new(node.saturating_sub(1), now, settings),
-            downstream: Neighbour::new(after, now, settings),
+            upstream: Neighbour::new(node.saturating_sub(1), all, seed, now, settings),
+            downstream: Neighbour::new(after, all, !seed, now, settings),
         }
     }
 

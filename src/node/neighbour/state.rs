@@ -15,6 +15,7 @@
 //! chain less and less. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be about to take it, too.
 
 use super::liveness::{Liveness, tick};
+use crate::jitter::Jitter;
 use crate::node::context::Proposer;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -100,6 +101,9 @@ pub(crate) struct Neighbour {
     /// The nodes heard since `since`, and in the span before: bit 0 is the nearest one.
     hearing: Hearing,
     losses: u8,
+    /// How long after one question the next one is asked.
+    tick: Duration,
+    jitter: Jitter,
     signs: Signs,
     /// The newest mission that the node taken holds, as far as it has said.
     pub(crate) holds: Option<MissionId>,
@@ -118,7 +122,7 @@ pub(crate) struct Neighbour {
 
 impl Neighbour {
     /// The side where `node` is taken to be, 0 for none.
-    pub(crate) fn new(node: u16, now: Instant, settings: &Settings) -> Self {
+    pub(crate) fn new(node: u16, all: u16, seed: u32, now: Instant, settings: &Settings) -> Self {
         let look_at = if node == 0 {
             None
         } else {
@@ -145,6 +149,8 @@ impl Neighbour {
                 before: 0,
             },
             losses: 0,
+            tick: tick(settings, all),
+            jitter: Jitter::new(seed),
             signs: Signs {
                 ask: false,
                 answer: 0,
@@ -245,7 +251,7 @@ impl Neighbour {
         let back = self.liveness.confirmed(at);
         if self.is_mutual() {
             let next = at + settings.probe_after;
-            self.look_at = Some(next.max(now + tick(settings)));
+            self.look_at = Some(next.max(now + self.tick));
         }
         back
     }
@@ -258,8 +264,8 @@ impl Neighbour {
     }
 
     /// The neighbour has answered the question of that number: when that was asked.
-    pub(crate) fn answered(&self, number: u16, settings: &Settings) -> Option<Instant> {
-        self.liveness.answered(number, settings)
+    pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
+        self.liveness.answered(number, self.tick)
     }
 
     /// Whether somebody is there, and takes this relay for its neighbour, too, as far as it has said.
@@ -274,7 +280,7 @@ impl Neighbour {
                 (NeighbourState::Linked, settings.probe_after)
             }
             (NeighbourState::Linked, false) => {
-                (NeighbourState::Pairing { since: now }, tick(settings))
+                (NeighbourState::Pairing { since: now }, self.tick)
             }
             _ => return false,
         };
@@ -311,7 +317,7 @@ impl Neighbour {
         dead: Duration,
         searches: bool,
     ) -> bool {
-        let step = tick(settings);
+        let step = self.jitter.spread(self.tick);
         let span = settings
             .dead_after
             .as_micros()
@@ -321,7 +327,7 @@ impl Neighbour {
         let mut look_again = now + step;
         match self.state {
             NeighbourState::Linked => {
-                let silence = self.liveness.silent(now, dead, settings);
+                let silence = self.liveness.silent(now, dead, step, settings);
                 lost = silence.lost;
                 self.signs.ask = true;
                 if lost && searches {
@@ -332,7 +338,7 @@ impl Neighbour {
                 }
             }
             NeighbourState::Pairing { since } => {
-                lost = self.liveness.silent(now, settings.dead_after, settings).lost;
+                lost = self.liveness.silent(now, settings.dead_after, step, settings).lost;
                 self.hello_all();
                 if lost || is_over(since) {
                     self.search(now);
@@ -347,7 +353,7 @@ impl Neighbour {
             NeighbourState::NoPeer => {
                 self.hello_all();
                 if !self.is_near(now, settings) {
-                    look_again = now + settings.dead_after;
+                    look_again = now + self.jitter.spread(settings.dead_after);
                 }
             }
         }
@@ -363,7 +369,7 @@ impl Neighbour {
     /// A node that is not taken has been heard: where the chain has ended here so far, and nobody was near, it is looked after.
     pub(crate) fn notice(&mut self, now: Instant, settings: &Settings) {
         if self.has_no_peer() && !self.is_near(now, settings) {
-            self.look_at = Some(now + tick(settings));
+            self.look_at = Some(now + self.tick);
         }
         self.near = Some(now);
     }
@@ -406,7 +412,7 @@ impl Neighbour {
         self.liveness = Liveness::new(now);
         self.liveness.met();
         self.hold_down = None;
-        self.look_at = Some(now + tick(settings));
+        self.look_at = Some(now + self.tick);
         true
     }
 

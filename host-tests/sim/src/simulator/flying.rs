@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use uav_relay::{Phase, Relay};
+use uav_relay::{Phase, Relay, ViewId};
 
 use super::drones::Point;
 
@@ -13,8 +13,10 @@ pub struct Seen {
     pub is_on: bool,
     /// What it does.
     pub phase: Phase,
-    /// The number of its view.
-    pub view: u16,
+    /// Its view.
+    pub view: ViewId,
+    /// Whether it may hold what was agreed on in it, by its own clock.
+    pub leased: bool,
     /// How many relays that has.
     pub relays: u16,
     /// Its place among them, from 1.
@@ -35,6 +37,7 @@ impl Seen {
             is_on,
             phase: relay.phase(),
             view: relay.view(),
+            leased: relay.lease().is_some(),
             relays: relay.mission().relays(),
             index: relay.index(),
             version: relay.version(),
@@ -44,35 +47,26 @@ impl Seen {
     }
 
     /// The view that it is in.
-    fn part_of(&self) -> (u16, u16) {
+    fn part_of(&self) -> (ViewId, u16) {
         (self.view, self.relays)
     }
 
     /// Whether it flies an agreement.
     fn flies(&self) -> bool {
-        let agreed = matches!(
-            self.phase,
-            Phase::Holding | Phase::Answered | Phase::Waiting
-        );
-        self.is_on && agreed && self.place.is_some()
+        self.is_on && self.leased && self.place.is_some()
     }
 }
 
 /// How many separate groups fly an agreement of their own.
 ///
-/// A group are the relays of one view that fly an agreement, none of them without a quorum. Relays of one view that claim the same place
-/// in it are of two groups. Relays that a partition has separated, and that still hold what they agreed together, are one group: they are
-/// parts of one chain.
+/// A group are the relays of one view whose leases have not run out. Relays of one view that claim the same place in it are of two
+/// groups. Relays that a partition has separated, and that still hold what they agreed together, are one group: they are parts of one
+/// chain.
 pub fn groups(seen: &[Seen]) -> usize {
-    let mut views: BTreeMap<(u16, u16), BTreeMap<u16, usize>> = BTreeMap::new();
+    let mut views: BTreeMap<(ViewId, u16), BTreeMap<u16, usize>> = BTreeMap::new();
     for one in seen.iter().filter(|one| one.flies()) {
         let claims = views.entry(one.part_of()).or_default();
         *claims.entry(one.index).or_default() += 1;
-    }
-    for one in seen {
-        if one.is_on && one.phase == Phase::NoQuorum {
-            views.remove(&one.part_of());
-        }
     }
     let claims = views.values().filter_map(|claims| claims.values().max());
     claims.sum()
