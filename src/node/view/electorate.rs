@@ -133,11 +133,19 @@ impl Electorate {
         self.accepted = None;
     }
 
-    /// Accepts what was decided on `proposal`, unless it has promised a later one; whether it has.
-    pub(crate) fn accept(&mut self, proposal: ViewId, view: View) -> bool {
-        if proposal != self.promised {
+    /// What was decided on `proposal` follows `base`; whether it is to be taken up: not where a later one was promised.
+    pub(crate) fn hear(&mut self, proposal: ViewId, base: View) -> bool {
+        if proposal != self.promised || base.id < self.agreed.id {
             return false;
         }
+        if base.id > self.agreed.id {
+            self.learn(base);
+        }
+        true
+    }
+
+    /// Accepts `view`, which was decided on `proposal`.
+    pub(crate) fn accept(&mut self, proposal: ViewId, view: View) {
         let known = self
             .accepted
             .is_some_and(|accepted| accepted.successor.view.id == view.id && accepted.member);
@@ -145,7 +153,6 @@ impl Electorate {
             successor: Successor { proposal, view },
             member: view.id == proposal || known,
         });
-        true
     }
 
     /// What it has accepted last is known to be accepted by all.

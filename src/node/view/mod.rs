@@ -63,6 +63,8 @@ pub(crate) struct Proposed {
     /// What it has gathered, this relay's voice included.
     poll: Poll,
     handed_on: bool,
+    /// The view that the decision follows, once that is known.
+    base: View,
     /// What was decided on, once that is known; `None` if too few are there.
     decided: Option<View>,
     lease_left: u16,
@@ -276,6 +278,7 @@ impl ViewChange {
             place: place.saturating_add(1),
             poll,
             handed_on: false,
+            base: poll.agreed,
             decided: None,
             lease_left: 0,
         });
@@ -319,7 +322,7 @@ impl ViewChange {
             Outcome::Refused => None,
             Outcome::View(view) => Some(view),
         };
-        self.conclude(context, decided, lease_left)
+        self.conclude(context, poll.agreed, decided, lease_left)
     }
 
     fn on_decision(&mut self, context: &Context<'_>, decision: &Decision) -> Effects {
@@ -332,7 +335,12 @@ impl ViewChange {
                         view.id != proposed.view || view.relays > proposed.place
                     }) =>
             {
-                self.conclude(context, decision.view, decision.lease_left)
+                self.conclude(
+                    context,
+                    decision.base,
+                    decision.view,
+                    decision.lease_left,
+                )
             }
             _ => Effects::STALE,
         }
@@ -341,6 +349,7 @@ impl ViewChange {
     fn conclude(
         &mut self,
         context: &Context<'_>,
+        base: View,
         decided: Option<View>,
         lease_left: u16,
     ) -> Effects {
@@ -353,9 +362,13 @@ impl ViewChange {
             return Effects::FOREIGN;
         }
         let proposal = proposed.view;
-        if decided.is_some_and(|view| !self.electorate.accept(proposal, view)) {
+        if !self.electorate.hear(proposal, base) {
             return Effects::STALE;
         }
+        if let Some(view) = decided {
+            self.electorate.accept(proposal, view);
+        }
+        proposed.base = base;
         proposed.decided = decided;
         proposed.lease_left = lease_left;
         let leads = proposed.place == 1;
@@ -498,6 +511,7 @@ impl ViewChange {
                 mission_id: proposed.mission_id,
                 proposal: proposed.view,
                 place: proposed.place,
+                base: proposed.base,
                 view: proposed.decided,
                 lease_left: proposed.lease_left,
             }));

@@ -71,6 +71,8 @@ pub struct Decision {
     pub proposal: ViewId,
     /// The sender's place, from 1 at the one that has proposed: 1 to 1000.
     pub place: u16,
+    /// The newest view that any relay on the way knew to be agreed on: what is decided follows it.
+    pub base: View,
     /// The view to be accepted: the one proposed, or one that was decided on before; `None` if too few members are there.
     pub view: Option<View>,
     /// How long its places are not to be taken, for the sake of members of the view before that are elsewhere, in tenths of a second.
@@ -139,6 +141,11 @@ fn is_proposed(id: ViewId) -> bool {
     is_size(id.proposer()) && id.number() > 0
 }
 
+/// Whether a chain can be in it.
+fn is_view(view: View) -> bool {
+    (view.id == ViewId::LOADED || is_proposed(view.id)) && is_size(view.relays)
+}
+
 fn is_size(relays: u16) -> bool {
     (1..=MAX_RELAYS).contains(&relays)
 }
@@ -179,8 +186,7 @@ impl Proposal {
             lease_left: u16::from_le_bytes(lease_left),
             successor,
         };
-        let known = (agreed.id == ViewId::LOADED || is_proposed(agreed.id))
-            && is_size(agreed.relays)
+        let known = is_view(agreed)
             && poll.votes <= agreed.relays
             && successor.is_none_or(|successor| {
                 is_proposed(successor.proposal)
@@ -212,16 +218,18 @@ impl Decision {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let call = CallBody::new(self.mission_id, self.proposal, self.place);
         let view = self.view.map(SizedBody::of);
-        write(
-            &(tag::DECISION, call, view, self.lease_left.to_le_bytes()),
-            buffer,
-        )
+        let base = SizedBody::of(self.base);
+        let left = self.lease_left.to_le_bytes();
+        write(&(tag::DECISION, call, base, view, left), buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (call, view, lease_left): (CallBody, Option<SizedBody>, Word) = read(body)?;
+        let (call, base, view, lease_left): (CallBody, SizedBody, Option<SizedBody>, Word) =
+            read(body)?;
+        let base = base.view();
         let view = view.map(SizedBody::view);
-        let known = view.is_none_or(|view| is_proposed(view.id) && is_size(view.relays));
+        let known = is_view(base)
+            && view.is_none_or(|view| is_proposed(view.id) && is_size(view.relays));
         let (mission_id, proposal, place) = call
             .checked()
             .filter(|_| known)
@@ -230,6 +238,7 @@ impl Decision {
             mission_id,
             proposal,
             place,
+            base,
             view,
             lease_left: u16::from_le_bytes(lease_left),
         })

@@ -168,6 +168,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
             mission_id,
             proposal: view,
             place,
+            base: loaded,
             view: rng.random::<bool>().then_some(View {
                 id: view,
                 relays: rng.random_range(1..=mission.relays()),
