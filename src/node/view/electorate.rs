@@ -6,7 +6,7 @@
 //! | step | on the way | what a relay does | kept |
 //! | --- | --- | --- | --- |
 //! | proposal | onward | promises to accept no earlier proposal, and says what it accepted before | `promised` |
-//! | decision | back | accepts the view that was decided on, unless it has promised more since | `accepted` |
+//! | decision | back | accepts the view that was decided on, unless it has promised more since | `accepted`, `votes` |
 //! | a pass of that view | onward | knows that all accepted it | `agreed` |
 //!
 //! The last relay decides by what the proposal has gathered, the poll:
@@ -25,22 +25,20 @@
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
-/// A view that this relay has accepted, and does not know to be agreed on.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Accepted {
-    successor: Successor,
-    /// Whether it is a member.
-    member: bool,
-}
+/// Proposals that a relay remembers to have taken part in while it does not know what came of them.
+const VOTES: usize = 8;
 
 /// What one relay has said in the votes on views, and knows of them.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Electorate {
     /// The newest view that it knows to be agreed on, and whether it is a member.
     agreed: View,
     member: bool,
     promised: ViewId,
-    accepted: Option<Accepted>,
+    /// The successor of `agreed` that it has accepted, and does not know to be agreed on.
+    accepted: Option<Successor>,
+    /// The proposals after `agreed` that it has taken part in: it is a member of the views that come of them.
+    votes: heapless::Vec<ViewId, VOTES>,
     /// The node whose half of the chain as it was loaded is the larger.
     elder: u16,
 }
@@ -63,6 +61,7 @@ impl Electorate {
             member: true,
             promised: ViewId::LOADED,
             accepted: None,
+            votes: heapless::Vec::new(),
             elder,
         }
     }
@@ -70,11 +69,6 @@ impl Electorate {
     /// The largest proposal that it has taken part in.
     pub(crate) const fn promised(&self) -> ViewId {
         self.promised
-    }
-
-    /// The newest view that it knows to be agreed on.
-    pub(crate) const fn agreed(&self) -> View {
-        self.agreed
     }
 
     /// Takes part in `proposal`, which has gathered `told` so far, if it has promised no later one; what is gathered with it.
@@ -91,6 +85,12 @@ impl Electorate {
             return None;
         }
         self.promised = proposal;
+        if self.votes.is_full() {
+            // Of the oldest one it is the most likely that nothing came.
+            self.votes.rotate_left(1);
+            self.votes.pop();
+        }
+        _ = self.votes.push(proposal);
         let told = told.unwrap_or(Poll::of(self.agreed));
         if told.agreed.id > self.agreed.id {
             self.learn(told.agreed);
@@ -102,8 +102,7 @@ impl Electorate {
         } else {
             told
         };
-        let own = self.accepted.map(|accepted| accepted.successor);
-        let successor = match (before.successor, own) {
+        let successor = match (before.successor, self.accepted) {
             (Some(told), Some(own)) if told.proposal >= own.proposal => Some(told),
             (told, own) => own.or(told),
         };
@@ -125,47 +124,42 @@ impl Electorate {
 
     /// `view` is known to be agreed on.
     fn learn(&mut self, view: View) {
-        let accepted = self
-            .accepted
-            .filter(|accepted| accepted.successor.view.id == view.id);
-        self.member = accepted.is_some_and(|accepted| accepted.member);
+        self.member = self.votes.contains(&view.id);
+        self.votes.retain(|vote| *vote > view.id);
         self.agreed = view;
         self.accepted = None;
     }
 
-    /// What was decided on `proposal` follows `base`; whether it is to be taken up: not where a later one was promised.
-    pub(crate) fn hear(&mut self, proposal: ViewId, base: View) -> bool {
+    /// What was decided on `proposal`, a view that follows `base` or none, is accepted, unless this relay has promised more since; whether
+    /// it is.
+    pub(crate) fn accept(&mut self, proposal: ViewId, base: View, view: Option<View>) -> bool {
         if proposal != self.promised || base.id < self.agreed.id {
             return false;
         }
         if base.id > self.agreed.id {
             self.learn(base);
         }
+        if let Some(view) = view {
+            // No other of the proposals so far can be agreed on any more.
+            self.votes.retain(|vote| *vote == view.id);
+            self.accepted = Some(Successor { proposal, view });
+        } else {
+            self.votes.retain(|vote| *vote != proposal);
+        }
         true
-    }
-
-    /// Accepts `view`, which was decided on `proposal`.
-    pub(crate) fn accept(&mut self, proposal: ViewId, view: View) {
-        let known = self
-            .accepted
-            .is_some_and(|accepted| accepted.successor.view.id == view.id && accepted.member);
-        self.accepted = Some(Accepted {
-            successor: Successor { proposal, view },
-            member: view.id == proposal || known,
-        });
     }
 
     /// What it has accepted last is known to be accepted by all.
     pub(crate) fn commit(&mut self) {
         if let Some(accepted) = self.accepted {
-            self.learn(accepted.successor.view);
+            self.learn(accepted.view);
         }
     }
 
     /// Whether it has accepted `view`, and does not know that all have.
     pub(crate) fn awaits(&self, view: ViewId) -> bool {
         self.accepted
-            .is_some_and(|accepted| accepted.successor.view.id == view)
+            .is_some_and(|accepted| accepted.view.id == view)
     }
 }
 

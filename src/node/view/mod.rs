@@ -62,7 +62,8 @@ pub(crate) struct Proposed {
     pub(crate) place: u16,
     /// What it has gathered, this relay's voice included.
     poll: Poll,
-    handed_on: bool,
+    /// The node that it was handed on to, 0 for none.
+    handed_to: u16,
     /// The view that the decision follows, once that is known.
     base: View,
     /// What was decided on, once that is known; `None` if too few are there.
@@ -181,7 +182,7 @@ impl ViewChange {
     }
 
     /// The relay that a proposal was handed on to is not there any more: what comes of it can not be known. A later one can be.
-    pub(crate) fn abandon(&mut self, context: &Context<'_>) -> Effects {
+    fn abandon(&mut self, context: &Context<'_>) -> Effects {
         if let Some(later) = self.newest.next_by(context.member.node) {
             self.heard_of(later);
         }
@@ -277,7 +278,7 @@ impl ViewChange {
             mission_id,
             place: place.saturating_add(1),
             poll,
-            handed_on: false,
+            handed_to: 0,
             base: poll.agreed,
             decided: None,
             lease_left: 0,
@@ -302,7 +303,7 @@ impl ViewChange {
         let Some(proposed) = self.awaited() else {
             return Effects::NONE;
         };
-        if proposed.handed_on {
+        if proposed.handed_to != 0 {
             return self.abandon(context);
         }
         let Proposed {
@@ -362,11 +363,8 @@ impl ViewChange {
             return Effects::FOREIGN;
         }
         let proposal = proposed.view;
-        if !self.electorate.hear(proposal, base) {
+        if !self.electorate.accept(proposal, base, decided) {
             return Effects::STALE;
-        }
-        if let Some(view) = decided {
-            self.electorate.accept(proposal, view);
         }
         proposed.base = base;
         proposed.decided = decided;
@@ -487,13 +485,20 @@ impl ViewChange {
     }
 
     /// Whether the proposal is to be sent onward; it is taken for sent then.
-    pub(crate) fn take_onward(&mut self, context: &Context<'_>) -> Option<Message> {
+    ///
+    /// It goes to node `to`, and to no other one after that: who has taken part in it counts.
+    pub(crate) fn take_onward(&mut self, context: &Context<'_>, to: u16) -> Option<Message> {
         self.awaited()?;
         if !core::mem::take(&mut self.due.proposal) {
             return None;
         }
         let proposed = self.proposed.as_mut()?;
-        proposed.handed_on = true;
+        if proposed.handed_to != 0 && proposed.handed_to != to {
+            self.abandon(context);
+            return None;
+        }
+        proposed.handed_to = to;
+        let proposed = *proposed;
         self.retransmit.sent(context.now, trip(context));
         Some(Message::Proposal(Proposal {
             mission_id: proposed.mission_id,
