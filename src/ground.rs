@@ -315,6 +315,7 @@ impl Ground {
                 mission: self.base,
                 newest: ViewId::LOADED,
                 hears: 0,
+                behind: 1,
                 neighbour: 0,
                 ask: true,
                 form: false,

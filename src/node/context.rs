@@ -1,6 +1,6 @@
 //! What a relay is and flies, as every layer is handed it, and what a layer asks of the others.
 
-use crate::mission::{Band, Mission};
+use crate::mission::{Band, Heading, Mission};
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
 use crate::time::Instant;
@@ -40,6 +40,15 @@ impl Member {
             index: node,
             mission,
         }
+    }
+
+    /// Its place from the leader on, from 1, and how many there are, while nothing was counted.
+    pub(crate) const fn place_in_all(&self) -> (u16, u16) {
+        let place = match self.mission.heading() {
+            Heading::TowardRx => self.node,
+            Heading::TowardTx => self.all.saturating_sub(self.node).saturating_add(1),
+        };
+        (place, self.all)
     }
 
     /// The digest that passes bear in the view agreed on.

@@ -54,7 +54,7 @@ use context::{Context, Decided, Effects, Member};
 use lease::Lease;
 use mission_update::{MissionUpdate, takes_uploads};
 use neighbour::Neighbours;
-use neighbour::state::CANDIDATES;
+use neighbour::state::{CANDIDATES, Candidate};
 use round::Round;
 use round::state::Phase;
 use sample::{Meter, Sample};
@@ -612,6 +612,22 @@ impl Node {
         None
     }
 
+    /// How many relays there are on that side in the part of the chain that this relay is in, as it was counted last.
+    fn beyond(&self, side: Side) -> u16 {
+        if self.neighbours.at(side).has_no_peer() {
+            return 0;
+        }
+        let (place, all) = self
+            .view
+            .counted()
+            .unwrap_or_else(|| self.member.place_in_all());
+        if side == self.back() {
+            place.saturating_sub(1)
+        } else {
+            all.saturating_sub(place)
+        }
+    }
+
     fn hello(&self, now: Instant, side: Side, ask: bool) -> Hello {
         let latest = self.update.latest();
         Hello {
@@ -622,6 +638,7 @@ impl Node {
             form: self.view.asks() && side == self.back(),
             fresh: self.round.is_fresh(),
             ready: self.neighbours.at(side.other()).is_ready(),
+            behind: self.beyond(side.other()).saturating_add(1),
             hears: self.neighbours.at(side).hears(now, &self.member.settings),
             holds: latest,
             flies: self.member.active == latest,
@@ -641,7 +658,9 @@ impl Node {
             self.compare(side, from, hello.holds);
             self.neighbours.at_mut(side).holds = Some(hello.holds);
             if self.searches() {
-                let mutual = hello.neighbour == own && hears(own, from, hello.hears);
+                let two_way = hears(own, from, hello.hears);
+                self.neighbours.at_mut(side).hears_back(two_way);
+                let mutual = hello.neighbour == own && two_way;
                 self.told(now, side, mutual);
             }
             let waits = self.view.awaited().is_some();
@@ -659,6 +678,7 @@ impl Node {
     /// One that does not hear this relay is none: nothing can be agreed on with it.
     fn consider(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
+        let there = self.beyond(side);
         let Self {
             member,
             neighbours,
@@ -672,8 +692,14 @@ impl Node {
             return;
         }
         let pairs = hello.neighbour == own;
-        let nearer = from.abs_diff(own) < neighbour.node().abs_diff(own);
-        if neighbour.consider(from, pairs, nearer, hello.ready, now, &member.settings) {
+        let candidate = Candidate {
+            node: from,
+            pairs,
+            nearer: from.abs_diff(own) < neighbour.node().abs_diff(own),
+            ready: hello.ready,
+            longer: hello.behind > there,
+        };
+        if neighbour.consider(candidate, now, &member.settings) {
             neighbour.holds = Some(hello.holds);
             steering.link(side, Some(from));
             self.raise(Event::NeighbourBack(side));

@@ -1,18 +1,21 @@
 //! One side of a relay: which node it takes for its neighbour there, and what it does about silence.
 //!
-//! | state | the node taken is silent for `dead_after` | it says that it takes another | a hello comes from a node not taken | time passes |
+//! | state | the node taken is lost | it says that it takes another, or does not hear this relay | a hello comes from a node not taken that hears this relay | time passes |
 //! | --- | --- | --- | --- | --- |
-//! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead, if it is nearer, can hear a node beyond and was heard all through a hold-down | - |
+//! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead after a hold-down, if it is better | - |
 //! | `Pairing` | `Searching` | - | as above | after a span `Searching` |
-//! | `Searching` | - | - | taken, if it takes this relay or nobody | after a span `NoPeer` |
-//! | `NoPeer` | - | - | taken, if it takes this relay, or was heard all through a hold-down | the four nearest nodes are sent a hello every `dead_after`, and more often once one was heard |
+//! | `Searching` | - | - | taken; one that comes and goes after a hold-down | after a span `NoPeer` |
+//! | `NoPeer` | - | - | taken, if it takes this relay; else, or if it comes and goes, after a hold-down | the four nearest nodes are sent a hello every `dead_after`, and more often once one was heard |
 //!
-//! A span is as long as a silent neighbour is asked for, `dead_after` less `probe_after`. A node that has been taken is paired with until it
-//! says that it has taken this relay, too.
+//! A span is `dead_after` less `probe_after`. A node that has been taken is paired with until it says that it has taken this relay, too.
+//! A node that takes another one is not taken. *Better* is a nearer node that has somebody beyond it who hears it, and a farther one by which more
+//! relays hang together: then the link that is missing is on the other side of the node taken, and it is left out.
 //!
-//! While it searches, it sends hellos to the four nearest nodes there: as many as three relays in a row may be lost at once. The hold-down
-//! is `dead_after`, and twice as long after every loss on that side up to sixteen times: a link that comes and goes disturbs the
-//! chain less and less. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be about to take it, too.
+//! While it searches, it sends hellos to the four nearest nodes there: as many as three relays in a row may be lost at once. In a hold-down
+//! a node has to be heard all through: `probe_after` at first; after a second loss on that side `dead_after`, and twice as long after every
+//! other one up to sixteen times, so that a link that comes and goes disturbs the chain less and less. A loss is forgotten after 32 times
+//! `dead_after` without another. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be
+//! about to take it, too.
 
 use super::liveness::{Liveness, tick};
 use crate::jitter::Jitter;
@@ -26,6 +29,30 @@ pub(crate) const CANDIDATES: u16 = 4;
 
 /// Doublings of the hold-down.
 const DOUBLINGS: u8 = 4;
+
+/// After so many times `dead_after` without another, a loss is forgotten.
+const MEMORY: u32 = 32;
+
+/// A node that is not taken, and hears this relay.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) node: u16,
+    /// Whether it takes this relay for its neighbour.
+    pub(crate) pairs: bool,
+    /// Whether it is nearer than the one taken.
+    pub(crate) nearer: bool,
+    /// Whether it has somebody beyond it.
+    pub(crate) ready: bool,
+    /// Whether more relays hang together by it than by the one taken.
+    pub(crate) longer: bool,
+}
+
+impl Candidate {
+    /// Whether it is to take the place of another one.
+    const fn is_better(&self) -> bool {
+        if self.nearer { self.ready } else { self.longer }
+    }
+}
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
@@ -96,6 +123,11 @@ pub(crate) struct Neighbour {
     state: NeighbourState,
     liveness: Liveness,
     hold_down: Option<HoldDown>,
+    /// Whether the node taken has said that it hears this relay.
+    two_way: bool,
+    /// The node that was lost last, and when.
+    lost: u16,
+    lost_at: Instant,
     /// When a node that is not taken was heard last.
     near: Option<Instant>,
     /// The nodes heard since `since`, and in the span before: bit 0 is the nearest one.
@@ -142,6 +174,9 @@ impl Neighbour {
             },
             liveness: Liveness::new(now),
             hold_down: None,
+            two_way: false,
+            lost: 0,
+            lost_at: now,
             near: None,
             hearing: Hearing {
                 since: now,
@@ -175,12 +210,13 @@ impl Neighbour {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Whether nobody is needed there, or somebody can be heard.
+    /// Whether somebody is there that hears this relay, and is heard.
     pub(crate) fn is_ready(&self) -> bool {
         match self.state {
-            NeighbourState::NoPeer => true,
-            NeighbourState::Linked | NeighbourState::Pairing { .. } => self.liveness.is_there(),
-            NeighbourState::Searching { .. } => false,
+            NeighbourState::Linked | NeighbourState::Pairing { .. } => {
+                self.two_way && self.liveness.is_there()
+            }
+            NeighbourState::NoPeer | NeighbourState::Searching { .. } => false,
         }
     }
 
@@ -250,8 +286,10 @@ impl Neighbour {
     pub(crate) fn confirmed(&mut self, now: Instant, at: Instant, settings: &Settings) -> bool {
         let back = self.liveness.confirmed(at);
         if self.is_mutual() {
-            let next = at + settings.probe_after;
-            self.look_at = Some(next.max(now + self.tick));
+            let next = (at + settings.probe_after).max(now + self.tick);
+            // Another node than before is to be counted once its grace is over.
+            let waits = self.node != self.counted && now < self.grace;
+            self.look_at = Some(if waits { next.min(self.grace) } else { next });
         }
         back
     }
@@ -271,6 +309,11 @@ impl Neighbour {
     /// Whether somebody is there, and takes this relay for its neighbour, too, as far as it has said.
     pub(crate) fn is_mutual(&self) -> bool {
         self.state == NeighbourState::Linked
+    }
+
+    /// The neighbour has said whether it hears this relay.
+    pub(crate) const fn hears_back(&mut self, two_way: bool) {
+        self.two_way = two_way;
     }
 
     /// The neighbour has said whether it takes this relay for its own; whether that is new.
@@ -331,7 +374,7 @@ impl Neighbour {
                 lost = silence.lost;
                 self.signs.ask = true;
                 if lost && searches {
-                    self.losses = self.losses.saturating_add(1);
+                    self.lose(now, settings);
                     self.search(now);
                 } else {
                     look_again = silence.look_again;
@@ -374,6 +417,15 @@ impl Neighbour {
         self.near = Some(now);
     }
 
+    /// The node taken is lost: one more of a link that comes and goes, or the first one for long.
+    fn lose(&mut self, now: Instant, settings: &Settings) {
+        let long = now.since(self.lost_at) >= settings.dead_after.times(MEMORY);
+        let before = if long { 0 } else { self.losses };
+        self.losses = before.saturating_add(1);
+        self.lost = self.node;
+        self.lost_at = now;
+    }
+
     const fn search(&mut self, now: Instant) {
         self.node = 0;
         self.state = NeighbourState::Searching { since: now };
@@ -383,22 +435,23 @@ impl Neighbour {
 
     /// A node that is not taken has sent a hello: whether it is taken from now on.
     ///
-    /// `courts` is whether it takes this relay for its neighbour (else nobody), `nearer` whether it is nearer than the one
-    /// taken, `ready` whether it can hear a node beyond.
+    /// It is one that hears this relay, and takes it for its neighbour or nobody.
     pub(crate) fn consider(
         &mut self,
-        node: u16,
-        courts: bool,
-        nearer: bool,
-        ready: bool,
+        candidate: Candidate,
         now: Instant,
         settings: &Settings,
     ) -> bool {
+        let node = candidate.node;
+        // A link that comes and goes has to stay for a while first.
+        let flaps = node == self.lost && self.losses > 1;
         let takes = match self.state {
-            NeighbourState::Searching { .. } => true,
-            NeighbourState::NoPeer => courts || self.passes(node, now, settings),
+            NeighbourState::Searching { .. } => !flaps || self.passes(node, now, settings),
+            NeighbourState::NoPeer => {
+                candidate.pairs && !flaps || self.passes(node, now, settings)
+            }
             NeighbourState::Linked | NeighbourState::Pairing { .. } => {
-                nearer && ready && self.passes(node, now, settings)
+                candidate.is_better() && self.passes(node, now, settings)
             }
         };
         if !takes {
@@ -407,7 +460,9 @@ impl Neighbour {
         if !matches!(self.state, NeighbourState::Searching { .. }) {
             self.grace = now + settings.probe_after;
         }
+        self.signs = Signs::default();
         self.node = node;
+        self.two_way = true;
         self.state = NeighbourState::Pairing { since: now };
         self.liveness = Liveness::new(now);
         self.liveness.met();
@@ -429,8 +484,13 @@ impl Neighbour {
             since,
             heard: now,
         });
-        let times = 1 << self.losses.min(DOUBLINGS);
-        now.since(since) >= settings.dead_after.times(times)
+        let hold_down = match self.losses {
+            0 | 1 => settings.probe_after,
+            losses => settings
+                .dead_after
+                .times(1 << (losses - 2).min(DOUBLINGS)),
+        };
+        now.since(since) >= hold_down
     }
 
     /// A heartbeat that is owed: to which node, the number of its question and that of the one it answers.

@@ -66,8 +66,21 @@ pub(crate) struct Proposed {
     handed_to: u16,
     /// The view that the decision follows, once that is known.
     base: View,
+    /// How many have taken part in it, once that is known.
+    there: u16,
     /// What was decided on, once that is known; `None` if too few are there.
     decided: Option<View>,
+    lease_left: u16,
+}
+
+/// What came of a proposal.
+#[derive(Clone, Copy, Debug)]
+struct Verdict {
+    /// How many have taken part.
+    there: u16,
+    /// The view that is followed.
+    base: View,
+    view: Option<View>,
     lease_left: u16,
 }
 
@@ -176,6 +189,12 @@ impl ViewChange {
         self.proposed
     }
 
+    /// This relay's place from the leader on, from 1, and how many there are, as it was counted last.
+    pub(crate) fn counted(&self) -> Option<(u16, u16)> {
+        let proposed = self.proposed?;
+        Some((proposed.place, proposed.there.max(proposed.place)))
+    }
+
     /// Whether this relay is in a part of the chain that is too small.
     pub(crate) const fn has_no_quorum(&self) -> bool {
         self.refused
@@ -280,6 +299,7 @@ impl ViewChange {
             poll,
             handed_to: 0,
             base: poll.agreed,
+            there: 0,
             decided: None,
             lease_left: 0,
         });
@@ -323,7 +343,13 @@ impl ViewChange {
             Outcome::Refused => None,
             Outcome::View(view) => Some(view),
         };
-        self.conclude(context, poll.agreed, decided, lease_left)
+        let verdict = Verdict {
+            there: place,
+            base: poll.agreed,
+            view: decided,
+            lease_left,
+        };
+        self.conclude(context, verdict)
     }
 
     fn on_decision(&mut self, context: &Context<'_>, decision: &Decision) -> Effects {
@@ -332,28 +358,30 @@ impl ViewChange {
                 if proposed.view == decision.proposal
                     && proposed.mission_id == decision.mission_id
                     && proposed.place.saturating_add(1) == decision.place
+                    && decision.there > proposed.place
                     && decision.view.is_none_or(|view| {
                         view.id != proposed.view || view.relays > proposed.place
                     }) =>
             {
-                self.conclude(
-                    context,
-                    decision.base,
-                    decision.view,
-                    decision.lease_left,
-                )
+                let verdict = Verdict {
+                    there: decision.there,
+                    base: decision.base,
+                    view: decision.view,
+                    lease_left: decision.lease_left,
+                };
+                self.conclude(context, verdict)
             }
             _ => Effects::STALE,
         }
     }
 
-    fn conclude(
-        &mut self,
-        context: &Context<'_>,
-        base: View,
-        decided: Option<View>,
-        lease_left: u16,
-    ) -> Effects {
+    fn conclude(&mut self, context: &Context<'_>, verdict: Verdict) -> Effects {
+        let Verdict {
+            there,
+            base,
+            view: decided,
+            lease_left,
+        } = verdict;
         let Some(proposed) = &mut self.proposed else {
             return Effects::NONE;
         };
@@ -367,6 +395,7 @@ impl ViewChange {
             return Effects::STALE;
         }
         proposed.base = base;
+        proposed.there = there;
         proposed.decided = decided;
         proposed.lease_left = lease_left;
         let leads = proposed.place == 1;
@@ -516,6 +545,7 @@ impl ViewChange {
                 mission_id: proposed.mission_id,
                 proposal: proposed.view,
                 place: proposed.place,
+                there: proposed.there,
                 base: proposed.base,
                 view: proposed.decided,
                 lease_left: proposed.lease_left,

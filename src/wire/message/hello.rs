@@ -26,8 +26,10 @@ pub struct Hello {
     pub form: bool,
     /// Whether it has been switched on and has had no part in anything yet.
     pub fresh: bool,
-    /// Whether it can hear a node on its other side, or needs none there.
+    /// Whether it has a neighbour on its other side that hears it, too.
     pub ready: bool,
+    /// How many relays hang together from it on toward its other side, itself included: 1 to 1000.
+    pub behind: u16,
     /// The nodes on this side that it hears, bit 0 for the nearest: 0 to 15.
     pub hears: u8,
     /// The newest mission that it holds.
@@ -39,7 +41,7 @@ pub struct Hello {
 type Word = [u8; 2];
 
 impl Hello {
-    /// The mission; the newest view; the neighbour; digest and version of what it holds; whom it hears; flags from bit 0: asks for
+    /// The mission; the neighbour; how many are behind; the newest view; digest and version of what it holds; whom it hears; flags from bit 0: asks for
     /// a hello, asks for a new view, fresh, ready, flies what it holds.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let flags = [self.ask, self.form, self.fresh, self.ready, self.flies]
@@ -48,7 +50,7 @@ impl Hello {
             .fold(0_u8, |flags, flag| flags << 1 | u8::from(flag));
         let [digest, version] = [self.holds.digest, self.holds.version].map(u16::to_le_bytes);
         let newest = self.newest.bits().to_le_bytes();
-        let near = [self.mission, self.neighbour].map(u16::to_le_bytes);
+        let near = [self.mission, self.neighbour, self.behind].map(u16::to_le_bytes);
         write(
             &(tag::HELLO, near, newest, [digest, version], [self.hears, flags]),
             buffer,
@@ -56,14 +58,16 @@ impl Hello {
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let ([mission, neighbour], newest, [digest, version], [hears, flags]): (
-            [Word; 2],
+        let ([mission, neighbour, behind], newest, [digest, version], [hears, flags]): (
+            [Word; 3],
             [u8; 4],
             [Word; 2],
             [u8; 2],
         ) = read(body)?;
         let neighbour = u16::from_le_bytes(neighbour);
-        if neighbour > MAX_RELAYS || hears > 0x0F || flags > 0x1F {
+        let behind = u16::from_le_bytes(behind);
+        let known = neighbour <= MAX_RELAYS && (1..=MAX_RELAYS).contains(&behind);
+        if !known || hears > 0x0F || flags > 0x1F {
             return Err(MessageError::Value);
         }
         Ok(Self {
@@ -74,6 +78,7 @@ impl Hello {
             form: flags & 2 != 0,
             fresh: flags & 4 != 0,
             ready: flags & 8 != 0,
+            behind,
             flies: flags & 16 != 0,
             hears,
             holds: MissionId {

@@ -71,6 +71,8 @@ pub struct Decision {
     pub proposal: ViewId,
     /// The sender's place, from 1 at the one that has proposed: 1 to 1000.
     pub place: u16,
+    /// How many relays the proposal has come through: 1 to 1000.
+    pub there: u16,
     /// The newest view that any relay on the way knew to be agreed on: what is decided follows it.
     pub base: View,
     /// The view to be accepted: the one proposed, or one that was decided on before; `None` if too few members are there.
@@ -219,16 +221,18 @@ impl Decision {
         let call = CallBody::new(self.mission_id, self.proposal, self.place);
         let view = self.view.map(SizedBody::of);
         let base = SizedBody::of(self.base);
-        let left = self.lease_left.to_le_bytes();
-        write(&(tag::DECISION, call, base, view, left), buffer)
+        let numbers = [self.there, self.lease_left].map(u16::to_le_bytes);
+        write(&(tag::DECISION, call, base, view, numbers), buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (call, base, view, lease_left): (CallBody, SizedBody, Option<SizedBody>, Word) =
+        let (call, base, view, numbers): (CallBody, SizedBody, Option<SizedBody>, [Word; 2]) =
             read(body)?;
         let base = base.view();
+        let [there, lease_left] = numbers.map(u16::from_le_bytes);
         let view = view.map(SizedBody::view);
         let known = is_view(base)
+            && is_size(there)
             && view.is_none_or(|view| is_proposed(view.id) && is_size(view.relays));
         let (mission_id, proposal, place) = call
             .checked()
@@ -238,9 +242,10 @@ impl Decision {
             mission_id,
             proposal,
             place,
+            there,
             base,
             view,
-            lease_left: u16::from_le_bytes(lease_left),
+            lease_left,
         })
     }
 }

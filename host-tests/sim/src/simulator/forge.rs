@@ -148,6 +148,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
             fresh: rng.random(),
             ready: true,
             hears: 0x0F,
+            behind: place,
             holds: mission_id,
             flies: true,
         }),
@@ -168,6 +169,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
             mission_id,
             proposal: view,
             place,
+            there: place,
             base: loaded,
             view: rng.random::<bool>().then_some(View {
                 id: view,
