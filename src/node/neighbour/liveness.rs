@@ -77,6 +77,15 @@ impl Liveness {
         }
     }
 
+    /// Another node is there. What the channel has shown stays: if the one before was not lost after all, so many questions were too few.
+    pub(crate) fn renew(&mut self, now: Instant) {
+        *self = Self {
+            met: true,
+            longest: self.longest.max(self.unanswered),
+            ..Self::new(now)
+        };
+    }
+
     /// Whether it has been heard and is not lost.
     pub(crate) const fn is_there(&self) -> bool {
         self.met && !self.lost

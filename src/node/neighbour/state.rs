@@ -12,7 +12,7 @@
 //! relays hang together: then the link that is missing is on the other side of the node taken, and it is left out.
 //!
 //! While it searches, it sends hellos to the four nearest nodes there: as many as three relays in a row may be lost at once. In a hold-down
-//! a node has to be heard all through: `probe_after` at first; after a second loss on that side `dead_after`, and twice as long after every
+//! a node has to be heard all through: `probe_after` at first; after a fourth loss on that side `dead_after`, and twice as long after every
 //! other one up to sixteen times, so that a link that comes and goes disturbs the chain less and less. A loss is forgotten after 32 times
 //! `dead_after` without another. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be
 //! about to take it, too.
@@ -29,6 +29,9 @@ pub(crate) const CANDIDATES: u16 = 4;
 
 /// Doublings of the hold-down.
 const DOUBLINGS: u8 = 4;
+
+/// Losses after which a link is not one that comes and goes yet.
+const FORGIVEN: u8 = 3;
 
 /// After so many times `dead_after` without another, a loss is forgotten.
 const MEMORY: u32 = 32;
@@ -444,7 +447,7 @@ impl Neighbour {
     ) -> bool {
         let node = candidate.node;
         // A link that comes and goes has to stay for a while first.
-        let flaps = node == self.lost && self.losses > 1;
+        let flaps = node == self.lost && self.losses > FORGIVEN;
         let takes = match self.state {
             NeighbourState::Searching { .. } => !flaps || self.passes(node, now, settings),
             NeighbourState::NoPeer => {
@@ -464,8 +467,7 @@ impl Neighbour {
         self.node = node;
         self.two_way = true;
         self.state = NeighbourState::Pairing { since: now };
-        self.liveness = Liveness::new(now);
-        self.liveness.met();
+        self.liveness.renew(now);
         self.hold_down = None;
         self.look_at = Some(now + self.tick);
         true
@@ -474,7 +476,7 @@ impl Neighbour {
     /// Whether a node that is heard now has been for the whole of its hold-down.
     fn passes(&mut self, node: u16, now: Instant, settings: &Settings) -> bool {
         let since = match self.hold_down {
-            Some(known) if known.node == node && now.since(known.heard) <= settings.probe_after => {
+            Some(known) if known.node == node && now.since(known.heard) <= settings.dead_after => {
                 known.since
             }
             _ => now,
@@ -484,11 +486,9 @@ impl Neighbour {
             since,
             heard: now,
         });
-        let hold_down = match self.losses {
-            0 | 1 => settings.probe_after,
-            losses => settings
-                .dead_after
-                .times(1 << (losses - 2).min(DOUBLINGS)),
+        let hold_down = match self.losses.checked_sub(FORGIVEN + 1) {
+            None => settings.probe_after,
+            Some(more) => settings.dead_after.times(1 << more.min(DOUBLINGS)),
         };
         now.since(since) >= hold_down
     }
