@@ -2,6 +2,8 @@
 
 use crate::mission::{Band, Heading, Mission};
 use crate::place::Placement;
+use super::timing::{longest_lease, tenths};
+use super::view::electorate::Held;
 use crate::settings::{Method, Settings};
 use crate::time::Instant;
 use crate::view::ViewId;
@@ -66,8 +68,8 @@ pub(crate) struct Context<'a> {
     pub(crate) latest: MissionId,
     /// Whether nobody comes after it on a pass.
     pub(crate) end: bool,
-    /// How long members of its view may still rely on it, in tenths of a second.
-    pub(crate) lease_left: u16,
+    /// For how long what was agreed on may be held elsewhere.
+    pub(crate) held: Held,
     /// Upsilon as it measures it where it stands, 1/W.
     pub(crate) measured_per_w: Option<f32>,
 }
@@ -96,6 +98,11 @@ impl<'a> Context<'a> {
         let config = self.mission().config();
         let free = !(config.band.is_single() && config.lateral.is_single());
         cfg!(feature = "altitude") && self.settings().method == Method::Joint && free
+    }
+
+    /// The longest that anything is held, in tenths of a second.
+    pub(crate) fn longest_lease(&self) -> u16 {
+        tenths(longest_lease(self.settings()))
     }
 
     /// Whether passes begin here.

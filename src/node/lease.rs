@@ -23,10 +23,12 @@
 
 use super::context::{Context, Effects};
 use super::retransmit::{Retransmit, Trip};
-use super::timing::{PAUSE, earliest};
+use super::timing::{PAUSE, earliest, longest_lease, tenths};
+use super::view::electorate::Held;
 use crate::mission::Heading;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
+use crate::view::ViewId;
 use crate::wire::message::{Message, Pulse, Pulsed};
 
 /// Of a lease.
@@ -63,16 +65,13 @@ pub(crate) struct Lease {
     current: Option<Current>,
     /// Until when others may count on this relay.
     relied_on: Instant,
+    /// The view accepted last, and until when its places are not to be taken.
+    rest: (ViewId, Instant),
     /// At the leader: when the next pulse begins, and how long they took lately.
     next_at: Option<Instant>,
     slowest: Duration,
     retransmit: Retransmit,
     due: LeaseDue,
-}
-
-/// Tenths of a second, rounded up.
-fn tenths(span: Duration) -> u16 {
-    u16::try_from(span.as_micros().div_ceil(100_000)).unwrap_or(u16::MAX)
 }
 
 const fn from_tenths(tenths: u16) -> Duration {
@@ -86,6 +85,7 @@ impl Lease {
             state: LeaseState::Open,
             current: None,
             relied_on: now + settings.dead_after,
+            rest: (ViewId::LOADED, now),
             next_at: None,
             slowest: Duration::from_micros(0),
             retransmit: Retransmit::new(seed),
@@ -107,13 +107,19 @@ impl Lease {
         from_tenths(told).max(settings.dead_after)
     }
 
-    /// How long members of its view may still rely on this relay, in tenths of a second.
-    pub(crate) fn left(&self, now: Instant) -> u16 {
-        tenths(self.relied_on.since(now))
+    /// For how long what was agreed on may be held elsewhere.
+    pub(crate) fn held(&self, now: Instant) -> Held {
+        let (view, until) = self.rest;
+        Held {
+            lease_left: tenths(self.relied_on.since(now)),
+            view,
+            rest: tenths(until.since(now)),
+        }
     }
 
-    /// A new view is accepted.
-    pub(crate) fn renew(&mut self) {
+    /// `view` is accepted, whose places are not to be taken before `rest`.
+    pub(crate) fn renew(&mut self, view: ViewId, rest: Instant) {
+        self.rest = (view, rest);
         self.state = LeaseState::Open;
         self.current = None;
         self.next_at = None;
@@ -225,7 +231,7 @@ impl Lease {
     fn given(&self, settings: &Settings) -> u16 {
         let slow = self.slowest.times(4).as_micros();
         let wanted = slow.saturating_add(self.period(settings).times(2).as_micros());
-        let most = settings.dead_after.times(8);
+        let most = longest_lease(settings);
         let span = Duration::from_micros(wanted)
             .min(most)
             .max(settings.dead_after);

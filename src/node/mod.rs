@@ -60,6 +60,7 @@ use round::state::Phase;
 use sample::{Meter, Sample};
 use steering::Steering;
 use view::ViewChange;
+use view::electorate::Held;
 
 /// What the firmware is told.
 #[derive(Clone, Debug, Default)]
@@ -89,7 +90,7 @@ fn of<'a>(
     neighbours: &Neighbours,
     update: &MissionUpdate,
     meter: &Meter,
-    lease_left: u16,
+    held: Held,
 ) -> Context<'a> {
     let onward = Side::onward(member.mission.heading());
     Context {
@@ -97,7 +98,7 @@ fn of<'a>(
         member,
         latest: update.latest(),
         end: neighbours.at(onward).has_no_peer(),
-        lease_left,
+        held,
         measured_per_w: meter.published(),
     }
 }
@@ -162,7 +163,7 @@ impl Node {
             &self.neighbours,
             &self.update,
             &self.meter,
-            self.lease.left(now),
+            self.lease.held(now),
         )
     }
 
@@ -447,7 +448,7 @@ impl Node {
             &self.neighbours,
             &self.update,
             &self.meter,
-            self.lease.left(now),
+            self.lease.held(now),
         );
         let effects = match message {
             Message::Proposal(_) | Message::Decision(_) => self.view.handle(&context, message),
@@ -487,7 +488,7 @@ impl Node {
             &self.neighbours,
             &self.update,
             &self.meter,
-            self.lease.left(now),
+            self.lease.held(now),
         );
         let effects = self.round.handle_timeout(&context);
         self.apply(now, effects);
@@ -497,7 +498,7 @@ impl Node {
             &self.neighbours,
             &self.update,
             &self.meter,
-            self.lease.left(now),
+            self.lease.held(now),
         );
         let effects = self.lease.handle_timeout(&context);
         self.apply(now, effects);
@@ -522,7 +523,7 @@ impl Node {
                 &self.neighbours,
                 &self.update,
                 &self.meter,
-                self.lease.left(now),
+                self.lease.held(now),
             );
             let effects = self.view.handle_timeout(&context, leads, fresh);
             self.apply(now, effects);
@@ -579,7 +580,7 @@ impl Node {
                 &self.neighbours,
                 &self.update,
                 &self.meter,
-                self.lease.left(now),
+                self.lease.held(now),
             );
             let effects = self.view.decide(&context);
             self.apply(now, effects);
@@ -759,10 +760,10 @@ impl Node {
         let (back, onward) = (self.back(), self.onward());
         self.neighbours.at_mut(back).agree_with_proposer();
         self.neighbours.at_mut(onward).agree(place == relays);
-        self.lease.renew();
         let works = self.member.settings.method == Method::Joint;
-        let rest = Duration::from_millis(100).times(u32::from(lease_left));
-        self.round.renew(now + rest, leads, works);
+        let rest = now + Duration::from_millis(100).times(u32::from(lease_left));
+        self.lease.renew(proposed.view, rest);
+        self.round.renew(rest, leads, works);
         bump(&mut self.telemetry.stats.views);
         self.raise(Event::Reformed);
         if id != self.update.latest() {
@@ -802,7 +803,7 @@ impl Node {
                 &self.neighbours,
                 &self.update,
                 &self.meter,
-                self.lease.left(now),
+                self.lease.held(now),
             );
             let effects = self.round.restart(&context);
             self.apply(now, effects);
@@ -867,7 +868,7 @@ impl Node {
             &self.neighbours,
             &self.update,
             &self.meter,
-            self.lease.left(now),
+            self.lease.held(now),
         );
         if let Some((to, _)) = next
             && let Some(message) = self.view.take_onward(&context, to)

@@ -1,9 +1,23 @@
 //! What the layers have in common in keeping time.
 
+use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
 /// How long a relay rests between two portions of a computation, so that a caller's loop gets its turn.
 pub(crate) const PAUSE: Duration = Duration::from_micros(250);
+
+/// How many times `dead_after` a lease may take at most.
+const LONGEST: u32 = 8;
+
+/// The longest that a relay holds what was agreed on without hearing more.
+pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
+    settings.dead_after.times(LONGEST)
+}
+
+/// Tenths of a second, rounded up.
+pub(crate) fn tenths(span: Duration) -> u16 {
+    u16::try_from(span.as_micros().div_ceil(100_000)).unwrap_or(u16::MAX)
+}
 
 /// The earlier of two times.
 pub(crate) fn earliest(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {

@@ -15,6 +15,7 @@
 //! are done. So while a relay solves, the silence of a neighbour that it is in one view with is excused: both times count from the end
 //! of its own solving.
 
+use crate::node::timing::longest_lease;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
@@ -147,7 +148,7 @@ impl Liveness {
         let silent = now.since(self.heard);
         let run = if self.met { self.longest } else { 0 };
         let enough = self.unanswered >= run.saturating_mul(MARGIN).max(QUESTIONS);
-        let gone = silent >= dead && (enough || silent >= settings.dead_after.times(8));
+        let gone = silent >= dead && (enough || silent >= longest_lease(settings));
         let lost = gone && !self.lost;
         self.lost |= gone;
         let look_again = if self.lost {

@@ -43,6 +43,28 @@ pub(crate) struct Electorate {
     elder: u16,
 }
 
+/// For how long what was agreed on may be held elsewhere, in tenths of a second.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Held {
+    /// By members of its view that rely on this relay.
+    pub(crate) lease_left: u16,
+    /// By members of views before `view`.
+    pub(crate) view: ViewId,
+    pub(crate) rest: u16,
+}
+
+impl Held {
+    fn rest_of(&self, view: ViewId) -> u16 {
+        if view == ViewId::LOADED {
+            0
+        } else if view == self.view {
+            self.rest
+        } else {
+            u16::MAX
+        }
+    }
+}
+
 /// What the last relay decides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Outcome {
@@ -73,13 +95,13 @@ impl Electorate {
 
     /// Takes part in `proposal`, which has gathered `told` so far, if it has promised no later one; what is gathered with it.
     ///
-    /// `lease_left` is how long members of its view that are elsewhere may still rely on `node`, in tenths of a second.
+    /// `held` is for how long what was agreed on may be held elsewhere, as far as this relay knows.
     pub(crate) fn vote(
         &mut self,
         node: u16,
         proposal: ViewId,
         told: Option<Poll>,
-        lease_left: u16,
+        held: Held,
     ) -> Option<Poll> {
         if proposal <= self.promised {
             return None;
@@ -117,7 +139,8 @@ impl Electorate {
         if self.member {
             poll.votes = poll.votes.saturating_add(1);
             poll.proposer |= proposer == node;
-            poll.lease_left = poll.lease_left.min(lease_left);
+            poll.lease_left = poll.lease_left.min(held.lease_left);
+            poll.rest = poll.rest.min(held.rest_of(self.agreed.id));
         }
         Some(poll)
     }
@@ -161,6 +184,13 @@ impl Electorate {
         self.accepted
             .is_some_and(|accepted| accepted.view.id == view)
     }
+}
+
+/// How long the places of a view that follows are not to be taken, in tenths of a second; `most` where nobody knows.
+pub(crate) fn rest(poll: &Poll, most: u16) -> u16 {
+    let all = poll.votes == poll.agreed.relays;
+    let lease_left = if all { 0 } else { poll.lease_left };
+    poll.rest.max(lease_left).min(most)
 }
 
 /// The decision on `proposal`, which has come through `relays`, by the `poll` of them.

@@ -289,7 +289,7 @@ impl ViewChange {
         let node = context.member.node;
         let poll = self
             .electorate
-            .vote(node, view, told, context.lease_left)?;
+            .vote(node, view, told, context.held)?;
         self.state = ViewState::Proposed;
         self.stragglers = Stragglers::NONE;
         self.proposed = Some(Proposed {
@@ -337,8 +337,7 @@ impl ViewChange {
                 relays: place,
             })
         };
-        let all = poll.votes == poll.agreed.relays;
-        let lease_left = if all { 0 } else { poll.lease_left };
+        let lease_left = electorate::rest(&poll, context.longest_lease());
         let decided = match outcome {
             Outcome::Refused => None,
             Outcome::View(view) => Some(view),

@@ -34,6 +34,8 @@ pub struct Poll {
     pub proposer: bool,
     /// How long members of it that are elsewhere may still hold it, in tenths of a second.
     pub lease_left: u16,
+    /// How long its places are still not to be taken, for the sake of earlier views, in tenths of a second; 65535 where nobody knows.
+    pub rest: u16,
     /// The latest successor of it that a member has accepted, which may have been agreed on.
     pub successor: Option<Successor>,
 }
@@ -46,6 +48,7 @@ impl Poll {
             votes: 0,
             proposer: false,
             lease_left: u16::MAX,
+            rest: u16::MAX,
             successor: None,
         }
     }
@@ -159,6 +162,7 @@ impl Proposal {
             votes,
             proposer,
             lease_left,
+            rest,
             successor,
         } = self.poll;
         let successor = successor.map(|successor| {
@@ -166,7 +170,7 @@ impl Proposal {
             (proposal, SizedBody::of(successor.view))
         });
         let call = CallBody::new(self.mission_id, self.view, self.place);
-        let numbers = [votes.to_le_bytes(), lease_left.to_le_bytes()];
+        let numbers = [votes, lease_left, rest].map(u16::to_le_bytes);
         let agreed = SizedBody::of(agreed);
         write(
             &(tag::PROPOSAL, call, agreed, numbers, proposer, successor),
@@ -175,7 +179,8 @@ impl Proposal {
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (call, agreed, [votes, lease_left], proposer, successor): Body = read(body)?;
+        let (call, agreed, numbers, proposer, successor): Body = read(body)?;
+        let [votes, lease_left, rest] = numbers.map(u16::from_le_bytes);
         let agreed: View = SizedBody::view(agreed);
         let successor = successor.map(|(proposal, view)| Successor {
             proposal: ViewId::from_bits(u32::from_le_bytes(proposal)),
@@ -183,9 +188,10 @@ impl Proposal {
         });
         let poll = Poll {
             agreed,
-            votes: u16::from_le_bytes(votes),
+            votes,
             proposer,
-            lease_left: u16::from_le_bytes(lease_left),
+            lease_left,
+            rest,
             successor,
         };
         let known = is_view(agreed)
@@ -211,7 +217,7 @@ impl Proposal {
 type Body = (
     CallBody,
     SizedBody,
-    [Word; 2],
+    [Word; 3],
     bool,
     Option<([u8; 4], SizedBody)>,
 );

@@ -161,6 +161,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
                 votes: place,
                 proposer: true,
                 lease_left: 0,
+                rest: 0,
                 successor: None,
             },
         }),
