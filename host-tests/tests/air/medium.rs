@@ -145,3 +145,19 @@ fn a_radio_that_is_switched_off_sends_nothing_more() {
         .collect();
     assert_eq!(heard, [(1, false), (3, true)]);
 }
+
+#[test]
+fn who_finds_the_channel_busy_again_and_again_waits_longer_and_longer() {
+    let runs = 2_000;
+    let mut times = 0;
+    for seed in 0..runs {
+        let mut bench = Bench::in_one_range(Access::Csma, 2, seed);
+        bench.offer(at(0), 0, &[0; 400]);
+        bench.offer(at(micros(100)), 1, &[1; 20]);
+        times += bench.end().1.deferred;
+    }
+    // Of a channel that is busy for 300 bytes to 370 more, waits of 35, 75 and 155 bytes on average take up three; waits of 35 would take
+    // nine.
+    let mean = times as f64 / runs as f64;
+    assert!((2.5..4.5).contains(&mean), "{mean}");
+}
