@@ -90,8 +90,8 @@ pub struct Setup {
     pub radio_reach: usize,
     /// On a shared channel: how the radios come by it.
     pub access: Access,
-    /// Mean length of a run of losses, frames: 1 for losses that are independent, else at least [`Bursts::shortest`](
-    /// super::bursts::Bursts::shortest) of `faults.loss`.
+    /// Mean length of a run of losses, frames: 1 for losses that are independent, else at least
+    /// [`Bursts::shortest`](super::bursts::Bursts::shortest) of `faults.loss`.
     pub burst: f64,
     /// Relays that do not hear another one for a time.
     pub deaf: Vec<Deaf>,

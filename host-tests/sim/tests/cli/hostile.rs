@@ -9,7 +9,8 @@ use super::{chain, json};
 fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("lost.svg");
-    let report = json(&["--kill", "4@20", "--svg", file.to_str().unwrap()]);
+    let file_name = file.to_str().unwrap();
+    let report = json(&["--kill", "4@20", "--air", "ideal", "--svg", file_name]);
     assert_eq!(
         (
             report["uavs"].as_u64(),

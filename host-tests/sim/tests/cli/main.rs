@@ -8,6 +8,7 @@
     missing_docs
 )]
 
+mod air;
 mod hostile;
 mod upload;
 

@@ -87,7 +87,8 @@ fn without_an_upload_nothing_is_said_of_one() {
 fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("upload.svg");
-    let output = chain(&["--upload", MOVED, "--svg", file.to_str().unwrap()]);
+    let file_name = file.to_str().unwrap();
+    let output = chain(&["--upload", MOVED, "--air", "ideal", "--svg", file_name]);
     assert!(output.status.success() && output.stderr.is_empty());
     let text = String::from_utf8(output.stdout).unwrap();
     for line in [

@@ -15,8 +15,8 @@ use crate::times::{instant, span};
 #[command(next_help_heading = "Links and the air")]
 pub(crate) struct Air {
     /// How the radios share one channel, which those up to four away hear; csma unless said otherwise
-    #[arg(long, value_name = "A", value_enum, conflicts_with = "wires")]
-    air: Option<Sharing>,
+    #[arg(long = "air", value_name = "A", value_enum, conflicts_with = "wires")]
+    sharing: Option<Sharing>,
     /// Bits per second of every link, or of the channel, 300 to 10000000; a byte takes ten
     #[arg(long, value_name = "B", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..=10_000_000))]
     baud: u32,
@@ -46,7 +46,7 @@ enum Sharing {
 impl Air {
     /// Whether a shared channel is asked for.
     pub(crate) fn is_chosen(&self) -> bool {
-        self.air.is_some()
+        self.sharing.is_some()
     }
 
     /// Whether relays may be lost by it.
@@ -87,7 +87,7 @@ impl Air {
         setup.burst = self.burst;
         setup.link.baud = self.baud;
         setup.deaf.clone_from(&self.deaf);
-        setup.access = match (setup.settings.wiring, self.air) {
+        setup.access = match (setup.settings.wiring, self.sharing) {
             (Wiring::Pair, _) | (_, Some(Sharing::Ideal)) => Access::Ideal,
             (_, Some(Sharing::Aloha)) => Access::Aloha,
             (_, Some(Sharing::Csma) | None) => Access::Csma,

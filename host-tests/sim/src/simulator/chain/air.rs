@@ -46,7 +46,19 @@ impl Chain {
             .map(Receiver::Ground);
         let relays = relays.into_iter().map(Receiver::Relay);
         let receivers: Vec<Receiver> = relays.chain(grounds).collect();
+        self.overhear(frame, into, arrives);
         self.send(index, frame, into, arrives, receivers);
+    }
+
+    /// An attacker hears a frame that arrives at all whom it is for.
+    pub(super) fn overhear(&mut self, frame: &[u8], into: Port, arrives: Instant) {
+        if let Some(attacker) = &mut self.attacker {
+            attacker.record(Recorded {
+                arrived: arrives,
+                port: into,
+                bytes: frame.to_vec(),
+            });
+        }
     }
 
     /// Puts `frame` of node `from` into the queues of all that hear it, each with what happens to it on its way.
@@ -58,13 +70,6 @@ impl Chain {
         arrives: Instant,
         receivers: impl IntoIterator<Item = Receiver>,
     ) {
-        if let Some(attacker) = &mut self.attacker {
-            attacker.record(Recorded {
-                arrived: arrives,
-                port: into,
-                bytes: frame.to_vec(),
-            });
-        }
         let late_by = self.setup.link.hop_time();
         let mut faults = match self.setup.faults_end {
             Some(end) if self.now >= end => Faults::default(),

@@ -62,6 +62,10 @@ impl Chain {
     fn deliver(&mut self, sent: &Sent) {
         let relays = self.members.len();
         let arrives = self.now + self.setup.link.latency;
+        // Sent again, a frame that somebody has missed would be no replay.
+        if sent.missed == 0 {
+            self.overhear(&sent.frame, Port::Shared, arrives);
+        }
         let receivers = sent.heard_by.iter().map(|node| {
             node.checked_sub(relays)
                 .map_or(Receiver::Relay(*node), Receiver::Ground)

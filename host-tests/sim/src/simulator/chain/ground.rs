@@ -77,6 +77,7 @@ impl Chain {
                 Wiring::Shared => Port::Shared,
             };
             let from = relays + at;
+            self.overhear(bytes, into, arrives);
             self.send(from, bytes, into, arrives, receivers.map(Receiver::Relay));
         }
         if let Some(station) = self.stations.get_mut(at)

@@ -39,6 +39,8 @@ pub struct Sent {
     pub frame: Vec<u8>,
     /// The nodes that it has reached unharmed.
     pub heard_by: Vec<usize>,
+    /// How many in range it has not reached.
+    pub missed: usize,
 }
 
 /// What becomes of a frame at one node.
@@ -249,15 +251,17 @@ impl Medium {
             .iter()
             .position(|frame| frame.from == node && frame.ends == now)?;
         let over = self.on_air.swap_remove(at);
-        let count = |fate| over.hearers.iter().filter(|(_, it)| *it == fate).count() as u64;
-        self.counts.collided += count(Fate::Collided);
-        self.counts.unheard += count(Fate::Unheard);
+        let count = |fate| over.hearers.iter().filter(|(_, it)| *it == fate).count();
+        let (collided, unheard) = (count(Fate::Collided), count(Fate::Unheard));
+        self.counts.collided += collided as u64;
+        self.counts.unheard += unheard as u64;
         self.next(now, node, agenda);
         let clean = over.hearers.iter().filter(|(_, fate)| *fate == Fate::Clean);
         Some(Sent {
             from: node,
             frame: over.frame,
             heard_by: clean.map(|(by, _)| *by).collect(),
+            missed: collided + unheard,
         })
     }
 }

@@ -1,0 +1,123 @@
+//! How relays share the air, and what a soak says of a run.
+
+use serde_json::Value;
+
+use super::{chain, json, refusal};
+
+#[test]
+fn a_shared_channel_is_csma_unless_said_otherwise() {
+    for (extra, access) in [
+        (&["--shared"][..], Some("csma")),
+        (&["--air", "csma"], Some("csma")),
+        (&["--air", "aloha"], Some("aloha")),
+        (&["--air", "ideal"], None),
+        (&["--wires"], None),
+    ] {
+        let report = json(&[&["--uavs", "4", "--loss", "0.2"], extra].concat());
+        assert_eq!(report["air"]["access"].as_str(), access, "{extra:?}");
+        let shared = (extra != ["--wires"]).then_some("shared");
+        assert_eq!(report["channel"].as_str(), shared, "{extra:?}");
+        assert!(report["sir"].as_f64().unwrap() > 1.0, "{extra:?}");
+    }
+}
+
+#[test]
+fn a_slow_link_takes_longer() {
+    let took = |baud| json(&["--baud", baud])["virtual_s"].as_f64().unwrap();
+    let (fast, usual, slow) = (took("1000000"), took("115200"), took("9600"));
+    assert!(fast < usual && 5.0 * usual < slow, "{fast} {usual} {slow}");
+}
+
+#[test]
+fn a_soak_goes_on_to_its_end_and_says_how_much_of_it_was_right() {
+    let arguments = ["--soak", "200", "--kill", "4@20", "--boot", "4@60"];
+    let report = json(&arguments);
+    assert_eq!(report["virtual_s"], 200.0);
+    let number = |key: &str| report[key].as_f64().unwrap();
+    assert!((0.5..0.98).contains(&number("availability")), "{report}");
+    assert!(number("longest_outage_s") > 5.0 && number("first_agreement_s") < 2.0);
+    assert_eq!(report["most_flying"], 1);
+    assert!(number("least_separation_m") > 0.0);
+    let text = String::from_utf8(chain(&arguments).stdout).unwrap();
+    for line in [
+        "air (csma, 115200 baud): load 0.",
+        "availability: 0.",
+        "at once: 1",
+        "least separation of two relays: ",
+    ] {
+        assert!(text.contains(line), "{line} in {text}");
+    }
+}
+
+#[test]
+fn a_soak_of_a_good_chain_is_right_all_the_time_by_any_link() {
+    for extra in [&["--air", "ideal"][..], &["--wires"]] {
+        let report = json(&[&["--soak", "60"], extra].concat());
+        assert_eq!(report["availability"], 1.0, "{extra:?}");
+        assert_eq!(report["longest_outage_s"], 0.0, "{extra:?}");
+    }
+}
+
+#[test]
+fn losses_in_runs_have_the_mean_share_that_was_asked_for() {
+    let soaked = ["--soak", "600", "--air", "ideal", "--loss", "0.3"];
+    for burst in ["1", "20"] {
+        let report = json(&[&soaked[..], &["--burst", burst]].concat());
+        let lost = report["faults"]["lost"].as_f64().unwrap();
+        // The ideal channel: relays 1 to 8 have 4, 5, 6, 7, 7, 6, 5 and 4 others in range, and send much the same.
+        let received = report["messages"].as_f64().unwrap() * 5.5;
+        assert!((lost / received - 0.3).abs() < 0.06, "{burst}: {report}");
+    }
+}
+
+#[test]
+fn the_story_tells_who_does_not_hear_whom() {
+    let output = chain(&["--deaf", "4:3@5-9", "--soak", "20"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    for line in [
+        "5.000 s  relay 4 does not hear relay 3",
+        "9.000 s  relay 4 hears relay 3 again",
+    ] {
+        assert!(text.contains(line), "{line} in {text}");
+    }
+    let report = json(&["--deaf", "4:3@5", "--soak", "20"]);
+    let deaf: Vec<&Value> = report["timeline"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|moment| moment["what"] == "deaf")
+        .collect();
+    assert_eq!(deaf.len(), 1);
+    assert_eq!(
+        (deaf[0]["relay"].as_u64(), deaf[0]["other"].as_u64()),
+        (Some(4), Some(3))
+    );
+}
+
+#[test]
+fn wrong_options_of_the_air_are_named_with_what_is_allowed() {
+    let cases: [(&[&str], &[&str]); 12] = [
+        (&["--air", "csma", "--wires"], &["--air", "--wires"]),
+        (&["--air", "tdma"], &["--air", "tdma"]),
+        (&["--baud", "299"], &["--baud", "299", "300..=10000000"]),
+        (&["--burst", "0.5"], &["--burst", "0.5", "1.0 to 1000000.0"]),
+        (
+            &["--burst", "2", "--loss", "0.7"],
+            &["--burst 2", "3.3333", "--loss 0.7"],
+        ),
+        (&["--deaf", "4:3"], &["--deaf", "'4:3'", "J:I@S-E"]),
+        (&["--deaf", "4@3"], &["--deaf", "'4@3'", "J:I@S-E"]),
+        (&["--deaf", "4:4@1"], &["--deaf", "4:4@1", "two different"]),
+        (&["--deaf", "4:3@9-5"], &["--deaf", "4:3@9-5", "E after S"]),
+        (&["--deaf", "9:3@1"], &["--deaf 9:3@", "1 to 8"]),
+        (&["--deaf", "3:0@1"], &["--deaf 3:0@", "1 to 8"]),
+        (&["--soak", "0"], &["--soak", "'0'", "1.0 to 1000000.0"]),
+    ];
+    for (arguments, parts) in cases {
+        let (status, line) = refusal(arguments);
+        assert_eq!(status, 2, "{arguments:?}: {line}");
+        for part in parts {
+            assert!(line.contains(part), "{arguments:?}: {part} not in {line}");
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Throughput by Poisson traffic against the textbook: Abramson (1970) for pure ALOHA, Roberts (1975) for slotted ALOHA.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+
+/// Nodes that send to one that only listens: so many that none has two frames at once.
+const NODES: usize = 400;
+
+/// Bytes of a frame, with which it takes a round number of microseconds.
+const BYTES: usize = 90;
+
+/// One node hears them all, and they each other where `in_range`.
+fn crowd(access: Access, in_range: bool, seed: u64) -> Bench {
+    let listener = NODES;
+    let hearers = |node| {
+        let others = (0..NODES).filter(move |by| in_range && *by != node);
+        others
+            .chain((node != listener).then_some(listener))
+            .collect()
+    };
+    Bench::new(access, (0..=NODES).map(hearers).collect(), seed)
+}
+
+/// The share of the time that the listener receives frames whole, with `offered` frames begun per frame time over `frames` frame times.
+/// With `slots` they begin at multiples of a frame time.
+fn throughput(mut bench: Bench, offered: f64, frames: u64, slots: bool) -> f64 {
+    let frame = bench.medium.air_time(BYTES).as_micros();
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut now = 0.0;
+    while now < frames as f64 {
+        now -= (1.0 - rng.random::<f64>()).ln() / offered;
+        let begins = if slots {
+            now.ceil() as u64 * frame
+        } else {
+            (now * frame as f64) as u64
+        };
+        let node = rng.random_range(0..NODES);
+        bench.offer(at(begins), node, &[0; BYTES]);
+    }
+    let (who, _) = bench.end();
+    let received = who.iter().filter(|(_, by)| by.contains(&NODES)).count();
+    received as f64 / frames as f64
+}
+
+#[test]
+fn pure_aloha_has_its_throughput() {
+    for (offered, says) in [(0.1, 0.0819), (0.25, 0.1516), (0.5, 0.1839), (1.0, 0.1353)] {
+        let bench = crowd(Access::Aloha, false, 1);
+        let share = throughput(bench, offered, 200_000, false);
+        println!("G = {offered}: {share:.4}, and the textbook has {says}");
+        assert!((share - says).abs() < 0.003, "G = {offered}: {share}");
+    }
+}
+
+#[test]
+fn frames_that_begin_in_common_slots_have_twice_that() {
+    for (offered, says) in [(0.5, 0.3033), (1.0, 0.3679)] {
+        let bench = crowd(Access::Aloha, false, 1);
+        let share = throughput(bench, offered, 100_000, true);
+        println!("G = {offered} in slots: {share:.4}, and the textbook has {says}");
+        assert!((share - says).abs() < 0.005, "G = {offered}: {share}");
+    }
+}
+
+#[test]
+fn carrier_sense_carries_more_where_all_hear_each_other_and_little_where_none_do() {
+    let frames = 5_000;
+    let near = throughput(crowd(Access::Csma, true, 1), 0.5, frames, false);
+    let hidden = throughput(crowd(Access::Csma, false, 1), 0.5, frames, false);
+    println!("G = 0.5 by CSMA: {near:.4} in one range, {hidden:.4} hidden");
+    assert!(near > 0.4, "{near}");
+    assert!((hidden - 0.1839).abs() < 0.015, "{hidden}");
+}

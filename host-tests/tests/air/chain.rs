@@ -1,0 +1,91 @@
+//! Chains on the air.
+
+use host_tests::fixtures::mission;
+use uav_relay::Side;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::deaf::Deaf;
+use uav_relay_sim::simulator::outcome::{Ending, Turning};
+use uav_relay_sim::simulator::setup::Setup;
+
+use super::*;
+
+#[test]
+fn a_chain_takes_the_same_places_by_any_channel() {
+    let ideal = run(Setup::on_shared_channel(mission(8))).unwrap();
+    assert_eq!(ideal.air, AirCounts::default());
+    for access in [Access::Aloha, Access::Csma] {
+        for seed in 0..20 {
+            let mut setup = Setup::on_air(mission(8), access);
+            setup.seed = seed;
+            let outcome = run(setup.clone()).unwrap();
+            assert_eq!(outcome.ending, Ending::Settled, "{access:?}, seed {seed}");
+            assert_eq!(outcome.bits(), ideal.bits(), "{access:?}, seed {seed}");
+            // When the run ends some are still waiting.
+            let waiting = outcome.messages - outcome.air.sent;
+            assert!(waiting <= 8, "{access:?}, seed {seed}: {waiting}");
+            let again = run(setup).unwrap();
+            assert_eq!((again.ended, again.air), (outcome.ended, outcome.air));
+        }
+    }
+}
+
+#[test]
+fn a_deaf_relay_receives_nothing_from_that_one_until_it_hears_again() {
+    for access in [Access::Ideal, Access::Aloha, Access::Csma] {
+        let mut setup = Setup::on_air(mission(2), access);
+        setup.deaf = vec![Deaf {
+            by: 2,
+            of: 1,
+            from: at(0),
+            until: None,
+        }];
+        let outcome = run(setup.clone().soaked(seconds(60))).unwrap();
+        let received = [0, 1].map(|at| outcome.relays[at].stats.received);
+        assert!(
+            received[0] > 0 && received[1] == 0,
+            "{access:?}: {received:?}"
+        );
+        assert_eq!(outcome.relays[1].setpoint, None, "{access:?}");
+        setup.deaf[0].until = Some(seconds(30));
+        let outcome = run(setup.soaked(seconds(120))).unwrap();
+        assert!(outcome.relays[1].setpoint.is_some(), "{access:?}");
+        let told: Vec<_> = outcome
+            .moments
+            .iter()
+            .filter(|moment| matches!(moment.what, Turning::Deaf | Turning::Hears))
+            .map(|moment| (moment.at, moment.relay, moment.other))
+            .collect();
+        assert_eq!(told, [(at(0), 2, Some(1)), (seconds(30), 2, Some(1))]);
+    }
+}
+
+#[test]
+fn a_wire_can_be_deaf_in_one_direction_too() {
+    let mut setup = Setup::new(mission(3));
+    setup.deaf = vec![Deaf {
+        by: 3,
+        of: 2,
+        from: seconds(20),
+        until: None,
+    }];
+    let outcome = run(setup.soaked(seconds(120))).unwrap();
+    assert!(outcome.noticed.contains_key(&(3, Side::Upstream)));
+    assert!(!outcome.noticed.contains_key(&(2, Side::Upstream)));
+}
+
+#[test]
+fn what_a_timing_is_made_of_is_known_in_one_place() {
+    let mut setup = Setup::on_air(mission(20), Access::Csma);
+    setup.link.baud = 4_800;
+    let channel = setup.channel();
+    assert_eq!(
+        (channel.baud, channel.in_range, channel.overhead),
+        (4_800, 9, 12)
+    );
+    let channel = Setup::on_shared_channel(mission(3)).channel();
+    assert_eq!(
+        (channel.baud, channel.in_range, channel.overhead),
+        (115_200, 3, 0)
+    );
+    assert_eq!(Setup::new(mission(3)).channel().in_range, 1);
+}

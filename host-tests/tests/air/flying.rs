@@ -1,0 +1,70 @@
+//! Which groups fly an agreement of their own.
+
+use uav_relay::Phase;
+use uav_relay_sim::simulator::flying::{Seen, groups, has_agreed};
+
+/// Relay `index` of `relays` in view `view`.
+fn seen(view: u16, relays: u16, index: u16) -> Seen {
+    Seen {
+        is_on: true,
+        phase: Phase::Holding,
+        view,
+        relays,
+        index,
+        version: 0,
+        target: Some(2.0),
+        place: Some([1.0, 0.0, 20.0]),
+    }
+}
+
+#[test]
+fn relays_of_one_view_are_one_group_and_of_two_views_two() {
+    let mut all: Vec<Seen> = (1..=4).map(|index| seen(0, 4, index)).collect();
+    assert_eq!(groups(&all), 1);
+    all[3] = seen(1, 1, 1);
+    assert_eq!(groups(&all), 2);
+    // The same number for two views that each part has agreed to by itself.
+    let parts = [(2, 1), (2, 2), (3, 1), (3, 2), (3, 3)];
+    let parts = parts.map(|(relays, index)| seen(1, relays, index));
+    assert_eq!(groups(&parts), 2);
+    let halves = [1, 2, 1, 2].map(|index| seen(1, 2, index));
+    assert_eq!(groups(&halves), 2);
+}
+
+/// What becomes of a relay.
+type Change = fn(&mut Seen);
+
+#[test]
+fn who_is_off_has_no_place_or_has_no_quorum_flies_nothing() {
+    let all = || vec![seen(0, 2, 1), seen(1, 1, 1)];
+    let changes: [Change; 6] = [
+        |one| one.is_on = false,
+        |one| one.place = None,
+        |one| one.phase = Phase::NoQuorum,
+        |one| one.phase = Phase::ViewChange,
+        |one| one.phase = Phase::Idle,
+        |one| one.phase = Phase::Infeasible,
+    ];
+    for change in changes {
+        let mut all = all();
+        change(&mut all[1]);
+        assert_eq!(groups(&all), 1, "{all:?}");
+    }
+    // One without a quorum speaks for the others of its view.
+    let mut part = vec![seen(0, 3, 1), seen(0, 3, 2)];
+    part[0].phase = Phase::NoQuorum;
+    assert_eq!(groups(&part), 0);
+}
+
+#[test]
+fn all_of_a_view_have_to_hold_their_places_for_one_target() {
+    let all = || vec![seen(0, 2, 1), seen(0, 2, 2)];
+    assert!(has_agreed(&all()));
+    assert!(!has_agreed(&all()[..1]));
+    let mut other = all();
+    other[1].target = Some(1.0);
+    assert!(!has_agreed(&other));
+    let mut busy = all();
+    busy[0].phase = Phase::Waiting;
+    assert!(!has_agreed(&busy));
+}

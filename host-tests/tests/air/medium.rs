@@ -1,0 +1,163 @@
+//! Frames that meet on the air.
+
+use super::*;
+use uav_relay_sim::simulator::medium::access::{HEADER, QUEUE, TURNAROUND};
+
+#[test]
+fn a_frame_takes_its_bytes_its_header_and_the_turnaround() {
+    let mut bench = Bench::in_one_range(Access::Aloha, 2, 1);
+    bench.offer(at(500), 0, &[7; 100]);
+    bench.go_on(seconds(9));
+    let (over, sent) = &bench.sent[0];
+    let took = micros(TURNAROUND as u64) + micros(HEADER as u64 + 100);
+    assert_eq!(over.as_micros(), 500 + took);
+    assert_eq!(
+        (sent.frame.as_slice(), &sent.heard_by),
+        (&[7; 100][..], &vec![1])
+    );
+    assert_eq!(bench.medium.counts().air_time_us, micros(106));
+}
+
+#[test]
+fn two_frames_that_overlap_are_both_lost_where_both_are_heard() {
+    // 0 and 1 hear only each other's neighbours: 2 hears both, 3 hears 0 alone, 4 hears 1 alone.
+    let hearers = vec![vec![2, 3], vec![2, 4], vec![], vec![], vec![]];
+    for later in [0, 10, micros(50), micros(106) - 1] {
+        let mut bench = Bench::new(Access::Aloha, hearers.clone(), 1);
+        bench.offer(at(0), 0, &[1; 100]);
+        bench.offer(at(later), 1, &[2; 100]);
+        let (who, counts) = bench.end();
+        assert_eq!(who, [(0, vec![3]), (1, vec![4])], "{later} us later");
+        assert_eq!((counts.collided, counts.unheard), (2, 0));
+    }
+    // One that begins as the other ends is in nobody's way.
+    let mut bench = Bench::new(Access::Aloha, hearers, 1);
+    bench.offer(at(0), 0, &[1; 100]);
+    bench.offer(at(micros(106)), 1, &[2; 100]);
+    let (who, counts) = bench.end();
+    assert_eq!(who, [(0, vec![2, 3]), (1, vec![2, 4])]);
+    assert_eq!(counts.collided, 0);
+}
+
+#[test]
+fn of_three_frames_in_a_row_the_one_in_the_middle_takes_both_others_with_it() {
+    let hearers = vec![vec![3], vec![3], vec![3], vec![]];
+    let mut bench = Bench::new(Access::Aloha, hearers, 1);
+    for (node, later) in [(0, 0), (1, micros(80)), (2, micros(160))] {
+        bench.offer(at(later), node, &[0; 100]);
+    }
+    let (who, counts) = bench.end();
+    assert!(
+        who.iter().all(|(_, heard_by)| heard_by.is_empty()),
+        "{who:?}"
+    );
+    assert_eq!(counts.collided, 3);
+}
+
+#[test]
+fn who_sends_does_not_hear() {
+    // 1 begins to send while 0 does; 0 has long stopped hearing then, and 2 hears 1 alone.
+    let hearers = vec![vec![1], vec![0, 2], vec![]];
+    let mut bench = Bench::new(Access::Aloha, hearers.clone(), 1);
+    bench.offer(at(0), 0, &[1; 100]);
+    bench.offer(at(micros(50)), 1, &[2; 20]);
+    let (who, counts) = bench.end();
+    assert_eq!(who, [(1, vec![2]), (0, vec![])]);
+    assert_eq!((counts.collided, counts.unheard), (0, 2));
+    // It hears nothing while it turns, either: 0 begins just when 1 is about to.
+    let mut bench = Bench::new(Access::Aloha, hearers, 1);
+    bench.offer(at(0), 1, &[2; 5]);
+    bench.offer(at(1), 0, &[1; 100]);
+    let (who, counts) = bench.end();
+    assert_eq!(who, [(1, vec![2]), (0, vec![])]);
+    assert_eq!(counts.unheard, 2);
+}
+
+#[test]
+fn a_hidden_node_does_not_wait_and_one_in_range_does() {
+    for seed in 0..200 {
+        // In a row: 0 and 2 do not hear each other.
+        let mut bench = Bench::new(Access::Csma, vec![vec![1], vec![0, 2], vec![1]], seed);
+        bench.offer(at(0), 0, &[0; 200]);
+        // The longest first wait, and the frame is on the air for twice as long.
+        bench.offer(at(micros(100)), 2, &[2; 20]);
+        let (who, counts) = bench.end();
+        assert_eq!(who, [(2, vec![]), (0, vec![])], "seed {seed}");
+        assert_eq!((counts.collided, counts.deferred), (2, 0));
+        // All in one range.
+        let mut bench = Bench::in_one_range(Access::Csma, 3, seed);
+        bench.offer(at(0), 0, &[0; 200]);
+        bench.offer(at(micros(100)), 2, &[2; 20]);
+        let (who, counts) = bench.end();
+        assert_eq!(who, [(0, vec![1, 2]), (2, vec![0, 1])], "seed {seed}");
+        assert!(counts.deferred > 0 && counts.collided + counts.unheard == 0);
+    }
+}
+
+#[test]
+fn two_that_begin_in_the_same_slot_collide_and_in_different_slots_do_not() {
+    let (mut same, runs) = (0, 4_000);
+    for seed in 0..runs {
+        let mut bench = Bench::in_one_range(Access::Csma, 3, seed);
+        for node in [0, 1] {
+            bench.offer(at(0), node, &[0; 60]);
+        }
+        let (who, counts) = bench.end();
+        let lost = who.iter().filter(|(_, by)| by.is_empty()).count();
+        assert_eq!(counts.collided > 0, lost == 2, "seed {seed}");
+        assert!(lost == 0 || lost == 2, "seed {seed}");
+        same += u64::from(lost == 2);
+    }
+    // Eight slots to choose from; who finds the channel busy chooses again, and the other is done by then or later.
+    let share = same as f64 / runs as f64;
+    assert!((share - 1.0 / 8.0).abs() < 0.02, "{share}");
+}
+
+#[test]
+fn a_queue_holds_a_few_frames_in_order_and_drops_the_newest() {
+    let mut bench = Bench::in_one_range(Access::Csma, 2, 1);
+    let taken: Vec<bool> = (0..6)
+        .map(|tag| bench.offer(at(0), 0, &[tag; 30]))
+        .collect();
+    assert_eq!(taken, [true, true, true, true, false, false]);
+    bench.go_on(seconds(60));
+    let tags: Vec<u8> = bench.sent.iter().map(|(_, sent)| sent.frame[0]).collect();
+    assert_eq!((tags.as_slice(), QUEUE), (&[0, 1, 2, 3][..], 4));
+    assert_eq!(bench.medium.counts().dropped, 2);
+    // There is room again.
+    assert!(bench.offer(seconds(61), 0, &[9; 30]));
+}
+
+#[test]
+fn a_radio_that_is_switched_off_sends_nothing_more() {
+    let mut bench = Bench::in_one_range(Access::Aloha, 2, 1);
+    bench.offer(at(0), 0, &[1; 100]);
+    bench.offer(at(1), 0, &[2; 100]);
+    bench.go_on(at(micros(50)));
+    bench.medium.switch_off(0);
+    // Switched on again at once, it sends what it has then.
+    bench.offer(at(micros(50)), 0, &[3; 100]);
+    bench.go_on(seconds(60));
+    let heard: Vec<(u8, bool)> = bench
+        .sent
+        .iter()
+        .map(|(_, sent)| (sent.frame[0], !sent.heard_by.is_empty()))
+        .collect();
+    assert_eq!(heard, [(1, false), (3, true)]);
+}
+
+#[test]
+fn who_finds_the_channel_busy_again_and_again_waits_longer_and_longer() {
+    let runs = 2_000;
+    let mut times = 0;
+    for seed in 0..runs {
+        let mut bench = Bench::in_one_range(Access::Csma, 2, seed);
+        bench.offer(at(0), 0, &[0; 400]);
+        bench.offer(at(micros(100)), 1, &[1; 20]);
+        times += bench.end().1.deferred;
+    }
+    // Of a channel that is busy for 300 bytes to 370 more, waits of 35, 75 and 155 bytes on average take up three; waits of 35 would take
+    // nine.
+    let mean = times as f64 / runs as f64;
+    assert!((2.5..4.5).contains(&mean), "{mean}");
+}

@@ -1,0 +1,124 @@
+//! How much of the time a chain is right, how many groups fly at once, how near relays come to each other.
+
+use host_tests::fixtures::mission;
+use uav_relay_sim::report::ChainReport;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::many::run_seeds;
+use uav_relay_sim::simulator::optimum::undisturbed;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::{Partition, Setup};
+use uav_relay_sim::simulator::watch::Watched;
+
+use super::*;
+
+fn watched(setup: Setup) -> (Outcome, Watched) {
+    let outcome = run(setup).unwrap();
+    assert_eq!(outcome.ending, Ending::Soaked);
+    let watched = outcome.watched.unwrap();
+    (outcome, watched)
+}
+
+fn s(at: Instant) -> f64 {
+    at.as_micros() as f64 / 1e6
+}
+
+#[test]
+fn a_chain_that_nothing_happens_to_is_right_all_the_time() {
+    for access in [Access::Ideal, Access::Csma] {
+        let setup = Setup::on_air(mission(8), access).soaked(seconds(300));
+        let (outcome, watched) = watched(setup);
+        assert_eq!(outcome.ended, seconds(300));
+        assert_eq!(watched.availability, Some(1.0), "{access:?}");
+        assert_eq!(watched.most_flying, 1);
+        let places = outcome
+            .relays
+            .iter()
+            .map(|relay| relay.setpoint.unwrap().x_m);
+        let places: Vec<f64> = places.map(f64::from).collect();
+        let nearest = places.windows(2).map(|pair| pair[1] - pair[0]);
+        let nearest = nearest.reduce(f64::min).unwrap();
+        assert!((watched.least_separation_m.unwrap() - nearest).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn from_a_loss_to_the_new_places_it_is_wrong() {
+    let mut setup = Setup::on_shared_channel(mission(8));
+    setup.kills = vec![(4, seconds(50))];
+    let mission = setup.mission;
+    let (outcome, watched) = watched(setup.soaked(seconds(200)));
+    let report = ChainReport::new("align", &mission, &outcome, 1);
+    let converged = report.recovery[0].converged_s.unwrap();
+    let (first, wrong) = (s(watched.first_agreement.unwrap()), converged - 50.0);
+    let share = 1.0 - wrong / (200.0 - first);
+    assert!(
+        (watched.availability.unwrap() - share).abs() < 1e-3,
+        "{watched:?}, {share}"
+    );
+    let longest = watched.longest_wrong.unwrap().as_micros() as f64 / 1e6;
+    assert!((longest - wrong).abs() < 0.2, "{longest}, {wrong}");
+}
+
+#[test]
+fn the_optimum_is_that_of_exactly_those_who_are_left() {
+    let setup = Setup::on_shared_channel(mission(8));
+    let seven = run(Setup::new(mission(7))).unwrap();
+    let places = undisturbed(&setup, &[1, 2, 3, 5, 6, 7, 8], 0).unwrap();
+    for (place, relay) in places.iter().zip(&seven.relays) {
+        assert_eq!(place[0], f64::from(relay.setpoint.unwrap().x_m));
+    }
+    assert_eq!(places.len(), 7);
+}
+
+/// Relays 1 to 4 of eight, and the others, for good.
+fn split(quorum: bool) -> Setup {
+    let mut setup = Setup::on_shared_channel(mission(8));
+    setup.settings.quorum = quorum;
+    setup.partitions = vec![Partition {
+        after: 4,
+        from: seconds(30),
+        until: None,
+    }];
+    setup.soaked(seconds(200))
+}
+
+#[test]
+fn without_a_quorum_two_groups_fly_at_once() {
+    let (_, both) = watched(split(false));
+    assert_eq!(both.most_flying, 2);
+    // Either half is as large as the other, and right.
+    assert!(both.availability.unwrap() > 0.85, "{both:?}");
+}
+
+#[test]
+fn a_chain_that_never_agrees_is_never_right() {
+    let mut setup = Setup::on_shared_channel(mission(8));
+    setup.partitions = (1..8)
+        .map(|after| Partition {
+            after,
+            from: at(0),
+            until: None,
+        })
+        .collect();
+    let (_, watched) = watched(setup.soaked(seconds(100)));
+    assert_eq!(watched.availability, Some(0.0), "{watched:?}");
+    assert_eq!(watched.most_flying, 0);
+}
+
+#[test]
+fn many_seeds_give_what_each_gives_alone() {
+    let mut setup = Setup::on_air(mission(5), Access::Csma).soaked(seconds(60));
+    setup.faults = Faults {
+        loss: 0.4,
+        ..Faults::default()
+    };
+    setup.burst = 5.0;
+    let many = run_seeds(&setup, 10..20, |seed, outcome| (seed, outcome.air)).unwrap();
+    assert_eq!(many.len(), 10);
+    for (place, (seed, air)) in many.into_iter().enumerate() {
+        assert_eq!(seed, 10 + place as u64);
+        setup.seed = seed;
+        assert_eq!(run(setup.clone()).unwrap().air, air);
+    }
+}
