@@ -63,7 +63,8 @@ impl Roster {
             seats: OwnSeats::new(),
         };
         let mut last = roster.after;
-        for (index, altitude_m, power_w) in parts {
+        // By reference: what is left of an iterator by value is dropped by code that could panic.
+        for &(index, altitude_m, power_w) in &parts {
             let index = u16::from_le_bytes(index);
             let seat =
                 seat(index, altitude_m, power_w).filter(|_| index > last && index <= MAX_RELAYS);
