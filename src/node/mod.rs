@@ -9,7 +9,7 @@
 //! | `neighbour` | which node is taken for the neighbour on each side, and when it counts as lost |
 //! | `view` | the view change: how the chain comes to a new view of who is in it |
 //! | `mission_update` | a newer mission, in flight |
-//! | `round` | a round of agreement: sweeps, courses of the joint method, turns |
+//! | `round` | a round of agreement: sweeps, gatherings of the joint method, turns |
 //!
 //! | file | one idea |
 //! | --- | --- |

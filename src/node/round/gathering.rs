@@ -27,6 +27,7 @@ impl Seats {
     };
 
     /// What relay `index` brings along: what the mission says where nobody has asked.
+    #[inline(never)] // the solver asks in many places
     pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
         let at = usize::from(index).wrapping_sub(1);
         match self.own.get(at) {
@@ -72,10 +73,12 @@ impl Computation {
         self.seat(context) != Seat::common(context.mission())
     }
 
-    /// Whether the next pass of this leader is to gather what relays bring along: one differs, and not all of it is known.
+    /// Whether this relay leads, and its next pass is to gather what relays bring along: one differs, and not all of it is known.
     pub(super) fn gathers(&self, context: &Context<'_>) -> bool {
         let told = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.own);
-        context.joins()
+        let leads = context.index() == context.mission().leader();
+        leads
+            && context.joins()
             && match self.seats.known {
                 None => told || self.differs(context),
                 Some(known) => known < context.mission().relays(),
