@@ -236,7 +236,7 @@ fn look_at(message: &Message) {
                     .all(|index| index > roster.after && index <= MAX_RELAYS)
             );
             for seat in &roster.seats {
-                assert!(seat.altitude_m.is_none_or(is_flown));
+                assert!(seat.held_m.to_bits() == 0 || is_flown(seat.held_m));
                 assert!((1e-6..=1e6).contains(&seat.power_w));
             }
         }

@@ -523,7 +523,7 @@ impl Seats {
     fn roster(&self) -> Roster {
         let seat = |&(index, held_m, power_w): &(u16, f32, f32)| OwnSeat {
             index,
-            altitude_m: (held_m > 0.0).then_some(held_m),
+            held_m,
             power_w,
         };
         Roster {

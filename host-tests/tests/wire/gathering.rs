@@ -156,15 +156,15 @@ fn what_the_crate_writes_out_of_range_it_refuses_to_read() {
     for (y_m, expected) in [(1.0, Ok(())), (2e5, VALUE), (f32::NAN, VALUE)] {
         assert_eq!(verdict_on(&written(&sweep(y_m))), expected, "{y_m}");
     }
-    for (index, altitude_m, power_w, expected) in [
-        (1, Some(20.0), 1.0, Ok(())),
-        (0, Some(20.0), 1.0, VALUE),
-        (1, Some(f32::NAN), 1.0, VALUE),
-        (1, None, 0.0, VALUE),
+    for (index, held_m, power_w, expected) in [
+        (1, 20.0, 1.0, Ok(())),
+        (0, 20.0, 1.0, VALUE),
+        (1, f32::NAN, 1.0, VALUE),
+        (1, 0.0, 0.0, VALUE),
     ] {
         let seat = OwnSeat {
             index,
-            altitude_m,
+            held_m,
             power_w,
         };
         let roster = Roster {

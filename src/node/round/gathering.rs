@@ -52,7 +52,7 @@ impl Seats {
         for seat in &roster.seats {
             let at = usize::from(seat.index).wrapping_sub(1);
             if let Some(own) = self.own.get_mut(at) {
-                *own = [seat.altitude_m.unwrap_or(0.0), seat.power_w];
+                *own = [seat.held_m, seat.power_w];
             }
         }
         let last = roster.seats.last().filter(|_| roster.seats.is_full());
@@ -120,15 +120,12 @@ impl Computation {
             self.seats.known = Some(0);
         }
         if index > after && self.differs(context) {
-            let Profile {
-                altitude_m,
-                power_w,
-            } = self.profile;
+            let holds = context.settings().hold_altitude;
             // Where there is no room, the next pass asks again.
             _ = seats.push(OwnSeat {
                 index,
-                altitude_m: context.settings().hold_altitude.then_some(altitude_m),
-                power_w,
+                held_m: if holds { self.profile.altitude_m } else { 0.0 },
+                power_w: self.profile.power_w,
             });
         }
         self.pass = PassKind::Gather(Roster {

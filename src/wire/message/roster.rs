@@ -13,8 +13,8 @@ pub const MOST_NAMED: usize = 8;
 pub struct OwnSeat {
     /// Its place in the view, from 1 next to Tx.
     pub index: u16,
-    /// The altitude it keeps to, m; `None` if it chooses.
-    pub altitude_m: Option<f32>,
+    /// The altitude it keeps to, m; 0 if it chooses.
+    pub held_m: f32,
     /// Its transmit power, W.
     pub power_w: f32,
 }
@@ -44,8 +44,7 @@ impl Roster {
         let pass = PassId::new(self.number, self.mission);
         let mut parts = Parts::new();
         for seat in &self.seats {
-            let altitude_m = seat.altitude_m.unwrap_or(0.0);
-            _ = parts.push((seat.index.to_le_bytes(), altitude_m, seat.power_w));
+            _ = parts.push((seat.index.to_le_bytes(), seat.held_m, seat.power_w));
         }
         write(&(tag, pass, self.after.to_le_bytes(), parts), buffer)
     }
@@ -64,24 +63,20 @@ impl Roster {
         };
         let mut last = roster.after;
         // By reference: what is left of an iterator by value is dropped by code that could panic.
-        for &(index, altitude_m, power_w) in &parts {
+        for &(index, held_m, power_w) in &parts {
             let index = u16::from_le_bytes(index);
-            let seat =
-                seat(index, altitude_m, power_w).filter(|_| index > last && index <= MAX_RELAYS);
-            _ = roster.seats.push(seat.ok_or(MessageError::Value)?);
+            let chooses = held_m.to_bits() == 0;
+            let sound = profile(if chooses { 1.0 } else { held_m }, power_w).is_some();
+            if !(sound && index > last && index <= MAX_RELAYS) {
+                return Err(MessageError::Value);
+            }
+            _ = roster.seats.push(OwnSeat {
+                index,
+                held_m,
+                power_w,
+            });
             last = index;
         }
         Ok(roster)
     }
-}
-
-/// The relay of these numbers, if they are in range.
-fn seat(index: u16, altitude_m: f32, power_w: f32) -> Option<OwnSeat> {
-    let held = Some(altitude_m).filter(|held| held.to_bits() != 0);
-    let own = profile(held.unwrap_or(1.0), power_w)?;
-    Some(OwnSeat {
-        index,
-        altitude_m: held,
-        power_w: own.power_w,
-    })
 }

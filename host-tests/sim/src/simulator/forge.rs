@@ -106,10 +106,7 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
         }
         Message::Gathered(mut roster) => {
             roster.number = later(roster.number, rng);
-            roster
-                .seats
-                .iter_mut()
-                .for_each(|seat| seat.altitude_m = Some(50.0));
+            roster.seats.iter_mut().for_each(|seat| seat.held_m = 50.0);
             Message::Gathered(roster)
         }
         _ => return None,
