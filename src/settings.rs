@@ -2,6 +2,7 @@
 
 use crate::guard::config::GuardConfig;
 use crate::mission::{Mission, Profile};
+use crate::optimiser::joint::MOST_SOLVED;
 use crate::optimiser::local::Local;
 use crate::optimiser::search::Schedule;
 use crate::place::Placement;
@@ -36,7 +37,7 @@ pub enum Method {
     /// The best places at the altitudes held: Algorithm 1, in a field Algorithm 4.
     #[default]
     Align,
-    /// The best places, sides and altitudes together, within the mission's corridor. Not in a field.
+    /// The best places, sides and altitudes together, within the mission's corridor. Not in a field; up to 100 relays.
     Joint,
     /// Algorithm 1, and then Algorithm 2. Not in a field.
     Adjust(Adjust),
@@ -187,7 +188,8 @@ pub enum SetupError {
     Profile,
     /// The step of the fixed-step schedule is not a number above 0.
     Step,
-    /// `method` chooses altitudes, which it can not in a field, or the crate was built without the feature for it.
+    /// `method` chooses altitudes, which it can not in a field, nor the joint method for more than 100 relays, or the crate was built
+    /// without the feature for it.
     Method,
     /// `method.explore_m` is not within 0 to 1e5, or its grid has fewer than 2 columns or rows.
     Adjust,
@@ -214,7 +216,7 @@ impl core::fmt::Display for SetupError {
                 "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6"
             }
             Self::Step => "the fixed step must be above 0",
-            Self::Method => "method must be Align in a field, and without its feature, altitude or adjust",
+            Self::Method => "method must be Align in a field, and without its feature, altitude or adjust; Joint is for up to 100 relays",
             Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
             Self::Measure => {
                 "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000, and the feature field on"
@@ -251,7 +253,9 @@ pub(crate) fn check(
     }
     let able = match settings.method {
         Method::Align => true,
-        Method::Joint => cfg!(feature = "altitude") && mission.interferer().is_some(),
+        Method::Joint => {
+            usize::from(mission.relays()) <= MOST_SOLVED && mission.interferer().is_some()
+        }
         Method::Adjust(_) => cfg!(feature = "adjust") && mission.interferer().is_some(),
     };
     if !able {

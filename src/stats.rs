@@ -6,7 +6,7 @@
 pub struct Stats {
     /// Frames handed to the link, repetitions included.
     pub sent: u32,
-    /// Messages of a round (sweeps, courses, tokens) and proposals sent again because no answer came.
+    /// Messages of a round (sweeps, gatherings, tokens) and proposals sent again because no answer came.
     pub repeats: u32,
     /// Passes of any kind, and proposals, that this relay has begun as the leader.
     pub sweeps: u32,

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::{Adjust, Band, Instant, Method, Mission, MissionConfig, Profile, Side};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
-use uav_relay_oracle::random::joint::{CROWDED, ROOMY, scenario};
+use uav_relay_oracle::random::joint::{CROWDED, ROOMY, Scenario, scenario, with_own};
 use uav_relay_oracle::random::{self, log_uniform};
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Corridor, Effort, Place};
@@ -278,6 +278,112 @@ fn crowded_chains_are_safe_and_seldom_far_from_the_joint_optimum() {
     assert!(worst >= 0.5 && best <= 1.0 + 1e-5, "{worst} {best}");
 }
 
+/// A random chain in the plane above the line, some of whose relays bring along a power or an altitude of their own.
+fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
+    let drawn = scenario(rng, &(2..=20), ROOMY);
+    let mut drawn = with_own(rng, drawn).as_relays_know_it();
+    let common = drawn.link.relays.iter().map(|relay| relay.power_w);
+    // The mission says what relay 1 has: that one is alike.
+    let first = common.clone().next()?;
+    if drawn.held.is_empty() && common.into_iter().all(|power_w| power_w == first) {
+        return None;
+    }
+    for hold in &drawn.held {
+        drawn.link.relays[hold.relay].altitude_m = hold.altitude_m;
+    }
+    let alike = Link {
+        relays: vec![drawn.link.relays[0]; drawn.link.len()],
+        ..drawn.link.clone()
+    };
+    let mut setup = setup(&alike, drawn.corridor)?;
+    let config = MissionConfig {
+        common: Profile {
+            altitude_m: drawn.corridor.least_m as f32,
+            power_w: first as f32,
+        },
+        ..*setup.mission.config()
+    };
+    setup.mission = Mission::try_new(config).ok()?;
+    for (relay, index) in drawn.link.relays.iter().zip(1..) {
+        let own = Profile {
+            altitude_m: relay.altitude_m as f32,
+            power_w: relay.power_w as f32,
+        };
+        if own != config.common {
+            setup.profiles.push((index, own));
+        }
+    }
+    setup.held = drawn
+        .held
+        .iter()
+        .map(|hold| hold.relay as u16 + 1)
+        .collect();
+    Some((drawn, setup))
+}
+
+/// Two hundred random chains whose relays differ, against the same optimiser, and against the places that they were given.
+#[test]
+fn relays_that_differ_come_near_the_joint_optimum_and_never_below_their_given_places() {
+    let count = count(200);
+    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(45));
+    let (mut results, mut below) = (Vec::new(), Vec::new());
+    while results.len() < count {
+        let Some((drawn, joint_setup)) = mixed(&mut rng) else {
+            continue;
+        };
+        let (link, corridor) = (&drawn.link, drawn.corridor);
+        let Some(best) = joint::optimum(link, corridor, &drawn.held, Effort::usual(45)) else {
+            continue;
+        };
+        let mut given = joint_setup.clone();
+        given.settings.method = Method::Align;
+        let given = run(given).unwrap();
+        let outcome = run(joint_setup).unwrap();
+        let short = |place: &Place| {
+            format!(
+                "{:.3}/{:.4}",
+                place.x_m / link.distance_m,
+                place.altitude_m / link.distance_m
+            )
+        };
+        let list = |places: &[Place]| places.iter().map(short).collect::<Vec<_>>().join(" ");
+        let of = format!(
+            "N = {}, X {:.3} Y {:.4}, band {:.3} {:.3}, apart {:.4}, held {:?}, pw {:?}\n   best {}\n   ours {}",
+            link.len(),
+            link.x_i / link.distance_m,
+            link.y_i / link.distance_m,
+            corridor.least_m / link.distance_m,
+            corridor.most_m / link.distance_m,
+            link.min_separation_m / link.distance_m,
+            drawn.held.iter().map(|h| h.relay + 1).collect::<Vec<_>>(),
+            link.relays
+                .iter()
+                .map(|r| (r.power_w / link.relays[0].power_w * 100.0).round() / 100.0)
+                .collect::<Vec<_>>(),
+            list(&best.places),
+            list(&places(&outcome)),
+        );
+        assert_eq!(outcome.ending, Ending::Settled, "{of}");
+        let sir = joint::sir(link, &places(&outcome)).unwrap();
+        if given.ending == Ending::Settled
+            && sir < joint::sir(link, &places(&given)).unwrap() * (1.0 - 1e-4)
+        {
+            below.push(of.clone());
+        }
+        results.push(Result {
+            ratio: sir / best.sir,
+            of,
+            sweeps: outcome.sweeps,
+            bytes: outcome.bytes,
+        });
+    }
+    let (near, _, best, passes) = summary(&mut results);
+    assert!(below.is_empty(), "{below:?}");
+    assert!(near * 100 >= 98 * count, "{near} of {count}");
+    assert!(best <= 1.0 + 1e-5, "{best}");
+    assert!(f64::from(passes) <= 3.5 * count as f64, "{passes}");
+}
+
 #[test]
 fn faults_change_nothing() {
     let mut hurt = 0;
@@ -318,6 +424,43 @@ fn a_relay_may_hold_its_altitude() {
         altitudes[1] != 20.0 && altitudes[3] != 20.0,
         "{altitudes:?}"
     );
+}
+
+/// A sweep that shows that one differs, a gathering of eight at most, and a sweep of the places that come of it; a leader that differs
+/// itself begins with the gathering.
+#[test]
+fn relays_that_differ_take_three_round_trips_and_one_more_for_every_eight() {
+    for (relays, own, trips) in [
+        (5, &[3][..], 3),
+        (5, &[1], 2),
+        (1, &[1], 2),
+        (8, &[2, 5, 7], 3),
+        (20, &[2, 4, 6, 8, 10, 12, 14], 3),
+        (20, &[2, 4, 6, 8, 10, 12, 14, 16], 4),
+        (20, &[1, 2, 4, 6, 8, 10, 12, 14, 16], 3),
+        (20, &[6, 8, 10, 12, 14, 16, 18, 20], 3),
+    ] {
+        let (link, corridor) = roomy(relays, 500.0, 150.0, 280.0, 300.0);
+        let mut setup = setup(&link, corridor).unwrap();
+        for &index in own {
+            let own = Profile {
+                altitude_m: 80.0,
+                power_w: 1.25,
+            };
+            setup.profiles.push((index, own));
+            if index % 4 < 2 {
+                setup.held.push(index);
+            }
+        }
+        let outcome = settle(setup);
+        println!(
+            "{relays} relays, {own:?} differ: {} passes, {} messages, {} bytes",
+            outcome.sweeps, outcome.messages, outcome.bytes
+        );
+        assert_eq!(outcome.sweeps, trips, "{relays}: {own:?}");
+        let messages = u64::from(trips) * 2 * (relays as u64 - 1);
+        assert_eq!(outcome.messages, messages, "{relays}: {own:?}");
+    }
 }
 
 /// Where relays bring powers of their own the leader's prediction is wrong, and the chain finds its altitudes all the same.

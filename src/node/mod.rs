@@ -10,7 +10,7 @@
 //! | `view` | the view change: how the chain comes to a new view of who is in it |
 //! | `lease` | how long what was agreed on may be held |
 //! | `mission_update` | a newer mission, in flight |
-//! | `round` | a round of agreement: sweeps, courses of the joint method, turns |
+//! | `round` | a round of agreement: sweeps, gatherings of the joint method, turns |
 //!
 //! | file | one idea |
 //! | --- | --- |

@@ -1,7 +1,6 @@
 //! Any bytes behind a good check sequence: what can be read can be written, and is then the same.
 
 use uav_relay::mission::MAX_RELAYS;
-use uav_relay::optimiser::joint::trial::{TRIALS, Trial};
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};
@@ -228,29 +227,18 @@ fn look_at(message: &Message) {
             let across = sweep.chosen || sweep.relay.at.y_m.to_bits() == 0;
             assert!(across && !(sweep.chosen && sweep.measured_per_w.is_some()));
         }
-        Message::Course(course) => {
-            assert!((1e-6..=1e6).contains(&course.power_w));
-            assert!(course.trials.len() <= TRIALS);
-            let bar = course.bar;
+        Message::Gather(roster) | Message::Gathered(roster) => {
+            let indices = roster.seats.iter().map(|seat| seat.index);
+            assert!(indices.clone().is_sorted_by(|a, b| a < b));
             assert!(
-                (0.0..=1.0).contains(&bar.trust) && bar.slope < 0.0 && bar.estimate.abs() <= 1e3
+                indices
+                    .clone()
+                    .all(|index| index > roster.after && index <= MAX_RELAYS)
             );
-            for trial in &course.trials {
-                let Trial {
-                    target,
-                    penalty_m,
-                    place,
-                } = trial;
-                assert!(is_target(*target) && (0.0..=1e6).contains(&place.x_m));
-                assert!(*penalty_m >= 0.0);
-                assert!(is_beside(place.y_m) && is_flown(place.altitude_m));
+            for seat in &roster.seats {
+                assert!(seat.held_m.to_bits() == 0 || is_flown(seat.held_m));
+                assert!((1e-6..=1e6).contains(&seat.power_w));
             }
-        }
-        Message::Worth(worth) => {
-            assert!(worth.trial.is_none_or(|trial| usize::from(trial) < TRIALS));
-            assert!(worth.slack_m.is_finite());
-            let parts = worth.outlook.parts();
-            assert!(parts.iter().all(|part| part.is_finite()), "{parts:?}");
         }
         Message::Token(token) => {
             assert!(token.place.x_m.is_finite() && token.place.altitude_m > 0.0);

@@ -88,8 +88,7 @@ pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
         }
         4 => body.sweep(Extra::Upsilon),
         5 => body.sweep(Extra::Aside),
-        6 => body.course(),
-        7 => body.worth(),
+        6 | 7 => body.roster(),
         8 => body.token(),
         9 => body.moved(),
         10 => body.hello(),
@@ -272,38 +271,20 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Trials of places beside the line, each with its own target.
-    fn course(&mut self) {
+    /// Relays that bring along an altitude or a power of their own, most often after one another.
+    fn roster(&mut self) {
         self.pass();
-        self.power();
-        let distance_m = self.known.distance_m;
-        self.float(|input| input.even(0.0, 1.0));
-        self.float(|input| input.even(-2.0 * distance_m, -1e-3));
-        self.float(|input| input.even(-1e3, 10.0));
-        for _ in 0..self.small(0, 3) {
-            self.sir();
-            self.float(|input| input.even(0.0, 1.0));
-            self.place();
-            self.beside();
-            self.altitude();
-        }
-    }
-
-    /// A slack, then slopes, bends and gains, many of them nothing, as where there is no room to move.
-    fn worth(&mut self) {
-        self.pass();
-        if self.small(0, 1) == 1 {
-            self.small(0, 2);
-        }
-        let distance_m = self.known.distance_m;
-        self.float(|input| input.even(-distance_m, distance_m));
-        let flat = self.input.flag();
-        for _ in 0..12 {
-            if flat {
-                self.bytes.extend_from_slice(&[0; 4]);
+        let mut index = u16::from(self.small(0, 3));
+        self.bytes.push(0);
+        for _ in 0..self.small(0, 8) {
+            index += 1 + u16::from(self.input.below(3));
+            self.bytes.extend_from_slice(&index.to_le_bytes());
+            if self.input.flag() {
+                self.altitude();
             } else {
-                self.float(|input| input.even(-1e3, 1e3));
+                self.bytes.extend_from_slice(&[0; 4]);
             }
+            self.power();
         }
     }
 

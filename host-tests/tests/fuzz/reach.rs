@@ -91,7 +91,7 @@ fn chains_of_the_corpus_agree_by_every_method_over_bad_links() {
         });
         assert!(
             mixed.count() > 0,
-            "no chain agrees by courses, shared: {shared}"
+            "no chain agrees on what it gathered, shared: {shared}"
         );
     }
     let signed = chains.iter().filter(|relays| {

@@ -129,7 +129,7 @@ fn chain() -> Vec<Vec<u8>> {
     ]
     .concat();
     seeds.extend([8, 72].map(|how| with(&[0, 3, how], &uploads)));
-    // Relay 2 holds its altitude: places come of courses.
+    // Relay 2 holds its altitude: what it holds is gathered.
     let mixed = |how| {
         let rounds = [0, 13, 127].repeat(8);
         [&[1, 3, how, 1, 0][..], &[0, 4, 0, 0], &[3], &rounds].concat()

@@ -67,8 +67,8 @@ impl Ledger {
             _ if suspended => Met::Late,
             // Places are moved where there are some.
             Met::TakenUp if pass.moves && !stands => Met::Foreign,
-            // Rebooted in the midst of the sweep before, it does not know yet where it is to begin.
-            Met::TakenUp if pass.courses && self.begins_anew() && after.stale > before.stale => {
+            // Rebooted in the midst of the pass before, it does not know what the others brought along.
+            Met::TakenUp if pass.follows && self.begins_anew() && after.stale > before.stale => {
                 Met::Foreign
             }
             met => met,

@@ -62,8 +62,8 @@ pub(crate) struct Pass {
     pub(crate) digest: u16,
     /// Whether it is one of Algorithm 2.
     pub(crate) moves: bool,
-    /// Whether it is a course of the joint method.
-    pub(crate) courses: bool,
+    /// Whether it is one that some relays have been asked before, or of places chosen by what they said.
+    pub(crate) follows: bool,
 }
 
 /// The pass that a frame hands onward, if that is what it does.
@@ -74,7 +74,7 @@ pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
             let message = frame::decode(plain).ok()?.1;
             let number = match &message {
                 Message::Sweep(sweep) => sweep.number,
-                Message::Course(course) => course.number,
+                Message::Gather(roster) => roster.number,
                 Message::Token(token) => token.number,
                 _ => return None,
             };
@@ -82,7 +82,11 @@ pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
                 number,
                 digest: message.mission()?,
                 moves: matches!(message, Message::Token(_)),
-                courses: matches!(message, Message::Course(_)),
+                follows: match &message {
+                    Message::Gather(roster) => roster.after > 0,
+                    Message::Sweep(sweep) => sweep.chosen,
+                    _ => false,
+                },
             });
         }
     }

@@ -5,16 +5,14 @@ use crc::{CRC_32_ISCSI, Crc};
 use serde::Deserialize;
 use uav_relay::guard::Fence;
 use uav_relay::optimiser::PerTarget;
-use uav_relay::optimiser::joint::Outlook;
-use uav_relay::optimiser::joint::trial::{Bar, Trial};
 use uav_relay::optimiser::ladder::Ladder;
 use uav_relay::optimiser::verdict::Verdict;
 use uav_relay::place::{CrossSection, Station};
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{
-    AdjustStep, Answer, Course, Decision, Hello, Message, MessageError, Moved, PriorView, Proposal,
-    Sweep, Token, Worth,
+    AdjustStep, Answer, Decision, Hello, Message, MessageError, Moved, OwnSeat, PriorView,
+    Proposal, Roster, Sweep, Token,
 };
 use uav_relay::{Local, Placement};
 
@@ -47,22 +45,8 @@ pub(crate) enum Said {
         sweep: Swept,
         y_m: f32,
     },
-    Course {
-        number: u16,
-        mission: u16,
-        power_w: f32,
-        /// Trust, slope and estimate.
-        bar: [f32; 3],
-        /// Target, penalty, x, y and altitude of each.
-        trials: Vec<[f32; 5]>,
-    },
-    Worth {
-        number: u16,
-        mission: u16,
-        trial: Option<u8>,
-        slack_m: f32,
-        outlook: [f32; 12],
-    },
+    Gather(Seats),
+    Gathered(Seats),
     Token {
         number: u16,
         mission: u16,
@@ -95,6 +79,16 @@ pub(crate) enum Said {
         target_m: f32,
     },
     Offer(Offer),
+}
+
+/// What a gathering says, and its answer.
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+pub(crate) struct Seats {
+    pub(crate) number: u16,
+    pub(crate) mission: u16,
+    pub(crate) after: u16,
+    /// Place, altitude or 0, power of each.
+    pub(crate) seats: Vec<(u16, f32, f32)>,
 }
 
 /// What every sweep says.
@@ -230,31 +224,8 @@ impl Said {
                 upsilon_per_w,
             } => out = sweep.body(4, &[*upsilon_per_w]),
             Self::Aside { sweep, y_m } => out = sweep.body(5, &[*y_m]),
-            Self::Course {
-                number,
-                mission,
-                power_w,
-                bar,
-                trials,
-            } => {
-                out = pass(6, [*number, *mission]);
-                reals(&mut out, &[*power_w]);
-                reals(&mut out, bar);
-                out.push(u8::try_from(trials.len()).unwrap());
-                reals(&mut out, trials.as_flattened());
-            }
-            Self::Worth {
-                number,
-                mission,
-                trial,
-                slack_m,
-                outlook,
-            } => {
-                out = pass(7, [*number, *mission]);
-                option(&mut out, *trial);
-                reals(&mut out, &[*slack_m]);
-                reals(&mut out, outlook);
-            }
+            Self::Gather(seats) => out = seats.body(6),
+            Self::Gathered(seats) => out = seats.body(7),
             Self::Token {
                 number,
                 mission,
@@ -339,36 +310,8 @@ impl Said {
             }),
             Self::Busy { number } => Message::Busy { sweep: number },
             Self::Heartbeat { mission, answer } => Message::Heartbeat { mission, answer },
-            Self::Course {
-                number,
-                mission,
-                power_w,
-                bar: [trust, slope, estimate],
-                ref trials,
-            } => Message::Course(Course {
-                number,
-                mission,
-                power_w,
-                bar: Bar {
-                    trust,
-                    slope,
-                    estimate,
-                },
-                trials: trials.iter().copied().map(trial).collect(),
-            }),
-            Self::Worth {
-                number,
-                mission,
-                trial,
-                slack_m,
-                outlook,
-            } => Message::Worth(Worth {
-                number,
-                mission,
-                trial,
-                slack_m,
-                outlook: Outlook::from_parts(outlook).unwrap(),
-            }),
+            Self::Gather(ref seats) => Message::Gather(seats.roster()),
+            Self::Gathered(ref seats) => Message::Gathered(seats.roster()),
             Self::Token {
                 number,
                 mission,
@@ -494,22 +437,7 @@ impl Said {
                     && stand.is_none_or(is_place)
             }
             Self::Busy { .. } | Self::Heartbeat { .. } => true,
-            Self::Course {
-                power_w,
-                bar,
-                trials,
-                ..
-            } => is_power(*power_w) && is_bar(*bar) && trials.iter().copied().all(is_trial),
-            Self::Worth {
-                trial,
-                slack_m,
-                outlook,
-                ..
-            } => {
-                trial.is_none_or(|trial| trial < 3)
-                    && slack_m.is_finite()
-                    && outlook.iter().all(|part| part.is_finite())
-            }
+            Self::Gather(seats) | Self::Gathered(seats) => seats.in_range(),
             Self::Token {
                 x_m,
                 altitude_m,
@@ -576,34 +504,43 @@ fn is_beside(y_m: f32) -> bool {
     (-1e5..=1e5).contains(&y_m)
 }
 
-fn is_bar([trust, slope, estimate]: [f32; 3]) -> bool {
-    (0.0..=1.0).contains(&trust)
-        && slope < 0.0
-        && slope.is_finite()
-        && (-1e3..=1e3).contains(&estimate)
-}
-
-fn is_trial([target, penalty_m, x_m, y_m, altitude_m]: [f32; 5]) -> bool {
-    (f32::MIN_POSITIVE..=1e30).contains(&target)
-        && (0.0..f32::INFINITY).contains(&penalty_m)
-        && is_place(x_m)
-        && is_beside(y_m)
-        && is_altitude(altitude_m)
-}
-
 fn is_sir(sir: f32) -> bool {
     (0.0..f32::INFINITY).contains(&sir)
 }
 
-fn trial([target, penalty_m, x_m, y_m, altitude_m]: [f32; 5]) -> Trial {
-    Trial {
-        target,
-        penalty_m,
-        place: Placement {
-            x_m,
-            y_m,
-            altitude_m,
-        },
+impl Seats {
+    fn body(&self, tag: u8) -> Vec<u8> {
+        let mut out = pass(tag, [self.number, self.mission]);
+        out.extend(self.after.to_le_bytes());
+        out.push(u8::try_from(self.seats.len()).unwrap());
+        for &(index, altitude_m, power_w) in &self.seats {
+            out.extend(index.to_le_bytes());
+            reals(&mut out, &[altitude_m, power_w]);
+        }
+        out
+    }
+
+    fn roster(&self) -> Roster {
+        let seat = |&(index, held_m, power_w): &(u16, f32, f32)| OwnSeat {
+            index,
+            held_m,
+            power_w,
+        };
+        Roster {
+            number: self.number,
+            mission: self.mission,
+            after: self.after,
+            seats: self.seats.iter().map(seat).collect(),
+        }
+    }
+
+    fn in_range(&self) -> bool {
+        let mut before = self.after;
+        self.seats.iter().all(|&(index, held_m, power_w)| {
+            let later = index > before && index <= 1000;
+            before = index;
+            later && (held_m.to_bits() == 0 || is_altitude(held_m)) && is_power(power_w)
+        })
     }
 }
 
@@ -661,9 +598,17 @@ impl Reader<'_> {
         (0..count).map(|_| self.real()).collect()
     }
 
-    fn trials(&mut self) -> Option<Vec<[f32; 5]>> {
-        let count = self.byte().filter(|&count| count <= 3)?;
-        (0..count).map(|_| self.reals()).collect()
+    fn seats(&mut self) -> Option<Seats> {
+        let (number, mission, after) = (self.word()?, self.word()?, self.word()?);
+        let count = self.byte().filter(|&count| count <= 8)?;
+        let seats = (0..count).map(|_| Some((self.word()?, self.real()?, self.real()?)));
+        let seats = seats.collect::<Option<_>>()?;
+        Some(Seats {
+            number,
+            mission,
+            after,
+            seats,
+        })
     }
 
     fn reals<const N: usize>(&mut self) -> Option<[f32; N]> {
@@ -740,20 +685,8 @@ impl Reader<'_> {
                 let (sweep, [y_m]) = self.sweep()?;
                 Said::Aside { sweep, y_m }
             }
-            6 => Said::Course {
-                number: self.word()?,
-                mission: self.word()?,
-                power_w: self.real()?,
-                bar: self.reals()?,
-                trials: self.trials()?,
-            },
-            7 => Said::Worth {
-                number: self.word()?,
-                mission: self.word()?,
-                trial: self.option(Self::byte)?,
-                slack_m: self.real()?,
-                outlook: self.reals()?,
-            },
+            6 => Said::Gather(self.seats()?),
+            7 => Said::Gathered(self.seats()?),
             8 => Said::Token {
                 number: self.word()?,
                 mission: self.word()?,

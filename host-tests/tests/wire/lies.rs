@@ -23,13 +23,10 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         Said::Sweep(sweep) | Said::Measured { sweep, .. } | Said::Aside { sweep, .. } => {
             (sweep.number, sweep.mission) = (as_number, as_mission);
         }
+        Said::Gather(seats) | Said::Gathered(seats) => {
+            (seats.number, seats.mission) = (as_number, as_mission);
+        }
         Said::Verdict {
-            number, mission, ..
-        }
-        | Said::Course {
-            number, mission, ..
-        }
-        | Said::Worth {
             number, mission, ..
         }
         | Said::Token {

@@ -8,10 +8,10 @@ use uav_relay_oracle::random::seed;
 
 mod bodies;
 mod codec;
-mod course;
 mod damage;
 mod document;
 mod forming;
+mod gathering;
 mod golden;
 mod ground;
 mod ladder;

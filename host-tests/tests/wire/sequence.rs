@@ -14,7 +14,7 @@ use uav_relay::{
     Band, Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, Relay, Wiring,
 };
 
-use super::codec::{Forming, Said, Swept, plain, wire};
+use super::codec::{Forming, Said, Seats, Swept, plain, wire};
 use super::config;
 use super::lies::renamed;
 use super::offer::{Offer, offer};
@@ -104,6 +104,16 @@ pub(crate) fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> 
     out
 }
 
+/// What relay `index` brings along.
+pub(crate) fn seats(number: u16, mission: u16, index: u16) -> Seats {
+    Seats {
+        number,
+        mission,
+        after: 0,
+        seats: vec![(index, 30.0, 0.5)],
+    }
+}
+
 /// One message of each tag, of this pass.
 pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     let x_m = 400.0;
@@ -139,20 +149,8 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             upsilon_per_w: 1e8,
         },
         Said::Aside { sweep, y_m: -12.5 },
-        Said::Course {
-            number,
-            mission,
-            power_w,
-            bar: [0.5, -1.0, -1e3],
-            trials: vec![[1.0, 0.0, x_m, -12.5, altitude_m]],
-        },
-        Said::Worth {
-            number,
-            mission,
-            trial: Some(0),
-            slack_m: 1.0,
-            outlook: [0.5; 12],
-        },
+        Said::Gather(seats(number, mission, 3)),
+        Said::Gathered(seats(number, mission, 5)),
         Said::Token {
             number,
             mission,
@@ -474,27 +472,13 @@ fn tamed(said: Said) -> Said {
                 y_m: y_m % 100.0,
             }
         }
-        Said::Course {
-            number,
-            mission,
-            bar,
-            mut trials,
-            ..
-        } => {
-            for [target, penalty_m, x_m, y_m, altitude_m] in &mut trials {
-                *target = 0.5;
-                *penalty_m = penalty_m.min(1.0);
-                *x_m = into(*x_m);
-                *y_m %= 60.0;
-                *altitude_m = altitude_m.clamp(20.0, 300.0);
+        Said::Gather(mut seats) => {
+            seats.after = 0;
+            seats.seats.truncate(2);
+            for (seat, index) in seats.seats.iter_mut().zip(1..) {
+                seat.0 = index;
             }
-            Said::Course {
-                number,
-                mission,
-                power_w: 1.0,
-                bar,
-                trials,
-            }
+            Said::Gather(seats)
         }
         Said::Proposal(forming) => {
             let [_, relays, view, version] = forming.numbers;
@@ -673,7 +657,6 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                     if relay.setpoint() != place {
                         let cause = match (said.body()[0], pause) {
                             (1, 0) => "verdict",
-                            (7, 0) => "worth",
                             (8, _) => "turn",
                             (0 | 4 | 5, 0) => "sweep at the last",
                             _ => "work",

@@ -6,7 +6,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay::wire::frame::Header;
 
-use super::codec::{Forming, Said, Swept, plain, sealed, targets, wire};
+use super::codec::{Forming, Said, Seats, Swept, plain, sealed, targets, wire};
 use super::offered::{NUMBERS, offers};
 
 /// The largest node number.
@@ -162,59 +162,25 @@ fn beside() -> impl Strategy<Value = f32> {
     ]
 }
 
-/// A course in range, of `least` trials at least.
-pub(crate) fn courses(least: usize) -> BoxedStrategy<Said> {
-    let targets = prop_oneof![
-        4 => (-10.0..5.0_f32).prop_map(f32::exp2),
-        1 => (-126.0..99.0_f32).prop_map(f32::exp2),
-        1 => Just(f32::MIN_POSITIVE),
-        1 => Just(1e30),
-    ];
-    let penalties = prop_oneof![2 => Just(0.0), 2 => 0.0..=10.0_f32, 1 => up_to(f32::MAX)];
-    let trials = (targets, penalties, along(), beside(), altitudes())
-        .prop_map(|(target, penalty, x, y, altitude)| [target, penalty, x, y, altitude]);
+/// What relays bring along, in range.
+fn rosters() -> BoxedStrategy<Seats> {
+    let held = prop_oneof![1 => Just(0.0), 2 => altitudes()];
     let numbers = (any::<u16>(), any::<u16>());
-    (numbers, powers(), bars(), vec(trials, least..=3))
-        .prop_map(|((number, mission), power_w, bar, trials)| Said::Course {
-            number,
-            mission,
-            power_w,
-            bar,
-            trials,
-        })
-        .boxed()
-}
-
-/// By what trials are judged: in the first course, and later.
-fn bars() -> impl Strategy<Value = [f32; 3]> {
-    let trusts = prop_oneof![2 => 0.0..=1.0_f32, 1 => Just(0.5)];
-    let slopes = prop_oneof![
-        4 => -1000.0..=-1e-3_f32,
-        1 => Just(f32::MIN),
-        1 => Just(-f32::from_bits(1)),
-    ];
-    let estimates = prop_oneof![2 => Just(-1e3), 3 => -5.0..=5.0_f32, 1 => -1e3..=1e3_f32];
-    (trusts, slopes, estimates).prop_map(|(trust, slope, estimate)| [trust, slope, estimate])
-}
-
-/// What came of a course, in range.
-pub(crate) fn worths() -> BoxedStrategy<Said> {
-    let parts = || {
-        prop_oneof![
-            4 => -10.0..=10.0_f32,
-            1 => up_to(f32::MAX),
-            1 => up_to(f32::MAX).prop_map(|part| -part),
-        ]
-    };
-    let trials = proptest::option::of(0..3_u8);
-    let numbers = (any::<u16>(), any::<u16>());
-    (numbers, trials, parts(), vec(parts(), 12))
-        .prop_map(|((number, mission), trial, slack_m, outlook)| Said::Worth {
-            number,
-            mission,
-            trial,
-            slack_m,
-            outlook: outlook.try_into().unwrap(),
+    let afters = prop_oneof![4 => Just(0), 1 => 0..1000_u16];
+    (numbers, afters, vec((1..9_u16, held, powers()), 0..=8))
+        .prop_map(|((number, mission), after, mut seats)| {
+            let mut last = after;
+            for seat in &mut seats {
+                last += seat.0;
+                seat.0 = last;
+            }
+            seats.retain(|seat| seat.0 <= 1000);
+            Seats {
+                number,
+                mission,
+                after,
+                seats,
+            }
         })
         .boxed()
 }
@@ -369,8 +335,8 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
             .prop_map(|(mission, answer)| Said::Heartbeat { mission, answer }),
         2 => measured(sweeps(0)),
         2 => asides(sweeps(0)),
-        2 => courses(0),
-        2 => worths(),
+        2 => rosters().prop_map(Said::Gather),
+        2 => rosters().prop_map(Said::Gathered),
         2 => tokens(),
         2 => moves(),
         3 => formings(),
@@ -476,7 +442,7 @@ pub(crate) fn pad(body: &mut Vec<u8>, tag: bool, more: usize) {
         0 => 19,
         1 => 7 + usize::from(body[6]),
         4 | 5 => 23,
-        6 => 21,
+        6 | 7 => 7,
         _ => 0,
     };
     let at = if tag { 0 } else { count };

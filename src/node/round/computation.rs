@@ -1,16 +1,16 @@
 //! What a relay holds while it does its share of an algorithm: the pass that is under way, its place, its targets.
 
+use super::gathering::Seats;
 use super::state::{Action, Phase, RoundState};
 use super::sweeping::Sweeping;
 use super::task::LeaderTask;
 use super::turning::Turning;
 use crate::mission::Profile;
 use crate::node::context::Context;
-use crate::optimiser::joint::course::Coursing;
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement, Station};
-use crate::wire::message::{Answer, Course, Message, Moved, Sweep, Token, Worth};
+use crate::wire::message::{Answer, Message, Moved, Roster, Sweep, Token};
 
 /// Places weighed in one call of `work` in Algorithm 2, and a row of 24 more at most.
 pub(super) const PLACES_AT_ONCE: u16 = 600;
@@ -23,7 +23,7 @@ pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 #[derive(Clone, Debug)]
 pub(super) enum PassKind {
     Sweep(Sweeping),
-    Course(Coursing),
+    Gather(Roster),
     Turn(Turning),
 }
 
@@ -32,28 +32,10 @@ pub(super) enum PassKind {
 pub(super) struct Chosen {
     /// Across the line.
     pub(super) at: CrossSection,
-    /// Where it was by its own solution of the chain, before courses moved it: every beginning is from there.
-    solved: CrossSection,
     /// And no farther along it, m.
     pub(super) end_m: f32,
     /// Whether nobody holds back there.
     pub(super) plain: bool,
-}
-
-impl Chosen {
-    pub(super) const fn new(at: CrossSection, end_m: f32, plain: bool) -> Self {
-        Self {
-            at,
-            solved: at,
-            end_m,
-            plain,
-        }
-    }
-
-    /// What courses have come to counts no more.
-    pub(super) const fn begin_again(&mut self) {
-        self.at = self.solved;
-    }
 }
 
 /// A relay's share of the algorithms.
@@ -65,6 +47,8 @@ pub(crate) struct Computation {
     pub(super) sweeps: u32,
     /// What this relay was given.
     pub(super) profile: Profile,
+    /// What the relays of this view bring along.
+    pub(super) seats: Seats,
     /// Where the joint method has it in this view, once that is known.
     pub(super) chosen: Option<Chosen>,
     /// Where it is to be across the line.
@@ -86,6 +70,7 @@ impl Computation {
             task: LeaderTask::No,
             sweeps: 0,
             profile,
+            seats: Seats::UNKNOWN,
             chosen: None,
             at: profile.on_line().at,
             after: None,
@@ -106,6 +91,7 @@ impl Computation {
     pub(crate) fn load(&mut self, profile: Profile) {
         self.profile = profile;
         self.chosen = None;
+        self.seats = Seats::UNKNOWN;
         if self.setpoint.is_none() {
             self.at = profile.on_line().at;
         }
@@ -131,6 +117,7 @@ impl Computation {
         self.task.rest();
         self.after = None;
         self.chosen = None;
+        self.seats = Seats::UNKNOWN;
         self.state.renew(leads);
     }
 
@@ -184,13 +171,7 @@ impl Computation {
                 measured_per_w: context.measured_per_w,
                 reaches: sweeping.reaches.clone(),
             })),
-            PassKind::Course(coursing) if ALTITUDE => Some(Message::Course(Course {
-                number,
-                mission,
-                power_w: self.profile.power_w,
-                bar: coursing.bar,
-                trials: coursing.own.clone(),
-            })),
+            PassKind::Gather(roster) if ALTITUDE => Some(Message::Gather(roster.clone())),
             PassKind::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Token(Token {
                     number,
@@ -215,7 +196,7 @@ impl Computation {
         match &self.pass {
             PassKind::Turn(_) => true,
             PassKind::Sweep(sweeping) => sweeping.chosen,
-            PassKind::Course(_) => false,
+            PassKind::Gather(_) => false,
         }
     }
 
@@ -233,17 +214,7 @@ impl Computation {
                 stand: sweeping.stand(),
                 own: sweeping.own || self.differs(context),
             })),
-            PassKind::Course(coursing) if ALTITUDE => {
-                coursing.worth.map(|(trial, slack_m, outlook)| {
-                    Message::Worth(Worth {
-                        number,
-                        mission,
-                        trial,
-                        slack_m,
-                        outlook,
-                    })
-                })
-            }
+            PassKind::Gather(roster) if ALTITUDE => Some(Message::Gathered(roster.clone())),
             PassKind::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Moved(Moved {
                     number,

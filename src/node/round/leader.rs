@@ -1,6 +1,6 @@
 //! What the leader works out before it begins a pass: its prediction, the targets or altitudes to try next.
 
-use super::computation::{ADJUST, ALTITUDE, Computation};
+use super::computation::{ADJUST, Computation};
 use super::state::Action;
 use super::task::LeaderTask;
 use super::turning::Turning;
@@ -22,6 +22,9 @@ const FIELD_HOPS_AT_ONCE: u16 = 8;
 impl Computation {
     /// Goes on with the leader's computation; whether the next pass can begin.
     pub(super) fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
+        if self.gathers(context) {
+            return Ok(true);
+        }
         if self.is_solving(context) {
             if let Some(target) = self.solve(context) {
                 self.search_chosen(context, target)?;
@@ -118,17 +121,16 @@ impl Computation {
     /// The leader begins the pass it has planned.
     pub(super) fn begin_pass(&mut self, context: &Context<'_>) -> Action {
         let mission = context.mission();
+        if self.gathers(context) {
+            self.begin();
+            return self.begin_gathering(context);
+        }
         match &self.task {
             LeaderTask::Searching { search, given, .. } => {
                 let ladder = *search.ladder();
                 let chosen = context.joins() && self.chosen.is_some() && !given;
                 self.begin();
                 self.sweep_on(context, ladder, chosen, None, &origins(mission))
-            }
-            LeaderTask::Ascending(ascent) if ALTITUDE => {
-                let ascent = *ascent;
-                self.begin();
-                self.set_course(context, ascent)
             }
             LeaderTask::Adjusting(rounds) if ADJUST => {
                 let (turn, sir) = (rounds.turn(), rounds.sir);

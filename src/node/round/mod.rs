@@ -5,12 +5,13 @@
 //! | [`state`] | the state table of a pass, and its number |
 //! | `computation` | what a relay holds while it does its share |
 //! | `sweep`, `sweeping` | a sweep of targets (Algorithms 1 and 4) and its verdict |
-//! | `course` | trials of the joint method |
+//! | `chosen`, `gathering` | a relay's own solution of the chain by the joint method, and what it has to know of the others |
 //! | `turn`, `turning` | a turn of Algorithm 2 |
 //! | `leader`, `task` | what comes before a pass begins: which one, and what for |
 
+mod chosen;
 mod computation;
-mod course;
+mod gathering;
 mod leader;
 pub(crate) mod state;
 mod sweep;
@@ -68,8 +69,8 @@ impl Round {
         let next = match message {
             Message::Sweep(sweep) => computation.on_sweep(context, sweep),
             Message::Verdict(answer) => computation.on_verdict(context, answer),
-            Message::Course(course) if ALTITUDE => computation.on_course(context, course),
-            Message::Worth(worth) if ALTITUDE => computation.on_worth(context, worth),
+            Message::Gather(roster) if ALTITUDE => computation.on_gather(context, roster),
+            Message::Gathered(roster) if ALTITUDE => computation.on_gathered(context, roster),
             Message::Token(token) if ADJUST => computation.on_token(context, token),
             Message::Moved(moved) if ADJUST => computation.on_moved(context, moved),
             Message::Busy { sweep } => {
@@ -154,7 +155,11 @@ impl Round {
                     ..RoundDue::default()
                 };
                 self.retransmit.stop();
+                // Now that it knows what the others bring along it may have the chain to solve.
                 self.work_at = None;
+                if self.computation.is_solving(context) {
+                    self.work_soon(context.now);
+                }
                 Effects {
                     converged: agreed,
                     ..moved(to)

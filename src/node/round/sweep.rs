@@ -30,6 +30,10 @@ impl Computation {
         if sweep.chosen && context.mission().interferer().is_none() {
             return Action::Stale;
         }
+        if sweep.chosen && self.seats.is_partial(context.mission().relays()) {
+            // It was not there when the rest was told.
+            return Action::Foreign;
+        }
         self.state.take(sweep.number);
         self.sweep_on(
             context,
@@ -58,10 +62,6 @@ impl Computation {
         sweeping.ladder = ladder;
         sweeping.chosen = chosen;
         sweeping.begin(behind, from);
-        // Of places chosen, a plain pass is of those that courses came to.
-        if chosen && !ladder.is_plain() {
-            self.begin_again();
-        }
         self.state.wait();
         self.go_on_with_sweep(context)
     }
@@ -124,6 +124,9 @@ impl Computation {
             return self.agree(context);
         }
         self.state.answer();
+        if self.gathers(context) {
+            return Action::Work { moved: false };
+        }
         let LeaderTask::Searching { search, .. } = &mut self.task else {
             return Action::Answer {
                 moved: false,
@@ -150,17 +153,14 @@ impl Computation {
     /// The chain has agreed on a target. The leader may have more in mind.
     pub(super) fn agree(&mut self, context: &Context<'_>) -> Action {
         self.state.hold();
-        if let LeaderTask::Searching { last: false, .. } = self.task
-            && let Some(target) = self.target
-        {
+        if let LeaderTask::Searching { last: false, .. } = self.task {
             match context.settings().method {
                 Method::Adjust(adjust) if ADJUST => {
                     self.task.adjust(adjust);
                     self.state.answer();
                     return Action::Work { moved: true };
                 }
-                Method::Joint if context.joins() && self.is_mixed(context) => {
-                    self.begin_ascent(context, target);
+                Method::Joint if self.gathers(context) => {
                     self.state.answer();
                     return Action::Work { moved: true };
                 }

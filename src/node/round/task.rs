@@ -1,14 +1,10 @@
 //! What the leader has beyond every other relay: which pass comes next.
 
-use crate::optimiser::joint::Solver;
-use crate::optimiser::joint::ascent::Ascent;
+use crate::optimiser::joint::{MOST_SOLVED, Solver};
 use crate::optimiser::plan::Planner;
 use crate::optimiser::search::Search;
 use crate::settings::Adjust;
 use crate::wire::message::AdjustStep;
-
-/// The most relays whose chain is solved in one relay, without a message; longer ones are solved by messages.
-pub(crate) const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };
 
 /// A chain being solved by the joint method.
 pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
@@ -29,8 +25,6 @@ pub(crate) enum LeaderTask {
     Predicting(Planner),
     /// The same by the joint method: every relay does that, not the leader alone.
     Solving(ChainSolver),
-    /// The joint method by messages.
-    Ascending(Ascent),
     /// Trying targets at the altitudes held; whether the chain settles with what is agreed.
     Searching {
         search: Search,
@@ -111,11 +105,6 @@ impl LeaderTask {
     /// The same by the joint method.
     pub(crate) fn solve(&mut self, chain: ChainSolver) {
         *self = Self::Solving(chain);
-    }
-
-    /// Begins the joint method by messages.
-    pub(crate) fn ascend(&mut self, ascent: Ascent) {
-        *self = Self::Ascending(ascent);
     }
 
     /// Tries targets: the `last` thing to do, and of the places `given`, or not.

@@ -5,8 +5,12 @@
 //! is tried, and in the end a smaller region in which the derivatives are trusted.
 
 use super::outlook::Outlook;
-use super::trial::{Bar, SHARES, TRUST, Trial, Trials};
-use crate::place::Placement;
+
+/// Parts of the step that are tried, one after the other.
+const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
+
+/// What is trusted at first, of a relay's distance from the interferer and of ln gamma.
+const TRUST: f32 = 0.5;
 
 /// Trust below which nothing is gained any more.
 const LEAST_TRUST: f32 = 1e-4;
@@ -141,11 +145,6 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// The target at which the nominal chain's slack would be zero.
-    pub(crate) fn estimate(&self) -> f32 {
-        self.sigma - self.slack / self.slope
-    }
-
     /// A pass back begins.
     pub(crate) const fn look_back(&mut self) {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
@@ -238,57 +237,6 @@ impl Ascent {
             AscentStep::Over
         } else {
             AscentStep::Again
-        }
-    }
-
-    /// The next course, as the leader says it.
-    pub(crate) fn course(&self) -> (Bar, Trials) {
-        let trial = |sigma: f32| Trial {
-            target: libm::expf(sigma),
-            penalty_m: 0.0,
-            place: Placement::default(),
-        };
-        if self.iterations == 0 {
-            let mut trials = Trials::new();
-            _ = trials.push(trial(self.sigma));
-            return (Bar::FIRST, trials);
-        }
-        let bar = Bar {
-            trust: self.trust,
-            slope: self.slope,
-            estimate: self.estimate(),
-        };
-        let trials = SHARES.map(|share| trial(self.sigma_for(share)));
-        (bar, Trials::from(trials))
-    }
-
-    /// What came of it.
-    pub(crate) fn heard(&mut self, trial: Option<u8>, slack: f32, outlook: &Outlook) -> AscentStep {
-        let turn = match trial.map(usize::from) {
-            Some(_) if self.iterations == 0 => {
-                self.slack = slack;
-                AscentStep::Again
-            }
-            Some(at) => {
-                let share = SHARES.get(at).copied().unwrap_or(1.0);
-                let sigma = self.sigma_for(share);
-                self.taken(share, sigma, slack)
-            }
-            None => {
-                self.trust *= 0.2;
-                if self.trust < LEAST_TRUST {
-                    AscentStep::Over
-                } else {
-                    AscentStep::Again
-                }
-            }
-        };
-        self.look_back();
-        self.add(outlook);
-        match self.weighed() {
-            _ if turn == AscentStep::Over => turn,
-            AscentStep::Over => AscentStep::Over,
-            _ => AscentStep::Again,
         }
     }
 

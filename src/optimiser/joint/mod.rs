@@ -8,28 +8,26 @@
 //! | --- | --- |
 //! | `axis` | which coordinate of a place follows from the other two |
 //! | `hop` | how a hop's end moves with everything it depends on |
-//! | [`outlook`] | what the rest of the chain is worth, as the relay before it sees it |
+//! | `outlook` | what the rest of the chain is worth, as the relay before it sees it |
 //! | `policy` | a relay's step, and how it follows what changed before it |
-//! | [`link`] | one relay and the hop into it: both passes, one relay's worth of each |
+//! | `link` | one relay and the hop into it: both passes, one relay's worth of each |
 //! | `ascent` | how far the target is raised, and what is taken of a step |
 //! | `starts`, `seek`, `cells` | where an ascent begins; the target of a chain that does not change; a place in six bytes |
 //! | [`solver`] | a whole chain without a message |
-//! | [`trial`] | what a course carries |
-//! | [`course`] | one relay's share where relays hold what the others do not know |
 
-pub(crate) mod ascent;
+mod ascent;
 mod axis;
 mod cells;
-pub mod course;
 mod hop;
-pub mod link;
-pub mod outlook;
+mod link;
+mod outlook;
 mod policy;
 mod seek;
 pub mod solver;
 mod starts;
-pub mod trial;
 
 pub use link::Room;
-pub use outlook::Outlook;
 pub use solver::{Seat, Solver};
+
+/// The most relays of a chain that relays solve by the joint method; without the feature `altitude` they solve none.
+pub const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };

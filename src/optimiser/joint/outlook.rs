@@ -12,13 +12,9 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// How many numbers an [`Outlook`] is.
-pub const PARTS: usize = 12;
-
 /// The slack about a nominal chain, as a relay's place changes.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Outlook {
+pub(crate) struct Outlook {
     /// By x, y and h, m per m.
     pub(crate) slope: Triple,
     /// By two of them, 1/m; symmetric.
@@ -32,38 +28,6 @@ pub struct Outlook {
 }
 
 impl Outlook {
-    /// The twelve numbers: slopes by x, y, h; bends by xx, xy, xh, yy, yh, hh; slope by ln target; linear and square gain.
-    pub fn parts(&self) -> [f32; PARTS] {
-        let [x, y, h] = self.slope;
-        let [[xx, xy, xh], [_, yy, yh], [_, _, hh]] = self.bend;
-        [
-            x,
-            y,
-            h,
-            xx,
-            xy,
-            xh,
-            yy,
-            yh,
-            hh,
-            self.by_target,
-            self.linear,
-            self.square,
-        ]
-    }
-
-    /// From those numbers, if all of them are finite.
-    pub fn from_parts(parts: [f32; PARTS]) -> Option<Self> {
-        let [x, y, h, xx, xy, xh, yy, yh, hh, by_target, linear, square] = parts;
-        parts.iter().all(|part| part.is_finite()).then_some(Self {
-            slope: [x, y, h],
-            bend: [[xx, xy, xh], [xy, yy, yh], [xh, yh, hh]],
-            by_target,
-            linear,
-            square,
-        })
-    }
-
     /// The slack of a last relay at `at`, m, and its outlook, when Rx, `distance_m` from Tx, is heard as far as `reach_m`: how much farther
     /// from Rx it could be. Beyond Rx along x is as good as right above it.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {

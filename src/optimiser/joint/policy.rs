@@ -19,14 +19,6 @@ pub(crate) struct Policy {
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
-    /// To stay.
-    pub(super) const NONE: Self = Self {
-        axis: Coordinate::X,
-        rising: true,
-        step: [0.0; 2],
-        follow: [[0.0; 3]; 2],
-    };
-
     /// The step within the box that gains most by a concave quadratic: `slope`, and `bend` (yy, yh, hh) turned concave.
     pub(super) fn best(
         slope: [f32; 2],

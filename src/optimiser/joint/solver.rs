@@ -49,7 +49,7 @@ const CEILING: f32 = 5e-5;
 /// How far above that ceiling the other hops are when a chain is probed first, in ln gamma.
 const PROBED: f32 = 3e-4;
 
-/// Most relays of a chain that is polished.
+/// Most relays of a chain that is polished, but where some keep to an altitude: the way of the others has kinks there.
 const POLISHED: u16 = 5;
 
 /// How often the moves of a polish are halved, and the first of them, as a part of the room.
@@ -105,8 +105,8 @@ struct Mark {
 
 impl Mark {
     fn look(&mut self, outlook: &Outlook) {
-        let [x, y, h, xx, xy, xh, yy, yh, hh, ..] = outlook.parts();
-        self.slope = [x, y, h];
+        let [[xx, xy, xh], [_, yy, yh], [_, _, hh]] = outlook.bend;
+        self.slope = outlook.slope;
         self.bend = [xx, xy, xh, yy, yh, hh];
     }
 
@@ -245,6 +245,34 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         }
     }
 
+    /// The altitude that relay `index` keeps to, if it keeps to one while others choose.
+    fn held_at(&self, index: u16) -> Option<f32> {
+        let Room { band, .. } = (self.seat_of)(index).room;
+        let free = !self.mission.config().band.is_single();
+        (free && band.is_single()).then_some(band.least_m)
+    }
+
+    /// Whether any relay does.
+    fn holds(&self) -> bool {
+        (1..=self.mission.relays()).any(|index| self.held_at(index).is_some())
+    }
+
+    /// The altitude at relay `index` on the way from one that does to the next.
+    fn altitude_between(&self, index: u16, level: bool) -> f32 {
+        let relays = self.mission.relays();
+        let held = |index: u16| Some((index, self.held_at(index)?));
+        let before = (1..=index).rev().find_map(held);
+        let after = (index..=relays).find_map(held);
+        let least_m = self.mission.config().band.least_m;
+        let end = |at, other: Option<(u16, f32)>| {
+            (at, other.filter(|_| level).map_or(least_m, |(_, h)| h))
+        };
+        let (from, low) = before.unwrap_or(end(0, after));
+        let (to, high) = after.unwrap_or(end(relays + 1, before));
+        let share = f32::from(index - from) / f32::from((to - from).max(1));
+        low + share * (high - low)
+    }
+
     /// Relay `index`, fed from `from`.
     fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
@@ -352,8 +380,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
     ) -> Poll<Result<f32, Infeasible>> {
-        let room = (chain.seat_of)(1).room;
-        let Some(start) = Start::number(self.number, room) else {
+        let Some(start) = Start::number(self.number, Room::of(chain.mission)) else {
             // All have been tried.
             let Some((_, number)) = self.best else {
                 return Poll::Ready(Err(Infeasible));
@@ -377,6 +404,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             self.number += 1;
             return Poll::Pending;
         }
+        if matches!(start, Start::Held { .. }) && !chain.holds() {
+            self.number += 1;
+            return Poll::Pending;
+        }
         self.start = start;
         self.ascent = Ascent::new(chain.distance_m(), 0.0, 0.0, 0.0);
         self.restart();
@@ -392,7 +423,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 let sigma = chain.ceiling() + 2.0 * CEILING;
                 Work::Seek(Seek::down(sigma, 0.1, 1.5, JUDGED), Purpose::Last)
             }
-            Start::Arch { .. } | Start::Around { .. } | Start::Far | Start::Through { .. } => {
+            Start::Arch { .. }
+            | Start::Around { .. }
+            | Start::Far
+            | Start::Through { .. }
+            | Start::Held { .. } => {
                 Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, 0.02), Purpose::Start)
             }
         };
@@ -436,6 +471,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                     room,
                 )
             }
+            start @ Start::Held { level, .. } => CrossSection {
+                altitude_m: chain.altitude_between(index, level),
+                ..start.across(chain.distance_m(), self.pass.from.x_m, room)
+            },
             start => start.across(chain.distance_m(), self.pass.from.x_m, room),
         };
         Cell::of(wanted, room).place(room)
@@ -728,7 +767,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (tried % relays + 1, self.moving % 6, tried / relays)
     }
 
-    /// Tries the next move of a chain of few relays that meets `sigma`: each alone by a part of its room, and by less and less. What
+    /// Tries the next move of a chain that is polished and meets `sigma`: each alone by a part of its room, and by less and less. What
     /// the derivatives do not see, since something else binds there, it may.
     fn polish(
         &mut self,
@@ -736,7 +775,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         sigma: f32,
     ) -> Poll<Result<f32, Infeasible>> {
         let (index, way, halved) = self.move_of(chain.mission);
-        if chain.mission.relays() > POLISHED || halved > HALVINGS || self.moved >= MOVES {
+        let polished = chain.mission.relays() <= POLISHED || chain.holds();
+        if !polished || halved > HALVINGS || self.moved >= MOVES {
             return Poll::Ready(Ok(libm::expf(sigma)));
         }
         let room = (chain.seat_of)(index).room;

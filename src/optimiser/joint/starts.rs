@@ -20,6 +20,9 @@ pub(super) enum Start {
     Around { aside: f32, up: f32, far: f32 },
     /// An arch, with no least separation till the places are judged, by rules that let relays hold back.
     Through { aside: f32, up: f32 },
+    /// An arch to the side, at altitudes that lead from one that a relay keeps to the next; before the first and after the last of them
+    /// `level`, or down to Tx and Rx.
+    Held { aside: f32, level: bool },
     /// As far off the line as the room goes, one relay after the other in turn at its corner and a least separation aside from there:
     /// for relays that have no room to stand in a row.
     Turns,
@@ -42,6 +45,16 @@ const ARCHES: [(f32, f32); 7] = [
 
 /// How many of them are tried with no least separation.
 const THROUGH: usize = 3;
+
+/// To the side, and whether level at the ends.
+const HELD: [(f32, bool); 6] = [
+    (0.0, true),
+    (0.0, false),
+    (-1.0, true),
+    (1.0, true),
+    (-0.25, true),
+    (0.25, true),
+];
 
 /// Spirals: aside and up of the place they lead to first, and how far that is from the interferer, in parts of the geometric mean of
 /// the distances of Tx and Rx.
@@ -200,8 +213,12 @@ impl Start {
             1 => Some(free.then_some(Self::Near)),
             2 => Some((!lateral.is_single()).then_some(Self::Turns)),
             past => {
-                let &(aside, up) = ARCHES.get(past - 3).filter(|_| past < 3 + THROUGH)?;
-                Some(fits((aside, up)).then_some(Self::Through { aside, up }))
+                let past = past - 3;
+                if let Some(&(aside, up)) = ARCHES.get(past).filter(|_| past < THROUGH) {
+                    return Some(fits((aside, up)).then_some(Self::Through { aside, up }));
+                }
+                let &(aside, level) = HELD.get(past - THROUGH)?;
+                Some(fits((aside, 0.0)).then_some(Self::Held { aside, level }))
             }
         }
     }
@@ -210,6 +227,7 @@ impl Start {
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
             Self::Arch { aside, up } | Self::Through { aside, up } => (aside, up),
+            Self::Held { aside, .. } => (aside, 0.0),
             Self::Near | Self::Far | Self::Turns | Self::Around { .. } => (0.0, 0.0),
         };
         let t = (x_m / distance_m).clamp(0.0, 1.0);

@@ -4,22 +4,22 @@
 //! its ranges: what is read holds no number that a relay would have to doubt. A body is a byte, the `tag`, and postcard of a
 //! tuple, whose order is the format. `parts` has what several kinds have in common.
 
-mod course;
 mod fence;
 mod hello;
 #[cfg(feature = "upload")]
 mod offer;
 mod parts;
 mod pulse;
+mod roster;
 mod sweep;
 mod tag;
 mod turn;
 mod view;
 
-pub use self::course::{Course, Worth};
 pub use self::hello::Hello;
 pub use self::parts::MessageError;
 pub use self::pulse::{Pulse, Pulsed};
+pub use self::roster::{MOST_NAMED, OwnSeat, OwnSeats, Roster};
 pub use self::sweep::{Answer, Sweep};
 pub use self::turn::{AdjustStep, Moved, Token};
 pub use self::view::{Decision, Poll, Proposal, Successor};
@@ -53,10 +53,10 @@ pub enum Message {
         /// The number of the question that it answers, 0 for none.
         answer: u16,
     },
-    /// Onward: where the sender would be in each of a few trials.
-    Course(Course),
-    /// Back: which of them is gone by, and what the rest of the chain is worth about it.
-    Worth(Worth),
+    /// Onward: what the relays up to the sender bring along.
+    Gather(Roster),
+    /// Back: what those along the whole chain do.
+    Gathered(Roster),
     /// Onward: whose turn it is to move.
     Token(Token),
     /// Back: who has moved where.
@@ -93,8 +93,7 @@ impl Message {
             Self::Heartbeat { mission, .. } | Self::Fence { mission, .. } => Some(*mission),
             Self::Pulse(pulse) => Some(pulse.mission),
             Self::Pulsed(pulsed) => Some(pulsed.mission),
-            Self::Course(course) => Some(course.mission),
-            Self::Worth(worth) => Some(worth.mission),
+            Self::Gather(roster) | Self::Gathered(roster) => Some(roster.mission),
             Self::Token(token) => Some(token.mission),
             Self::Moved(moved) => Some(moved.mission),
             Self::Hello(hello) => Some(hello.mission),
@@ -111,8 +110,8 @@ impl Message {
             self,
             Self::Sweep(_)
                 | Self::Verdict(_)
-                | Self::Course(_)
-                | Self::Worth(_)
+                | Self::Gather(_)
+                | Self::Gathered(_)
                 | Self::Token(_)
                 | Self::Moved(_)
                 | Self::Pulse(_)
@@ -130,7 +129,7 @@ impl Message {
         matches!(
             self,
             Self::Sweep(_)
-                | Self::Course(_)
+                | Self::Gather(_)
                 | Self::Token(_)
                 | Self::Proposal(_)
                 | Self::Pulse(_)
@@ -155,8 +154,8 @@ impl Message {
             }
             Self::Pulse(pulse) => pulse.encode(buffer),
             Self::Pulsed(pulsed) => pulsed.encode(buffer),
-            Self::Course(course) => course.encode(buffer),
-            Self::Worth(worth) => worth.encode(buffer),
+            Self::Gather(roster) => roster.encode(tag::GATHER, buffer),
+            Self::Gathered(roster) => roster.encode(tag::GATHERED, buffer),
             Self::Token(token) => token.encode(buffer),
             Self::Moved(moved) => moved.encode(buffer),
             Self::Hello(hello) => hello.encode(buffer),
@@ -178,7 +177,7 @@ impl Message {
         let (tag, body) = bytes.split_first().ok_or(MessageError::Encoding)?;
         match *tag {
             tag::MEASURED if !cfg!(feature = "field") => Err(MessageError::Value),
-            tag::ASIDE | tag::COURSE | tag::WORTH if !cfg!(feature = "altitude") => {
+            tag::ASIDE | tag::GATHER | tag::GATHERED if !cfg!(feature = "altitude") => {
                 Err(MessageError::Value)
             }
             tag::TOKEN | tag::MOVED if !cfg!(feature = "adjust") => Err(MessageError::Value),
@@ -200,8 +199,8 @@ impl Message {
             }
             tag::PULSE => Pulse::decode(body).map(Self::Pulse),
             tag::PULSED => Pulsed::decode(body).map(Self::Pulsed),
-            tag::COURSE => Course::decode(body).map(Self::Course),
-            tag::WORTH => Worth::decode(body).map(Self::Worth),
+            tag::GATHER => Roster::decode(body).map(Self::Gather),
+            tag::GATHERED => Roster::decode(body).map(Self::Gathered),
             tag::TOKEN => Token::decode(body).map(Self::Token),
             tag::MOVED => Moved::decode(body).map(Self::Moved),
             tag::HELLO => Hello::decode(body).map(Self::Hello),

@@ -8,8 +8,7 @@ pub(super) const fn number_of(message: &Message) -> Option<u16> {
         Message::Sweep(sweep) => sweep.number,
         Message::Verdict(answer) => answer.number,
         Message::Busy { sweep } => *sweep,
-        Message::Course(course) => course.number,
-        Message::Worth(worth) => worth.number,
+        Message::Gather(roster) | Message::Gathered(roster) => roster.number,
         Message::Token(token) => token.number,
         Message::Moved(moved) => moved.number,
         Message::Heartbeat { .. }

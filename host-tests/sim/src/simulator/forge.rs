@@ -77,7 +77,7 @@ fn lie(mission: &Mission, way: Way, heard: Option<Vec<u8>>, rng: &mut ChaCha8Rng
     twisted.unwrap_or_else(|| made_up(mission, way, rng))
 }
 
-/// A sweep, a course or an answer to one that was heard, from the same relay to the same, as if it were of one of the next passes and said
+/// A sweep, a gathering or an answer to one that was heard, from the same relay to the same, as if it were of one of the next passes and said
 /// something else.
 fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let whole = with_check(plain);
@@ -100,18 +100,15 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
             answer.verdict.commit = Some(0);
             Message::Verdict(answer)
         }
-        Message::Course(mut course) => {
-            course.number = later(course.number, rng);
-            let aside_m = rng.random_range(-100.0..100.0);
-            for trial in &mut course.trials {
-                trial.place.y_m += aside_m;
-            }
-            Message::Course(course)
+        Message::Gather(mut roster) => {
+            roster.number = later(roster.number, rng);
+            roster.seats.iter_mut().for_each(|seat| seat.power_w *= 0.5);
+            Message::Gather(roster)
         }
-        Message::Worth(mut worth) => {
-            worth.number = later(worth.number, rng);
-            worth.trial = Some(0);
-            Message::Worth(worth)
+        Message::Gathered(mut roster) => {
+            roster.number = later(roster.number, rng);
+            roster.seats.iter_mut().for_each(|seat| seat.held_m = 50.0);
+            Message::Gathered(roster)
         }
         _ => return None,
     };

@@ -9,15 +9,12 @@ use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::optimiser::pass::{Behind, Link};
 use uav_relay::optimiser::spacing::Stand;
 use uav_relay::place::Station;
-use uav_relay::{Method, Mission, Placement};
+use uav_relay::{Mission, Placement};
 
 use super::briefed::Briefed;
 use super::found::{NoPlan, Plan};
 use super::source;
 use uav_relay_sim::scenario::Scenario;
-use uav_relay_sim::simulator::chain;
-use uav_relay_sim::simulator::outcome::Ending;
-use uav_relay_sim::simulator::setup::Setup;
 
 /// A solver for any chain.
 type Chain = Solver<{ MAX_RELAYS as usize }, { MAX_RELAYS as usize / 10 }>;
@@ -25,34 +22,11 @@ type Chain = Solver<{ MAX_RELAYS as usize }, { MAX_RELAYS as usize / 10 }>;
 /// The best places, sides and altitudes of so many relays that the joint method finds.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, relays, tolerance)?;
-    let found = joint(&briefed);
-    // Relays that differ agree by messages, and seldom on the same.
-    let told = (!briefed.own.is_empty())
-        .then(|| agreed(&briefed))
-        .flatten();
-    let plans = [found, told].into_iter().flatten().map(|places| {
-        let briefed = Briefed::new(scenario, relays, tolerance)?;
-        Ok(briefed.plan(&places, "the joint method", false))
-    });
-    let plans: Vec<Plan> = plans.collect::<Result<_, NoPlan>>()?;
-    match plans.into_iter().max_by(|a, b| a.sir().total_cmp(&b.sir())) {
-        Some(plan) => Ok(plan),
+    match joint(&briefed) {
+        Some(places) => Ok(briefed.plan(&places, "the joint method", false)),
         // As the relays do, which then stay at the altitudes they hold.
         None => source::best(scenario, relays, tolerance),
     }
-}
-
-/// The places that simulated relays agree on, with the messages and all; `None` where they agree on none.
-fn agreed(briefed: &Briefed) -> Option<Vec<Placement>> {
-    let mut setup = Setup::new(briefed.mission);
-    setup.settings.method = Method::Joint;
-    setup.profiles.clone_from(&briefed.own);
-    setup.held.clone_from(&briefed.held);
-    let outcome = chain::run(setup).ok()?;
-    let places = outcome.relays.iter().map(|relay| relay.setpoint);
-    places
-        .collect::<Option<_>>()
-        .filter(|_| outcome.ending == Ending::Settled)
 }
 
 /// The places that the joint method finds; `None` where it finds none.
