@@ -843,8 +843,8 @@ impl Node {
             &self.meter,
             self.lease.left(now),
         );
-        if let Some(message) = self.view.take_onward(&context)
-            && let Some((to, _)) = next
+        if let Some((to, _)) = next
+            && let Some(message) = self.view.take_onward(&context, to)
         {
             #[cfg(feature = "upload")]
             if let Some(upload) = self.update.offer_to(self.neighbours.at(onward).holds) {

@@ -25,22 +25,20 @@
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
-/// A view that this relay has accepted, and does not know to be agreed on.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Accepted {
-    successor: Successor,
-    /// Whether it is a member.
-    member: bool,
-}
+/// How many proposals of which it has not heard the decision a relay remembers.
+const VOTES: usize = 8;
 
 /// What one relay has said in the votes on views, and knows of them.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Electorate {
     /// The newest view that it knows to be agreed on, and whether it is a member.
     agreed: View,
     member: bool,
     promised: ViewId,
-    accepted: Option<Accepted>,
+    /// A view that it has accepted, and does not know to be agreed on.
+    accepted: Option<Successor>,
+    /// Proposals that it has taken part in, and that may become views: then it is a member. The latest first.
+    voted: [ViewId; VOTES],
     /// The node whose half of the chain as it was loaded is the larger.
     elder: u16,
 }
@@ -63,6 +61,7 @@ impl Electorate {
             member: true,
             promised: ViewId::LOADED,
             accepted: None,
+            voted: [ViewId::LOADED; VOTES],
             elder,
         }
     }
@@ -91,6 +90,10 @@ impl Electorate {
             return None;
         }
         self.promised = proposal;
+        self.voted.rotate_right(1);
+        if let Some(latest) = self.voted.first_mut() {
+            *latest = proposal;
+        }
         let told = told.unwrap_or(Poll::of(self.agreed));
         if told.agreed.id > self.agreed.id {
             self.learn(told.agreed);
@@ -102,8 +105,7 @@ impl Electorate {
         } else {
             told
         };
-        let own = self.accepted.map(|accepted| accepted.successor);
-        let successor = match (before.successor, own) {
+        let successor = match (before.successor, self.accepted) {
             (Some(told), Some(own)) if told.proposal >= own.proposal => Some(told),
             (told, own) => own.or(told),
         };
@@ -125,12 +127,25 @@ impl Electorate {
 
     /// `view` is known to be agreed on.
     fn learn(&mut self, view: View) {
-        let accepted = self
-            .accepted
-            .filter(|accepted| accepted.successor.view.id == view.id);
-        self.member = accepted.is_some_and(|accepted| accepted.member);
+        self.member = self.voted.contains(&view.id);
         self.agreed = view;
         self.accepted = None;
+        self.forget(|voted| voted <= view.id);
+    }
+
+    /// Forgets that it has taken part in proposals that will be no views any more.
+    fn forget(&mut self, over: impl Fn(ViewId) -> bool) {
+        let mut kept = [ViewId::LOADED; VOTES];
+        let voted = self.voted.iter().filter(|voted| !over(**voted));
+        for (kept, voted) in kept.iter_mut().zip(voted) {
+            *kept = *voted;
+        }
+        self.voted = kept;
+    }
+
+    /// No new view has come of `proposal`, and none will.
+    pub(crate) fn withdraw(&mut self, proposal: ViewId) {
+        self.forget(|voted| voted == proposal);
     }
 
     /// Accepts what was decided on `proposal`, unless it has promised a later one; whether it has.
@@ -138,27 +153,24 @@ impl Electorate {
         if proposal != self.promised {
             return false;
         }
-        let known = self
-            .accepted
-            .is_some_and(|accepted| accepted.successor.view.id == view.id && accepted.member);
-        self.accepted = Some(Accepted {
-            successor: Successor { proposal, view },
-            member: view.id == proposal || known,
-        });
+        self.accepted = Some(Successor { proposal, view });
+        if view.id != proposal {
+            self.withdraw(proposal);
+        }
         true
     }
 
     /// What it has accepted last is known to be accepted by all.
     pub(crate) fn commit(&mut self) {
         if let Some(accepted) = self.accepted {
-            self.learn(accepted.successor.view);
+            self.learn(accepted.view);
         }
     }
 
     /// Whether it has accepted `view`, and does not know that all have.
     pub(crate) fn awaits(&self, view: ViewId) -> bool {
         self.accepted
-            .is_some_and(|accepted| accepted.successor.view.id == view)
+            .is_some_and(|accepted| accepted.view.id == view)
     }
 }
 
@@ -176,4 +188,18 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16) -> Outcome {
         },
         |successor| successor.view,
     ))
+}
+
+#[cfg(test)]
+impl Electorate {
+    /// As it was before there was an electorate: what is decided on is agreed on, and whoever is there has a voice.
+    pub(crate) fn count_everybody(&mut self) {
+        self.commit();
+        self.member = true;
+    }
+
+    /// Whether it has a voice on the successor of the view that it knows to be agreed on.
+    pub(crate) const fn is_member(&self) -> bool {
+        self.member
+    }
 }

@@ -26,6 +26,8 @@
 //! `probe_after`.
 
 pub(crate) mod electorate;
+#[cfg(all(test, not(target_os = "none")))]
+mod model;
 
 use super::context::{Context, Decided, Effects, Proposer};
 use super::numbering::Stragglers;
@@ -44,7 +46,7 @@ use electorate::{Electorate, Outcome};
 const LEAP: u32 = 256;
 
 /// Where the view change is.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 enum ViewState {
     Settled,
     Proposed,
@@ -52,7 +54,7 @@ enum ViewState {
 }
 
 /// A proposal, as one relay sees it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Proposed {
     /// The new view.
     pub(crate) view: ViewId,
@@ -62,14 +64,15 @@ pub(crate) struct Proposed {
     pub(crate) place: u16,
     /// What it has gathered, this relay's voice included.
     poll: Poll,
-    handed_on: bool,
-    /// What was decided on, once that is known; `None` if too few are there.
+    /// The one node that it was handed on to: were it handed to another one, too, two views could bear its name.
+    handed_to: Option<u16>,
+    /// What was decided on, once that is known; an old view, or none, if too few are there.
     decided: Option<View>,
     lease_left: u16,
 }
 
 /// What is to be sent.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 struct ViewDue {
     proposal: bool,
     decision: bool,
@@ -178,13 +181,14 @@ impl ViewChange {
         self.refused
     }
 
-    /// The relay that a proposal was handed on to is not there any more: what comes of it can not be known. A later one can be.
-    pub(crate) fn abandon(&mut self, context: &Context<'_>) -> Effects {
-        if let Some(later) = self.newest.next_by(context.member.node) {
+    /// The relay that the proposal was handed on to is not there any more: what comes of it can not be known. A later one can be.
+    fn abandon(&mut self, context: &Context<'_>, proposal: ViewId) {
+        if self.newest <= proposal
+            && let Some(later) = proposal.next_by(context.member.node)
+        {
             self.heard_of(later);
         }
         self.ask(context.now);
-        Effects::NONE
     }
 
     /// A proposal or a decision from the neighbour before or after, of a mission that this relay holds.
@@ -275,7 +279,7 @@ impl ViewChange {
             mission_id,
             place: place.saturating_add(1),
             poll,
-            handed_on: false,
+            handed_to: None,
             decided: None,
             lease_left: 0,
         });
@@ -299,8 +303,9 @@ impl ViewChange {
         let Some(proposed) = self.awaited() else {
             return Effects::NONE;
         };
-        if proposed.handed_on {
-            return self.abandon(context);
+        if proposed.handed_to.is_some() {
+            self.abandon(context, proposed.view);
+            return Effects::NONE;
         }
         let Proposed {
             view, place, poll, ..
@@ -316,7 +321,8 @@ impl ViewChange {
         let all = poll.votes == poll.agreed.relays;
         let lease_left = if all { 0 } else { poll.lease_left };
         let decided = match outcome {
-            Outcome::Refused => None,
+            // Those before who are its members may not know that it was agreed on, and had no voice.
+            Outcome::Refused => Some(poll.agreed).filter(|view| view.id != ViewId::LOADED),
             Outcome::View(view) => Some(view),
         };
         self.conclude(context, decided, lease_left)
@@ -353,12 +359,20 @@ impl ViewChange {
             return Effects::FOREIGN;
         }
         let proposal = proposed.view;
-        if decided.is_some_and(|view| !self.electorate.accept(proposal, view)) {
+        if self.electorate.promised() != proposal {
             return Effects::STALE;
         }
         proposed.decided = decided;
         proposed.lease_left = lease_left;
         let leads = proposed.place == 1;
+        let agreed = self.electorate.agreed();
+        let decided = decided.filter(|view| view.id > agreed.id);
+        match decided {
+            Some(view) => {
+                self.electorate.accept(proposal, view);
+            }
+            None => self.electorate.withdraw(proposal),
+        }
         if leads && decided.is_some() {
             // So have all the others.
             self.electorate.commit();
@@ -473,14 +487,17 @@ impl ViewChange {
         wait.min(settings.probe_after)
     }
 
-    /// Whether the proposal is to be sent onward; it is taken for sent then.
-    pub(crate) fn take_onward(&mut self, context: &Context<'_>) -> Option<Message> {
-        self.awaited()?;
+    /// Whether the proposal is to be sent onward, to node `to`; it is taken for sent then.
+    pub(crate) fn take_onward(&mut self, context: &Context<'_>, to: u16) -> Option<Message> {
+        let proposal = self.awaited()?.view;
         if !core::mem::take(&mut self.due.proposal) {
             return None;
         }
         let proposed = self.proposed.as_mut()?;
-        proposed.handed_on = true;
+        if *proposed.handed_to.get_or_insert(to) != to {
+            self.abandon(context, proposal);
+            return None;
+        }
         self.retransmit.sent(context.now, trip(context));
         Some(Message::Proposal(Proposal {
             mission_id: proposed.mission_id,

@@ -1,0 +1,659 @@
+//! All that can happen to a short chain, one thing after the other: the view change that flies, checked in every order of events.
+//!
+//! | what happens | how it is modelled |
+//! | --- | --- |
+//! | a frame | once sent it stays in the air: it arrives any time later, in any order, as often as may be, or never |
+//! | links are cut and heal | the chain falls into other parts, any set partition; a relay's neighbours are the next ones of its part |
+//! | a relay falls silent | it is a part of its own |
+//! | a proposal is timed out | a relay with nobody before it proposes anew, with a larger number than any in its part |
+//! | nobody is after a relay any more | it decides, or gives the proposal up |
+//! | a pass | who knows that the view it flies is agreed on tells the next one, if that flies it, too |
+//! | a relay reboots | it keeps its electorate, and nothing else; or it forgets that, too |
+//!
+//! How many cuts, proposals and reboots there are is bounded; nothing else is. There is no time: what a lease adds is that the places
+//! of a view are not taken before members of the one before have let go of theirs.
+//!
+//! A view is *in force* from the moment its leader has it accepted by all until a view that follows it is. Views that follow each other
+//! one by one are never in force at once, so what is checked is that they are one chain, back to the chain as it was loaded.
+
+extern crate std;
+
+use std::string::String;
+use std::time::Duration as Span;
+use std::vec::Vec;
+use std::{format, println, vec};
+
+use stateright::{Checker, HasDiscoveries, Model, Property};
+
+use super::{ViewChange, ViewState};
+use crate::jitter::Jitter;
+use crate::mission::Mission;
+use crate::mission::tests::paper;
+use crate::node::context::{Context, Decided, Effects, Member};
+use crate::node::numbering::Stragglers;
+use crate::node::retransmit::Retransmit;
+use crate::settings::Settings;
+use crate::time::Instant;
+use crate::view::{View, ViewId};
+use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
+
+/// A view and its size, as it can be sorted.
+type Sized = (ViewId, u16);
+
+/// What is sent.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+enum Body {
+    Proposal {
+        view: ViewId,
+        place: u16,
+        agreed: Sized,
+        votes: u16,
+        proposer: bool,
+        successor: Option<(ViewId, Sized)>,
+    },
+    Decision {
+        proposal: ViewId,
+        place: u16,
+        view: Option<Sized>,
+    },
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+struct Frame {
+    from: usize,
+    to: usize,
+    body: Body,
+}
+
+/// One relay.
+#[derive(Clone, Debug)]
+struct Unit {
+    change: ViewChange,
+    /// The view that it accepted last, its place in that, and how many are in it.
+    flies: (ViewId, u16, u16),
+}
+
+impl Unit {
+    fn key(&self) -> impl Eq + core::hash::Hash + use<> {
+        let change = &self.change;
+        (
+            change.state,
+            change.proposed,
+            change.electorate,
+            self.flies,
+        )
+    }
+}
+
+impl PartialEq for Unit {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+
+impl Eq for Unit {}
+
+impl core::hash::Hash for Unit {
+    fn hash<H: core::hash::Hasher>(&self, hasher: &mut H) {
+        self.key().hash(hasher);
+    }
+}
+
+/// A view that was decided on first: what it follows, and how many are in it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+struct Decree {
+    view: Sized,
+    follows: ViewId,
+}
+
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+struct Chain {
+    units: Vec<Unit>,
+    /// The part of each relay.
+    parts: Vec<u8>,
+    /// In order, each once.
+    air: Vec<Frame>,
+    /// What has been decided on, and what has been agreed on, ever.
+    decrees: Vec<Decree>,
+    agreed: Vec<Sized>,
+    cuts: u8,
+    proposals: u8,
+    reboots: u8,
+    losses: u8,
+}
+
+/// What happens.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Happens {
+    Part(usize),
+    Arrives(Frame),
+    Proposes(usize),
+    EndsAt(usize),
+    Repeats(usize),
+    Passes(usize),
+    Reboots(usize),
+    Forgets(usize),
+}
+
+/// Who counts.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Rule {
+    /// As it flies.
+    Members,
+    /// Everybody present, against the size of the newest view that somebody present has.
+    Everybody,
+}
+
+/// What is checked, of how much.
+#[derive(Clone, Debug)]
+struct Check {
+    rule: Rule,
+    members: Vec<Member>,
+    partitions: Vec<Vec<u8>>,
+    cuts: u8,
+    proposals: u8,
+    reboots: u8,
+    losses: u8,
+    /// Whether every state is healed, to see whether it settles.
+    heals: bool,
+}
+
+/// Puts it where it belongs, once.
+fn put<T: Ord>(all: &mut Vec<T>, one: T) {
+    if let Err(at) = all.binary_search(&one) {
+        all.insert(at, one);
+    }
+}
+
+/// All ways in which so many relays fall into parts.
+fn partitions(relays: usize) -> Vec<Vec<u8>> {
+    let mut all = vec![vec![]];
+    for _ in 0..relays {
+        all = all
+            .iter()
+            .flat_map(|parts: &Vec<u8>| {
+                let next = parts.iter().max().map_or(0, |most| most + 1);
+                (0..=next).map(move |part| {
+                    let mut parts = parts.clone();
+                    parts.push(part);
+                    parts
+                })
+            })
+            .collect();
+    }
+    all
+}
+
+impl Check {
+    fn of(relays: u16) -> Self {
+        let mission = Mission::try_new(paper(relays)).unwrap();
+        Self {
+            rule: Rule::Members,
+            members: (1..=relays)
+                .map(|node| Member::new(mission, Settings::default(), node))
+                .collect(),
+            partitions: partitions(usize::from(relays)),
+            cuts: 2,
+            proposals: 2,
+            reboots: 0,
+            losses: 0,
+            heals: false,
+        }
+    }
+
+    fn unit(&self) -> Unit {
+        let relays = self.members.len() as u16;
+        Unit {
+            change: ViewChange::new(relays, 1, 1),
+            flies: (ViewId::LOADED, 0, relays),
+        }
+    }
+
+    fn before(chain: &Chain, at: usize) -> Option<usize> {
+        (0..at).rev().find(|&other| chain.parts[other] == chain.parts[at])
+    }
+
+    fn after(chain: &Chain, at: usize) -> Option<usize> {
+        (at + 1..chain.parts.len()).find(|&other| chain.parts[other] == chain.parts[at])
+    }
+
+    fn context(&self, chain: &Chain, at: usize) -> Context<'_> {
+        let member = &self.members[at];
+        Context {
+            now: Instant::ZERO,
+            member,
+            latest: member.active,
+            end: Self::after(chain, at).is_none(),
+            lease_left: 0,
+            measured_per_w: None,
+        }
+    }
+
+    fn message(&self, body: Body) -> Message {
+        let mission_id = self.members[0].active;
+        let view = |(id, relays)| View { id, relays };
+        match body {
+            Body::Proposal {
+                view: id,
+                place,
+                agreed,
+                votes,
+                proposer,
+                successor,
+            } => Message::Proposal(Proposal {
+                mission_id,
+                view: id,
+                place,
+                poll: Poll {
+                    agreed: view(agreed),
+                    votes,
+                    proposer,
+                    lease_left: 0,
+                    successor: successor.map(|(proposal, of)| Successor {
+                        proposal,
+                        view: view(of),
+                    }),
+                },
+            }),
+            Body::Decision {
+                proposal,
+                place,
+                view: of,
+            } => Message::Decision(Decision {
+                mission_id,
+                proposal,
+                place,
+                view: of.map(view),
+                lease_left: 0,
+            }),
+        }
+    }
+
+    fn body(message: &Message) -> Option<Body> {
+        let sized = |view: View| (view.id, view.relays);
+        match message {
+            Message::Proposal(proposal) => Some(Body::Proposal {
+                view: proposal.view,
+                place: proposal.place,
+                agreed: sized(proposal.poll.agreed),
+                votes: proposal.poll.votes,
+                proposer: proposal.poll.proposer,
+                successor: proposal
+                    .poll
+                    .successor
+                    .map(|successor| (successor.proposal, sized(successor.view))),
+            }),
+            Message::Decision(decision) => Some(Body::Decision {
+                proposal: decision.proposal,
+                place: decision.place,
+                view: decision.view.map(sized),
+            }),
+            _ => None,
+        }
+    }
+
+    /// What relay `at` has to say goes out, and what came of it is taken down.
+    fn settle(&self, chain: &mut Chain, at: usize, effects: Effects) {
+        let (before, after) = (Self::before(chain, at), Self::after(chain, at));
+        let context = self.context(chain, at);
+        let Chain {
+            units,
+            air,
+            decrees,
+            agreed,
+            ..
+        } = chain;
+        let unit = &mut units[at];
+        let mut send = |to: usize, message: &Message| {
+            if let Some(body) = Self::body(message) {
+                let from = at;
+                put(air, Frame { from, to, body });
+            }
+        };
+        if let Some(to) = after
+            && let Some(message) = unit.change.take_onward(&context, to as u16 + 1)
+        {
+            send(to, &message);
+        }
+        if let Some(to) = before {
+            while let Some(message) = unit.change.take_back() {
+                send(to, &message);
+            }
+        }
+        if let Some(proposed) = unit.change.proposed
+            && let Some(decided) = effects.decided
+        {
+            if let Decided::Granted { relays, .. } = decided {
+                unit.flies = (proposed.view, proposed.place, relays);
+            }
+            if let Some(view) = proposed.decided {
+                if view.id == proposed.view && view.relays == proposed.place {
+                    put(
+                        decrees,
+                        Decree {
+                            view: (view.id, view.relays),
+                            follows: proposed.poll.agreed.id,
+                        },
+                    );
+                }
+                if proposed.place == 1 {
+                    put(agreed, (view.id, view.relays));
+                }
+            }
+        }
+        let change = &mut unit.change;
+        if self.rule == Rule::Everybody {
+            change.electorate.count_everybody();
+        }
+        // What is of time alone, or makes up for what is heard of late.
+        change.newest = ViewId::LOADED;
+        change.asks = false;
+        change.tries = 0;
+        change.ask_at = None;
+        change.refused = false;
+        change.stragglers = Stragglers::NONE;
+        change.retransmit = Retransmit::new(1);
+        change.jitter = Jitter::new(1);
+    }
+
+    fn propose(&self, chain: &mut Chain, at: usize) {
+        let newest = (0..chain.units.len())
+            .filter(|&other| chain.parts[other] == chain.parts[at])
+            .map(|other| chain.units[other].change.electorate.promised())
+            .max()
+            .unwrap();
+        let context = self.context(chain, at);
+        let change = &mut chain.units[at].change;
+        change.heard_of(newest);
+        if change.awaited().is_some() {
+            change.heard_of(newest.next_by(self.members[at].node).unwrap());
+        }
+        change.asks = true;
+        change.ask_at = Some(Instant::ZERO);
+        let effects = change.handle_timeout(&context, true, false);
+        self.settle(chain, at, effects);
+    }
+
+    fn arrive(&self, chain: &mut Chain, frame: &Frame) {
+        let at = frame.to;
+        let neighbour = match frame.body {
+            Body::Proposal { .. } => Self::before(chain, at),
+            Body::Decision { .. } => Self::after(chain, at),
+        };
+        if neighbour != Some(frame.from) {
+            return;
+        }
+        let context = self.context(chain, at);
+        let message = self.message(frame.body);
+        let effects = chain.units[at].change.handle(&context, &message);
+        self.settle(chain, at, effects);
+    }
+
+    fn end(&self, chain: &mut Chain, at: usize) {
+        if Self::after(chain, at).is_none() {
+            let context = self.context(chain, at);
+            let effects = chain.units[at].change.decide(&context);
+            self.settle(chain, at, effects);
+        }
+    }
+
+    fn repeat(&self, chain: &mut Chain, at: usize) {
+        chain.units[at].change.resend();
+        self.settle(chain, at, Effects::NONE);
+    }
+
+    fn pass(chain: &mut Chain, at: usize) {
+        let Some(to) = Self::after(chain, at) else {
+            return;
+        };
+        let Unit { change, flies } = &chain.units[at];
+        let (view, place, _) = *flies;
+        let knows = change.electorate.agreed().id == view && change.awaited().is_none();
+        let next = &mut chain.units[to];
+        if knows && next.change.awaited().is_none() && next.flies.0 == view && next.flies.1 == place + 1 {
+            next.change.commit(view);
+        }
+    }
+
+    fn reboot(&self, chain: &mut Chain, at: usize, remembers: bool) {
+        let electorate = chain.units[at].change.electorate;
+        chain.units[at] = self.unit();
+        if remembers {
+            chain.units[at].change.electorate = electorate;
+        }
+        self.settle(chain, at, Effects::NONE);
+    }
+
+    /// All in one part; what is in the air arrives, until nothing changes any more.
+    fn drain(&self, chain: &mut Chain) {
+        loop {
+            let before = chain.clone();
+            for at in 0..chain.units.len() {
+                self.end(chain, at);
+                self.repeat(chain, at);
+                Self::pass(chain, at);
+            }
+            for frame in before.air.clone() {
+                self.arrive(chain, &frame);
+            }
+            if *chain == before {
+                return;
+            }
+        }
+    }
+
+    /// After how many proposals all relays, in one part, are in one view of them all that they know to be agreed on.
+    fn settles(&self, chain: &Chain, keeps_air: bool) -> Option<u8> {
+        let mut chain = chain.clone();
+        chain.parts.fill(0);
+        if !keeps_air {
+            chain.air.clear();
+        }
+        self.drain(&mut chain);
+        for proposals in 0..8 {
+            let all = chain.units.len() as u16;
+            let first = chain.units[0].change.electorate.agreed();
+            let settled = chain.units.iter().all(|unit| {
+                let change = &unit.change;
+                let knows = change.electorate.agreed() == first && change.electorate.is_member();
+                knows && change.state != ViewState::Proposed && unit.flies.0 == first.id
+            });
+            if settled && first.relays == all {
+                return Some(proposals);
+            }
+            chain.air.clear();
+            self.propose(&mut chain, 0);
+            self.drain(&mut chain);
+        }
+        None
+    }
+
+    /// Every view that was agreed on follows another one that was, and no two follow the same.
+    fn is_one_chain(chain: &Chain) -> bool {
+        let follows = |(id, _): &Sized| {
+            let decree = chain.decrees.iter().find(|decree| decree.view.0 == *id);
+            decree.map(|decree| decree.follows)
+        };
+        let mut before: Vec<_> = chain.agreed.iter().map(follows).collect();
+        let known = before.iter().all(|view| {
+            view.is_some_and(|view| {
+                view == ViewId::LOADED || chain.agreed.iter().any(|(id, _)| *id == view)
+            })
+        });
+        before.sort();
+        let count = before.len();
+        before.dedup();
+        known && before.len() == count
+    }
+
+    fn has_one_size(chain: &Chain) -> bool {
+        let twice = |all: &[ViewId]| all.windows(2).any(|pair| pair[0] == pair[1]);
+        let decrees: Vec<_> = chain.decrees.iter().map(|decree| decree.view.0).collect();
+        let agreed: Vec<_> = chain.agreed.iter().map(|view| view.0).collect();
+        !twice(&decrees) && !twice(&agreed)
+    }
+
+    /// Nobody knows anything to be agreed on that is not, and no more than are in a view have a voice in it.
+    fn is_known_and_counted(&self, chain: &Chain) -> bool {
+        self.rule == Rule::Everybody
+            || chain.units.iter().all(|unit| {
+                let view = unit.change.electorate.agreed();
+                let members = chain.units.iter().filter(|unit| {
+                    let electorate = unit.change.electorate;
+                    electorate.agreed() == view && electorate.is_member()
+                });
+                let known = view.id == ViewId::LOADED
+                    || chain.agreed.contains(&(view.id, view.relays));
+                known && members.count() <= usize::from(view.relays)
+            })
+    }
+}
+
+impl Model for Check {
+    type State = Chain;
+    type Action = Happens;
+
+    fn init_states(&self) -> Vec<Chain> {
+        let relays = self.members.len();
+        let mut chain = Chain {
+            units: vec![self.unit(); relays],
+            parts: vec![0; relays],
+            air: vec![],
+            decrees: vec![],
+            agreed: vec![],
+            cuts: self.cuts,
+            proposals: self.proposals,
+            reboots: self.reboots,
+            losses: self.losses,
+        };
+        for at in 0..relays {
+            self.settle(&mut chain, at, Effects::NONE);
+        }
+        vec![chain]
+    }
+
+    fn actions(&self, chain: &Chain, actions: &mut Vec<Happens>) {
+        actions.extend(chain.air.iter().copied().map(Happens::Arrives));
+        let relays = 0..chain.units.len();
+        for at in relays {
+            if chain.proposals > 0 && Self::before(chain, at).is_none() {
+                actions.push(Happens::Proposes(at));
+            }
+            actions.extend([Happens::EndsAt(at), Happens::Repeats(at), Happens::Passes(at)]);
+            if chain.reboots > 0 {
+                actions.push(Happens::Reboots(at));
+            }
+            if chain.losses > 0 {
+                actions.push(Happens::Forgets(at));
+            }
+        }
+        if chain.cuts > 0 {
+            actions.extend((0..self.partitions.len()).map(Happens::Part));
+        }
+    }
+
+    fn next_state(&self, before: &Chain, action: Happens) -> Option<Chain> {
+        let mut chain = before.clone();
+        match action {
+            Happens::Part(number) => chain.parts.clone_from(&self.partitions[number]),
+            Happens::Arrives(frame) => self.arrive(&mut chain, &frame),
+            Happens::Proposes(at) => self.propose(&mut chain, at),
+            Happens::EndsAt(at) => self.end(&mut chain, at),
+            Happens::Repeats(at) => self.repeat(&mut chain, at),
+            Happens::Passes(at) => Self::pass(&mut chain, at),
+            Happens::Reboots(at) => self.reboot(&mut chain, at, true),
+            Happens::Forgets(at) => self.reboot(&mut chain, at, false),
+        }
+        if chain == *before {
+            return None;
+        }
+        match action {
+            Happens::Part(_) => chain.cuts -= 1,
+            Happens::Proposes(_) => chain.proposals -= 1,
+            Happens::Reboots(_) => chain.reboots -= 1,
+            Happens::Forgets(_) => chain.losses -= 1,
+            _ => {}
+        }
+        Some(chain)
+    }
+
+    fn properties(&self) -> Vec<Property<Self>> {
+        vec![
+            Property::always("agreed views follow each other one by one", |_, chain| {
+                Self::is_one_chain(chain)
+            }),
+            Property::always("a view has one size", |_, chain| Self::has_one_size(chain)),
+            Property::always("what is known is so, and members are counted once", |check: &Self, chain| {
+                check.is_known_and_counted(chain)
+            }),
+            Property::always("once healed it settles", |check: &Self, chain| {
+                !check.heals
+                    || check.settles(chain, true).is_some()
+                        && check.settles(chain, false).is_some()
+            }),
+        ]
+    }
+}
+
+/// What was found, after it has been printed.
+fn found(check: &Check) -> Vec<(String, String)> {
+    let Check {
+        rule,
+        members,
+        cuts,
+        proposals,
+        reboots,
+        losses,
+        heals,
+        ..
+    } = check;
+    let checker = check
+        .clone()
+        .checker()
+        .threads(2)
+        .finish_when(HasDiscoveries::Any)
+        .timeout(Span::from_secs(600))
+        .spawn_bfs();
+    let began = std::time::Instant::now();
+    let checker = checker.join();
+    println!(
+        "{} relays, {rule:?}: {cuts} cuts, {proposals} proposals, {reboots} reboots, {losses} of memory, heals: {heals}: {} states, depth {}, {:.1} s, done: {}",
+        members.len(),
+        checker.unique_state_count(),
+        checker.max_depth(),
+        began.elapsed().as_secs_f32(),
+        checker.is_done(),
+    );
+    let discoveries = checker.discoveries().into_iter();
+    discoveries
+        .map(|(name, path)| {
+            let mut trace = String::new();
+            for (state, action) in path.into_vec() {
+                trace += &format!("parts {:?} agreed {:?} {:?}\n", state.parts, state.agreed, state.decrees);
+                for unit in state.units { trace += &format!("     {:?} {:?} {:?}\n", unit.change.state, unit.change.proposed, unit.change.electorate); }
+                trace += &format!("  {action:?}\n");
+            }
+            (String::from(name), trace)
+        })
+        .collect()
+}
+
+fn env(name: &str, or: u8) -> u8 {
+    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(or)
+}
+
+#[test]
+fn probe() {
+    let check = Check {
+        cuts: env("CUTS", 2),
+        proposals: env("PROPOSALS", 2),
+        reboots: env("REBOOTS", 0),
+        losses: env("LOSSES", 0),
+        heals: env("HEALS", 0) == 1,
+        rule: if env("OLD", 0) == 1 { Rule::Everybody } else { Rule::Members },
+        ..Check::of(env("RELAYS", 3).into())
+    };
+    for (name, trace) in found(&check) {
+        println!("{name}:\n{trace}");
+    }
+}
