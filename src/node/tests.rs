@@ -5,8 +5,8 @@ use crate::mission::tests::paper;
 use crate::mission::{Interference, Interferer, Mission, MissionConfig};
 use crate::settings::{Identity, Settings, Wiring};
 use crate::time::Instant;
-use crate::wire::auth::{Auth, Key};
 use crate::view::{View, ViewId};
+use crate::wire::auth::{Auth, Key};
 use crate::wire::message::{Poll, Proposal};
 
 const NOW: Instant = Instant::from_millis(10_000);

@@ -332,7 +332,10 @@ impl Neighbour {
                 }
             }
             NeighbourState::Pairing { since } => {
-                lost = self.liveness.silent(now, settings.dead_after, settings).lost;
+                lost = self
+                    .liveness
+                    .silent(now, settings.dead_after, settings)
+                    .lost;
                 self.hello_all();
                 if lost || is_over(since) {
                     self.search(now);

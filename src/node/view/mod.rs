@@ -28,8 +28,11 @@
 pub(crate) mod electorate;
 #[cfg(all(test, not(target_os = "none")))]
 mod model;
+pub(crate) mod record;
+#[cfg(test)]
+mod tests;
 
-use super::context::{Context, Decided, Effects, Proposer};
+use super::context::{Context, Decided, Effects, Member, Proposer};
 use super::numbering::Stragglers;
 use super::retransmit::{Retransmit, Trip};
 use super::timing::{PAUSE, earliest};
@@ -41,6 +44,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
 use electorate::{Electorate, Outcome};
+use record::{RecordError, ViewRecord};
 
 /// How far ahead of all it has heard of a view may be that a relay hears of.
 const LEAP: u32 = 256;
@@ -120,6 +124,40 @@ impl ViewChange {
                 busy: false,
             },
         }
+    }
+
+    /// What it has said, as a relay of the mission with digest `base`.
+    pub(crate) const fn record(&self, base: u16) -> ViewRecord {
+        ViewRecord::new(base, self.electorate)
+    }
+
+    /// Whether nothing was said or heard of a view since this relay was switched on.
+    pub(crate) fn is_untouched(&self) -> bool {
+        self.proposed.is_none() && self.newest == self.electorate.promised()
+    }
+
+    /// A relay that has just been switched on, `untouched` or not, has said what is in `record`. It asks for a view.
+    pub(crate) fn resume(
+        &mut self,
+        member: &Member,
+        record: &ViewRecord,
+        untouched: bool,
+    ) -> Result<(), RecordError> {
+        let elder = self.electorate.elder;
+        let electorate = record
+            .electorate(member.digest, member.all, elder)
+            .ok_or(RecordError::Base)?;
+        let new = self.electorate == Electorate::new(member.all, elder);
+        if !(new && untouched && self.is_untouched()) {
+            return Err(RecordError::Begun);
+        }
+        self.electorate = electorate;
+        self.newest = electorate.promised();
+        if self.newest > ViewId::LOADED {
+            self.asks = true;
+            self.ask_at = Some(Instant::ZERO);
+        }
+        Ok(())
     }
 
     /// The latest view heard of.
@@ -269,9 +307,7 @@ impl ViewChange {
         told: Option<Poll>,
     ) -> Option<Effects> {
         let node = context.member.node;
-        let poll = self
-            .electorate
-            .vote(node, view, told, context.lease_left)?;
+        let poll = self.electorate.vote(node, view, told, context.lease_left)?;
         self.state = ViewState::Proposed;
         self.stragglers = Stragglers::NONE;
         self.proposed = Some(Proposed {
@@ -537,4 +573,3 @@ const fn trip(context: &Context<'_>) -> Trip {
         slow: false,
     }
 }
-
