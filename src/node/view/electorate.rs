@@ -226,6 +226,10 @@ mod tests {
         ViewId::from_bits(number << 10 | node)
     }
 
+    fn count(nodes: &[u16]) -> u16 {
+        u16::try_from(nodes.len()).unwrap()
+    }
+
     /// A chain of relays, nodes 1 to as many.
     struct Chain(Vec<Electorate>);
 
@@ -248,7 +252,7 @@ mod tests {
         /// What is decided on a proposal to `nodes`; the last `accept` of them hear of it.
         fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Outcome {
             let poll = self.poll(nodes, proposal);
-            let outcome = decide(&poll, proposal, nodes.len() as u16);
+            let outcome = decide(&poll, proposal, count(nodes));
             if let Outcome::View(view) = outcome {
                 for &node in nodes.iter().rev().take(accept) {
                     assert!(self.0[usize::from(node) - 1].accept(proposal, view));
@@ -279,7 +283,7 @@ mod tests {
                     .filter(|node| part >> (node - 1) & 1 == 1)
                     .collect();
                 let outcome = Chain::of(relays).propose(&nodes, id(1, 1), 0);
-                let there = nodes.len() as u16;
+                let there = count(&nodes);
                 let most = 2 * there > relays || 2 * there == relays && nodes[0] == 1;
                 assert_eq!(outcome != Outcome::Refused, most, "{nodes:?} of {relays}");
                 if most {
@@ -470,7 +474,7 @@ mod tests {
             relay.withdraw(id(number, 2));
         }
         assert!(relay.has_voted(view.id));
-        for number in 100..100 + VOTES as u32 - 1 {
+        for number in (100..).take(VOTES - 1) {
             relay.vote(2, id(number, 2), None, 0).unwrap();
         }
         assert!(relay.has_voted(view.id));

@@ -26,7 +26,8 @@
 //! `probe_after`.
 
 pub(crate) mod electorate;
-#[cfg(all(test, not(target_os = "none")))]
+#[cfg(test)]
+#[cfg(not(target_os = "none"))]
 mod model;
 pub(crate) mod record;
 #[cfg(test)]

@@ -16,6 +16,8 @@
 //! A view is *in force* from the moment its leader has it accepted by all until a view that follows it is. Views that follow each other
 //! one by one are never in force at once, so what is checked is that they are one chain, back to the chain as it was loaded.
 
+#![allow(clippy::cast_possible_truncation, reason = "chains of a few relays")]
+
 extern crate std;
 
 use std::string::String;
