@@ -5,7 +5,7 @@
 //!
 //! | step | on the way | what a relay does | kept |
 //! | --- | --- | --- | --- |
-//! | proposal | onward | promises to accept no earlier proposal, and says what it accepted before | `promised` |
+//! | proposal | onward | promises to accept no earlier proposal, and says what it accepted before | `promised`, `voted` |
 //! | decision | back | accepts the view that was decided on, unless it has promised more since | `accepted` |
 //! | a pass of that view | onward | knows that all accepted it | `agreed` |
 //!
@@ -13,7 +13,7 @@
 //!
 //! | the poll of the newest view that anybody there knows to be agreed on | decision |
 //! | --- | --- |
-//! | not more than half of its members, nor half with the one that proposed it | refused |
+//! | not more than half of its members, nor half with the one that proposed it | refused; that view is named, for those before who did not know it and had no voice |
 //! | enough, and a member has accepted a successor that may have been agreed on | that one again, of the latest proposal; the leader proposes anew from there |
 //! | enough otherwise | a view of all that are there |
 //!
@@ -98,10 +98,11 @@ impl Electorate {
             return None;
         }
         self.promised = proposal;
-        self.voted.rotate_right(1);
-        if let Some(latest) = self.voted.first_mut() {
-            *latest = proposal;
+        let mut voted = [proposal; VOTES];
+        for (kept, earlier) in voted.iter_mut().skip(1).zip(self.voted) {
+            *kept = earlier;
         }
+        self.voted = voted;
         let told = told.unwrap_or(Poll::of(self.agreed));
         if told.agreed.id > self.agreed.id {
             self.learn(told.agreed);

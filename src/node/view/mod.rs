@@ -23,7 +23,14 @@
 //! | `Decided` | hand on: `Proposed` | hand back again | stale | - |
 //!
 //! While a view is proposed no pass goes on. One that was refused leaves the places where they are; its leader proposes again every
-//! `probe_after`.
+//! `probe_after`. A proposal that was handed on stays with the node that it was handed to: once another one, or nobody, is there, a
+//! later one is asked for.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | [`electorate`] | who may decide, and what a relay has said in the votes |
+//! | [`record`] | that, as it is stored |
+//! | `model` | a test: all that can happen to a chain of three or four |
 
 pub(crate) mod electorate;
 #[cfg(test)]

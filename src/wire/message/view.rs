@@ -71,7 +71,8 @@ pub struct Decision {
     pub proposal: ViewId,
     /// The sender's place, from 1 at the one that has proposed: 1 to 1000.
     pub place: u16,
-    /// The view to be accepted: the one proposed, or one that was decided on before; `None` if too few members are there.
+    /// The view to be accepted: the one proposed, or one that was decided on before. If too few members are there, the one that they
+    /// are too few of, `None` for the chain as it was loaded.
     pub view: Option<View>,
     /// How long its places are not to be taken, for the sake of members of the view before that are elsewhere, in tenths of a second.
     pub lease_left: u16,
