@@ -687,13 +687,14 @@ impl Check {
             began.elapsed().as_secs_f32(),
         );
         let (what, path) = checker.discoveries().into_iter().next()?;
-        let mut how = String::new();
-        for (chain, happens) in path.into_vec() {
-            how += &format!(
-                "{:?} agreed: {:?}\n  {happens:?}\n",
-                chain.parts, chain.agreed
-            );
-        }
+        let steps = path.into_vec().into_iter();
+        let steps: Vec<String> = steps
+            .map(|(chain, happens)| {
+                let Chain { parts, agreed, .. } = chain;
+                format!("{parts:?} agreed: {agreed:?}\n  {happens:?}\n")
+            })
+            .collect();
+        let how = steps.concat();
         println!("it does not hold that {what}:\n{how}");
         Some(Found { what, how })
     }
