@@ -28,7 +28,8 @@
 //! *What it takes.* Who has been switched on without the [`ViewRecord`](crate::ViewRecord) that it left belongs to the chain as it was
 //! loaded, and to nothing that came after. So no promise holds that it gave: those who know of no view but the first must not be a
 //! quorum of that, those who have forgotten among them. In a chain of five, where three fly on, one that forgets is enough, with the two
-//! that were left behind: they decide beside the two of three that remember.
+//! that were left behind: they decide beside the two of three that remember. One that forgets in the midst of a proposal may also hand the
+//! same one on another way.
 
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
