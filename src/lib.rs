@@ -37,6 +37,7 @@ pub use ground::{Ground, Progress};
 pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfig, Profile};
 pub use node::round::state::Phase;
 pub use node::sample::Sample;
+pub use node::view::record::{RecordError, ViewRecord};
 pub use optimiser::local::Local;
 pub use optimiser::search::Schedule;
 pub use place::Placement;

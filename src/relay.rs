@@ -13,6 +13,7 @@ use crate::mission::{Mission, Profile};
 use crate::node::Node;
 use crate::node::round::state::Phase;
 use crate::node::sample::Sample;
+use crate::node::view::record::{RecordError, ViewRecord};
 use crate::place::Placement;
 use crate::settings::{Identity, Settings, SetupError, Wiring, check};
 use crate::side::Side;
@@ -306,6 +307,24 @@ impl Relay {
     /// The view of the chain that it has accepted last.
     pub fn view(&self) -> ViewId {
         self.node.member().view
+    }
+
+    /// What it has said in the votes on views, to be stored whenever it has changed, *before* [`poll_transmit`](Self::poll_transmit) is
+    /// called: a promise that is forgotten is none. Constant work.
+    pub const fn view_record(&self) -> ViewRecord {
+        self.node.view_record()
+    }
+
+    /// Has a relay that has just been made, and was handed nothing but an upload yet, stand by what it had said before it was
+    /// switched off in flight: the [`view_record`](Self::view_record) that was stored last.
+    ///
+    /// Constant work.
+    ///
+    /// # Errors
+    /// [`RecordError::Base`] if it was stored by a relay that was loaded with another mission, [`RecordError::Begun`] if the relay
+    /// has begun to talk or to compute. Nothing has changed then.
+    pub fn resume_view(&mut self, record: &ViewRecord) -> Result<(), RecordError> {
+        self.node.resume_view(record)
     }
 
     /// Until when it may hold what was agreed on without hearing more: by then nobody else flies anything else. `None` before that is

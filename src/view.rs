@@ -50,7 +50,7 @@ impl ViewId {
 }
 
 /// A view and its size.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct View {
     /// Which one.

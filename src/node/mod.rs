@@ -44,7 +44,6 @@ use crate::settings::{Identity, Method, Settings, Wiring};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
-use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Hello, Message};
 #[cfg(feature = "upload")]
@@ -61,6 +60,7 @@ use sample::{Meter, Sample};
 use steering::Steering;
 use view::ViewChange;
 use view::electorate::Held;
+use view::record::{RecordError, ViewRecord};
 
 /// What the firmware is told.
 #[derive(Clone, Debug, Default)]
@@ -413,10 +413,7 @@ impl Node {
         let Self {
             member, neighbours, ..
         } = self;
-        if neighbours
-            .at_mut(side)
-            .confirmed(now, at, &member.settings)
-        {
+        if neighbours.at_mut(side).confirmed(now, at, &member.settings) {
             self.raise(Event::NeighbourBack(side));
         }
     }
@@ -832,6 +829,17 @@ impl Node {
         self.steer(now);
     }
 
+    /// What it has said in the votes on views.
+    pub(crate) const fn view_record(&self) -> ViewRecord {
+        self.view.record(self.member.digest)
+    }
+
+    /// A relay that has just been switched on has said what is in `record`.
+    pub(crate) fn resume_view(&mut self, record: &ViewRecord) -> Result<(), RecordError> {
+        let untouched = self.round.is_untouched();
+        self.view.resume(&self.member, record, untouched)
+    }
+
     /// The next message to send, to which node at which side. Call until there is none.
     pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         if let Some(message) = self.next_of_a_round(now) {
@@ -1074,7 +1082,7 @@ impl Node {
 
     /// A relay that has just been switched on flies `upload`, which it held before.
     pub(crate) fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
-        let untouched = self.view.newest() == ViewId::LOADED && self.round.is_untouched();
+        let untouched = self.view.is_untouched() && self.round.is_untouched();
         let mission = self.update.resume(&self.member, upload, untouched)?;
         self.member.mission = mission;
         self.member.active = upload.id();

@@ -5,8 +5,9 @@ use crate::mission::tests::paper;
 use crate::mission::{Interference, Interferer, Mission, MissionConfig};
 use crate::settings::{Identity, Settings, Wiring};
 use crate::time::Instant;
+use crate::view::{View, ViewId};
 use crate::wire::auth::{Auth, Key};
-use crate::wire::message::{PriorView, Proposal};
+use crate::wire::message::{Poll, Proposal};
 
 const NOW: Instant = Instant::from_millis(10_000);
 
@@ -60,7 +61,15 @@ fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
             Message::Hello(hello) => Message::Hello(hello),
             Message::Proposal(proposal) => Message::Proposal(proposal),
             Message::Offer(upload) => Message::Offer(upload),
-            Message::Heartbeat { mission, answer } => Message::Heartbeat { mission, answer },
+            Message::Heartbeat {
+                mission,
+                ask,
+                answer,
+            } => Message::Heartbeat {
+                mission,
+                ask,
+                answer,
+            },
             _ => panic!("{message:?}"),
         };
         said.push((to, message)).unwrap();
@@ -72,12 +81,14 @@ fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
 fn hello(node: &Node, holds: MissionId) -> Message {
     Message::Hello(Hello {
         mission: node.member.digest,
-        newest: 0,
+        newest: ViewId::LOADED,
         neighbour: 2,
         ask: false,
         form: false,
         fresh: false,
         ready: true,
+        behind: 1,
+        hears: 0x0F,
         holds,
         flies: true,
     })
@@ -86,12 +97,15 @@ fn hello(node: &Node, holds: MissionId) -> Message {
 fn proposal(mission_id: MissionId) -> Message {
     Message::Proposal(Proposal {
         mission_id,
-        view: 1,
+        view: ViewId::LOADED.next_by(1).unwrap(),
         place: 1,
-        before: PriorView {
-            view: 0,
-            relays: 3,
-            leader: true,
+        poll: Poll {
+            votes: 1,
+            proposer: true,
+            ..Poll::of(View {
+                id: ViewId::LOADED,
+                relays: 3,
+            })
         },
     })
 }

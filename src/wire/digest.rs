@@ -51,7 +51,7 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
 /// Which mission somebody holds or flies: the newest of all that were uploaded, or the one that was loaded before flight.
 ///
 /// In the order of versions; of two missions with one version, the one with the larger digest counts as the newer one.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MissionId {
     /// The operator's number of an uploaded mission, from 1; 0 is the mission that was loaded before flight.

@@ -276,7 +276,7 @@ impl Neighbour {
     /// An intact frame from the node `distance` nodes away, which is the one `taken` or not.
     pub(crate) fn heard(&mut self, distance: u16, taken: bool, now: Instant, settings: &Settings) {
         self.hearing.age(now, settings);
-        if distance >= 1 && distance <= CANDIDATES {
+        if (1..=CANDIDATES).contains(&distance) {
             self.hearing.now |= 1 << (distance - 1);
         }
         if taken {

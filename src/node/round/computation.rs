@@ -81,7 +81,6 @@ impl Computation {
     }
 
     /// Whether it has just been made.
-    #[cfg(feature = "upload")]
     pub(crate) const fn is_untouched(&self) -> bool {
         let at_first = matches!(self.state.phase(), Phase::Idle | Phase::Planning);
         at_first && matches!(self.task, LeaderTask::No) && self.setpoint.is_none()

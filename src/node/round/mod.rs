@@ -273,7 +273,6 @@ impl Round {
     }
 
     /// Whether it has just been made.
-    #[cfg(feature = "upload")]
     pub(crate) const fn is_untouched(&self) -> bool {
         self.computation.is_untouched()
     }

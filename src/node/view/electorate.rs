@@ -5,9 +5,11 @@
 //!
 //! | step | on the way | what a relay does | kept |
 //! | --- | --- | --- | --- |
-//! | proposal | onward | promises to accept no earlier proposal, and says what it accepted before | `promised` |
-//! | decision | back | accepts the view that was decided on, unless it has promised more since | `accepted`, `votes` |
+//! | proposal | onward | promises to accept no earlier proposal, and says what it accepted before | `promised`, `voted` |
+//! | decision | back | accepts the view that was decided on, unless it has promised more since | `accepted` |
 //! | a pass of that view | onward | knows that all accepted it | `agreed` |
+//!
+//! A decision names the view that it follows, also one that refuses: those before who did not know it had no voice, and have one next time.
 //!
 //! The last relay decides by what the proposal has gathered, the poll:
 //!
@@ -19,28 +21,37 @@
 //!
 //! *Why there are no two.* Two decisions on the successor of one view have a member of it in common. The later proposal comes to that
 //! member after it has accepted the earlier decision, and is told of it; or before, and then the member accepts that decision no more, so that
-//! the leader who waits for it never hears that all have. A relay that was no member has no voice: who has been switched on without the
-//! [`ViewRecord`](crate::ViewRecord) that it left belongs to the chain as it was loaded, and to nothing that came after.
+//! the leader who waits for it never hears that all have. A relay that was no member has no voice.
+//!
+//! *Who is a member.* A proposal is handed on by each relay to one other alone, so it goes one way, and who has taken part in it is in the
+//! view that may come of it, whether or not it hears the decision. A relay remembers the last [`VOTES`] proposals that it has heard
+//! no decision of. One that is in a view and has forgotten so is safe, and has no voice until the next one.
+//!
+//! *What it takes.* Who has been switched on without the [`ViewRecord`](crate::ViewRecord) that it left belongs to the chain as it was
+//! loaded, and to nothing that came after. So no promise holds that it gave: those who know of no view but the first must not be a
+//! quorum of that, those who have forgotten among them. In a chain of five, where three fly on, one that forgets is enough, with the two
+//! that were left behind: they decide beside the two of three that remember. One that forgets in the midst of a proposal may also hand the
+//! same one on another way.
 
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
-/// Proposals that a relay remembers to have taken part in while it does not know what came of them.
-const VOTES: usize = 8;
+/// How many proposals of which it has not heard the decision a relay remembers.
+pub(super) const VOTES: usize = 8;
 
 /// What one relay has said in the votes on views, and knows of them.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Electorate {
     /// The newest view that it knows to be agreed on, and whether it is a member.
-    agreed: View,
-    member: bool,
-    promised: ViewId,
-    /// The successor of `agreed` that it has accepted, and does not know to be agreed on.
-    accepted: Option<Successor>,
-    /// The proposals after `agreed` that it has taken part in: it is a member of the views that come of them.
-    votes: heapless::Vec<ViewId, VOTES>,
+    pub(super) agreed: View,
+    pub(super) member: bool,
+    pub(super) promised: ViewId,
+    /// A view that it has accepted, and does not know to be agreed on.
+    pub(super) accepted: Option<Successor>,
+    /// Proposals that it has taken part in, and that may become views: then it is a member. The latest first.
+    pub(super) voted: [ViewId; VOTES],
     /// The node whose half of the chain as it was loaded is the larger.
-    elder: u16,
+    pub(super) elder: u16,
 }
 
 /// For how long what was agreed on may be held elsewhere, in tenths of a second.
@@ -54,6 +65,13 @@ pub(crate) struct Held {
 }
 
 impl Held {
+    #[cfg(test)]
+    pub(super) const NONE: Self = Self {
+        lease_left: 0,
+        view: ViewId::LOADED,
+        rest: 0,
+    };
+
     fn rest_of(&self, view: ViewId) -> u16 {
         if view == ViewId::LOADED {
             0
@@ -83,7 +101,7 @@ impl Electorate {
             member: true,
             promised: ViewId::LOADED,
             accepted: None,
-            votes: heapless::Vec::new(),
+            voted: [ViewId::LOADED; VOTES],
             elder,
         }
     }
@@ -91,6 +109,11 @@ impl Electorate {
     /// The largest proposal that it has taken part in.
     pub(crate) const fn promised(&self) -> ViewId {
         self.promised
+    }
+
+    /// The newest view that it knows to be agreed on.
+    pub(crate) const fn agreed(&self) -> View {
+        self.agreed
     }
 
     /// Takes part in `proposal`, which has gathered `told` so far, if it has promised no later one; what is gathered with it.
@@ -107,12 +130,11 @@ impl Electorate {
             return None;
         }
         self.promised = proposal;
-        if self.votes.is_full() {
-            // Of the oldest one it is the most likely that nothing came.
-            self.votes.rotate_left(1);
-            self.votes.pop();
+        let mut voted = [proposal; VOTES];
+        for (kept, earlier) in voted.iter_mut().skip(1).zip(self.voted) {
+            *kept = earlier;
         }
-        _ = self.votes.push(proposal);
+        self.voted = voted;
         let told = told.unwrap_or(Poll::of(self.agreed));
         if told.agreed.id > self.agreed.id {
             self.learn(told.agreed);
@@ -147,14 +169,24 @@ impl Electorate {
 
     /// `view` is known to be agreed on.
     fn learn(&mut self, view: View) {
-        self.member = self.votes.contains(&view.id);
-        self.votes.retain(|vote| *vote > view.id);
+        self.member = self.voted.contains(&view.id);
         self.agreed = view;
         self.accepted = None;
+        self.forget(|voted| voted <= view.id);
     }
 
-    /// What was decided on `proposal`, a view that follows `base` or none, is accepted, unless this relay has promised more since; whether
-    /// it is.
+    /// Forgets that it has taken part in proposals that will be no views any more.
+    fn forget(&mut self, over: impl Fn(ViewId) -> bool) {
+        let mut kept = [ViewId::LOADED; VOTES];
+        let voted = self.voted.iter().filter(|voted| !over(**voted));
+        for (kept, voted) in kept.iter_mut().zip(voted) {
+            *kept = *voted;
+        }
+        self.voted = kept;
+    }
+
+    /// Accepts what was decided on `proposal`, a view that follows `base` or none, unless this relay has promised more since; whether
+    /// it has.
     pub(crate) fn accept(&mut self, proposal: ViewId, base: View, view: Option<View>) -> bool {
         if proposal != self.promised || base.id < self.agreed.id {
             return false;
@@ -163,11 +195,11 @@ impl Electorate {
             self.learn(base);
         }
         if let Some(view) = view {
-            // No other of the proposals so far can be agreed on any more.
-            self.votes.retain(|vote| *vote == view.id);
             self.accepted = Some(Successor { proposal, view });
-        } else {
-            self.votes.retain(|vote| *vote != proposal);
+        }
+        if view.is_none_or(|view| view.id != proposal) {
+            // Nothing new has come of it, and nothing will.
+            self.forget(|voted| voted == proposal);
         }
         true
     }
@@ -207,4 +239,330 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16) -> Outcome {
         },
         |successor| successor.view,
     ))
+}
+
+#[cfg(test)]
+impl Electorate {
+    /// As it was before there was an electorate: what is decided on is agreed on, and whoever is there has a voice.
+    pub(super) fn count_everybody(&mut self) {
+        self.commit();
+        self.member = true;
+    }
+
+    /// Whether it has taken part in `proposal`, which may become a view.
+    pub(super) fn has_voted(&self, proposal: ViewId) -> bool {
+        self.voted.contains(&proposal)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::{Electorate, Held, Outcome, VOTES, decide};
+    use crate::view::{View, ViewId};
+    use crate::wire::message::{Poll, Successor};
+
+    const fn left(lease_left: u16) -> Held {
+        Held {
+            lease_left,
+            view: ViewId::LOADED,
+            rest: 0,
+        }
+    }
+
+    fn id(number: u32, node: u32) -> ViewId {
+        ViewId::from_bits(number << 10 | node)
+    }
+
+    fn count(nodes: &[u16]) -> u16 {
+        u16::try_from(nodes.len()).unwrap()
+    }
+
+    /// A chain of relays, nodes 1 to as many.
+    struct Chain(Vec<Electorate>);
+
+    impl Chain {
+        fn of(relays: u16) -> Self {
+            Self((0..relays).map(|_| Electorate::new(relays, 1)).collect())
+        }
+
+        /// Whether the one of that place from 0 accepts `view`.
+        fn accept(&mut self, at: usize, view: View) -> bool {
+            let base = self.0[at].agreed();
+            self.0[at].accept(view.id, base, Some(view))
+        }
+
+        /// What a proposal gathers of `nodes`.
+        fn poll(&mut self, nodes: &[u16], proposal: ViewId) -> Poll {
+            let mut told = None;
+            for &node in nodes {
+                let electorate = &mut self.0[usize::from(node) - 1];
+                told = electorate.vote(node, proposal, told, left(0));
+                assert!(told.is_some(), "node {node}");
+            }
+            told.unwrap()
+        }
+
+        /// What is decided on a proposal to `nodes`; the last `accept` of them hear of it.
+        fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Outcome {
+            let poll = self.poll(nodes, proposal);
+            let outcome = decide(&poll, proposal, count(nodes));
+            if let Outcome::View(view) = outcome {
+                for &node in nodes.iter().rev().take(accept) {
+                    assert!(self.0[usize::from(node) - 1].accept(proposal, poll.agreed, Some(view)));
+                }
+                if accept == nodes.len() {
+                    self.0[usize::from(nodes[0]) - 1].commit();
+                }
+            }
+            outcome
+        }
+
+        fn knows(&self, node: u16) -> (View, bool) {
+            let electorate = self.0[usize::from(node) - 1];
+            (electorate.agreed(), electorate.member)
+        }
+    }
+
+    const fn granted(id: ViewId, relays: u16) -> Outcome {
+        Outcome::View(View { id, relays })
+    }
+
+    /// For all parts of all chains up to seven, as they were loaded.
+    #[test]
+    fn more_than_half_decide_or_half_with_the_elder() {
+        for relays in 1..=7_u16 {
+            for part in 1..1_u32 << relays {
+                let nodes: Vec<u16> = (1..=relays)
+                    .filter(|node| part >> (node - 1) & 1 == 1)
+                    .collect();
+                let outcome = Chain::of(relays).propose(&nodes, id(1, 1), 0);
+                let there = count(&nodes);
+                let most = 2 * there > relays || 2 * there == relays && nodes[0] == 1;
+                assert_eq!(outcome != Outcome::Refused, most, "{nodes:?} of {relays}");
+                if most {
+                    assert_eq!(outcome, granted(id(1, 1), there));
+                }
+                // Never two parts of one chain.
+                let rest = ((1 << relays) - 1) & !part;
+                let rest: Vec<u16> = (1..=relays)
+                    .filter(|node| rest >> (node - 1) & 1 == 1)
+                    .collect();
+                if most && !rest.is_empty() {
+                    let other = Chain::of(relays).propose(&rest, id(1, 2), 0);
+                    assert_eq!(other, Outcome::Refused);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_members_of_the_view_decide_and_not_those_who_are_there() {
+        let mut chain = Chain::of(5);
+        let first = chain.propose(&[1, 2, 3], id(1, 1), 3);
+        assert_eq!(first, granted(id(1, 1), 3));
+        // Three of five, but one of three that are in the view.
+        let others = chain.propose(&[3, 4, 5], id(2, 3), 3);
+        assert_eq!(others, granted(id(1, 1), 3), "it may be agreed on");
+        let next = chain.propose(&[3, 4, 5], id(3, 3), 3);
+        assert_eq!(next, Outcome::Refused);
+        assert_eq!(
+            [3, 4, 5].map(|node| chain.knows(node).1),
+            [true, false, false]
+        );
+        // Two of its three.
+        let members = chain.propose(&[1, 2], id(4, 1), 2);
+        assert_eq!(members, granted(id(4, 1), 2));
+    }
+
+    #[test]
+    fn of_a_split_view_the_half_of_its_proposer_goes_on() {
+        for (part, goes_on) in [(&[3, 4][..], true), (&[1, 2], false), (&[2, 3], true)] {
+            let mut chain = Chain::of(4);
+            // Node 3 proposes, and the others hear of it in two ways.
+            let view = View {
+                id: id(1, 3),
+                relays: 4,
+            };
+            for (electorate, node) in chain.0.iter_mut().zip(1..) {
+                electorate.vote(node, view.id, None, left(0)).unwrap();
+                assert!(electorate.accept(view.id, electorate.agreed(), Some(view)));
+                electorate.commit();
+            }
+            let outcome = chain.propose(part, id(2, 1), 0);
+            assert_eq!(outcome != Outcome::Refused, goes_on, "{part:?}");
+        }
+    }
+
+    #[test]
+    fn what_may_be_agreed_on_is_decided_on_again() {
+        let mut chain = Chain::of(3);
+        // The last one alone has heard of it.
+        assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 1), granted(id(1, 1), 3));
+        assert_eq!(chain.propose(&[2, 3], id(2, 2), 2), granted(id(1, 1), 3));
+        assert_eq!(
+            chain.knows(2).0.id,
+            id(1, 1),
+            "all there have accepted it now"
+        );
+        // Who has voted for it is in it, heard or not.
+        assert_eq!(chain.propose(&[2, 3], id(3, 2), 2), granted(id(3, 2), 2));
+    }
+
+    #[test]
+    fn of_two_that_were_accepted_the_later_proposal_is_decided_on_again() {
+        for accepted_first in [1, 3] {
+            let mut chain = Chain::of(3);
+            let early = Successor {
+                proposal: id(1, 1),
+                view: View {
+                    id: id(1, 1),
+                    relays: 3,
+                },
+            };
+            let late = Successor {
+                proposal: id(2, 2),
+                view: View {
+                    id: id(2, 2),
+                    relays: 2,
+                },
+            };
+            chain.0[0].promised = late.proposal;
+            let (first, last) = if accepted_first == 1 {
+                (early, late)
+            } else {
+                (late, early)
+            };
+            chain.0[0].accepted = Some(first);
+            chain.0[2].accepted = Some(last);
+            assert_eq!(
+                chain.propose(&[1, 2, 3], id(3, 1), 0),
+                Outcome::View(late.view)
+            );
+        }
+    }
+
+    #[test]
+    fn a_promise_keeps_what_was_decided_before_from_being_accepted() {
+        let mut chain = Chain::of(3);
+        assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 0), granted(id(2, 1), 3));
+        // The second one has promised more in the meantime, and takes part in nothing that is older.
+        chain.poll(&[2], id(3, 2));
+        let view = View {
+            id: id(2, 1),
+            relays: 3,
+        };
+        assert!(!chain.accept(1, view));
+        assert!(chain.accept(2, view));
+        for old in [id(1, 3), id(2, 1), id(3, 1), id(3, 2)] {
+            assert_eq!(chain.0[1].vote(2, old, None, left(0)), None, "{old:?}");
+        }
+        assert!(chain.0[1].vote(2, id(3, 3), None, left(0)).is_some());
+    }
+
+    #[test]
+    fn all_know_by_the_next_proposal_what_one_knows_to_be_agreed_on() {
+        let mut chain = Chain::of(4);
+        chain.propose(&[1, 2, 3], id(1, 1), 3);
+        let poll = chain.poll(&[1, 2, 3, 4], id(2, 1));
+        assert_eq!(
+            (poll.agreed.id, poll.votes, poll.proposer),
+            (id(1, 1), 3, true)
+        );
+        assert_eq!(
+            [1, 2, 3, 4].map(|node| chain.knows(node).1),
+            [true, true, true, false]
+        );
+        assert_eq!(chain.knows(4).0, poll.agreed);
+    }
+
+    /// They come before those who know: their voices are those of an older view, and do not count.
+    #[test]
+    fn who_does_not_know_the_view_has_no_voice_in_it_yet() {
+        let mut chain = Chain::of(3);
+        chain.propose(&[1, 2, 3], id(1, 1), 3);
+        chain.0[2].commit();
+        let poll = chain.poll(&[2, 3], id(2, 2));
+        assert_eq!((poll.agreed.id, poll.votes), (id(1, 1), 1));
+        assert_eq!(decide(&poll, id(2, 2), 2), Outcome::Refused);
+    }
+
+    #[test]
+    fn commit_is_of_what_was_accepted_last() {
+        let mut chain = Chain::of(3);
+        assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 2), granted(id(1, 1), 3));
+        assert!(chain.0[1].awaits(id(1, 1)) && !chain.0[0].awaits(id(1, 1)));
+        chain.0[0].commit();
+        assert_eq!(
+            chain.knows(1).0.id,
+            ViewId::LOADED,
+            "it has accepted nothing"
+        );
+        chain.0[1].commit();
+        assert_eq!(chain.knows(2).0.id, id(1, 1));
+        assert!(!chain.0[1].awaits(id(1, 1)));
+    }
+
+    #[test]
+    fn others_may_rely_on_members_alone() {
+        let mut chain = Chain::of(3);
+        let poll = chain.0[1].vote(2, id(1, 1), None, left(70)).unwrap();
+        let poll = chain.0[2].vote(3, id(1, 1), Some(poll), left(40)).unwrap();
+        assert_eq!(poll.lease_left, 40);
+        chain.0[0].member = false;
+        let poll = chain.0[0].vote(1, id(1, 1), Some(poll), left(10)).unwrap();
+        assert_eq!((poll.lease_left, poll.votes), (40, 2));
+    }
+
+    /// Proposals that came to nothing take no room; of those that nothing is heard of so many are remembered.
+    #[test]
+    fn votes_are_remembered_until_what_came_of_them_is_known() {
+        let mut relay = Electorate::new(3, 1);
+        let view = View {
+            id: id(1, 1),
+            relays: 3,
+        };
+        relay.vote(2, view.id, None, left(0)).unwrap();
+        for number in 2..100 {
+            relay.vote(2, id(number, 2), None, left(0)).unwrap();
+            let base = relay.agreed();
+            assert!(relay.accept(id(number, 2), base, None));
+        }
+        assert!(relay.has_voted(view.id));
+        for number in (100..).take(VOTES - 1) {
+            relay.vote(2, id(number, 2), None, left(0)).unwrap();
+        }
+        assert!(relay.has_voted(view.id));
+        let mut more = relay;
+        let told = Poll::of(view);
+        assert_eq!(
+            relay
+                .vote(2, id(200, 3), Some(told), left(0))
+                .map(|poll| poll.votes),
+            Some(0),
+            "one too many"
+        );
+        more.learn(view);
+        assert!(more.member);
+        assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
+    }
+
+    /// The bound that is stated above: node 2 is in the view that goes on, forgets it, and is counted in the chain as it was loaded.
+    #[test]
+    fn one_that_forgets_what_it_said_may_decide_beside_the_view() {
+        let mut chain = Chain::of(5);
+        assert_eq!(chain.propose(&[3, 4, 5], id(1, 3), 3), granted(id(1, 3), 3));
+        chain.0[2] = Electorate::new(5, 1);
+        assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 3), granted(id(2, 1), 3));
+        // The others are two of its three.
+        chain.0[3].commit();
+        assert_eq!(chain.propose(&[4, 5], id(3, 4), 2), granted(id(3, 4), 2));
+        // With what it had stored it would have told of that.
+        let mut kept = Chain::of(5);
+        assert_eq!(kept.propose(&[3, 4, 5], id(1, 3), 3), granted(id(1, 3), 3));
+        assert_eq!(kept.propose(&[1, 2, 3], id(2, 1), 3), Outcome::Refused);
+    }
 }

@@ -23,11 +23,24 @@
 //! | `Decided` | hand on: `Proposed` | hand back again | stale | - |
 //!
 //! While a view is proposed no pass goes on. One that was refused leaves the places where they are; its leader proposes again every
-//! `probe_after`.
+//! `probe_after`. A proposal that was handed on stays with the node that it was handed to: once another one, or nobody, is there, a
+//! later one is asked for.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | [`electorate`] | who may decide, and what a relay has said in the votes |
+//! | [`record`] | that, as it is stored |
+//! | `model` | a test: all that can happen to a chain of three or four |
 
 pub(crate) mod electorate;
+#[cfg(test)]
+#[cfg(not(target_os = "none"))]
+mod model;
+pub(crate) mod record;
+#[cfg(test)]
+mod tests;
 
-use super::context::{Context, Decided, Effects, Proposer};
+use super::context::{Context, Decided, Effects, Member, Proposer};
 use super::numbering::Stragglers;
 use super::retransmit::{Retransmit, Trip};
 use super::timing::{PAUSE, earliest};
@@ -39,12 +52,13 @@ use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
 use electorate::{Electorate, Outcome};
+use record::{RecordError, ViewRecord};
 
 /// How far ahead of all it has heard of a view may be that a relay hears of.
 const LEAP: u32 = 256;
 
 /// Where the view change is.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 enum ViewState {
     Settled,
     Proposed,
@@ -52,7 +66,7 @@ enum ViewState {
 }
 
 /// A proposal, as one relay sees it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Proposed {
     /// The new view.
     pub(crate) view: ViewId,
@@ -62,8 +76,8 @@ pub(crate) struct Proposed {
     pub(crate) place: u16,
     /// What it has gathered, this relay's voice included.
     poll: Poll,
-    /// The node that it was handed on to, 0 for none.
-    handed_to: u16,
+    /// The one node that it was handed on to: were it handed to another one, too, two views could bear its name.
+    handed_to: Option<u16>,
     /// The view that the decision follows, once that is known.
     base: View,
     /// How many have taken part in it, once that is known.
@@ -85,7 +99,7 @@ struct Verdict {
 }
 
 /// What is to be sent.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 struct ViewDue {
     proposal: bool,
     decision: bool,
@@ -133,6 +147,40 @@ impl ViewChange {
                 busy: false,
             },
         }
+    }
+
+    /// What it has said, as a relay of the mission with digest `base`.
+    pub(crate) const fn record(&self, base: u16) -> ViewRecord {
+        ViewRecord::new(base, self.electorate)
+    }
+
+    /// Whether nothing was said or heard of a view since this relay was switched on.
+    pub(crate) fn is_untouched(&self) -> bool {
+        self.proposed.is_none() && self.newest == self.electorate.promised()
+    }
+
+    /// A relay that has just been switched on, `untouched` or not, has said what is in `record`. It asks for a view.
+    pub(crate) fn resume(
+        &mut self,
+        member: &Member,
+        record: &ViewRecord,
+        untouched: bool,
+    ) -> Result<(), RecordError> {
+        let elder = self.electorate.elder;
+        let electorate = record
+            .electorate(member.digest, member.all, elder)
+            .ok_or(RecordError::Base)?;
+        let new = self.electorate == Electorate::new(member.all, elder);
+        if !(new && untouched && self.is_untouched()) {
+            return Err(RecordError::Begun);
+        }
+        self.electorate = electorate;
+        self.newest = electorate.promised();
+        if self.newest > ViewId::LOADED {
+            self.asks = true;
+            self.ask_at = Some(Instant::ZERO);
+        }
+        Ok(())
     }
 
     /// The latest view heard of.
@@ -200,13 +248,14 @@ impl ViewChange {
         self.refused
     }
 
-    /// The relay that a proposal was handed on to is not there any more: what comes of it can not be known. A later one can be.
-    fn abandon(&mut self, context: &Context<'_>) -> Effects {
-        if let Some(later) = self.newest.next_by(context.member.node) {
+    /// The relay that the proposal was handed on to is not there any more: what comes of it can not be known. A later one can be.
+    fn abandon(&mut self, context: &Context<'_>, proposal: ViewId) {
+        if self.newest <= proposal
+            && let Some(later) = proposal.next_by(context.member.node)
+        {
             self.heard_of(later);
         }
         self.ask(context.now);
-        Effects::NONE
     }
 
     /// A proposal or a decision from the neighbour before or after, of a mission that this relay holds.
@@ -297,7 +346,7 @@ impl ViewChange {
             mission_id,
             place: place.saturating_add(1),
             poll,
-            handed_to: 0,
+            handed_to: None,
             base: poll.agreed,
             there: 0,
             decided: None,
@@ -323,8 +372,9 @@ impl ViewChange {
         let Some(proposed) = self.awaited() else {
             return Effects::NONE;
         };
-        if proposed.handed_to != 0 {
-            return self.abandon(context);
+        if proposed.handed_to.is_some() {
+            self.abandon(context, proposed.view);
+            return Effects::NONE;
         }
         let Proposed {
             view, place, poll, ..
@@ -393,6 +443,7 @@ impl ViewChange {
         if !self.electorate.accept(proposal, base, decided) {
             return Effects::STALE;
         }
+        let taught = base.id > proposed.poll.agreed.id;
         proposed.base = base;
         proposed.there = there;
         proposed.decided = decided;
@@ -412,9 +463,13 @@ impl ViewChange {
         self.asks = false;
         self.ask_at = None;
         if leads && decided.is_none() {
-            // Somebody may be back who could not be heard.
+            // Somebody may be back who could not be heard. Who has heard of a newer view only now has a voice at once.
             self.asks = true;
-            let wait = context.member.settings.probe_after;
+            let wait = if taught {
+                PAUSE
+            } else {
+                context.member.settings.probe_after
+            };
             self.ask_at = Some(context.now + self.jitter.spread(wait));
         }
         let came = match decided {
@@ -512,20 +567,17 @@ impl ViewChange {
         wait.min(settings.probe_after)
     }
 
-    /// Whether the proposal is to be sent onward; it is taken for sent then.
-    ///
-    /// It goes to node `to`, and to no other one after that: who has taken part in it counts.
+    /// Whether the proposal is to be sent onward, to node `to`; it is taken for sent then.
     pub(crate) fn take_onward(&mut self, context: &Context<'_>, to: u16) -> Option<Message> {
-        self.awaited()?;
+        let proposal = self.awaited()?.view;
         if !core::mem::take(&mut self.due.proposal) {
             return None;
         }
         let proposed = self.proposed.as_mut()?;
-        if proposed.handed_to != 0 && proposed.handed_to != to {
-            self.abandon(context);
+        if *proposed.handed_to.get_or_insert(to) != to {
+            self.abandon(context, proposal);
             return None;
         }
-        proposed.handed_to = to;
         let proposed = *proposed;
         self.retransmit.sent(context.now, trip(context));
         Some(Message::Proposal(Proposal {
@@ -568,4 +620,3 @@ const fn trip(context: &Context<'_>) -> Trip {
         slow: false,
     }
 }
-

@@ -28,7 +28,7 @@ pub struct Pulsed {
 }
 
 impl Pulse {
-    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+    pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.mission);
         write(&(tag::PULSE, pass, self.lease.to_le_bytes()), buffer)
     }
@@ -48,7 +48,7 @@ impl Pulse {
 }
 
 impl Pulsed {
-    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+    pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.mission);
         write(&(tag::PULSED, pass, self.done), buffer)
     }

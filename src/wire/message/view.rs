@@ -9,7 +9,7 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 
 /// The proposal of a new view, as one relay hands it to the next.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {
     /// The mission that the view is to fly: the one that every relay up to the sender holds.
@@ -23,7 +23,7 @@ pub struct Proposal {
 }
 
 /// What a proposal has gathered.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Poll {
     /// The newest view that any relay on the way knows to be agreed on.
@@ -55,7 +55,7 @@ impl Poll {
 }
 
 /// A view that was decided on, and may have been agreed on.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {
     /// The proposal that the decision was on.
@@ -65,7 +65,7 @@ pub struct Successor {
 }
 
 /// What came of a proposal, as it travels back.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decision {
     /// The mission that was proposed.

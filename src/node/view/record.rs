@@ -1,0 +1,327 @@
+//! What a relay has said in the votes on views, as it is stored: a promise that is forgotten is none.
+
+use super::electorate::{Electorate, VOTES};
+use crate::mission::MAX_RELAYS;
+use crate::view::{View, ViewId};
+use crate::wire::message::Successor;
+
+/// Of what is stored; another format has another number.
+const FORMAT: u8 = 1;
+
+/// What has to survive a reboot, so that two parts of a chain never decide on one view each: what a relay has promised and accepted, and
+/// which view it knows to be agreed on.
+///
+/// | step | a firmware |
+/// | --- | --- |
+/// | after every input, before `Relay::poll_transmit` | compares `Relay::view_record` with what it has stored last, and stores it if it has changed |
+/// | the relay is switched on in flight | hands it to `Relay::resume_view` right after `Relay::new` |
+/// | the relay is switched on before another flight | forgets it |
+///
+/// What is said to others must be stored before. It changes a few times in a view change, and never else.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ViewRecord {
+    /// The digest of the mission that was loaded before flight.
+    base: u16,
+    /// Checked; whose half is the larger one is not part of it.
+    electorate: Electorate,
+}
+
+/// Why a record was refused.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum RecordError {
+    /// It is of a relay that was loaded with another mission.
+    Base,
+    /// The relay has begun already.
+    Begun,
+}
+
+impl core::fmt::Display for RecordError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Base => "the record is of a relay that was loaded with another mission",
+            Self::Begun => "the relay has begun: what it has said before comes too late",
+        })
+    }
+}
+
+impl core::error::Error for RecordError {}
+
+/// The next bytes.
+fn take<const N: usize>(bytes: &mut &[u8]) -> Option<[u8; N]> {
+    let (next, rest) = bytes.split_first_chunk()?;
+    *bytes = rest;
+    Some(*next)
+}
+
+fn take_id(bytes: &mut &[u8]) -> Option<ViewId> {
+    take(bytes).map(|id| ViewId::from_bits(u32::from_le_bytes(id)))
+}
+
+fn take_view(bytes: &mut &[u8]) -> Option<View> {
+    let id = take_id(bytes)?;
+    let relays = u16::from_le_bytes(take(bytes)?);
+    (1..=MAX_RELAYS)
+        .contains(&relays)
+        .then_some(View { id, relays })
+}
+
+fn take_flag(bytes: &mut &[u8]) -> Option<bool> {
+    let [flag] = take(bytes)?;
+    (flag <= 1).then_some(flag == 1)
+}
+
+/// Whether a node can have proposed that.
+fn is_proposed(id: ViewId) -> bool {
+    id.number() > 0 && (1..=MAX_RELAYS).contains(&id.proposer())
+}
+
+impl ViewRecord {
+    /// Bytes of a record.
+    pub const LENGTH: usize = 25 + 4 * VOTES;
+
+    pub(crate) const fn new(base: u16, electorate: Electorate) -> Self {
+        Self {
+            base,
+            electorate: Electorate {
+                elder: 0,
+                ..electorate
+            },
+        }
+    }
+
+    /// What was said, by a relay of the mission with digest `base` and `relays` relays, of which `elder` leads.
+    pub(super) fn electorate(&self, base: u16, relays: u16, elder: u16) -> Option<Electorate> {
+        let Electorate { agreed, .. } = self.electorate;
+        let fits = agreed.relays == relays || agreed.id > ViewId::LOADED && agreed.relays < relays;
+        (self.base == base && fits).then_some(Electorate {
+            elder,
+            ..self.electorate
+        })
+    }
+
+    /// As it is to be stored. There is no checksum in it.
+    pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
+        let Electorate {
+            agreed,
+            member,
+            promised,
+            accepted,
+            voted,
+            elder: _,
+        } = self.electorate;
+        let known = accepted.is_some();
+        let accepted = accepted.unwrap_or(Successor {
+            proposal: ViewId::LOADED,
+            view: agreed,
+        });
+        let id = |id: ViewId| id.bits().to_le_bytes();
+        let bytes = [FORMAT]
+            .into_iter()
+            .chain(self.base.to_le_bytes())
+            .chain(id(agreed.id))
+            .chain(agreed.relays.to_le_bytes())
+            .chain([u8::from(member)])
+            .chain(id(promised))
+            .chain([u8::from(known)])
+            .chain(id(accepted.proposal))
+            .chain(id(accepted.view.id))
+            .chain(accepted.view.relays.to_le_bytes())
+            .chain(voted.into_iter().flat_map(id));
+        let mut stored = [0; Self::LENGTH];
+        for (stored, byte) in stored.iter_mut().zip(bytes) {
+            *stored = byte;
+        }
+        stored
+    }
+
+    /// What was stored, if it is of this format and could have been said.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let mut rest = bytes;
+        let rest = &mut rest;
+        let [_format] = take(rest)?;
+        let base = u16::from_le_bytes(take(rest)?);
+        let agreed = take_view(rest)?;
+        let member = take_flag(rest)?;
+        let promised = take_id(rest)?;
+        let known = take_flag(rest)?;
+        let proposal = take_id(rest)?;
+        let view = take_view(rest)?;
+        let accepted = known.then_some(Successor { proposal, view });
+        let mut voted = [ViewId::LOADED; VOTES];
+        for voted in &mut voted {
+            *voted = take_id(rest)?;
+        }
+        let electorate = Electorate {
+            agreed,
+            member,
+            promised,
+            accepted,
+            voted,
+            elder: 0,
+        };
+        let record = Self { base, electorate };
+        let same = record.to_bytes().as_slice() == bytes;
+        (same && is_sound(&electorate)).then_some(record)
+    }
+}
+
+/// Whether a relay can have said that.
+fn is_sound(kept: &Electorate) -> bool {
+    let Electorate {
+        agreed, promised, ..
+    } = *kept;
+    let is_between = |id: ViewId| is_proposed(id) && agreed.id < id && id <= promised;
+    let accepted = kept.accepted.is_none_or(|accepted| {
+        is_between(accepted.view.id)
+            && is_between(accepted.proposal)
+            && accepted.view.id <= accepted.proposal
+    });
+    let falls = kept.voted.windows(2).all(|pair| match pair {
+        [later, earlier] => later > earlier || *earlier == ViewId::LOADED,
+        _ => true,
+    });
+    let mut voted = kept.voted.iter().filter(|id| **id != ViewId::LOADED);
+    let known = |id| id == ViewId::LOADED || is_proposed(id);
+    let loaded = agreed.id != ViewId::LOADED || kept.member;
+    known(agreed.id)
+        && agreed.id <= promised
+        && known(promised)
+        && loaded
+        && accepted
+        && falls
+        && voted.all(|id| is_between(*id))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Electorate, RecordError, ViewRecord};
+    use crate::node::view::electorate::Held;
+    use crate::mission::Mission;
+    use crate::mission::tests::paper;
+    use crate::relay::Relay;
+    use crate::settings::{Identity, Settings};
+    use crate::time::Instant;
+    use crate::view::{View, ViewId};
+
+    fn view(number: u32, node: u32) -> ViewId {
+        ViewId::from_bits(number << 10 | node)
+    }
+
+    /// After a view that it has accepted, and two proposals that it has heard no more of.
+    fn busy() -> Electorate {
+        let mut electorate = Electorate::new(3, 1);
+        let first = view(1, 1);
+        electorate.vote(2, first, None, Held::NONE).unwrap();
+        let relays = 3;
+        let base = electorate.agreed();
+        assert!(electorate.accept(first, base, Some(View { id: first, relays })));
+        electorate.vote(2, view(2, 3), None, Held::NONE).unwrap();
+        electorate.vote(2, view(3, 1), None, Held::NONE).unwrap();
+        electorate
+    }
+
+    fn stored() -> [u8; ViewRecord::LENGTH] {
+        ViewRecord::new(7, busy()).to_bytes()
+    }
+
+    #[test]
+    fn what_is_read_back_is_what_was_stored() {
+        let mut later = busy();
+        later.commit();
+        for electorate in [Electorate::new(1000, 1), busy(), later] {
+            let record = ViewRecord::new(7, electorate);
+            assert_eq!(ViewRecord::from_bytes(&record.to_bytes()), Some(record));
+        }
+        let relays = busy().agreed().relays;
+        let record = ViewRecord::from_bytes(&stored()).unwrap();
+        assert_eq!(record.electorate(7, relays, 1), Some(busy()));
+    }
+
+    #[test]
+    fn another_length_and_another_format_are_refused() {
+        let bytes = stored();
+        for length in 0..bytes.len() {
+            assert_eq!(ViewRecord::from_bytes(&bytes[..length]), None, "{length}");
+        }
+        let mut longer = [0; ViewRecord::LENGTH + 1];
+        longer[..bytes.len()].copy_from_slice(&bytes);
+        assert_eq!(ViewRecord::from_bytes(&longer), None);
+        assert_eq!(ViewRecord::from_bytes(&[0xFF; ViewRecord::LENGTH]), None);
+        assert_eq!(ViewRecord::from_bytes(&[0; ViewRecord::LENGTH]), None);
+    }
+
+    /// Of every byte with every other value: what is taken is stored again as it was.
+    #[test]
+    fn nothing_is_read_that_could_not_have_been_said() {
+        let mut taken = 0;
+        for at in 0..ViewRecord::LENGTH {
+            for value in 0..=u8::MAX {
+                let mut bytes = stored();
+                bytes[at] = value;
+                if let Some(record) = ViewRecord::from_bytes(&bytes) {
+                    assert_eq!(record.to_bytes(), bytes);
+                    taken += 1;
+                }
+            }
+        }
+        assert!(taken < ViewRecord::LENGTH * 128, "{taken}");
+        let small = ViewRecord::LENGTH - 4;
+        for (at, value) in [(7, 0), (8, 4), (9, 2), (9, 0), (10, 0), (14, 2), (small, 1)] {
+            let mut bytes = stored();
+            bytes[at] = value;
+            assert_eq!(ViewRecord::from_bytes(&bytes), None, "byte {at}");
+        }
+    }
+
+    fn relay(relays: u16) -> Relay {
+        let mission = Mission::try_new(paper(relays)).unwrap();
+        let identity = Identity {
+            network: 1,
+            index: 2,
+        };
+        Relay::new(mission, identity, Settings::default(), 1, Instant::ZERO).unwrap()
+    }
+
+    #[test]
+    fn a_relay_that_is_switched_on_again_has_said_what_it_had_said() {
+        let mut first = relay(3);
+        assert_eq!(first.view_record(), relay(3).view_record());
+        let digest = crate::wire::digest::digest(first.mission());
+        let record = ViewRecord::new(digest, busy());
+        assert_eq!(first.resume_view(&record), Ok(()));
+        assert_eq!(first.view_record(), record);
+        let same = ViewRecord::from_bytes(&record.to_bytes()).unwrap();
+        assert_eq!(first.view_record(), same);
+    }
+
+    #[test]
+    fn a_record_is_for_a_relay_of_its_mission_that_has_not_begun() {
+        let record = relay(3).view_record();
+        let mut other = relay(4);
+        assert_eq!(other.resume_view(&record), Err(RecordError::Base));
+        let digest = crate::wire::digest::digest(relay(3).mission());
+        let stray = ViewRecord::new(digest.wrapping_add(1), busy());
+        assert_eq!(relay(3).resume_view(&stray), Err(RecordError::Base));
+        let mut twice = relay(3);
+        let busy = ViewRecord::new(digest, busy());
+        assert_eq!(twice.resume_view(&busy), Ok(()));
+        assert_eq!(twice.resume_view(&busy), Err(RecordError::Begun));
+        // The leader of a chain begins by itself.
+        let mission = *relay(3).mission();
+        let identity = Identity {
+            network: 1,
+            index: 1,
+        };
+        let now = Instant::ZERO;
+        let mut leader = Relay::new(mission, identity, Settings::default(), 1, now).unwrap();
+        while leader
+            .poll_timeout()
+            .is_some_and(|at| at < Instant::from_millis(1))
+        {
+            leader.handle_timeout(leader.poll_timeout().unwrap_or(now));
+        }
+        assert_eq!(leader.resume_view(&record), Err(RecordError::Begun));
+    }
+}
