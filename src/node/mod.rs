@@ -416,7 +416,7 @@ impl Node {
             Message::Heartbeat { ask, answer, .. } => {
                 let neighbour = self.neighbours.at_mut(side);
                 neighbour.asked(*ask);
-                if let Some(at) = neighbour.answered(*answer, &self.member.settings) {
+                if let Some(at) = neighbour.answered(*answer) {
                     self.confirm(now, side, at);
                 }
                 return;

@@ -1,7 +1,7 @@
 //! From any state to one agreement: faults stop, links are whole, and the leader is told once to begin again.
 
 use proptest::{prop_assert, prop_assert_eq};
-use uav_relay::{Duration, Relay};
+use uav_relay::{Duration, Relay, ViewId};
 
 use super::Checked;
 use super::chain::{MISS, World};
@@ -92,7 +92,7 @@ impl World<'_> {
     /// A view that was called for before the agreement may come after it: then the chain agrees again.
     fn settle(&mut self, at_most: Duration) -> Checked {
         for _ in 0..MOST_VIEWS {
-            let views: Vec<u16> = self.relays.iter().map(Relay::view).collect();
+            let views: Vec<ViewId> = self.relays.iter().map(Relay::view).collect();
             let until = self.now + self.a_call();
             while self.flow(until)? {}
             if self.relays.iter().map(Relay::view).eq(views) {

@@ -258,8 +258,8 @@ impl Neighbour {
     }
 
     /// The neighbour has answered the question of that number: when that was asked.
-    pub(crate) fn answered(&self, number: u16, settings: &Settings) -> Option<Instant> {
-        self.liveness.answered(number, settings)
+    pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
+        self.liveness.answered(number)
     }
 
     /// Whether somebody is there, and takes this relay for its neighbour, too, as far as it has said.

@@ -116,7 +116,8 @@ impl Electorate {
             ..before
         };
         if self.member {
-            poll.votes = poll.votes.saturating_add(1);
+            // No more than there are, whatever was told: nobody would read that.
+            poll.votes = poll.votes.saturating_add(1).min(poll.agreed.relays);
             poll.proposer |= proposer == node;
             poll.lease_left = poll.lease_left.min(lease_left);
         }
