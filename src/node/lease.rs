@@ -146,7 +146,7 @@ impl Lease {
                     return Effects::REPEATED;
                 }
                 1 if current.done.is_some() => {
-                    self.grant(current);
+                    effects = self.grant(context.now, current);
                     effects.heard_back = current.done;
                 }
                 // The leader has begun anew, or this relay was not asked for long.
@@ -154,20 +154,32 @@ impl Lease {
                 _ => return Effects::STALE,
             }
         }
-        self.take(context, pulse.number, pulse.lease);
+        // Only a leader has a lease from it.
+        _ = self.take(context, pulse.number, pulse.lease);
         effects
     }
 
-    /// All took part in `pulse`.
-    fn grant(&mut self, pulse: Current) {
+    /// All took part in `pulse`; so long ago, perhaps, that the lease has run out since.
+    fn grant(&mut self, now: Instant, pulse: Current) -> Effects {
         let until = pulse.handed_on + from_tenths(pulse.span);
-        self.state = match self.state {
-            LeaseState::Until(at) => LeaseState::Until(at.max(until)),
-            LeaseState::Open | LeaseState::Lapsed => LeaseState::Until(until),
-        };
+        let until = self.until().map_or(until, |at| at.max(until));
+        if until > now {
+            self.state = LeaseState::Until(until);
+            return Effects::NONE;
+        }
+        self.lapse()
     }
 
-    fn take(&mut self, context: &Context<'_>, number: u16, span: u16) {
+    fn lapse(&mut self) -> Effects {
+        self.state = LeaseState::Lapsed;
+        Effects {
+            lapsed: true,
+            view_needed: true,
+            ..Effects::NONE
+        }
+    }
+
+    fn take(&mut self, context: &Context<'_>, number: u16, span: u16) -> Effects {
         self.current = Some(Current {
             number,
             span,
@@ -178,16 +190,16 @@ impl Lease {
         self.retransmit.stop();
         self.due = LeaseDue::default();
         if context.is_last() {
-            self.finish(context);
-        } else {
-            self.due.onward = true;
+            return self.finish(context);
         }
+        self.due.onward = true;
+        Effects::NONE
     }
 
     /// The current pulse has come back from the last relay.
-    fn finish(&mut self, context: &Context<'_>) {
+    fn finish(&mut self, context: &Context<'_>) -> Effects {
         let Some(current) = &mut self.current else {
-            return;
+            return Effects::NONE;
         };
         current.done = Some(context.now);
         let current = *current;
@@ -197,11 +209,11 @@ impl Lease {
         self.retransmit.stop();
         if !context.leads() {
             self.due.back = true;
-            return;
+            return Effects::NONE;
         }
         // The first two follow each other at once: nobody else has a lease before the second.
         let first = self.state == LeaseState::Open;
-        self.grant(current);
+        let effects = self.grant(context.now, current);
         let took = context.now.since(current.handed_on);
         let eighth = self.slowest.as_micros() / 8;
         let lately = self.slowest.as_micros().saturating_sub(eighth);
@@ -212,6 +224,7 @@ impl Lease {
             self.period(context.settings())
         };
         self.next_at = Some(context.now + wait);
+        effects
     }
 
     fn period(&self, settings: &Settings) -> Duration {
@@ -236,38 +249,35 @@ impl Lease {
         else {
             return Effects::STALE;
         };
-        if pulsed.done {
-            self.finish(context);
+        let effects = if pulsed.done {
+            self.finish(context)
         } else {
             self.retransmit.heard();
             self.retransmit.sent(context.now, trip(context));
-        }
+            Effects::NONE
+        };
         Effects {
             heard_onward: Some(current.handed_on),
-            ..Effects::NONE
+            ..effects
         }
     }
 
     /// Does what is due: a pulse at the leader, one more time, or nothing any more.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let now = context.now;
+        let resent = self.retransmit.is_due(now);
+        self.due.onward |= resent;
         let mut effects = Effects::NONE;
-        if self.retransmit.is_due(now) {
-            self.due.onward = true;
-            effects.resent = true;
-        }
         if self.next_at.is_some_and(|at| at <= now) {
             self.next_at = None;
             let number = self.current.map_or(0, |current| current.number);
             let span = self.given(context.settings());
-            self.take(context, number.wrapping_add(1), span);
+            effects = self.take(context, number.wrapping_add(1), span);
         }
         if self.until().is_some_and(|at| at <= now) {
-            self.state = LeaseState::Lapsed;
-            effects.lapsed = true;
-            effects.view_needed = true;
+            effects = self.lapse();
         }
-        effects
+        Effects { resent, ..effects }
     }
 
     /// What is to be sent onward; it is taken for sent then.

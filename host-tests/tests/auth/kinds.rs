@@ -180,6 +180,8 @@ impl Attacker {
     pub(crate) fn attack(&mut self, net: &Net, kind: Kind) -> Option<Attack> {
         let heard = if kind.is_of_an_offer() {
             &net.heard[*net.offers.choose(&mut self.rng)?]
+        } else if kind == Kind::RecordedHandshake {
+            &net.heard[*net.handshakes.choose(&mut self.rng)?]
         } else {
             net.heard.choose(&mut self.rng)?
         };

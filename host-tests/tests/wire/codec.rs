@@ -298,6 +298,11 @@ impl Proposed {
             && self
                 .successor
                 .is_none_or(|(proposal, view)| is_proposed(proposal) && view.is_proposed())
+            // All of that was proposed before.
+            && agreed.id < self.call.view
+            && self.successor.is_none_or(|(proposal, view)| {
+                proposal < self.call.view && view.id <= proposal
+            })
     }
 }
 

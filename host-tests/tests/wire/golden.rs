@@ -251,6 +251,10 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
         id: u32::MAX - 0x17,
         relays: 1000,
     };
+    const BEFORE: SizedView = SizedView {
+        id: MOST.id - 1,
+        ..MOST
+    };
     let frames = vectors().frames;
     let some = |what: fn(&Said) -> bool| {
         assert!(frames.iter().any(|vector| what(&vector.message)));
@@ -286,11 +290,11 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
                 view: MOST.id,
                 place: 1000,
             },
-            agreed: MOST,
+            agreed: BEFORE,
             votes: 1000,
             lease_left: u16::MAX,
             proposer: true,
-            successor: Some((MOST.id, MOST)),
+            successor: Some((BEFORE.id, BEFORE)),
         })
     });
     some(|said| matches!(said, Said::Decision(decision) if decision.view.is_none()));

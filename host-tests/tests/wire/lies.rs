@@ -54,7 +54,20 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         Said::Heartbeat { mission, .. } | Said::Fence { mission, .. } => *mission = as_mission,
         Said::Hello(hello) => (hello.newest, hello.mission) = (view(as_number), as_mission),
         // Of a view that flies the mission that was loaded.
-        Said::Proposal(Proposed { call, .. }) | Said::Decision(Decided { call, .. }) => {
+        Said::Proposal(proposed) => {
+            let Proposed {
+                call,
+                agreed,
+                successor,
+                ..
+            } = proposed;
+            (call.view, call.of) = (view(as_number), (as_mission, 0));
+            if agreed.id >= call.view {
+                agreed.id = 0;
+            }
+            *successor = successor.filter(|(proposal, _)| *proposal < call.view);
+        }
+        Said::Decision(Decided { call, .. }) => {
             (call.view, call.of) = (view(as_number), (as_mission, 0));
         }
         Said::Offer(offer) => offer.base = as_mission,

@@ -100,8 +100,12 @@ const CALL: Call = Call {
     place: 1,
 };
 
+/// The next view of node 1000, the last that may propose.
 const PROPOSAL: Proposed = Proposed {
-    call: CALL,
+    call: Call {
+        view: 0x0BE8,
+        ..CALL
+    },
     agreed: VIEW,
     votes: 0,
     lease_left: 0,
@@ -396,10 +400,19 @@ fn a_view_is_named_by_a_relay_that_may_propose_it() {
             let proposed = number > 0 && (1..=1000).contains(&node);
             for (said, at, expected) in [
                 (Said::Hello(HELLO), 5, true),
-                (Said::Proposal(PROPOSAL), 5, proposed),
-                (Said::Proposal(PROPOSAL), 11, proposed || view == 0),
-                (Said::Proposal(PROPOSAL), 23, proposed),
-                (Said::Proposal(PROPOSAL), 27, proposed),
+                // All that it tells of was proposed before, and a view not after what was decided by.
+                (Said::Proposal(PROPOSAL), 5, proposed && view > VIEW.id),
+                (
+                    Said::Proposal(PROPOSAL),
+                    11,
+                    (proposed || view == 0) && view < PROPOSAL.call.view,
+                ),
+                (
+                    Said::Proposal(PROPOSAL),
+                    23,
+                    proposed && (VIEW.id..PROPOSAL.call.view).contains(&view),
+                ),
+                (Said::Proposal(PROPOSAL), 27, proposed && view <= VIEW.id),
                 (Said::Decision(DECISION), 5, proposed),
                 (Said::Decision(DECISION), 12, proposed),
             ] {

@@ -325,24 +325,30 @@ fn formings() -> BoxedStrategy<Said> {
     let calls = || {
         (stamps(), proposals(), counts(1)).prop_map(|(of, view, place)| Call { of, view, place })
     };
-    let agreed = prop_oneof![
-        2 => views(),
-        1 => counts(1).prop_map(|relays| SizedView { id: 0, relays }),
+    // One after the other: what is agreed on, a view, what it was decided by, what is proposed.
+    let order = [proposals(), proposals(), proposals(), proposals()].prop_map(|mut order| {
+        order.sort_unstable();
+        order
+    });
+    let order = prop_oneof![
+        3 => order.clone(),
+        1 => order.prop_map(|[_, a, b, c]| [0, a, b, c]),
     ];
     let votes = any::<proptest::sample::Index>();
-    let successor = proptest::option::of((proposals(), views()));
-    let poll = (agreed, votes, spans(), any::<bool>(), successor);
-    let proposal = (calls(), poll).prop_map(
-        |(call, (agreed, votes, lease_left, proposer, successor))| {
-            let votes = votes.index(usize::from(agreed.relays) + 1);
-            Said::Proposal(Proposed {
-                call,
-                agreed,
+    let sizes = (counts(1), votes, proptest::option::of(counts(1)));
+    let proposal = (calls(), order, sizes, spans(), any::<bool>()).prop_filter_map(
+        "proposed before what has come of it",
+        |(call, order, (relays, votes, successor), lease_left, proposer)| {
+            let [agreed, id, decided_by, view] = order;
+            let votes = votes.index(usize::from(relays) + 1);
+            (decided_by < view).then_some(Said::Proposal(Proposed {
+                call: Call { view, ..call },
+                agreed: SizedView { id: agreed, relays },
                 votes: u16::try_from(votes).unwrap(),
                 lease_left,
                 proposer,
-                successor,
-            })
+                successor: successor.map(|relays| (decided_by, SizedView { id, relays })),
+            }))
         },
     );
     let granted = proptest::option::of(views());

@@ -66,6 +66,36 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
     }
 }
 
+/// A neighbour that has said that it is of this mission is in another view, if its passes are: somebody has missed something.
+#[test]
+fn a_pass_of_another_view_has_the_relay_ask_for_one() {
+    let now = Instant::ZERO;
+    let view = id(2, 1);
+    let (mut relay, mission) = in_view(4, view);
+    let own = mission.wrapping_add(mark(view));
+    for (port, from) in [(Port::Upstream, 4), (Port::Downstream, 4)] {
+        let hello = a_hello(0, mission, from, 0);
+        relay.handle_bytes(now, port, &framed(4, port, &hello));
+    }
+    sent(&mut relay, now);
+    for (kind, port, calls) in [
+        (0, Port::Upstream, true),
+        (8, Port::Upstream, true),
+        (15, Port::Upstream, true),
+        (1, Port::Downstream, false),
+        (16, Port::Downstream, false),
+    ] {
+        let mut after = relay.clone();
+        let said = &one_of_each(FIRST, own.wrapping_add(1))[kind];
+        after.handle_bytes(now, port, &framed(4, port, said));
+        let called = soon(&mut after, now).iter().any(|(port, said)| {
+            *port == Port::Upstream
+                && matches!(said, Said::Hello(hello) if hello.flags & FORMS != 0)
+        });
+        assert_eq!(called, calls, "{said:?}");
+    }
+}
+
 #[test]
 fn heartbeats_bear_the_digest_of_the_mission_in_every_view() {
     let view = id(7, 1);
