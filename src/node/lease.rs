@@ -228,7 +228,8 @@ impl Lease {
     }
 
     fn period(&self, settings: &Settings) -> Duration {
-        Duration::from_micros(settings.probe_after.as_micros() / 2).max(self.slowest)
+        let half = Duration::from_micros(settings.probe_after.as_micros() / 2);
+        half.max(self.slowest).max(PAUSE)
     }
 
     /// What the leader gives the others, in tenths of a second.

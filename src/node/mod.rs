@@ -854,8 +854,9 @@ impl Node {
             &self.meter,
             self.lease.left(now),
         );
-        if let Some(message) = self.view.take_onward(&context)
-            && let Some((to, _)) = next
+        // Without anybody to hand it to it waits, and is not taken for handed on.
+        if let Some((to, _)) = next
+            && let Some(message) = self.view.take_onward(&context)
         {
             #[cfg(feature = "upload")]
             if let Some(upload) = self.update.offer_to(self.neighbours.at(onward).holds) {

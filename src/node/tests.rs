@@ -6,9 +6,13 @@ use crate::mission::{Interference, Interferer, Mission, MissionConfig};
 use crate::settings::{Identity, Settings, Wiring};
 use crate::time::Instant;
 use crate::wire::auth::{Auth, Key};
-use crate::wire::message::{PriorView, Proposal};
+use crate::view::{View, ViewId};
+use crate::wire::message::{Poll, Proposal};
 
 const NOW: Instant = Instant::from_millis(10_000);
+
+/// The first view that relay 1 proposes.
+const FIRST: ViewId = ViewId::from_bits(1 << 10 | 1);
 
 fn base() -> Mission {
     Mission::try_new(paper(3)).unwrap()
@@ -60,7 +64,15 @@ fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
             Message::Hello(hello) => Message::Hello(hello),
             Message::Proposal(proposal) => Message::Proposal(proposal),
             Message::Offer(upload) => Message::Offer(upload),
-            Message::Heartbeat { mission, answer } => Message::Heartbeat { mission, answer },
+            Message::Heartbeat {
+                mission,
+                ask,
+                answer,
+            } => Message::Heartbeat {
+                mission,
+                ask,
+                answer,
+            },
             _ => panic!("{message:?}"),
         };
         said.push((to, message)).unwrap();
@@ -72,8 +84,9 @@ fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
 fn hello(node: &Node, holds: MissionId) -> Message {
     Message::Hello(Hello {
         mission: node.member.digest,
-        newest: 0,
+        newest: ViewId::LOADED,
         neighbour: 2,
+        hears: 1,
         ask: false,
         form: false,
         fresh: false,
@@ -86,12 +99,16 @@ fn hello(node: &Node, holds: MissionId) -> Message {
 fn proposal(mission_id: MissionId) -> Message {
     Message::Proposal(Proposal {
         mission_id,
-        view: 1,
+        view: FIRST,
         place: 1,
-        before: PriorView {
-            view: 0,
-            relays: 3,
-            leader: true,
+        poll: Poll {
+            votes: 1,
+            proposer: true,
+            lease_left: 0,
+            ..Poll::of(View {
+                id: ViewId::LOADED,
+                relays: 3,
+            })
         },
     })
 }

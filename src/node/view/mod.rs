@@ -180,7 +180,10 @@ impl ViewChange {
 
     /// The relay that a proposal was handed on to is not there any more: what comes of it can not be known. A later one can be.
     pub(crate) fn abandon(&mut self, context: &Context<'_>) -> Effects {
-        if let Some(later) = self.newest.next_by(context.member.node) {
+        let latest = self
+            .proposed
+            .is_some_and(|proposed| proposed.view >= self.newest);
+        if latest && let Some(later) = self.newest.next_by(context.member.node) {
             self.heard_of(later);
         }
         self.ask(context.now);
