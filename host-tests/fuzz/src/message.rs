@@ -4,8 +4,8 @@
 
 mod offer;
 
-use uav_relay::wire::crc::CRC_32C;
 use uav_relay::ViewId;
+use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::digest::MissionId;
 
 use super::input::Input;
@@ -79,7 +79,10 @@ pub fn sealed(plain: &mut Vec<u8>) {
 
 /// A body of any of the seventeen kinds, or of none.
 pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
-    let tag = input.below(18);
+    let tag = match input.below(16) {
+        15 => 15 + input.below(3),
+        tag => tag,
+    };
     let mut body = Body {
         bytes: vec![tag],
         input,

@@ -95,7 +95,9 @@ fn a_relay_that_hears_of_a_newer_view_than_its_own_calls() {
     chain.reboot(1, 9);
     // Passes of view 0 are none of the tail's; it says so, and the number of the next view is above that of its own.
     // The tail counts as a member that may be elsewhere for as long as its lease lasts.
-    let took = chain.until(10_000 + 16_000, |chain| chain.holds() && chain.relays[0].view().number() == 2);
+    let took = chain.until(10_000 + 16_000, |chain| {
+        chain.holds() && chain.relays[0].view().number() == 2
+    });
     let views: Vec<_> = chain.relays.iter().map(uav_relay::Relay::view).collect();
     println!("{took:?} ms, {views:?}");
     assert!(took.is_some());

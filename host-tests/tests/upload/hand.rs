@@ -176,10 +176,13 @@ fn a_relay_alone_flies_what_it_is_uploaded_and_the_ground_hears_of_it() {
         ] {
             assert!(events.contains(&event), "{event:?} of {events:?}");
         }
-        assert_eq!(ground.progress(), Progress::Flown {
-            by: 1,
-            view: ViewId::from_bits(1 << 10 | 1)
-        });
+        assert_eq!(
+            ground.progress(),
+            Progress::Flown {
+                by: 1,
+                view: ViewId::from_bits(1 << 10 | 1)
+            }
+        );
         assert_eq!(ground.poll_timeout(), None);
         assert_eq!(relay.version(), 2);
         // An older one is refused, and the ground is told why.

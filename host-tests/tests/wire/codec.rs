@@ -13,8 +13,8 @@ use uav_relay::place::{CrossSection, Station};
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{
-    AdjustStep, Answer, Course, Decision, Hello, Message, MessageError, Moved, Poll, Proposal, Pulse,
-    Pulsed, Successor, Sweep, Token, Worth,
+    AdjustStep, Answer, Course, Decision, Hello, Message, MessageError, Moved, Poll, Proposal,
+    Pulse, Pulsed, Successor, Sweep, Token, Worth,
 };
 use uav_relay::{Local, Placement, View, ViewId};
 

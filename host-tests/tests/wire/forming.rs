@@ -175,16 +175,35 @@ fn a_decision_that_is_not_awaited_is_stale() {
     ] {
         let mut after = waiting.clone();
         let decision = granted(decided, of, place, relays);
-        after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &decision));
-        assert_eq!(counted(after.stats()), ["received", "stale"], "{decision:?}");
+        after.handle_bytes(
+            now,
+            Port::Downstream,
+            &framed(4, Port::Downstream, &decision),
+        );
+        assert_eq!(
+            counted(after.stats()),
+            ["received", "stale"],
+            "{decision:?}"
+        );
         assert_eq!(after.view(), ViewId::LOADED);
         assert_eq!(sent(&mut after, now), []);
     }
     let decision = granted(view, of, 5, 5);
-    waiting.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &decision));
-    assert_eq!((waiting.view().bits(), waiting.mission().relays()), (view, 5));
+    waiting.handle_bytes(
+        now,
+        Port::Downstream,
+        &framed(4, Port::Downstream, &decision),
+    );
+    assert_eq!(
+        (waiting.view().bits(), waiting.mission().relays()),
+        (view, 5)
+    );
     // Once more.
-    waiting.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &decision));
+    waiting.handle_bytes(
+        now,
+        Port::Downstream,
+        &framed(4, Port::Downstream, &decision),
+    );
     assert_eq!(waiting.stats().stale, 1);
 }
 
@@ -281,7 +300,11 @@ fn a_member_adds_its_voice() {
             id: id(9, 2),
             relays: 11,
         };
-        assert_eq!(decided.view, (votes == 10).then_some(view), "11 of 20 or 10");
+        assert_eq!(
+            decided.view,
+            (votes == 10).then_some(view),
+            "11 of 20 or 10"
+        );
         assert_eq!(decided.lease_left, lease_left.min(RELIED));
     }
 }
@@ -305,9 +328,42 @@ fn what_may_have_been_agreed_on_is_decided_on_again() {
     // It has accepted that view, too, by this proposal, and says so from now on, if nobody says so of a later one.
     for (told, expected) in [
         (None, before),
-        (Some((id(8, 2), SizedView { relays: 9, ..before })), before),
-        (Some((id(9, 1), SizedView { relays: 9, ..before })), SizedView { relays: 9, ..before }),
-        (Some((id(9, 2), SizedView { relays: 8, ..before })), SizedView { relays: 8, ..before }),
+        (
+            Some((
+                id(8, 2),
+                SizedView {
+                    relays: 9,
+                    ..before
+                },
+            )),
+            before,
+        ),
+        (
+            Some((
+                id(9, 1),
+                SizedView {
+                    relays: 9,
+                    ..before
+                },
+            )),
+            SizedView {
+                relays: 9,
+                ..before
+            },
+        ),
+        (
+            Some((
+                id(9, 2),
+                SizedView {
+                    relays: 8,
+                    ..before
+                },
+            )),
+            SizedView {
+                relays: 8,
+                ..before
+            },
+        ),
     ] {
         let proposal = Proposed {
             successor: told,
@@ -335,7 +391,11 @@ fn what_may_have_been_agreed_on_is_decided_on_again() {
         view: Some(before),
         lease_left: 40,
     });
-    head.handle_bytes(now, Port::Downstream, &framed(1, Port::Downstream, &decision));
+    head.handle_bytes(
+        now,
+        Port::Downstream,
+        &framed(1, Port::Downstream, &decision),
+    );
     assert_eq!(head.view(), ViewId::LOADED);
     assert_eq!(counted(head.stats()), ["received"]);
     // All have accepted it now, so it was agreed on: its members decide on the next one, and this relay is none of them, as it was
@@ -348,7 +408,10 @@ fn what_may_have_been_agreed_on_is_decided_on_again() {
         ..proposed(id(2, 1), (mission, 0), 1, 8)
     };
     let now = now + Duration::from_millis(1);
-    assert_eq!(soon(&mut head, now), [(Port::Downstream, Said::Proposal(next))]);
+    assert_eq!(
+        soon(&mut head, now),
+        [(Port::Downstream, Said::Proposal(next))]
+    );
 }
 
 /// The middle of a part that is too small to go on: it holds, hands that back, and asks for nothing any more.
@@ -460,7 +523,11 @@ fn a_view_too_far_ahead_is_not_heard_of() {
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &hello));
         let known = if believed { newest } else { 0 };
         let answer = hearing(1, a_hello(known, mission, 3, FRESH));
-        assert_eq!(soon(&mut relay, now), [(Port::Upstream, answer)], "{number}");
+        assert_eq!(
+            soon(&mut relay, now),
+            [(Port::Upstream, answer)],
+            "{number}"
+        );
     }
 }
 
@@ -485,7 +552,11 @@ fn more_relays_than_the_mission_has_are_stale() {
         assert_eq!(counted(relay.stats()), ["received"], "{place}");
         assert_eq!(sent(&mut relay, now).len(), 1);
         let decision = granted(view, of, place + 1, 9);
-        relay.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &decision));
+        relay.handle_bytes(
+            now,
+            Port::Downstream,
+            &framed(4, Port::Downstream, &decision),
+        );
         assert_eq!(counted(relay.stats()), ["received", "stale"], "{place}");
         assert_eq!(relay.mission().relays(), 8);
     }

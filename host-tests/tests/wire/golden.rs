@@ -159,11 +159,46 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
         |said| matches!(said, Said::Verdict { commit: Some(15), slacks, .. } if slacks.len() == 16),
     );
     some(|said| matches!(said, Said::Busy { .. }));
-    some(|said| matches!(said, Said::Heartbeat { ask: 1.., answer: 0, .. }));
-    some(|said| matches!(said, Said::Heartbeat { ask: 0, answer: 1.., .. }));
-    some(|said| matches!(said, Said::Heartbeat { ask: u16::MAX, answer: u16::MAX, .. }));
+    some(|said| {
+        matches!(
+            said,
+            Said::Heartbeat {
+                ask: 1..,
+                answer: 0,
+                ..
+            }
+        )
+    });
+    some(|said| {
+        matches!(
+            said,
+            Said::Heartbeat {
+                ask: 0,
+                answer: 1..,
+                ..
+            }
+        )
+    });
+    some(|said| {
+        matches!(
+            said,
+            Said::Heartbeat {
+                ask: u16::MAX,
+                answer: u16::MAX,
+                ..
+            }
+        )
+    });
     some(|said| matches!(said, Said::Pulse { lease: 1, .. }));
-    some(|said| matches!(said, Said::Pulse { lease: u16::MAX, .. }));
+    some(|said| {
+        matches!(
+            said,
+            Said::Pulse {
+                lease: u16::MAX,
+                ..
+            }
+        )
+    });
     some(|said| matches!(said, Said::Pulsed { done: true, .. }));
     some(|said| matches!(said, Said::Pulsed { done: false, .. }));
     some(|said| matches!(said, Said::Measured { sweep, .. } if sweep.reaches.len() == 16));
@@ -279,9 +314,9 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
     some(|said| matches!(said, Said::Hello(hello) if hello.holds.1 == 0 && hello.flags & 16 != 0));
     some(|said| matches!(said, Said::Hello(hello) if hello.holds.1 > 0 && hello.flags & 16 == 0));
     some(|said| matches!(said, Said::Hello(hello) if hello.hears == 5));
-    some(|said| {
-        matches!(said, Said::Proposal(proposal) if proposal.agreed.id == 0 && !proposal.proposer)
-    });
+    some(
+        |said| matches!(said, Said::Proposal(proposal) if proposal.agreed.id == 0 && !proposal.proposer),
+    );
     some(|said| matches!(said, Said::Proposal(proposal) if proposal.successor.is_none()));
     some(|said| {
         matches!(said, Said::Proposal(proposal) if *proposal == Proposed {

@@ -21,7 +21,11 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
         let heard = (1..=12).contains(&sender) && (1..=4).contains(&sender.abs_diff(6));
         let neighbour = if sender < 6 { 5 } else { 7 };
         // It hears whoever has just said something, but for nodes that are too far away.
-        let mask = if heard { 1 << (sender.abs_diff(6) - 1) } else { 0 };
+        let mask = if heard {
+            1 << (sender.abs_diff(6) - 1)
+        } else {
+            0
+        };
         let answer = |from| hearing(mask, a_hello(0, mission, from, FRESH));
         if heard {
             assert_eq!(counted(near.stats()), ["received"], "{sender}");

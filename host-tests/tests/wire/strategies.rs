@@ -6,7 +6,9 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay::wire::frame::Header;
 
-use super::codec::{Call, Decided, Greeting, Proposed, Said, SizedView, Swept, plain, sealed, targets, wire};
+use super::codec::{
+    Call, Decided, Greeting, Proposed, Said, SizedView, Swept, plain, sealed, targets, wire,
+};
 use super::offered::{NUMBERS, offers};
 
 /// The largest node number.
@@ -385,13 +387,12 @@ fn pulses() -> BoxedStrategy<Said> {
         mission,
         lease: span.max(1),
     });
-    let pulsed = (any::<[u16; 2]>(), any::<bool>()).prop_map(|([number, mission], done)| {
-        Said::Pulsed {
+    let pulsed =
+        (any::<[u16; 2]>(), any::<bool>()).prop_map(|([number, mission], done)| Said::Pulsed {
             number,
             mission,
             done,
-        }
-    });
+        });
     prop_oneof![pulse, pulsed].boxed()
 }
 

@@ -3,7 +3,9 @@
 
 use host_tests::fixtures::paper;
 use uav_relay::wire::digest::digest;
-use uav_relay::{Duration, Event, Instant, Interference, Mission, Port, Relay, Upload, ViewId, Wiring};
+use uav_relay::{
+    Duration, Event, Instant, Interference, Mission, Port, Relay, Upload, ViewId, Wiring,
+};
 
 use super::codec::{Greeting, Said};
 use super::forming::{
@@ -324,7 +326,11 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
         peers[1]
             .clone()
             .says(&mut after, NOW, &forming(12, 2, of, 5));
-        assert_eq!((after.version(), after.view().number()), (2, view), "{of:?}");
+        assert_eq!(
+            (after.version(), after.view().number()),
+            (2, view),
+            "{of:?}"
+        );
         if view == 2 {
             // It still holds a newer one than it flies.
             let [_, later] = both(&mut after);

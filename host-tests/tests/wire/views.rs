@@ -56,7 +56,9 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
                 assert_eq!(counted(after.stats()), expected, "{view:x}, {off}, {kind}");
                 let out = soon(&mut after, now);
                 if known {
-                    let hellos = out.iter().filter(|(_, said)| matches!(said, Said::Hello(_)));
+                    let hellos = out
+                        .iter()
+                        .filter(|(_, said)| matches!(said, Said::Hello(_)));
                     assert_eq!(hellos.count(), 0, "{out:?}");
                 } else {
                     assert_eq!(out, [(port, hello(neighbour))], "{view:x}, {off}, {kind}");
@@ -121,11 +123,7 @@ fn a_late_proposal_of_an_old_view_changes_nothing_and_a_leader_that_insists_hear
     let now = Instant::ZERO;
     let of = (mission, 0);
     // View 5 from another place than the one it was agreed with.
-    for (nth, view, place) in [
-        (1, id(5, 2), 2),
-        (2, id(5, 1), 3),
-        (3, id(3, 9), 3),
-    ] {
+    for (nth, view, place) in [(1, id(5, 2), 2), (2, id(5, 1), 3), (3, id(3, 9), 3)] {
         let proposal = Said::Proposal(proposed(view, of, place, 8));
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
         assert_eq!(soon(&mut relay, now), []);
@@ -232,20 +230,38 @@ fn a_lease_is_granted_by_the_next_pulse_and_runs_out() {
     };
     let (up, down) = (Port::Upstream, Port::Downstream);
     assert_eq!(hear(&mut relay, 10, up, &pulse(9)), [(down, pulse(9))]);
-    assert_eq!(hear(&mut relay, 15, up, &pulse(9)), [(up, pulsed(9, false))]);
+    assert_eq!(
+        hear(&mut relay, 15, up, &pulse(9)),
+        [(up, pulsed(9, false))]
+    );
     assert_eq!(hear(&mut relay, 20, down, &pulsed(9, false)), []);
     assert_eq!(relay.stats().repeated, 1);
-    assert_eq!(hear(&mut relay, 30, down, &pulsed(9, true)), [(up, pulsed(9, true))]);
+    assert_eq!(
+        hear(&mut relay, 30, down, &pulsed(9, true)),
+        [(up, pulsed(9, true))]
+    );
     assert_eq!(hear(&mut relay, 35, up, &pulse(9)), [(up, pulsed(9, true))]);
-    assert_eq!(relay.lease(), None, "the others may not have taken part yet");
+    assert_eq!(
+        relay.lease(),
+        None,
+        "the others may not have taken part yet"
+    );
     // What does not fit is stale.
-    for (port, said) in [(up, pulse(8)), (down, pulsed(9, true)), (down, pulsed(8, true))] {
+    for (port, said) in [
+        (up, pulse(8)),
+        (down, pulsed(9, true)),
+        (down, pulsed(8, true)),
+    ] {
         let before = relay.stats().stale;
         assert_eq!(hear(&mut relay, 40, port, &said), []);
         assert_eq!(relay.stats().stale, before + 1, "{said:?}");
     }
     assert_eq!(hear(&mut relay, 50, up, &pulse(10)), [(down, pulse(10))]);
-    assert_eq!(relay.lease(), Some(at(10 + 16_000)), "from when it was handed on");
+    assert_eq!(
+        relay.lease(),
+        Some(at(10 + 16_000)),
+        "from when it was handed on"
+    );
     // One that begins elsewhere grants nothing.
     assert_eq!(hear(&mut relay, 60, up, &pulse(50)), [(down, pulse(50))]);
     assert_eq!(relay.lease(), Some(at(16_010)));
