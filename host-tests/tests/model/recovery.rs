@@ -62,7 +62,9 @@ impl World<'_> {
         let greets = if self.scenario.signs() { 2 } else { 0 };
         let probe_after_us = self.scenario.settings[0].probe_after.as_micros();
         let silence_us = greets * probe_after_us + 2 * self.a_call().as_micros();
-        Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us)
+        // A relay that was rebooted may be needed for a view that it has forgotten: places are not taken before its lease is over.
+        let lease_us = self.scenario.settings[0].dead_after.as_micros();
+        Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us + lease_us)
     }
 
     /// How long a call for a new view may take to the leader where nothing is lost: each relay on its way may just have called in
