@@ -17,9 +17,9 @@ pub enum Event {
     /// The neighbour at that side has given no sign of life for 15 s, or what the settings say. On a channel of its own it goes on being
     /// asked; on a shared one the relay searches for another node at that side.
     NeighbourLost(Side),
-    /// A lost neighbour has been heard again, or another node has taken its place.
+    /// A lost neighbour has answered again, or another node has taken its place.
     NeighbourBack(Side),
-    /// A node at that side was loaded with another mission, or flies one that this relay cannot come to; its messages are ignored.
+    /// A node at that side was loaded with another mission, as a hello or a heartbeat of its says; its messages are ignored.
     MissionMismatch(Side),
     /// The chain has agreed on a new view of who is in it: `Relay::view`, `Relay::index` and the relays of `Relay::mission` have new
     /// values, and new places follow.

@@ -304,7 +304,7 @@ impl Relay {
         self.node.member().index
     }
 
-    /// The view of the chain that it has accepted last.
+    /// The view of the chain that it is in, which it has accepted last: all that it says of places is of that view.
     pub fn view(&self) -> ViewId {
         self.node.member().view
     }

@@ -141,9 +141,9 @@ pub struct Settings {
     /// The longest that a sweep (100 bytes) takes from one relay's `poll_transmit` to the next one's, its computing included;
     /// above 0. For messages that take longer it is multiplied.
     pub hop_time: Duration,
-    /// After this long without a frame from a neighbour the relay asks it for a heartbeat, sixteen times until `dead_after`; above 0.
+    /// After this long without an answer from a neighbour the relay asks whether it is there, sixteen times until `dead_after`; above 0.
     pub probe_after: Duration,
-    /// After this long without one it counts as lost; above `probe_after`.
+    /// After this long without one it counts as lost, and for this long at least a relay holds what was agreed on; above `probe_after`.
     pub dead_after: Duration,
     /// Whether a part of the chain goes on without the others only if it has a quorum: more than half of the members of the view
     /// before, or half with the one that proposed it. Without that, the parts of a chain that is split would get in each other's way.

@@ -66,10 +66,10 @@ fn without_prediction_four_sweeps_are_enough() {
             "N = {relays}: {} sweeps",
             outcome.sweeps
         );
-        assert_eq!(
-            outcome.messages,
-            2 * u64::from(relays - 1) * u64::from(outcome.sweeps)
-        );
+        // There and back; and so do the first two pulses, once there is something to hold.
+        let there_and_back = 2 * u64::from(relays - 1);
+        let pulses = outcome.messages - there_and_back * u64::from(outcome.sweeps);
+        assert!(pulses <= 2 * there_and_back, "N = {relays}: {pulses}");
     }
 }
 

@@ -164,16 +164,13 @@ impl Lease {
         effects
     }
 
-    /// All took part in `pulse`. It may have taken longer than the lease.
+    /// All took part in `pulse`; so long ago, perhaps, that the lease has run out since.
     fn grant(&mut self, now: Instant, pulse: Current) {
         let until = pulse.handed_on + from_tenths(pulse.span);
-        if until <= now {
-            return;
+        if until > now {
+            let until = self.until().map_or(until, |at| at.max(until));
+            self.state = LeaseState::Until(until);
         }
-        self.state = match self.state {
-            LeaseState::Until(at) => LeaseState::Until(at.max(until)),
-            LeaseState::Open | LeaseState::Lapsed => LeaseState::Until(until),
-        };
     }
 
     fn take(&mut self, context: &Context<'_>, number: u16, span: u16) {
@@ -206,6 +203,8 @@ impl Lease {
             self.due.back = true;
             return;
         }
+        // After a slow one the next one follows soon; where all are slow the channel is left some time for others.
+        let period = self.period(context.settings());
         // The first two follow each other at once: nobody else has a lease before the second.
         let first = self.state == LeaseState::Open;
         self.grant(context.now, current);
@@ -216,13 +215,14 @@ impl Lease {
         let wait = if first {
             PAUSE
         } else {
-            self.period(context.settings())
+            period
         };
         self.next_at = Some(context.now + wait);
     }
 
     fn period(&self, settings: &Settings) -> Duration {
-        Duration::from_micros(settings.probe_after.as_micros() / 2).max(self.slowest)
+        let half = Duration::from_micros(settings.probe_after.as_micros() / 2);
+        half.max(self.slowest).max(PAUSE)
     }
 
     /// What the leader gives the others, in tenths of a second.
@@ -258,23 +258,24 @@ impl Lease {
     /// Does what is due: a pulse at the leader, one more time, or nothing any more.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let now = context.now;
-        let mut effects = Effects::NONE;
-        if self.retransmit.is_due(now) {
-            self.due.onward = true;
-            effects.resent = true;
-        }
+        let resent = self.retransmit.is_due(now);
+        self.due.onward |= resent;
         if self.next_at.is_some_and(|at| at <= now) {
             self.next_at = None;
             let number = self.current.map_or(0, |current| current.number);
             let span = self.given(context.settings());
             self.take(context, number.wrapping_add(1), span);
         }
-        if self.until().is_some_and(|at| at <= now) {
+        let lapsed = self.until().is_some_and(|at| at <= now);
+        if lapsed {
             self.state = LeaseState::Lapsed;
-            effects.lapsed = true;
-            effects.view_needed = true;
         }
-        effects
+        Effects {
+            resent,
+            lapsed,
+            view_needed: lapsed,
+            ..Effects::NONE
+        }
     }
 
     /// What is to be sent onward; it is taken for sent then.

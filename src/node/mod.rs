@@ -363,7 +363,7 @@ impl Node {
             // Nobody says anything else to a node that it has not taken.
             self.told(now, side, true);
         }
-        if !self.is_of_this_view(side, from, message) {
+        if !self.is_of_this_view(now, side, from, message) {
             return true;
         }
         self.dispatch(now, side, from, message);
@@ -372,8 +372,14 @@ impl Node {
     }
 
     /// Whether `message` from the neighbour `from` is of the mission and, if it is of one, of the view that this relay is in.
-    /// What is not is counted, and answered by a hello if the two may have to come to one view.
-    fn is_of_this_view(&mut self, side: Side, from: u16, message: &Message) -> bool {
+    /// What is not is counted and answered by a hello, and a pass of another view has the relay ask for one.
+    fn is_of_this_view(
+        &mut self,
+        now: Instant,
+        side: Side,
+        from: u16,
+        message: &Message,
+    ) -> bool {
         let Some(digest) = message.mission() else {
             return true;
         };
@@ -391,6 +397,11 @@ impl Node {
             // What it flies, and in which view, it says in a hello.
             bump(&mut self.telemetry.stats.view);
             self.owe_hello(side, from, true);
+            // It has said that it is of this mission: then the two are in different views.
+            let of_mission = self.neighbours.at(side).holds.is_some();
+            if of_mission && message.is_of_a_view() && message.is_onward() {
+                self.view.ask(now);
+            }
         }
         known
     }
@@ -888,6 +899,7 @@ impl Node {
             &self.meter,
             self.lease.held(now),
         );
+        // Without anybody to hand it to it waits.
         if let Some((to, _)) = next
             && let Some(message) = self.view.take_onward(&context, to)
         {

@@ -11,6 +11,9 @@ use crate::wire::message::{Poll, Proposal};
 
 const NOW: Instant = Instant::from_millis(10_000);
 
+/// The first view that relay 1 proposes.
+const FIRST: ViewId = ViewId::from_bits(1 << 10 | 1);
+
 fn base() -> Mission {
     Mission::try_new(paper(3)).unwrap()
 }
@@ -97,7 +100,7 @@ fn hello(node: &Node, holds: MissionId) -> Message {
 fn proposal(mission_id: MissionId) -> Message {
     Message::Proposal(Proposal {
         mission_id,
-        view: ViewId::LOADED.next_by(1).unwrap(),
+        view: FIRST,
         place: 1,
         poll: Poll {
             votes: 1,

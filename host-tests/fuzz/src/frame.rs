@@ -4,8 +4,8 @@ use uav_relay::mission::MAX_RELAYS;
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};
-use uav_relay::wire::message::Message;
-use uav_relay::{Identity, Instant, Mission, Port, Relay, Stats};
+use uav_relay::wire::message::{Message, Successor};
+use uav_relay::{Identity, Instant, Mission, Port, Relay, Stats, ViewId};
 
 use super::cobs::stuffed;
 use super::input::Input;
@@ -250,17 +250,31 @@ fn look_at(message: &Message) {
             assert!(answer.verdict.slacks.iter().all(|slack| slack.is_finite()));
             assert!(answer.stand.is_none_or(|x_m| (0.0..=1e6).contains(&x_m)));
         }
-        Message::Hello(hello) => assert!(hello.neighbour <= MAX_RELAYS, "{hello:?}"),
+        Message::Hello(hello) => {
+            assert!(
+                hello.neighbour <= MAX_RELAYS && hello.hears < 16,
+                "{hello:?}"
+            );
+        }
         Message::Proposal(proposal) => {
-            let there = 1..=MAX_RELAYS;
-            assert!(there.contains(&proposal.place), "{proposal:?}");
-            assert!(there.contains(&proposal.before.relays), "{proposal:?}");
+            let poll = proposal.poll;
+            let agreed = poll.agreed;
+            assert!(is_count(proposal.place) && is_proposed(proposal.view));
+            assert!(agreed.id == ViewId::LOADED || is_proposed(agreed.id));
+            assert!(
+                is_count(agreed.relays) && poll.votes <= agreed.relays,
+                "{poll:?}"
+            );
+            if let Some(Successor { proposal, view }) = poll.successor {
+                assert!(is_proposed(proposal) && is_proposed(view.id) && is_count(view.relays));
+            }
         }
-        Message::Decision(count) => {
-            let there = 1..=MAX_RELAYS;
-            assert!(there.contains(&count.place), "{count:?}");
-            assert!(count.relays.is_none_or(|relays| there.contains(&relays)));
+        Message::Decision(decision) => {
+            assert!(is_count(decision.place) && is_proposed(decision.proposal));
+            let view = decision.view;
+            assert!(view.is_none_or(|view| is_proposed(view.id) && is_count(view.relays)));
         }
+        Message::Pulse(pulse) => assert!(pulse.lease > 0),
         Message::Fence { fence, .. } => {
             assert!(
                 fence.association != 0 && fence.x_m.abs() <= 1e7 && fence.target_m.abs() <= 1e7
@@ -270,8 +284,17 @@ fn look_at(message: &Message) {
             let same = Mission::try_new(*upload.config()).is_ok();
             assert!(same && upload.version() > 0, "{upload:?}");
         }
-        Message::Busy { .. } | Message::Heartbeat { .. } => {}
+        Message::Busy { .. } | Message::Heartbeat { .. } | Message::Pulsed(_) => {}
     }
+}
+
+fn is_count(relays: u16) -> bool {
+    (1..=MAX_RELAYS).contains(&relays)
+}
+
+/// Whether a node may have proposed that.
+fn is_proposed(view: ViewId) -> bool {
+    view.number() > 0 && is_count(view.proposer())
 }
 
 fn is_target(sir: f32) -> bool {

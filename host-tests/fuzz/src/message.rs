@@ -4,6 +4,7 @@
 
 mod offer;
 
+use uav_relay::ViewId;
 use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::digest::MissionId;
 
@@ -20,8 +21,8 @@ pub struct Known {
     pub flown: u16,
     /// The newest mission that it holds.
     pub held: MissionId,
-    /// Number of the view that it has agreed to.
-    pub view: u16,
+    /// The view that it has agreed to.
+    pub view: ViewId,
     /// Number of its current pass.
     pub number: u16,
     /// Number of the talk that its last fence was of, 0 for none.
@@ -65,14 +66,23 @@ impl Header {
     }
 }
 
+/// What a view adds to the digest of the mission that it flies: its lower half, and its upper half with the bytes turned round.
+fn mark(view: ViewId) -> u16 {
+    let [a, b, c, d] = view.bits().to_le_bytes();
+    u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
+}
+
 /// Adds the check sequence.
 pub fn sealed(plain: &mut Vec<u8>) {
     plain.extend_from_slice(&CRC_32C.checksum(plain).to_le_bytes());
 }
 
-/// A body of any of the fifteen kinds, or of none.
+/// A body of any of the seventeen kinds, or of none.
 pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
-    let tag = input.below(16);
+    let tag = match input.below(16) {
+        15 => 15 + input.below(3),
+        tag => tag,
+    };
     let mut body = Body {
         bytes: vec![tag],
         input,
@@ -84,7 +94,8 @@ pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
         2 => body.number(),
         3 => {
             body.digest();
-            body.small(0, 1);
+            body.question();
+            body.question();
         }
         4 => body.sweep(Extra::Upsilon),
         5 => body.sweep(Extra::Aside),
@@ -93,9 +104,11 @@ pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
         9 => body.moved(),
         10 => body.hello(),
         11 => body.proposal(),
-        12 => body.count(),
+        12 => body.decision(),
         13 => body.fence(),
         14 => body.offer(),
+        15 => body.pulse(),
+        16 => body.pulsed(),
         _ => body.bytes = body.input.piece().to_vec(),
     }
     body.bytes
@@ -142,22 +155,56 @@ impl Body<'_, '_> {
     /// Of a pass of the relay's view, or, rarely, of another one.
     fn pass(&mut self) {
         self.number();
-        let view = match self.input.byte() {
+        let mark = mark(self.known.view);
+        let mark = match self.input.byte() {
             u8::MAX => self.input.word(),
-            up @ 240.. => self.known.view.wrapping_add(u16::from(up - 240)),
-            _ => self.known.view,
+            up @ 240.. => mark.wrapping_add(u16::from(up - 240)),
+            _ => mark,
         };
-        self.word(self.known.flown.wrapping_add(view));
+        self.word(self.known.flown.wrapping_add(mark));
     }
 
-    /// The number of a view: the relay's, one of the next, or any.
+    /// A view: the relay's, one of the next by a node that may propose it, one before, or any.
     fn view(&mut self) {
+        let own = self.known.view;
         let view = match self.input.byte() {
-            up @ 0..224 => self.known.view.wrapping_add(u16::from(up % 4)),
-            down @ 224..248 => self.known.view.wrapping_sub(u16::from(down - 223)),
+            0..32 => own.bits(),
+            up @ 32..224 => {
+                let number = own.number().wrapping_add(u32::from(up % 4));
+                number << 10 | u32::from(up / 4 % 4) + 1
+            }
+            down @ 224..240 => {
+                let number = own.number().wrapping_sub(u32::from(down - 223));
+                number << 10 | 1
+            }
+            240..244 => 0,
+            _ => u32::from(self.input.word()) << 16 | u32::from(self.input.word()),
+        };
+        self.bytes.extend_from_slice(&view.to_le_bytes());
+    }
+
+    /// A view and its size.
+    fn sized(&mut self) {
+        self.view();
+        self.relay();
+    }
+
+    /// The number of a question, mostly none or one of the first.
+    fn question(&mut self) {
+        let number = match self.input.byte() {
+            small @ 0..240 => u16::from(small % 12),
             _ => self.input.word(),
         };
-        self.word(view);
+        self.word(number);
+    }
+
+    /// Tenths of a second, mostly few.
+    fn lease(&mut self) {
+        let tenths = match self.input.byte() {
+            few @ 0..240 => u16::from(few),
+            _ => self.input.word(),
+        };
+        self.word(tenths);
     }
 
     /// A relay of a short chain, or any.
@@ -308,36 +355,61 @@ impl Body<'_, '_> {
     }
 
     fn hello(&mut self) {
-        self.view();
         self.digest();
         self.relay();
-        self.word(0);
+        self.view();
         let MissionId { digest, version } = self.mission_id();
         self.word(digest);
         self.word(version);
+        self.small(0, 15);
         self.small(0, 31);
     }
 
-    fn proposal(&mut self) {
-        self.view();
+    /// A mission, a proposal of it and a place.
+    fn call(&mut self) {
         let MissionId { digest, version } = self.mission_id();
         self.word(digest);
-        self.relay();
-        self.relay();
-        self.view();
         self.word(version);
+        self.view();
+        self.relay();
+    }
+
+    fn proposal(&mut self) {
+        self.call();
+        self.sized();
+        self.relay();
+        self.lease();
+        self.small(0, 1);
+        if self.small(0, 1) == 1 {
+            self.view();
+            self.sized();
+        }
+    }
+
+    fn decision(&mut self) {
+        self.call();
+        if self.small(0, 1) == 1 {
+            self.sized();
+        }
+        self.lease();
+    }
+
+    fn pulse(&mut self) {
+        self.pulse_number();
+        self.lease();
+    }
+
+    fn pulsed(&mut self) {
+        self.pulse_number();
         self.small(0, 1);
     }
 
-    fn count(&mut self) {
-        self.view();
-        let MissionId { digest, version } = self.mission_id();
-        self.word(digest);
-        self.relay();
-        self.relay();
-        self.word(0);
-        self.word(version);
-        self.bytes.push(0);
+    /// The number of a pulse, one of the first, and the digest of the relay's view, or, rarely, of another one.
+    fn pulse_number(&mut self) {
+        self.question();
+        let wrong = u16::from(self.input.byte() == u8::MAX);
+        let digest = self.known.flown.wrapping_add(mark(self.known.view));
+        self.word(digest ^ wrong);
     }
 
     /// The mission that the relay holds, the one that it was loaded with, one that is newer or older than the one held, or any.

@@ -10,19 +10,20 @@ use uav_relay::wire::message::Message;
 use uav_relay::wire::upload::Upload;
 use uav_relay::{
     Event, Identity, Instant, Method, Mission, MissionConfig, Placement, Port, Relay, Sample,
-    Settings, Side, Stats, Wiring,
+    Settings, Side, Stats, ViewId, Wiring,
 };
 
 use super::counted::{all, intact};
 use super::heap;
 use number::number_of;
 
-/// Frames that a relay can owe at once: a pass or what came of one, a sign that it is busy; to either side a heartbeat, four
-/// hellos, a fence, an offer and a hello to the ground; a handshake to each of the eight nodes that it remembers.
-const MOST_FRAMES: usize = 2 + 2 * (1 + 4 + 1 + 2) + 8;
+/// Frames that a relay can owe at once: a pass or what came of one, a sign that it is busy; the decision on a proposal; a pulse, and
+/// what came of it; to either side a heartbeat, four hellos, a fence, an offer and a hello to the ground; a handshake to each of
+/// the eight nodes that it remembers.
+const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 8;
 
 /// Events that can be pending at once.
-const MOST_EVENTS: usize = 13;
+const MOST_EVENTS: usize = 14;
 
 /// Nodes this far off are heard on a shared channel.
 const NEAR: u16 = 4;
@@ -55,7 +56,7 @@ pub struct Watched {
     settings: Settings,
     stats: Stats,
     /// The view it has agreed to.
-    view: u16,
+    view: ViewId,
     agreed: Option<Placement>,
     setpoint: Option<Placement>,
     /// Frames it has sent.
@@ -67,7 +68,7 @@ pub struct Watched {
     /// Number of the talk that its last fence was of.
     association: u16,
     /// View and number of the pass that its place is from, as far as that is known.
-    held: Option<(u16, u16)>,
+    held: Option<(ViewId, u16)>,
     /// What it flew when it was looked at last.
     flown: MissionConfig,
 }
@@ -92,7 +93,7 @@ impl Watched {
             all: mission.relays(),
             settings,
             stats: Stats::default(),
-            view: 0,
+            view: ViewId::LOADED,
             agreed: None,
             setpoint: None,
             sent: 0,
@@ -125,7 +126,7 @@ impl Watched {
     }
 
     /// View and number of the pass that the place it has agreed to is from; `None` where a guard leads it there, too.
-    pub const fn held(&self) -> Option<(u16, u16)> {
+    pub const fn held(&self) -> Option<(ViewId, u16)> {
         self.held
     }
 
@@ -289,11 +290,11 @@ impl Watched {
     fn look_at_view(&mut self, events: &[Event]) {
         let (relay, node) = (&self.relay, self.node);
         let (view, left) = (relay.view(), relay.mission().relays());
-        assert!(view >= self.view, "view {view} after {}", self.view);
+        assert!(view >= self.view, "{view:?} after {:?}", self.view);
         let counted = relay.stats().views > self.stats.views;
-        assert_eq!(counted, view > self.view, "view {view} in silence");
+        assert_eq!(counted, view > self.view, "{view:?} in silence");
         let told = events.contains(&Event::Reformed);
-        assert_eq!(told, view > self.view, "view {view}, {events:?}");
+        assert_eq!(told, view > self.view, "{view:?}, {events:?}");
         let index = relay.index();
         assert!((1..=left).contains(&index), "place {index} of {left}");
         assert!(left <= self.all, "{left} of {}", self.all);

@@ -42,7 +42,7 @@ fn worked(name: &str) -> (Vec<u8>, Vec<u8>) {
 fn the_worked_frames_are_what_the_rules_say() {
     let (a, b) = (nonce(5, 1), nonce(9, 2));
     let mut heartbeat = Plain::new(NETWORK, 1, 2, SIGNED, 2);
-    heartbeat.0.extend([3, 0x3C, 0x5A, 1]);
+    heartbeat.0.extend([3, 0x3C, 0x5A, 5, 0, 0, 0]);
     let frames = [
         (
             "a handshake",

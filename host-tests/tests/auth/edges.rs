@@ -49,7 +49,7 @@ impl Link {
     /// A heartbeat with this counter.
     fn say(&mut self, counter: u32) -> Option<&'static str> {
         let mut frame = Plain::new(NETWORK, 1, 2, SIGNED, counter);
-        frame.0.extend([3, 0, 0, 0]);
+        frame.0.extend([3, 0, 0, 0, 0, 0, 0]);
         let nonces = self.nonces;
         self.give(&frame.signed(&KEY, nonces))
     }

@@ -169,7 +169,7 @@ impl Attacker {
         let mut kinds: Vec<u8> = messages.iter().map(|message| message.0[0]).collect();
         kinds.sort_unstable();
         kinds.dedup();
-        let all: Vec<u8> = (0..=14).collect();
+        let all: Vec<u8> = (0..=16).collect();
         assert_eq!(kinds, all);
         let mut rng = ChaCha8Rng::seed_from_u64(seed(1));
         rng.set_stream(stream);
@@ -180,6 +180,8 @@ impl Attacker {
     pub(crate) fn attack(&mut self, net: &Net, kind: Kind) -> Option<Attack> {
         let heard = if kind.is_of_an_offer() {
             &net.heard[*net.offers.choose(&mut self.rng)?]
+        } else if kind == Kind::RecordedHandshake {
+            &net.heard[*net.handshakes.choose(&mut self.rng)?]
         } else {
             net.heard.choose(&mut self.rng)?
         };

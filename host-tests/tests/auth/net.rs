@@ -67,6 +67,8 @@ pub(crate) struct Net {
     pub(crate) heard: Vec<Heard>,
     /// Which of them are offers of a newer mission.
     pub(crate) offers: Vec<usize>,
+    /// Which are handshakes.
+    pub(crate) handshakes: Vec<usize>,
     /// Messages that genuine frames have brought, for each relay since it was switched on.
     pub(crate) genuine: Vec<u32>,
     /// Links (from, to) on which a message has been taken since both ends were switched on.
@@ -96,6 +98,7 @@ impl Net {
             now: Instant::ZERO,
             heard: Vec::new(),
             offers: Vec::new(),
+            handshakes: Vec::new(),
             genuine: vec![0; relays.into()],
             proven: BTreeMap::new(),
             learned: BTreeMap::new(),
@@ -323,6 +326,9 @@ impl Net {
         self.under_way.push_back((self.now + ON_THE_WAY, number));
         if super::offers::is_offer(&super::frames::plain(&wire)) {
             self.offers.push(number);
+        }
+        if super::frames::plain(&wire).is_handshake() {
+            self.handshakes.push(number);
         }
         self.heard.push(Heard {
             from,

@@ -170,10 +170,10 @@ fn offer(side: u8) -> Vec<u8> {
 /// it, too, and they are counted in a view that flies it.
 fn uploaded(how: u8) -> Vec<u8> {
     let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
-    let hello = [9, 1, 10, 0, 0, 2, 0, 0, 0];
-    // The next view, of the mission held: from the first place, after view 0 of four with its leader; back from the third.
-    let proposal = [9, 0, 11, 1, 0, 1, 4, 0, 1, 0];
-    let count = [9, 1, 12, 1, 0, 3, 4, 0];
+    let hello = [9, 1, 10, 0, 2, 0, 0, 1, 0, 0];
+    // The next view, of the mission held: from the first place, after view 0 of four with a voice, its leader's; back from the third.
+    let proposal = [9, 0, 11, 0, 33, 1, 240, 4, 1, 0, 1, 0, 0];
+    let decision = [9, 1, 12, 0, 33, 3, 1, 33, 4, 0, 0];
     let wake = [3, 3];
     let parts = [
         &head[..],
@@ -181,7 +181,7 @@ fn uploaded(how: u8) -> Vec<u8> {
         &wake,
         &hello,
         &proposal,
-        &count,
+        &decision,
         &wake,
     ];
     parts.concat()
@@ -191,7 +191,7 @@ fn uploaded(how: u8) -> Vec<u8> {
 fn by_the_ground(index: u8) -> Vec<u8> {
     let head = [0, 3, 0, index, 8, 0, 0, 0, 0, 1, 0];
     let side = u8::from(index > 0);
-    let asks = [9, side, 10, 0, 0, 0, 0, 1, 0];
+    let asks = [9, side, 10, 0, 0, 0, 0, 0, 1, 0];
     let offer = offer(side);
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }

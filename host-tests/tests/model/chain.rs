@@ -11,7 +11,7 @@ use super::passes::Met;
 use super::scenario::{Kind, Scenario};
 use super::seal::{Seal, taken};
 use super::tally::Tally;
-use super::wires::{FLIGHT, Flying, Wires, end, pass};
+use super::wires::{FLIGHT, Flying, Wires, end, message, pass};
 
 /// By how much f32 arithmetic may miss a target, relative.
 pub(crate) const MISS: f64 = 2e-4;
@@ -68,10 +68,13 @@ impl<'a> World<'a> {
                 let leads = at == self.scenario.leader();
                 self.ledgers[at].says(self.scenario, leads, pass)?;
             }
-            let to = match transmit.port {
-                Port::Upstream => at - 1,
-                _ => at + 1,
+            let (to, side) = match transmit.port {
+                Port::Upstream => (at - 1, Side::Upstream),
+                _ => (at + 1, Side::Downstream),
             };
+            if let Some(message) = message(&bytes) {
+                self.ledgers[at].told(side, &message, now);
+            }
             let frame = Flying {
                 due: now + FLIGHT,
                 seal: Seal {
@@ -188,8 +191,8 @@ impl<'a> World<'a> {
         self.relays[to].handle_bytes(self.now, port, bytes);
         let after = self.relays[to].stats();
         let is_taken = taken(after) > taken(&before);
-        let signs = self.scenario.signs();
-        self.ledgers[to].heard(from, ended, is_taken.then_some(frame), signs, self.now)?;
+        let settings = &self.scenario.settings[to];
+        self.ledgers[to].heard(from, ended, is_taken.then_some(frame), settings, self.now)?;
         if let Some(pass) = pass(&frame.bytes).filter(|_| is_taken) {
             let met =
                 self.ledgers[to].meets(self.scenario, pass, stands, suspended, &before, after)?;

@@ -1,16 +1,25 @@
 //! What one relay was told and has counted, as plain data, and what may never happen to a relay by itself.
 
 use proptest::{prop_assert, prop_assert_eq};
-use uav_relay::{Event, Instant, Method, Phase, Placement, Profile, Relay, Settings, Side, Stats};
+use uav_relay::wire::message::Message;
+use uav_relay::{
+    Duration, Event, Instant, Method, Phase, Placement, Profile, Relay, Settings, Side, Stats,
+    ViewId,
+};
 use uav_relay_oracle::reference::joint::Place;
 
 use super::Checked;
 use super::scenario::Scenario;
 use super::seal::{Taken, refused, taken};
-use super::wires::{Ended, Flying};
+use super::wires::{Ended, Flying, message};
 
-/// The most frames that one drain may give: a pass or what came of one, "busy", and to each side a sign of life and a hello.
-pub(crate) const MOST_FRAMES: u32 = 6;
+/// The most frames that one drain may give: a pass or what came of one, "busy", what came of a proposal, a pulse and what came of it,
+/// and to each side a heartbeat and a hello.
+pub(crate) const MOST_FRAMES: u32 = 9;
+
+/// Questions between `probe_after` and `dead_after`, and how many of them may still be answered.
+const QUESTIONS: u64 = 16;
+const OPEN: u32 = 4;
 
 /// One relay, by what it has said since it was switched on.
 #[derive(Debug)]
@@ -23,12 +32,11 @@ pub(crate) struct Ledger {
     sent: u32,
     ended: Ended,
     refused: u32,
-    heard: [Instant; 2],
-    /// Neighbours that have been silent for too long, and those that the relay has said so of.
-    missed: [bool; 2],
-    noticed: [bool; 2],
+    signs: [Signs; 2],
+    /// The longest lease that was given, or `dead_after`.
+    longest: Duration,
     /// The view of the chain that it has agreed to, from 0 in every life.
-    pub(crate) view: u16,
+    pub(crate) view: ViewId,
     /// The last pass of that view that it took part in.
     pub(crate) pass: Option<u16>,
     /// The last ones of its lives before.
@@ -39,6 +47,64 @@ pub(crate) struct Ledger {
     pub(crate) epoch: u32,
     /// The frames that it has taken.
     taken: Taken,
+}
+
+/// What is known of a neighbour's being there.
+#[derive(Debug)]
+struct Signs {
+    /// Its number, and when it was asked, of every question.
+    asked: Vec<(u16, Instant)>,
+    /// When it was there for certain, and when it may have been.
+    surely: Instant,
+    perhaps: Instant,
+    /// When something came that may have been a sign of it.
+    last: Instant,
+    /// Whether the relay has said that it is lost.
+    missed: bool,
+}
+
+impl Signs {
+    const fn new(now: Instant) -> Self {
+        Self {
+            asked: Vec::new(),
+            surely: now,
+            perhaps: now,
+            last: now,
+            missed: false,
+        }
+    }
+
+    fn ask(&mut self, message: &Message, now: Instant) {
+        if let Message::Heartbeat { ask, .. } = message {
+            self.asked.push((*ask, now));
+        }
+    }
+
+    /// An answer is a sign of when its question was asked; what comes back of a pulse, of when that was handed on.
+    fn heard(&mut self, message: &Message, tick: Duration, now: Instant) {
+        match message {
+            Message::Heartbeat { answer, .. } => {
+                let known = self.asked.iter().rev().find(|(number, _)| number == answer);
+                let Some((_, asked)) = known else {
+                    return;
+                };
+                self.last = now;
+                self.perhaps = self.perhaps.max(*asked);
+                // So few questions can have followed it that it is open yet.
+                if now.since(*asked) < tick.times(OPEN) {
+                    self.surely = self.surely.max(*asked);
+                }
+            }
+            Message::Pulse(_) | Message::Pulsed(_) => (self.last, self.perhaps) = (now, now),
+            _ => {}
+        }
+    }
+}
+
+/// How long after one question the next one is asked, at the soonest.
+fn tick(settings: &Settings) -> Duration {
+    let span = settings.dead_after.as_micros() - settings.probe_after.as_micros();
+    Duration::from_micros(span / QUESTIONS)
 }
 
 /// What one turn of a relay's main loop gave.
@@ -70,10 +136,9 @@ impl Ledger {
             sent: 0,
             ended: Ended::default(),
             refused: 0,
-            heard: [now; 2],
-            missed: [false; 2],
-            noticed: [false; 2],
-            view: 0,
+            signs: [now; 2].map(Signs::new),
+            longest: Duration::from_micros(0),
+            view: ViewId::LOADED,
             pass: None,
             passes_before: Vec::new(),
             measured_per_w: None,
@@ -99,7 +164,7 @@ impl Ledger {
         from: Side,
         ended: Ended,
         taken: Option<&Flying>,
-        signs: bool,
+        settings: &Settings,
         now: Instant,
     ) -> Checked {
         self.ended.intact += ended.intact;
@@ -109,11 +174,30 @@ impl Ledger {
         };
         let Flying { bytes, seal, .. } = frame;
         prop_assert!(ended.intact > 0, "a broken frame is taken");
-        if !signs || self.taken.take(side(from), bytes, *seal, self.epoch)? {
-            self.heard[side(from)] = now;
-            self.missed[side(from)] = false;
+        let tick = tick(settings);
+        if settings.auth.is_some() {
+            self.taken.take(side(from), bytes, *seal, self.epoch)?;
+        }
+        if let Some(message) = message(bytes) {
+            self.signs[side(from)].heard(&message, tick, now);
+            self.leased(&message);
         }
         Ok(())
+    }
+
+    /// The relay says something to its neighbour at `to`.
+    pub(crate) fn told(&mut self, to: Side, message: &Message, now: Instant) {
+        if let Message::Heartbeat { ask: 1.., .. } = message {
+            self.signs[side(to)].ask(message, now);
+        }
+        self.leased(message);
+    }
+
+    fn leased(&mut self, message: &Message) {
+        if let Message::Pulse(pulse) = message {
+            let lease = Duration::from_millis(100 * u64::from(pulse.lease));
+            self.longest = self.longest.max(lease);
+        }
     }
 
     /// Samples were given to a relay that has no use for them.
@@ -148,7 +232,7 @@ impl Ledger {
         let views = relay.stats().views;
         let told = events.contains(&Event::Reformed);
         prop_assert_eq!(told, views > self.stats.views, "a view in silence");
-        prop_assert!(u32::from(relay.view()) >= views);
+        prop_assert!(relay.view().number() >= views);
         prop_assert!(!events.contains(&Event::NoQuorum), "everybody is there");
         Ok(())
     }
@@ -293,32 +377,43 @@ impl Ledger {
         Ok(())
     }
 
-    /// A neighbour is missed from the moment it has been silent for `Settings::dead_after` until it is heard.
+    /// A neighbour is missed once it has answered nothing for `dead_after`, or for as long as a lease may be, and until it does.
     fn miss(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let there = [at > 0, at + 1 < scenario.relays()];
         for event in turn.events {
             match event {
-                Event::NeighbourLost(of) => self.noticed[side(*of)] = true,
-                Event::NeighbourBack(of) => self.noticed[side(*of)] = false,
+                Event::NeighbourLost(of) => {
+                    let signs = &mut self.signs[side(*of)];
+                    let silence = turn.now.since(signs.surely);
+                    prop_assert!(
+                        silence >= scenario.settings[at].dead_after,
+                        "missed too soon by relay {}",
+                        at + 1
+                    );
+                    signs.missed = true;
+                }
+                Event::NeighbourBack(of) => self.signs[side(*of)].missed = false,
                 Event::MissionMismatch(_) => prop_assert!(false, "all fly one mission"),
                 _ => {}
             }
         }
-        for of in [0, 1] {
-            let silence = turn.now.since(self.heard[of]);
-            self.missed[of] |= there[of] && silence >= scenario.settings[at].dead_after;
-        }
-        if scenario.settings[at].method == Method::Joint {
-            // While it solves the chain, silence is excused: it misses nobody too soon.
-            let soon = (self.noticed[0] && !self.missed[0]) || (self.noticed[1] && !self.missed[1]);
-            prop_assert!(!soon, "neighbours of relay {}", at + 1);
-        } else {
-            prop_assert_eq!(self.noticed, self.missed, "neighbours of relay {}", at + 1);
+        let settings = &scenario.settings[at];
+        let tick = tick(settings);
+        let most = self.longest.max(settings.dead_after);
+        for (signs, there) in self.signs.iter().zip(there) {
+            // While it solves the chain, silence is excused.
+            let looks = there && settings.method != Method::Joint;
+            let due = (signs.perhaps + most).max(signs.last + tick) + tick;
+            prop_assert!(
+                !looks || signs.missed || turn.now < due,
+                "not missed by relay {}: {signs:?}",
+                at + 1
+            );
         }
         Ok(())
     }
 
     pub(crate) fn misses_nobody(&self) -> bool {
-        self.missed == [false; 2]
+        self.signs.iter().all(|signs| !signs.missed)
     }
 }

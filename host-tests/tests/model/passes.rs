@@ -7,7 +7,7 @@
 
 use proptest::{prop_assert, prop_assert_eq};
 use uav_relay::wire::digest::digest;
-use uav_relay::{Relay, Stats};
+use uav_relay::{Relay, Stats, ViewId};
 
 use super::Checked;
 use super::ledger::Ledger;
@@ -19,6 +19,12 @@ const FIRST: u16 = 64;
 
 /// So many numbers behind a pass is one that is over; a leader that is told to begin again may leave as many unsaid.
 const NEAR: u16 = 32;
+
+/// What a view adds to the digest of the mission: its lower half, and its upper half with the bytes turned round.
+fn mark(view: ViewId) -> u16 {
+    let [a, b, c, d] = view.bits().to_le_bytes();
+    u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
+}
 
 /// The number after `last`.
 const fn next(last: u16) -> u16 {
@@ -42,7 +48,7 @@ impl Ledger {
     /// What relay `at` says of its view. A new one begins without a pass.
     pub(crate) fn look_up(&mut self, relay: &Relay) -> Checked {
         let view = relay.view();
-        prop_assert!(view >= self.view, "view {view} after {}", self.view);
+        prop_assert!(view >= self.view, "{view:?} after {:?}", self.view);
         if view > self.view {
             self.view = view;
             self.pass = None;
@@ -60,7 +66,7 @@ impl Ledger {
         before: &Stats,
         after: &Stats,
     ) -> Checked<Met> {
-        let view = digest(&scenario.mission).wrapping_add(self.view);
+        let view = digest(&scenario.mission).wrapping_add(mark(self.view));
         let met = match self.rule(pass.number) {
             _ if pass.digest != view => Met::Foreign,
             // Its view is being changed.
@@ -119,7 +125,7 @@ impl Ledger {
     /// The relay hands a pass onward: the one that it has taken up, or, as the leader, one that is new. The leader's first one
     /// may never have been said: another may have come between, or its neighbour could not read it.
     pub(crate) fn says(&mut self, scenario: &Scenario, leads: bool, pass: Pass) -> Checked {
-        let view = digest(&scenario.mission).wrapping_add(self.view);
+        let view = digest(&scenario.mission).wrapping_add(mark(self.view));
         prop_assert_eq!(pass.digest, view, "a pass of another view is said");
         match self.pass {
             _ if !leads => prop_assert_eq!(Some(pass.number), self.pass, "said, not heard"),

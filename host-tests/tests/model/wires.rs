@@ -58,7 +58,7 @@ pub(crate) struct Wires {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Pass {
     pub(crate) number: u16,
-    /// The digest of the mission, and the number of the view more.
+    /// The digest of the mission, and the mark of the view more.
     pub(crate) digest: u16,
     /// Whether it is one of Algorithm 2.
     pub(crate) moves: bool,
@@ -66,31 +66,36 @@ pub(crate) struct Pass {
     pub(crate) follows: bool,
 }
 
-/// The pass that a frame hands onward, if that is what it does.
-pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
+/// The message in a frame; a handshake is none.
+pub(crate) fn message(frame: &[u8]) -> Option<Message> {
     let mut deframer = Deframer::new();
     for &byte in frame {
         if let Some(Ok(plain)) = deframer.push(byte) {
-            let message = frame::decode(plain).ok()?.1;
-            let number = match &message {
-                Message::Sweep(sweep) => sweep.number,
-                Message::Gather(roster) => roster.number,
-                Message::Token(token) => token.number,
-                _ => return None,
-            };
-            return Some(Pass {
-                number,
-                digest: message.mission()?,
-                moves: matches!(message, Message::Token(_)),
-                follows: match &message {
-                    Message::Gather(roster) => roster.after > 0,
-                    Message::Sweep(sweep) => sweep.chosen,
-                    _ => false,
-                },
-            });
+            return frame::decode(plain).ok().map(|(_, message)| message);
         }
     }
     None
+}
+
+/// The pass that a frame hands onward, if that is what it does.
+pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
+    let message = message(frame)?;
+    let number = match &message {
+        Message::Sweep(sweep) => sweep.number,
+        Message::Gather(roster) => roster.number,
+        Message::Token(token) => token.number,
+        _ => return None,
+    };
+    Some(Pass {
+        number,
+        digest: message.mission()?,
+        moves: matches!(message, Message::Token(_)),
+        follows: match &message {
+            Message::Gather(roster) => roster.after > 0,
+            Message::Sweep(sweep) => sweep.chosen,
+            _ => false,
+        },
+    })
 }
 
 /// Where a line ends: the relay, and its port.

@@ -211,10 +211,32 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
     );
     let (now, sweep) = first_sweep(&mut head);
     tail.handle_bytes(now, Port::Upstream, &sweep);
+    // By its digest a pass may be one of another view: the two have to say hello.
     assert_eq!(
-        (tail.phase(), tail.stats().mission, tail.stats().rejected()),
-        (Phase::Idle, 1, 1)
+        (tail.phase(), tail.stats().view, tail.stats().mission),
+        (Phase::Idle, 1, 0)
     );
+    assert_eq!(events(&mut tail), []);
+    let said = drain(&mut tail, now);
+    let [(Port::Upstream, Message::Hello(hello), bytes)] = &said[..] else {
+        panic!("{said:?}");
+    };
+    assert!(hello.ask && !hello.form, "{hello:?}");
+    head.handle_bytes(now, Port::Downstream, bytes);
+    assert_eq!((head.stats().mission, head.stats().rejected()), (1, 1));
+    assert_eq!(
+        events(&mut head),
+        [Event::MissionMismatch(Side::Downstream)]
+    );
+    assert!(drain(&mut head, now).is_empty(), "it is not answered");
+    // And so a heartbeat tells.
+    let beat = Message::Heartbeat {
+        mission: digest(head.mission()),
+        ask: 1,
+        answer: 0,
+    };
+    tail.handle_bytes(now, Port::Upstream, &encode(1, 2, &beat));
+    assert_eq!((tail.stats().mission, tail.stats().rejected()), (1, 2));
     assert_eq!(events(&mut tail), [Event::MissionMismatch(Side::Upstream)]);
     assert!(drain(&mut tail, now).is_empty());
     assert_eq!(tail.setpoint(), None);
@@ -224,7 +246,8 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
 fn a_foreign_a_misaddressed_and_a_misdirected_frame_are_counted_and_nothing_else() {
     let beat = Message::Heartbeat {
         mission: digest(&mission(3)),
-        answer: true,
+        ask: 300,
+        answer: 0,
     };
     let mut relay = relay(mission(3), 2);
     let now = Instant::ZERO;
@@ -248,52 +271,87 @@ fn a_foreign_a_misaddressed_and_a_misdirected_frame_are_counted_and_nothing_else
     relay.handle_bytes(now, Port::Upstream, &encode(1, 2, &beat));
     assert!(matches!(
         &drain(&mut relay, now)[..],
-        [(Port::Upstream, Message::Heartbeat { answer: false, .. }, _)]
+        [(
+            Port::Upstream,
+            Message::Heartbeat {
+                ask: 0,
+                answer: 300,
+                ..
+            },
+            _
+        )]
     ));
 }
 
 #[test]
 fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
-    let beat = encode(
-        1,
-        2,
-        &Message::Heartbeat {
-            mission: digest(&mission(2)),
-            answer: false,
-        },
-    );
+    let beat = |ask, answer| {
+        let mission = digest(&mission(2));
+        let beat = Message::Heartbeat {
+            mission,
+            ask,
+            answer,
+        };
+        encode(1, 2, &beat)
+    };
     // A relay that has had a pass has nothing to call for.
     let mut tail = relay(mission(2), 2);
     let (start, sweep) = first_sweep(&mut relay(mission(2), 1));
     tail.handle_bytes(start, Port::Upstream, &sweep);
     drain(&mut tail, start);
     events(&mut tail);
-    let mut asked = 0;
+    // When each question was asked.
+    let mut asked = Vec::new();
     let mut now = start;
     let mut seen = Vec::new();
     while now.since(start) < Duration::from_millis(60_000) {
         now = tail.poll_timeout().unwrap();
         tail.handle_timeout(now);
         let sent = drain(&mut tail, now);
-        let asks = |(_, message, _): &(Port, Message, Vec<u8>)| {
-            matches!(message, Message::Heartbeat { answer: true, .. })
-        };
-        assert!(sent.iter().all(asks), "{sent:?}");
-        asked += sent.len();
+        for (_, message, _) in &sent {
+            let Message::Heartbeat { ask, answer: 0, .. } = message else {
+                panic!("{message:?}");
+            };
+            asked.push(now);
+            assert_eq!(usize::from(*ask), asked.len());
+        }
         seen.extend(
             events(&mut tail)
                 .into_iter()
-                .map(|event| (now.since(start).as_micros() / 1_000, event)),
+                .map(|event| (now.since(Instant::ZERO).as_micros() / 1_000, event)),
         );
     }
     assert_eq!(seen, [(15_000, Event::NeighbourLost(Side::Upstream))]);
-    assert!((8..=30).contains(&asked), "{asked} heartbeats in a minute");
-    tail.handle_bytes(now, Port::Upstream, &beat);
-    assert_eq!(events(&mut tail), [Event::NeighbourBack(Side::Upstream)]);
-    assert_eq!(
-        tail.poll_timeout(),
-        Some(now + Duration::from_millis(5_000))
-    );
+    let count = asked.len();
+    assert!((8..=30).contains(&count), "{count} heartbeats in a minute");
+    // Only an answer is a sign of life, and only one to one of the last four questions.
+    let last = u16::try_from(count).unwrap();
+    for (ask, answer) in [(9, 0), (0, last - 4), (0, 1), (0, last + 1), (0, u16::MAX)] {
+        tail.handle_bytes(now, Port::Upstream, &beat(ask, answer));
+        assert_eq!(events(&mut tail), [], "{ask} {answer}");
+        drain(&mut tail, now);
+    }
+    // It counts from when the question was asked.
+    for before in 0..4_u16 {
+        let mut after = tail.clone();
+        let late = now + Duration::from_millis(100);
+        after.handle_bytes(late, Port::Upstream, &beat(0, last - before));
+        assert_eq!(
+            events(&mut after),
+            [Event::NeighbourBack(Side::Upstream)],
+            "{before}"
+        );
+        let heard = asked[count - 1 - usize::from(before)];
+        let mut lost = late;
+        while events(&mut after) != [Event::NeighbourLost(Side::Upstream)] {
+            lost = after.poll_timeout().unwrap();
+            after.handle_timeout(lost);
+            drain(&mut after, lost);
+        }
+        // It is looked at again a sixteenth of ten seconds later, at the earliest.
+        let due = (heard + Duration::from_millis(15_000)).max(late + Duration::from_millis(625));
+        assert_eq!(lost, due, "{before}");
+    }
 }
 
 #[test]

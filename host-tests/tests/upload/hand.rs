@@ -4,7 +4,7 @@ use uav_relay::ground::Progress;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::wire::upload::{LENGTH, UploadError};
 use uav_relay::{
-    Auth, Event, Field, FieldPoint, Ground, Identity, Key, Port, Relay, Settings, Wiring,
+    Auth, Event, Field, FieldPoint, Ground, Identity, Key, Port, Relay, Settings, ViewId, Wiring,
 };
 
 use super::*;
@@ -176,7 +176,13 @@ fn a_relay_alone_flies_what_it_is_uploaded_and_the_ground_hears_of_it() {
         ] {
             assert!(events.contains(&event), "{event:?} of {events:?}");
         }
-        assert_eq!(ground.progress(), Progress::Flown { by: 1, view: 1 });
+        assert_eq!(
+            ground.progress(),
+            Progress::Flown {
+                by: 1,
+                view: ViewId::from_bits(1 << 10 | 1)
+            }
+        );
         assert_eq!(ground.poll_timeout(), None);
         assert_eq!(relay.version(), 2);
         // An older one is refused, and the ground is told why.

@@ -11,10 +11,10 @@ use uav_relay::place::{CrossSection, Station};
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{
-    AdjustStep, Answer, Decision, Hello, Message, MessageError, Moved, OwnSeat, PriorView,
-    Proposal, Roster, Sweep, Token,
+    AdjustStep, Answer, Decision, Hello, Message, MessageError, Moved, OwnSeat, Poll, Proposal,
+    Pulse, Pulsed, Roster, Successor, Sweep, Token,
 };
-use uav_relay::{Local, Placement};
+use uav_relay::{Local, Placement, View, ViewId};
 
 use super::offer::Offer;
 
@@ -35,7 +35,9 @@ pub(crate) enum Said {
     },
     Heartbeat {
         mission: u16,
-        answer: bool,
+        /// The number of its own question, and that of the one it answers; 0 for none.
+        ask: u16,
+        answer: u16,
     },
     Measured {
         sweep: Swept,
@@ -67,9 +69,9 @@ pub(crate) enum Said {
         any: bool,
         worst: f32,
     },
-    Hello(Forming),
-    Proposal(Forming),
-    Decision(Forming),
+    Hello(Greeting),
+    Proposal(Proposed),
+    Decision(Decided),
     Fence {
         number: u16,
         mission: u16,
@@ -79,6 +81,16 @@ pub(crate) enum Said {
         target_m: f32,
     },
     Offer(Offer),
+    Pulse {
+        number: u16,
+        mission: u16,
+        lease: u16,
+    },
+    Pulsed {
+        number: u16,
+        mission: u16,
+        done: bool,
+    },
 }
 
 /// What a gathering says, and its answer.
@@ -150,36 +162,165 @@ impl Swept {
     }
 }
 
-/// What the three messages by which a chain forms anew have in common.
+/// What a hello says.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
-pub(crate) struct Forming {
-    /// Of a view.
-    pub(crate) number: u16,
+pub(crate) struct Greeting {
     pub(crate) mission: u16,
-    /// Four numbers, in the order in which they are sent.
-    pub(crate) numbers: [u16; 4],
+    pub(crate) neighbour: u16,
+    pub(crate) newest: u32,
+    /// Digest and version of the mission held.
+    pub(crate) holds: (u16, u16),
+    pub(crate) hears: u8,
     pub(crate) flags: u8,
 }
 
-impl Forming {
-    fn body(self, tag: u8) -> Vec<u8> {
-        let mut out = vec![tag];
-        for word in [self.number, self.mission].iter().chain(&self.numbers) {
-            out.extend(word.to_le_bytes());
-        }
-        out.push(self.flags);
+impl Greeting {
+    fn body(self) -> Vec<u8> {
+        let mut out = pass(10, [self.mission, self.neighbour]);
+        out.extend(self.newest.to_le_bytes());
+        words(&mut out, &[self.holds.0, self.holds.1]);
+        out.extend([self.hears, self.flags]);
         out
     }
 
     fn flag(self, bit: u8) -> bool {
         self.flags >> bit & 1 == 1
     }
+}
 
-    fn mission_id(self, digest: u16) -> MissionId {
-        MissionId {
-            version: self.numbers[3],
-            digest,
+/// A view and how many relays it has.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+pub(crate) struct SizedView {
+    pub(crate) id: u32,
+    pub(crate) relays: u16,
+}
+
+impl SizedView {
+    fn write(self, out: &mut Vec<u8>) {
+        out.extend(self.id.to_le_bytes());
+        words(out, &[self.relays]);
+    }
+
+    fn view(self) -> View {
+        View {
+            id: ViewId::from_bits(self.id),
+            relays: self.relays,
         }
+    }
+
+    fn is_proposed(self) -> bool {
+        is_proposed(self.id) && is_count(self.relays)
+    }
+}
+
+/// What a proposal and the decision on it have in common: of which mission, which view, and the place of the sender.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+pub(crate) struct Call {
+    /// Digest and version of the mission.
+    pub(crate) of: (u16, u16),
+    pub(crate) view: u32,
+    pub(crate) place: u16,
+}
+
+impl Call {
+    fn body(self, tag: u8) -> Vec<u8> {
+        let mut out = pass(tag, [self.of.0, self.of.1]);
+        out.extend(self.view.to_le_bytes());
+        words(&mut out, &[self.place]);
+        out
+    }
+
+    fn mission_id(self) -> MissionId {
+        mission_id(self.of)
+    }
+
+    fn in_range(self) -> bool {
+        is_proposed(self.view) && is_count(self.place)
+    }
+}
+
+/// What a proposal says.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+pub(crate) struct Proposed {
+    pub(crate) call: Call,
+    pub(crate) agreed: SizedView,
+    pub(crate) votes: u16,
+    pub(crate) lease_left: u16,
+    pub(crate) proposer: bool,
+    /// The proposal that was decided on, and the view that was decided for.
+    pub(crate) successor: Option<(u32, SizedView)>,
+}
+
+impl Proposed {
+    fn body(self) -> Vec<u8> {
+        let mut out = self.call.body(11);
+        self.agreed.write(&mut out);
+        words(&mut out, &[self.votes, self.lease_left]);
+        out.push(u8::from(self.proposer));
+        out.push(u8::from(self.successor.is_some()));
+        if let Some((proposal, view)) = self.successor {
+            out.extend(proposal.to_le_bytes());
+            view.write(&mut out);
+        }
+        out
+    }
+
+    fn message(self) -> Message {
+        Message::Proposal(Proposal {
+            mission_id: self.call.mission_id(),
+            view: ViewId::from_bits(self.call.view),
+            place: self.call.place,
+            poll: Poll {
+                agreed: self.agreed.view(),
+                votes: self.votes,
+                proposer: self.proposer,
+                lease_left: self.lease_left,
+                successor: self.successor.map(|(proposal, view)| Successor {
+                    proposal: ViewId::from_bits(proposal),
+                    view: view.view(),
+                }),
+            },
+        })
+    }
+
+    fn in_range(self) -> bool {
+        let agreed = self.agreed;
+        self.call.in_range()
+            && (agreed.id == 0 || is_proposed(agreed.id))
+            && is_count(agreed.relays)
+            && self.votes <= agreed.relays
+            && self
+                .successor
+                .is_none_or(|(proposal, view)| is_proposed(proposal) && view.is_proposed())
+            // All of that was proposed before.
+            && agreed.id < self.call.view
+            && self.successor.is_none_or(|(proposal, view)| {
+                proposal < self.call.view && view.id <= proposal
+            })
+    }
+}
+
+/// What a decision says.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+pub(crate) struct Decided {
+    pub(crate) call: Call,
+    pub(crate) view: Option<SizedView>,
+    pub(crate) lease_left: u16,
+}
+
+impl Decided {
+    fn body(self) -> Vec<u8> {
+        let mut out = self.call.body(12);
+        out.push(u8::from(self.view.is_some()));
+        if let Some(view) = self.view {
+            view.write(&mut out);
+        }
+        words(&mut out, &[self.lease_left]);
+        out
+    }
+
+    fn in_range(self) -> bool {
+        self.call.in_range() && self.view.is_none_or(SizedView::is_proposed)
     }
 }
 
@@ -214,10 +355,13 @@ impl Said {
                 out.push(2);
                 out.extend(number.to_le_bytes());
             }
-            Self::Heartbeat { mission, answer } => {
+            Self::Heartbeat {
+                mission,
+                ask,
+                answer,
+            } => {
                 out.push(3);
-                out.extend(mission.to_le_bytes());
-                out.push(u8::from(*answer));
+                words(&mut out, &[*mission, *ask, *answer]);
             }
             Self::Measured {
                 sweep,
@@ -258,9 +402,9 @@ impl Said {
                 out.push(u8::from(*any));
                 reals(&mut out, &[*worst]);
             }
-            Self::Hello(forming) => out = forming.body(10),
-            Self::Proposal(forming) => out = forming.body(11),
-            Self::Decision(forming) => out = forming.body(12),
+            Self::Hello(greeting) => out = greeting.body(),
+            Self::Proposal(proposed) => out = proposed.body(),
+            Self::Decision(decided) => out = decided.body(),
             Self::Fence {
                 number,
                 mission,
@@ -276,6 +420,22 @@ impl Said {
                 reals(&mut out, &[*x_m, *target_m]);
             }
             Self::Offer(offer) => out = offer.body(),
+            Self::Pulse {
+                number,
+                mission,
+                lease,
+            } => {
+                out = pass(15, [*number, *mission]);
+                words(&mut out, &[*lease]);
+            }
+            Self::Pulsed {
+                number,
+                mission,
+                done,
+            } => {
+                out = pass(16, [*number, *mission]);
+                out.push(u8::from(*done));
+            }
         }
         out
     }
@@ -309,7 +469,15 @@ impl Said {
                 own,
             }),
             Self::Busy { number } => Message::Busy { sweep: number },
-            Self::Heartbeat { mission, answer } => Message::Heartbeat { mission, answer },
+            Self::Heartbeat {
+                mission,
+                ask,
+                answer,
+            } => Message::Heartbeat {
+                mission,
+                ask,
+                answer,
+            },
             Self::Gather(ref seats) => Message::Gather(seats.roster()),
             Self::Gathered(ref seats) => Message::Gathered(seats.roster()),
             Self::Token {
@@ -356,32 +524,43 @@ impl Said {
                 any,
                 worst,
             }),
-            Self::Hello(forming) => Message::Hello(Hello {
-                mission: forming.mission,
-                newest: forming.number,
-                neighbour: forming.numbers[0],
-                ask: forming.flag(0),
-                form: forming.flag(1),
-                fresh: forming.flag(2),
-                ready: forming.flag(3),
-                holds: forming.mission_id(forming.numbers[2]),
-                flies: forming.flag(4),
+            Self::Hello(greeting) => Message::Hello(Hello {
+                mission: greeting.mission,
+                newest: ViewId::from_bits(greeting.newest),
+                neighbour: greeting.neighbour,
+                ask: greeting.flag(0),
+                form: greeting.flag(1),
+                fresh: greeting.flag(2),
+                ready: greeting.flag(3),
+                hears: greeting.hears,
+                holds: mission_id(greeting.holds),
+                flies: greeting.flag(4),
             }),
-            Self::Proposal(forming) => Message::Proposal(Proposal {
-                mission_id: forming.mission_id(forming.mission),
-                view: forming.number,
-                place: forming.numbers[0],
-                before: PriorView {
-                    view: forming.numbers[2],
-                    relays: forming.numbers[1],
-                    leader: forming.flag(0),
-                },
+            Self::Proposal(proposed) => proposed.message(),
+            Self::Decision(decided) => Message::Decision(Decision {
+                mission_id: decided.call.mission_id(),
+                proposal: ViewId::from_bits(decided.call.view),
+                place: decided.call.place,
+                view: decided.view.map(SizedView::view),
+                lease_left: decided.lease_left,
             }),
-            Self::Decision(forming) => Message::Decision(Decision {
-                mission_id: forming.mission_id(forming.mission),
-                view: forming.number,
-                place: forming.numbers[0],
-                relays: Some(forming.numbers[1]).filter(|&relays| relays > 0),
+            Self::Pulse {
+                number,
+                mission,
+                lease,
+            } => Message::Pulse(Pulse {
+                number,
+                mission,
+                lease,
+            }),
+            Self::Pulsed {
+                number,
+                mission,
+                done,
+            } => Message::Pulsed(Pulsed {
+                number,
+                mission,
+                done,
             }),
             Self::Fence {
                 number,
@@ -436,7 +615,8 @@ impl Said {
                     && slacks.iter().all(|slack| (-2e9..=2e9).contains(slack))
                     && stand.is_none_or(is_place)
             }
-            Self::Busy { .. } | Self::Heartbeat { .. } => true,
+            Self::Busy { .. } | Self::Heartbeat { .. } | Self::Pulsed { .. } => true,
+            Self::Pulse { lease, .. } => *lease > 0,
             Self::Gather(seats) | Self::Gathered(seats) => seats.in_range(),
             Self::Token {
                 x_m,
@@ -466,17 +646,11 @@ impl Said {
                 worst,
                 ..
             } => is_place(*x_m) && is_altitude(*altitude_m) && is_sir(*worst),
-            Self::Hello(Forming { numbers, flags, .. }) => {
-                numbers[0] <= 1000 && numbers[1] == 0 && *flags <= 31
+            Self::Hello(greeting) => {
+                greeting.neighbour <= 1000 && greeting.hears <= 15 && greeting.flags <= 31
             }
-            Self::Proposal(Forming { numbers, flags, .. }) => {
-                let counts = &numbers[..2];
-                counts.iter().all(|count| (1..=1000).contains(count)) && *flags <= 1
-            }
-            Self::Decision(Forming { numbers, flags, .. }) => {
-                let [place, relays, unused, _] = *numbers;
-                (1..=1000).contains(&place) && relays <= 1000 && unused == 0 && *flags == 0
-            }
+            Self::Proposal(proposed) => proposed.in_range(),
+            Self::Decision(decided) => decided.in_range(),
             Self::Fence {
                 number,
                 x_m,
@@ -486,6 +660,19 @@ impl Said {
             Self::Offer(offer) => offer.in_range(),
         }
     }
+}
+
+fn mission_id((digest, version): (u16, u16)) -> MissionId {
+    MissionId { version, digest }
+}
+
+fn is_count(relays: u16) -> bool {
+    (1..=1000).contains(&relays)
+}
+
+/// Whether a node may have proposed that: its number is in the low ten bits, the number of the view above.
+fn is_proposed(view: u32) -> bool {
+    (1..=1000).contains(&(view % 1024)) && view >= 1024
 }
 
 fn is_altitude(altitude_m: f32) -> bool {
@@ -545,12 +732,16 @@ impl Seats {
 }
 
 /// What the message of a pass begins with: its tag, its number, the digest.
-fn pass(tag: u8, words: [u16; 2]) -> Vec<u8> {
+fn pass(tag: u8, numbers: [u16; 2]) -> Vec<u8> {
     let mut out = vec![tag];
-    for word in words {
-        out.extend(word.to_le_bytes());
-    }
+    words(&mut out, &numbers);
     out
+}
+
+fn words(out: &mut Vec<u8>, numbers: &[u16]) {
+    for number in numbers {
+        out.extend(number.to_le_bytes());
+    }
 }
 
 fn option(out: &mut Vec<u8>, byte: Option<u8>) {
@@ -587,6 +778,10 @@ impl Reader<'_> {
 
     fn word(&mut self) -> Option<u16> {
         self.take().map(u16::from_le_bytes)
+    }
+
+    fn long(&mut self) -> Option<u32> {
+        self.take().map(u32::from_le_bytes)
     }
 
     fn real(&mut self) -> Option<f32> {
@@ -672,7 +867,8 @@ impl Reader<'_> {
             },
             3 => Said::Heartbeat {
                 mission: self.word()?,
-                answer: self.bool()?,
+                ask: self.word()?,
+                answer: self.word()?,
             },
             4 => {
                 let (sweep, [upsilon_per_w]) = self.sweep()?;
@@ -707,9 +903,9 @@ impl Reader<'_> {
                 any: self.bool()?,
                 worst: self.real()?,
             },
-            10 => Said::Hello(self.forming()?),
-            11 => Said::Proposal(self.forming()?),
-            12 => Said::Decision(self.forming()?),
+            10 => Said::Hello(self.greeting()?),
+            11 => Said::Proposal(self.proposed()?),
+            12 => Said::Decision(self.decided()?),
             13 => Said::Fence {
                 number: self.word()?,
                 mission: self.word()?,
@@ -719,16 +915,62 @@ impl Reader<'_> {
                 target_m: self.real()?,
             },
             14 => Said::Offer(self.offer()?),
+            15 => Said::Pulse {
+                number: self.word()?,
+                mission: self.word()?,
+                lease: self.word()?,
+            },
+            16 => Said::Pulsed {
+                number: self.word()?,
+                mission: self.word()?,
+                done: self.bool()?,
+            },
             _ => return None,
         })
     }
 
-    fn forming(&mut self) -> Option<Forming> {
-        Some(Forming {
-            number: self.word()?,
+    fn greeting(&mut self) -> Option<Greeting> {
+        Some(Greeting {
             mission: self.word()?,
-            numbers: [self.word()?, self.word()?, self.word()?, self.word()?],
+            neighbour: self.word()?,
+            newest: self.long()?,
+            holds: (self.word()?, self.word()?),
+            hears: self.byte()?,
             flags: self.byte()?,
+        })
+    }
+
+    fn sized(&mut self) -> Option<SizedView> {
+        Some(SizedView {
+            id: self.long()?,
+            relays: self.word()?,
+        })
+    }
+
+    fn call(&mut self) -> Option<Call> {
+        Some(Call {
+            of: (self.word()?, self.word()?),
+            view: self.long()?,
+            place: self.word()?,
+        })
+    }
+
+    fn proposed(&mut self) -> Option<Proposed> {
+        Some(Proposed {
+            call: self.call()?,
+            agreed: self.sized()?,
+            votes: self.word()?,
+            lease_left: self.word()?,
+            proposer: self.bool()?,
+            successor: self.option(|rest| Some((rest.long()?, rest.sized()?)))?,
+        })
+    }
+
+    fn decided(&mut self) -> Option<Decided> {
+        Some(Decided {
+            call: self.call()?,
+            view: self.option(Self::sized)?,
+            lease_left: self.word()?,
         })
     }
 

@@ -1,5 +1,5 @@
 //! Golden vectors, both ways: `data/vectors.json`, made by a Python program of its own (bodies by the byte tables, those of
-//! the tags 0, 2 and 3 again by the postcard implementation pohlednice 0.2.1, CRC bit by bit, COBS by its definition, ladders
+//! the tags 0 and 2 again by the postcard implementation pohlednice 0.2.1, CRC bit by bit, COBS by its definition, ladders
 //! with each step rounded).
 
 use serde::Deserialize;
@@ -8,7 +8,7 @@ use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message};
 
-use super::codec::{self, Said, Swept};
+use super::codec::{self, Call, Decided, Greeting, Proposed, Said, SizedView, Swept};
 use super::offer::Offer;
 
 #[derive(Deserialize)]
@@ -159,8 +159,48 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
         |said| matches!(said, Said::Verdict { commit: Some(15), slacks, .. } if slacks.len() == 16),
     );
     some(|said| matches!(said, Said::Busy { .. }));
-    some(|said| matches!(said, Said::Heartbeat { answer: true, .. }));
-    some(|said| matches!(said, Said::Heartbeat { answer: false, .. }));
+    some(|said| {
+        matches!(
+            said,
+            Said::Heartbeat {
+                ask: 1..,
+                answer: 0,
+                ..
+            }
+        )
+    });
+    some(|said| {
+        matches!(
+            said,
+            Said::Heartbeat {
+                ask: 0,
+                answer: 1..,
+                ..
+            }
+        )
+    });
+    some(|said| {
+        matches!(
+            said,
+            Said::Heartbeat {
+                ask: u16::MAX,
+                answer: u16::MAX,
+                ..
+            }
+        )
+    });
+    some(|said| matches!(said, Said::Pulse { lease: 1, .. }));
+    some(|said| {
+        matches!(
+            said,
+            Said::Pulse {
+                lease: u16::MAX,
+                ..
+            }
+        )
+    });
+    some(|said| matches!(said, Said::Pulsed { done: true, .. }));
+    some(|said| matches!(said, Said::Pulsed { done: false, .. }));
     some(|said| matches!(said, Said::Measured { sweep, .. } if sweep.reaches.len() == 16));
     some(|said| matches!(said, Said::Measured { upsilon_per_w, .. } if *upsilon_per_w == 1e-9));
     some(|said| matches!(said, Said::Measured { upsilon_per_w, .. } if *upsilon_per_w == 1e32));
@@ -225,7 +265,15 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
 }
 
 #[test]
-fn the_vectors_hold_every_hello_proposal_and_count() {
+fn the_vectors_hold_every_hello_proposal_and_decision() {
+    const MOST: SizedView = SizedView {
+        id: u32::MAX - 0x17,
+        relays: 1000,
+    };
+    const BEFORE: SizedView = SizedView {
+        id: MOST.id - 1,
+        ..MOST
+    };
     let frames = vectors().frames;
     let some = |what: fn(&Said) -> bool| {
         assert!(frames.iter().any(|vector| what(&vector.message)));
@@ -237,24 +285,54 @@ fn the_vectors_hold_every_hello_proposal_and_count() {
                 .any(|vector| matches!(vector.message, Said::Hello(hello) if hello.flags == flags))
         );
     }
-    some(
-        |said| matches!(said, Said::Hello(hello) if hello.numbers == [1000, 0, u16::MAX, u16::MAX]),
-    );
-    some(
-        |said| matches!(said, Said::Hello(hello) if hello.numbers[3] == 0 && hello.flags & 16 != 0),
-    );
-    some(
-        |said| matches!(said, Said::Hello(hello) if hello.numbers[3] > 0 && hello.flags & 16 == 0),
-    );
-    some(|said| matches!(said, Said::Proposal(proposal) if proposal.flags == 0));
     some(|said| {
-        let most = [1000, 1000, u16::MAX, u16::MAX];
-        matches!(said, Said::Proposal(proposal) if proposal.numbers == most && proposal.flags == 1)
+        matches!(said, Said::Hello(hello) if *hello == Greeting {
+            mission: u16::MAX,
+            neighbour: 1000,
+            newest: u32::MAX,
+            holds: (u16::MAX, u16::MAX),
+            hears: 15,
+            flags: 31,
+        })
     });
-    some(|said| matches!(said, Said::Decision(count) if count.numbers[1] == 0));
+    some(|said| matches!(said, Said::Hello(hello) if hello.holds.1 == 0 && hello.flags & 16 != 0));
+    some(|said| matches!(said, Said::Hello(hello) if hello.holds.1 > 0 && hello.flags & 16 == 0));
+    some(|said| matches!(said, Said::Hello(hello) if hello.hears == 5));
+    some(
+        |said| matches!(said, Said::Proposal(proposal) if proposal.agreed.id == 0 && !proposal.proposer),
+    );
+    some(|said| matches!(said, Said::Proposal(proposal) if proposal.successor.is_none()));
     some(|said| {
-        let most = [1000, 1000, 0, u16::MAX];
-        matches!(said, Said::Decision(count) if count.numbers == most)
+        matches!(said, Said::Proposal(proposal) if *proposal == Proposed {
+            call: Call {
+                of: (u16::MAX, u16::MAX),
+                view: MOST.id,
+                place: 1000,
+            },
+            agreed: BEFORE,
+            votes: 1000,
+            lease_left: u16::MAX,
+            proposer: true,
+            successor: Some((BEFORE.id, BEFORE)),
+        })
+    });
+    some(|said| matches!(said, Said::Decision(decision) if decision.view.is_none()));
+    some(|said| {
+        matches!(
+            said,
+            Said::Decision(Decided { call, view: Some(view), .. }) if view.id != call.view
+        )
+    });
+    some(|said| {
+        matches!(said, Said::Decision(decision) if *decision == Decided {
+            call: Call {
+                of: (u16::MAX, u16::MAX),
+                view: MOST.id,
+                place: 1000,
+            },
+            view: Some(MOST),
+            lease_left: u16::MAX,
+        })
     });
 }
 

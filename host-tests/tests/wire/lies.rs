@@ -11,11 +11,16 @@ use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::{Instant, Port, Wiring};
 
-use super::codec::{Said, plain, wire};
+use super::codec::{Decided, Proposed, Said, plain, wire};
 use super::config;
 use super::receive::{drain, relay};
 use super::strategies::{messages, sweeps};
 use super::stream::unstuffed;
+
+/// The view of that number which relay 1 proposes; what is proposed has a number above 0.
+fn view(number: u16) -> u32 {
+    u32::from(number.max(1)) << 10 | 1
+}
 
 /// Puts a number and a digest into a message, where it has them.
 pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
@@ -34,15 +39,33 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         }
         | Said::Moved {
             number, mission, ..
+        }
+        | Said::Pulse {
+            number, mission, ..
+        }
+        | Said::Pulsed {
+            number, mission, ..
         } => (*number, *mission) = (as_number, as_mission),
         Said::Busy { number } => *number = as_number,
         // The number of a fence is that of a talk, never 0.
         Said::Heartbeat { mission, .. } | Said::Fence { mission, .. } => *mission = as_mission,
-        Said::Hello(hello) => (hello.number, hello.mission) = (as_number, as_mission),
+        Said::Hello(hello) => (hello.newest, hello.mission) = (view(as_number), as_mission),
         // Of a view that flies the mission that was loaded.
-        Said::Proposal(forming) | Said::Decision(forming) => {
-            (forming.number, forming.mission) = (as_number, as_mission);
-            forming.numbers[3] = 0;
+        Said::Proposal(proposed) => {
+            let Proposed {
+                call,
+                agreed,
+                successor,
+                ..
+            } = proposed;
+            (call.view, call.of) = (view(as_number), (as_mission, 0));
+            if agreed.id >= call.view {
+                agreed.id = 0;
+            }
+            *successor = successor.filter(|(proposal, _)| *proposal < call.view);
+        }
+        Said::Decision(Decided { call, .. }) => {
+            (call.view, call.of) = (view(as_number), (as_mission, 0));
         }
         Said::Offer(offer) => offer.base = as_mission,
     }

@@ -10,7 +10,7 @@ use super::bodies::{
     ENCODING, HEADER, VALUE, assert_ranges, assert_refused_cut_and_longer, assert_refused_padded,
     single, verdict_on, with, written, zeros,
 };
-use super::codec::{Forming, Said, Swept, plain, sealed};
+use super::codec::{Call, Decided, Greeting, Proposed, Said, SizedView, Swept, plain, sealed};
 use super::golden::vectors;
 use super::offer::offer;
 
@@ -79,12 +79,44 @@ fn moved() -> Said {
     }
 }
 
-/// In range as a hello and as a count.
-const FORMING: Forming = Forming {
-    number: 1,
+const HELLO: Greeting = Greeting {
     mission: 2,
-    numbers: [1, 0, 0, 0],
+    neighbour: 1,
+    newest: 0,
+    holds: (2, 0),
+    hears: 0,
     flags: 0,
+};
+
+/// The first view that node 1 proposes.
+const VIEW: SizedView = SizedView {
+    id: 0x0401,
+    relays: 1,
+};
+
+const CALL: Call = Call {
+    of: (2, 0),
+    view: VIEW.id,
+    place: 1,
+};
+
+/// The next view of node 1000, the last that may propose.
+const PROPOSAL: Proposed = Proposed {
+    call: Call {
+        view: 0x0BE8,
+        ..CALL
+    },
+    agreed: VIEW,
+    votes: 0,
+    lease_left: 0,
+    proposer: false,
+    successor: Some((VIEW.id, VIEW)),
+};
+
+const DECISION: Decided = Decided {
+    call: CALL,
+    view: Some(VIEW),
+    lease_left: 0,
 };
 
 const NO_MESSAGE: FrameError = FrameError::Message(MessageError::Encoding);
@@ -116,17 +148,17 @@ fn bodies_that_are_no_message_are_refused() {
     for vector in vectors().frames {
         let body = vector.message.body();
         assert_refused_cut_and_longer(&body, &vector.name);
-        for tag in 15..=u8::MAX {
+        for tag in 17..=u8::MAX {
             let mut other = body.clone();
             other[0] = tag;
             assert_eq!(verdict_on(&other), ENCODING, "{}", vector.name);
         }
     }
-    let heartbeat = [3, 0, 0];
+    let pulsed = [16, 0, 0, 0, 0];
     let verdict_head = [1, 0, 0, 0, 0];
     let option = [1, 0, 0, 0, 0, 0];
     for byte in 2..=u8::MAX {
-        let bool_byte = [&heartbeat[..], &[byte]].concat();
+        let bool_byte = [&pulsed[..], &[byte]].concat();
         assert_eq!(verdict_on(&bool_byte), ENCODING, "bool {byte}");
         let option_byte = [&option[..], &[byte, 0, 0]].concat();
         assert_eq!(verdict_on(&option_byte), ENCODING, "Option {byte}");
@@ -143,6 +175,14 @@ fn bodies_that_are_no_message_are_refused() {
         let mut bool_byte = moved().body();
         bool_byte[13] = byte;
         assert_eq!(verdict_on(&bool_byte), ENCODING, "bool {byte}");
+        for (mut body, at) in [
+            (Said::Proposal(PROPOSAL).body(), 21),
+            (Said::Proposal(PROPOSAL).body(), 22),
+            (Said::Decision(DECISION).body(), 11),
+        ] {
+            body[at] = byte;
+            assert_eq!(verdict_on(&body), ENCODING, "tag {}, {at}", body[0]);
+        }
     }
     for count in 17..=127_u8 {
         let mut slacks = zeros(verdict(None, &[]).body(), 7, count);
@@ -168,12 +208,14 @@ fn padded_varints_are_refused() {
     }
     for body in [
         Said::Busy { number: 9 }.body(),
-        vec![3, 0, 0, 1],
+        vec![3, 0, 0, 1, 0, 0, 0],
         token(0, 0.0, 0, 0).body(),
         moved().body(),
-        Said::Hello(FORMING).body(),
-        Said::Proposal(FORMING).body(),
-        Said::Decision(FORMING).body(),
+        Said::Hello(HELLO).body(),
+        Said::Proposal(PROPOSAL).body(),
+        Said::Decision(DECISION).body(),
+        vec![15, 0, 0, 0, 0, 1, 0],
+        vec![16, 0, 0, 0, 0, 1],
         Said::Offer(offer()).body(),
     ] {
         assert_refused_padded(&body, false);
@@ -306,33 +348,90 @@ fn taken(mut body: Vec<u8>, at: usize) -> Vec<u16> {
 }
 
 #[test]
-fn a_chain_has_up_to_a_thousand_relays_and_what_a_message_does_not_use_is_zero() {
-    let hello = Said::Hello(FORMING).body();
-    let proposal = Said::Proposal(Forming {
-        numbers: [1, 1, 0, 0],
-        ..FORMING
-    });
-    let proposal = proposal.body();
-    let count = Said::Decision(FORMING).body();
+fn a_chain_has_up_to_a_thousand_relays() {
     let any: Vec<u16> = (0..=u16::MAX).collect();
     let (from_0, from_1) = (any[..=1000].to_vec(), any[1..=1000].to_vec());
-    for (body, numbers, flags) in [
-        (&hello, [&from_0, &vec![0], &any, &any], 32),
-        (&proposal, [&from_1, &from_1, &any, &any], 2),
-        (&count, [&from_1, &from_0, &vec![0], &any], 1),
+    let votes = PROPOSAL.agreed.relays;
+    for (said, at, numbers) in [
+        (Said::Hello(HELLO), 1, &any),
+        (Said::Hello(HELLO), 3, &from_0),
+        (Said::Hello(HELLO), 9, &any),
+        (Said::Hello(HELLO), 11, &any),
+        (Said::Proposal(PROPOSAL), 1, &any),
+        (Said::Proposal(PROPOSAL), 3, &any),
+        (Said::Proposal(PROPOSAL), 9, &from_1),
+        (Said::Proposal(PROPOSAL), 15, &from_1),
+        (Said::Proposal(PROPOSAL), 17, &any[..=votes.into()].to_vec()),
+        (Said::Proposal(PROPOSAL), 19, &any),
+        (Said::Proposal(PROPOSAL), 31, &from_1),
+        (Said::Decision(DECISION), 1, &any),
+        (Said::Decision(DECISION), 3, &any),
+        (Said::Decision(DECISION), 9, &from_1),
+        (Said::Decision(DECISION), 16, &from_1),
+        (Said::Decision(DECISION), 18, &any),
     ] {
-        for (at, numbers) in [5, 7, 9, 11].into_iter().zip(numbers) {
-            assert_eq!(&taken(body.clone(), at), numbers, "tag {}, {at}", body[0]);
-        }
-        for at in [1, 3] {
-            assert_eq!(taken(body.clone(), at), any, "tag {}, {at}", body[0]);
-        }
+        let body = said.body();
+        assert_eq!(&taken(body.clone(), at), numbers, "tag {}, {at}", body[0]);
+    }
+    for (at, most) in [(13, 15), (14, 31)] {
         for byte in 0..=u8::MAX {
-            let mut body = body.clone();
-            body[13] = byte;
-            let expected = if byte < flags { Ok(()) } else { VALUE };
-            assert_eq!(verdict_on(&body), expected, "tag {}: {byte}", body[0]);
+            let mut body = Said::Hello(HELLO).body();
+            body[at] = byte;
+            let expected = if byte <= most { Ok(()) } else { VALUE };
+            assert_eq!(verdict_on(&body), expected, "{at}: {byte}");
         }
+    }
+}
+
+/// What is proposed is named by a node of a chain and has a number above 0. Any view may have been heard of, and what was loaded be
+/// agreed on.
+#[test]
+fn a_view_is_named_by_a_relay_that_may_propose_it() {
+    let fits = |said: &Said, at: usize, view: u32| {
+        let mut body = said.body();
+        body[at..at + 4].copy_from_slice(&view.to_le_bytes());
+        let read = verdict_on(&body);
+        assert!(read == Ok(()) || read == VALUE, "{read:?}");
+        read.is_ok()
+    };
+    for number in [0, 1, 2, 4_194_303] {
+        for node in 0..1024 {
+            let view = number << 10 | node;
+            let proposed = number > 0 && (1..=1000).contains(&node);
+            for (said, at, expected) in [
+                (Said::Hello(HELLO), 5, true),
+                // All that it tells of was proposed before, and a view not after what was decided by.
+                (Said::Proposal(PROPOSAL), 5, proposed && view > VIEW.id),
+                (
+                    Said::Proposal(PROPOSAL),
+                    11,
+                    (proposed || view == 0) && view < PROPOSAL.call.view,
+                ),
+                (
+                    Said::Proposal(PROPOSAL),
+                    23,
+                    proposed && (VIEW.id..PROPOSAL.call.view).contains(&view),
+                ),
+                (Said::Proposal(PROPOSAL), 27, proposed && view <= VIEW.id),
+                (Said::Decision(DECISION), 5, proposed),
+                (Said::Decision(DECISION), 12, proposed),
+            ] {
+                assert_eq!(fits(&said, at, view), expected, "{said:?}, {at}: {view:x}");
+            }
+        }
+    }
+}
+
+/// A lease of no time would have run out before it is given.
+#[test]
+fn a_pulse_gives_a_lease() {
+    let pulse = vec![15, 0, 0, 0, 0, 1, 0];
+    let any: Vec<u16> = (0..=u16::MAX).collect();
+    assert_eq!(taken(pulse.clone(), 5), any[1..]);
+    for at in [1, 3] {
+        assert_eq!(taken(pulse.clone(), at), any);
+        assert_eq!(taken(vec![16, 0, 0, 0, 0, 1], at), any);
+        assert_eq!(taken(vec![3, 0, 0, 1, 0, 2, 0], at), any);
     }
 }
 

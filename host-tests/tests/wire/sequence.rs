@@ -11,11 +11,13 @@ use proptest::test_runner::TestRunner;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::{
-    Band, Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, Relay, Wiring,
+    Band, Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, Relay, ViewId,
+    Wiring,
 };
 
-use super::codec::{Forming, Said, Seats, Swept, plain, wire};
+use super::codec::{Greeting, Proposed, Said, Seats, SizedView, Swept, plain, wire};
 use super::config;
+use super::forming::{ASKS, FRESH, a_hello, granted, hearing, id, mark, proposed};
 use super::lies::renamed;
 use super::offer::{Offer, offer};
 use super::receive::{FIELD, counted, drain, relay_of};
@@ -119,6 +121,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     let x_m = 400.0;
     let altitude_m = 20.0;
     let power_w = 1.0;
+    let view = id(u32::from(number).max(1), 1);
     let sweep = Swept {
         number,
         mission,
@@ -142,7 +145,8 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         Said::Busy { number },
         Said::Heartbeat {
             mission,
-            answer: false,
+            ask: 0,
+            answer: 0,
         },
         Said::Measured {
             sweep: sweep.clone(),
@@ -171,24 +175,16 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             any: true,
             worst: 1.0,
         },
-        Said::Hello(Forming {
-            number,
+        Said::Hello(Greeting {
             mission,
-            numbers: [4, 0, mission, 0],
+            neighbour: 4,
+            newest: view,
+            holds: (mission, 0),
+            hears: 1,
             flags: 16,
         }),
-        Said::Proposal(Forming {
-            number,
-            mission,
-            numbers: [3, 8, 0, 0],
-            flags: 1,
-        }),
-        Said::Decision(Forming {
-            number,
-            mission,
-            numbers: [5, 8, 0, 0],
-            flags: 0,
-        }),
+        Said::Proposal(proposed(view, (mission, 0), 3, 8)),
+        granted(view, (mission, 0), 5, 8),
         Said::Fence {
             number: 1,
             mission,
@@ -201,6 +197,16 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             base: mission,
             ..offer()
         }),
+        Said::Pulse {
+            number,
+            mission,
+            lease: 150,
+        },
+        Said::Pulsed {
+            number,
+            mission,
+            done: true,
+        },
     ]
 }
 
@@ -234,8 +240,8 @@ fn a_message_from_the_wrong_side_for_the_heading_is_misdirected_and_nothing_else
             }
             for said in one_of_each(SECOND, digest(relay.mission())) {
                 let wrong = match said.body()[0] {
-                    0 | 4..=6 | 8 | 11 => to,
-                    1 | 2 | 7 | 9 | 12 => from,
+                    0 | 4..=6 | 8 | 11 | 15 => to,
+                    1 | 2 | 7 | 9 | 12 | 16 => from,
                     _ => continue,
                 };
                 let mut after = relay.clone();
@@ -254,10 +260,15 @@ fn a_message_from_the_wrong_side_for_the_heading_is_misdirected_and_nothing_else
 }
 
 #[test]
-fn a_message_of_another_mission_is_ignored_from_either_side() {
+fn a_message_of_another_mission_leads_to_a_hello_at_most() {
     for config in [source(), mission(Interference::Field(FIELD))] {
         let (relay, from, to) = relay_4(config);
-        let other = digest(relay.mission()) ^ 0x4000;
+        let own = digest(relay.mission());
+        let other = own ^ 0x4000;
+        let hello = |port| {
+            let neighbour = if port == Port::Upstream { 3 } else { 5 };
+            hearing(1, a_hello(0, own, neighbour, ASKS | FRESH))
+        };
         for said in one_of_each(FIRST, other) {
             if matches!(said, Said::Busy { .. }) {
                 continue;
@@ -265,8 +276,16 @@ fn a_message_of_another_mission_is_ignored_from_either_side() {
             for port in [from, to] {
                 let mut after = relay.clone();
                 after.handle_bytes(Instant::ZERO, port, &framed(4, port, &said));
-                assert_eq!(counted(after.stats()), ["mission", "received"], "{said:?}");
-                assert_eq!(sent(&mut after, Instant::ZERO), []);
+                // That is for hellos and heartbeats to tell: of a view it may be another view alone.
+                let of_a_view = !matches!(said.body()[0], 3 | 10 | 13 | 14);
+                let (expected, greeted) = if of_a_view {
+                    (["received", "view"], Some((port, hello(port))))
+                } else {
+                    (["mission", "received"], None)
+                };
+                assert_eq!(counted(after.stats()), expected, "{said:?}");
+                let greeted: Vec<_> = greeted.into_iter().collect();
+                assert_eq!(sent(&mut after, Instant::ZERO), greeted, "{said:?}");
                 assert_eq!(after.phase(), relay.phase());
             }
         }
@@ -480,11 +499,14 @@ fn tamed(said: Said) -> Said {
             }
             Said::Gather(seats)
         }
-        Said::Proposal(forming) => {
-            let [_, relays, view, version] = forming.numbers;
-            Said::Proposal(Forming {
-                numbers: [3, relays.min(8), view, version],
-                ..forming
+        Said::Proposal(mut proposed) => {
+            proposed.call.place = 3;
+            let SizedView { id, relays } = proposed.agreed;
+            let relays = relays.min(8);
+            Said::Proposal(Proposed {
+                agreed: SizedView { id, relays },
+                votes: proposed.votes.min(relays),
+                ..proposed
             })
         }
         other => other,
@@ -601,16 +623,16 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
             // The pass that is said, and the last one that the relay may have taken up.
             let mut pass = if begun { FIRST } else { 0 };
             let mut last = pass;
-            let mut view = 0;
+            let mut view = ViewId::LOADED;
             for step in steps {
                 if relay.view() != view {
                     *counts.entry("view").or_insert(0) += 1;
                     (view, begun) = (relay.view(), false);
                 }
                 let kind = step.said.body()[0];
-                let onward = [0, 4, 5, 6, 8, 11].contains(&kind);
+                let onward = [0, 4, 5, 6, 8, 11, 15].contains(&kind);
                 let port = if onward == step.right_side { from } else { to };
-                if onward && kind != 11 {
+                if onward && ![11, 15].contains(&kind) {
                     pass = if begun {
                         last + 1
                     } else {
@@ -621,9 +643,13 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                     }
                 }
                 let (number, mission) = match kind {
-                    10..=12 => (view.wrapping_add(1), digest),
+                    10..=12 => {
+                        let low = u16::try_from(view.number() & 0xFFFF).unwrap();
+                        (low.wrapping_add(1), digest)
+                    }
                     3 | 13 | 14 => (0, digest),
-                    _ => (pass, digest.wrapping_add(view)),
+                    15 | 16 => (0, digest.wrapping_add(mark(view.bits()))),
+                    _ => (pass, digest.wrapping_add(mark(view.bits()))),
                 };
                 let number = number.wrapping_add_signed(step.off);
                 let wrong = if step.right_mission { 0 } else { 0x4000 };
@@ -633,6 +659,7 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                     0 | 4 | 5 => 1,
                     6 => 7,
                     11 => 12,
+                    15 => 16,
                     _ => 9,
                 };
                 let answer = one_of_each(number, mission)[answer].clone();

@@ -4,7 +4,7 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Instant, Port, Relay, Wiring};
 
 use super::codec::Said;
-use super::forming::{ASKS, FORMS, FRESH, READY, a_hello, between, soon};
+use super::forming::{ASKS, FORMS, FRESH, READY, a_hello, between, hearing, id, soon};
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, one_of_each, sent};
 
@@ -20,7 +20,13 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
         near.handle_bytes(now, Port::Shared, &between(sender, 6, &hello));
         let heard = (1..=12).contains(&sender) && (1..=4).contains(&sender.abs_diff(6));
         let neighbour = if sender < 6 { 5 } else { 7 };
-        let answer = |from| a_hello(0, mission, from, FRESH);
+        // It hears whoever has just said something, but for nodes that are too far away.
+        let mask = if heard {
+            1 << (sender.abs_diff(6) - 1)
+        } else {
+            0
+        };
+        let answer = |from| hearing(mask, a_hello(0, mission, from, FRESH));
         if heard {
             assert_eq!(counted(near.stats()), ["received"], "{sender}");
         } else {
@@ -61,10 +67,10 @@ fn relay_of_12(own: u16) -> Relay {
 #[test]
 fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
     let now = Instant::ZERO;
-    for (newest, calls) in [(0, false), (5, true)] {
+    for (newest, calls) in [(0, false), (id(5, 1), true)] {
         let mut relay = relay_of_12(6);
         let mission = digest(relay.mission());
-        let hello = |neighbour| a_hello(newest, mission, neighbour, 0);
+        let hello = |neighbour| hearing(1, a_hello(newest, mission, neighbour, 0));
         relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(0)));
         assert!(soon(&mut relay, now).is_empty(), "{newest}");
         relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(6)));
@@ -85,7 +91,7 @@ fn a_pass_waits_for_a_neighbour_that_takes_another() {
     let now = Instant::ZERO;
     let mut relay = relay_of_12(6);
     let mission = digest(relay.mission());
-    let hello = |neighbour| a_hello(0, mission, neighbour, 0);
+    let hello = |neighbour| hearing(1, a_hello(0, mission, neighbour, 0));
     relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(5)));
     let sweep = &one_of_each(FIRST, mission)[0];
     relay.handle_bytes(now, Port::Shared, &between(5, 6, sweep));
@@ -100,4 +106,22 @@ fn a_pass_waits_for_a_neighbour_that_takes_another() {
         ),
         "{out:?}"
     );
+}
+
+/// A link that bears frames one way alone is none: whoever does not hear this relay has not taken it, whatever it says.
+#[test]
+fn a_neighbour_that_does_not_hear_the_relay_is_as_one_that_takes_another() {
+    let now = Instant::ZERO;
+    for (hears, waits) in [(0, true), (0b1110, true), (1, false), (0b1111, false)] {
+        let mut relay = relay_of_12(6);
+        let mission = digest(relay.mission());
+        let hello = hearing(hears, a_hello(0, mission, 6, 0));
+        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello));
+        let sweep = &one_of_each(FIRST, mission)[0];
+        relay.handle_bytes(now, Port::Shared, &between(5, 6, sweep));
+        assert_eq!(counted(relay.stats()), ["received"]);
+        let out = sent(&mut relay, now);
+        let waiting = !out.iter().any(|(_, said)| matches!(said, Said::Sweep(_)));
+        assert_eq!(waiting, waits, "{hears:b}: {out:?}");
+    }
 }

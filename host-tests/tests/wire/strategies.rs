@@ -6,7 +6,9 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay::wire::frame::Header;
 
-use super::codec::{Forming, Said, Seats, Swept, plain, sealed, targets, wire};
+use super::codec::{
+    Call, Decided, Greeting, Proposed, Said, Seats, SizedView, Swept, plain, sealed, targets, wire,
+};
 use super::offered::{NUMBERS, offers};
 
 /// The largest node number.
@@ -253,41 +255,78 @@ fn counts(least: u16) -> BoxedStrategy<u16> {
     prop_oneof![4 => least..=9, 1 => least..=1000, 1 => Just(least), 1 => Just(1000)].boxed()
 }
 
-/// A hello, a proposal, a count or a fence.
+/// The name of a view: of number 1 or more, by a node of a chain.
+fn proposals() -> BoxedStrategy<u32> {
+    let numbers = prop_oneof![4 => 1..8_u32, 1 => 1..=0x003F_FFFF_u32, 1 => Just(0x003F_FFFF)];
+    (numbers, counts(1))
+        .prop_map(|(number, node)| number << 10 | u32::from(node))
+        .boxed()
+}
+
+/// A view that a node has proposed, and its size.
+fn views() -> impl Strategy<Value = SizedView> {
+    (proposals(), counts(1)).prop_map(|(id, relays)| SizedView { id, relays })
+}
+
+fn spans() -> impl Strategy<Value = u16> {
+    prop_oneof![4 => 0..200_u16, 1 => any::<u16>(), 1 => Just(u16::MAX)]
+}
+
+/// A hello, a proposal, a decision or a fence.
 fn formings() -> BoxedStrategy<Said> {
-    let views = || prop_oneof![4 => 0..8_u16, 1 => any::<u16>()];
-    let stamps = || (any::<u16>(), views());
-    let hello = (views(), any::<u16>(), counts(0), stamps(), 0..32_u8).prop_map(
-        |(number, mission, neighbour, (digest, version), flags)| {
-            Said::Hello(Forming {
-                number,
+    let versions = || prop_oneof![4 => 0..8_u16, 1 => any::<u16>()];
+    let stamps = || (any::<u16>(), versions());
+    let newest = prop_oneof![4 => proposals(), 1 => Just(0), 1 => any::<u32>()];
+    let sight = (0..16_u8, 0..32_u8);
+    let hello = (newest, any::<u16>(), counts(0), stamps(), sight).prop_map(
+        |(newest, mission, neighbour, holds, (hears, flags))| {
+            Said::Hello(Greeting {
                 mission,
-                numbers: [neighbour, 0, digest, version],
+                neighbour,
+                newest,
+                holds,
+                hears,
                 flags,
             })
         },
     );
-    let places = (counts(1), counts(1), views());
-    let proposal = (views(), stamps(), places, 0..2_u8).prop_map(
-        |(number, (mission, version), (place, relays, before), flags)| {
-            Said::Proposal(Forming {
-                number,
-                mission,
-                numbers: [place, relays, before, version],
-                flags,
-            })
+    let calls = || {
+        (stamps(), proposals(), counts(1)).prop_map(|(of, view, place)| Call { of, view, place })
+    };
+    // One after the other: what is agreed on, a view, what it was decided by, what is proposed.
+    let order = [proposals(), proposals(), proposals(), proposals()].prop_map(|mut order| {
+        order.sort_unstable();
+        order
+    });
+    let order = prop_oneof![
+        3 => order.clone(),
+        1 => order.prop_map(|[_, a, b, c]| [0, a, b, c]),
+    ];
+    let votes = any::<proptest::sample::Index>();
+    let sizes = (counts(1), votes, proptest::option::of(counts(1)));
+    let proposal = (calls(), order, sizes, spans(), any::<bool>()).prop_filter_map(
+        "proposed before what has come of it",
+        |(call, order, (relays, votes, successor), lease_left, proposer)| {
+            let [agreed, id, decided_by, view] = order;
+            let votes = votes.index(usize::from(relays) + 1);
+            (decided_by < view).then_some(Said::Proposal(Proposed {
+                call: Call { view, ..call },
+                agreed: SizedView { id: agreed, relays },
+                votes: u16::try_from(votes).unwrap(),
+                lease_left,
+                proposer,
+                successor: successor.map(|relays| (decided_by, SizedView { id, relays })),
+            }))
         },
     );
-    let count = (views(), stamps(), counts(1), counts(0)).prop_map(
-        |(number, (mission, version), place, relays)| {
-            Said::Decision(Forming {
-                number,
-                mission,
-                numbers: [place, relays, 0, version],
-                flags: 0,
-            })
-        },
-    );
+    let granted = proptest::option::of(views());
+    let decision = (calls(), granted, spans()).prop_map(|(call, view, lease_left)| {
+        Said::Decision(Decided {
+            call,
+            view,
+            lease_left,
+        })
+    });
     let fence = (
         1..=u16::MAX,
         any::<[u16; 3]>(),
@@ -304,7 +343,27 @@ fn formings() -> BoxedStrategy<Said> {
                 target_m,
             },
         );
-    prop_oneof![hello, proposal, count, fence].boxed()
+    prop_oneof![hello, proposal, decision, fence].boxed()
+}
+
+/// A pulse, or what came back of one.
+fn pulses() -> BoxedStrategy<Said> {
+    let pulse = (any::<[u16; 2]>(), spans()).prop_map(|([number, mission], span)| Said::Pulse {
+        number,
+        mission,
+        lease: span.max(1),
+    });
+    let pulsed =
+        (any::<[u16; 2]>(), any::<bool>()).prop_map(|([number, mission], done)| Said::Pulsed {
+            number,
+            mission,
+            done,
+        });
+    prop_oneof![pulse, pulsed].boxed()
+}
+
+fn questions() -> impl Strategy<Value = u16> {
+    prop_oneof![2 => Just(0), 3 => 0..9_u16, 1 => any::<u16>()]
 }
 
 /// A message in range.
@@ -331,8 +390,8 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         3 => sweeps(0),
         3 => verdicts,
         1 => any::<u16>().prop_map(|number| Said::Busy { number }),
-        1 => (any::<u16>(), any::<bool>())
-            .prop_map(|(mission, answer)| Said::Heartbeat { mission, answer }),
+        1 => (any::<u16>(), questions(), questions())
+            .prop_map(|(mission, ask, answer)| Said::Heartbeat { mission, ask, answer }),
         2 => measured(sweeps(0)),
         2 => asides(sweeps(0)),
         2 => rosters().prop_map(Said::Gather),
@@ -340,6 +399,7 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         2 => tokens(),
         2 => moves(),
         3 => formings(),
+        2 => pulses(),
         2 => offers(),
     ]
     .boxed()

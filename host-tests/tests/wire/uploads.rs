@@ -3,10 +3,14 @@
 
 use host_tests::fixtures::paper;
 use uav_relay::wire::digest::digest;
-use uav_relay::{Duration, Event, Instant, Interference, Mission, Port, Relay, Upload, Wiring};
+use uav_relay::{
+    Duration, Event, Instant, Interference, Mission, Port, Relay, Upload, ViewId, Wiring,
+};
 
-use super::codec::{Forming, Said};
-use super::forming::{ASKS, FLIES, FORMS, FRESH, READY, events};
+use super::codec::{Greeting, Said};
+use super::forming::{
+    ASKS, FLIES, FORMS, FRESH, READY, events, granted, hearing, id, mark, proposed,
+};
 use super::offer::{BYTES, Offer, offer};
 use super::receive::{FIELD, counted, relay};
 use super::sequence::{FIRST, framed, one_of_each, sent};
@@ -36,10 +40,12 @@ pub(crate) fn upload(version: u16, base: u16) -> Offer {
 
 /// A hello of a node that has heard of view 0 alone, and holds the mission of these: digest and version.
 pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
-    Said::Hello(Forming {
-        number: 0,
+    Said::Hello(Greeting {
         mission,
-        numbers: [neighbour, 0, holds.0, holds.1],
+        neighbour,
+        newest: 0,
+        holds,
+        hears: 0,
         flags,
     })
 }
@@ -89,13 +95,17 @@ fn a_newer_mission_is_held_told_and_offered_on_and_a_view_called_for() {
         assert_eq!(events(&mut relay), [Event::Uploaded]);
         assert_eq!(relay.version(), 0, "not flown before it is counted");
         let form = if side == 0 { FORMS } else { 0 };
-        let answer = hello(base, from, mission_id(&newer), FRESH | READY | form);
+        // No message has come from the other side yet.
+        let answer = hello(base, from, mission_id(&newer), FRESH | form);
+        let answer = hearing(1, answer);
         let mut now = vec![(from, answer)];
         if side == 1 {
             // The one before has not said that it holds it.
             now.push((3, Said::Offer(newer)));
         }
-        let call = hello(base, 3, mission_id(&newer), ASKS | FORMS | FRESH | READY);
+        let (hears, ready) = [(1, 0), (0, READY)][side];
+        let call = hello(base, 3, mission_id(&newer), ASKS | FORMS | FRESH | ready);
+        let call = hearing(hears, call);
         assert_eq!(both(&mut relay), [now, vec![(3, call)]]);
         assert_eq!(relay.stats().rejected(), 0);
     }
@@ -121,7 +131,8 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
         ..upload(3, base)
     };
     // What cannot be held is not answered: it would only be offered again.
-    let answer = || vec![(5, hello(base, 5, mission_id(&newer), FRESH | READY))];
+    let answer = hello(base, 5, mission_id(&newer), FRESH);
+    let answer = || vec![(5, hearing(1, answer.clone()))];
     for (other, answer) in [
         (newer, answer()),
         (rival, answer()),
@@ -168,7 +179,7 @@ fn a_hello_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_h
     peers[0].says(&mut relay, NOW, &Said::Offer(own));
     both(&mut relay);
     let (digest, version) = mission_id(&own);
-    let answer = hello(base, 5, mission_id(&own), FRESH | READY);
+    let answer = hearing(1, hello(base, 5, mission_id(&own), FRESH | READY));
     for (holds, expected) in [
         ((base, 0), Some(Said::Offer(own))),
         ((digest - 1, version), Some(Said::Offer(own))),
@@ -193,46 +204,33 @@ fn a_hello_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_h
     assert_eq!(said(&mut relay, NOW), []);
 }
 
-/// A proposal to relay 4, or a count.
-fn forming(tag: u8, view: u16, of: (u16, u16), place: u16) -> Said {
-    let relays = [place, 8, 0, of.1];
-    let forming = Forming {
-        number: view,
-        mission: of.0,
-        numbers: relays,
-        flags: 12 - tag,
-    };
+/// A proposal to relay 4, or a decision.
+fn forming(tag: u8, number: u32, of: (u16, u16), place: u16) -> Said {
     match tag {
-        11 => Said::Proposal(forming),
-        _ => Said::Decision(forming),
+        11 => Said::Proposal(proposed(id(number, 1), of, place, 8)),
+        _ => granted(id(number, 1), of, place, 8),
     }
 }
 
 #[test]
 fn a_proposal_of_another_mission_than_the_one_held_leads_to_a_hello() {
-    for known in [false, true] {
-        let (mut relay, mut peers, base) = relay_4();
-        if known {
-            // Then it is of the same relays, however foreign its mission may be.
-            peers[0].says(&mut relay, NOW, &hello(base, 4, (base, 0), 0));
-        }
-        let newer = mission_id(&upload(2, base));
-        let before = *relay.stats();
-        for proposal in [newer, (base, 2), (base.wrapping_add(1), 0)] {
-            let mut after = relay.clone();
-            let mut peer = peers[0].clone();
-            peer.says(&mut after, NOW, &forming(11, 1, proposal, 3));
-            let (was, is) = (before, after.stats());
-            let raised = (is.view - was.view, is.mission - was.mission);
-            assert_eq!(raised, if known { (1, 0) } else { (0, 1) }, "{proposal:?}");
-            let answer = hello(base, 3, (base, 0), FRESH | READY | FLIES);
-            assert_eq!(said(&mut after, NOW), [(3, answer)]);
-            assert_eq!(after.stats().received, before.received + 1);
-        }
-        peers[0].says(&mut relay, NOW, &forming(11, 1, (base, 0), 3));
-        let on = (5, forming(11, 1, (base, 0), 4));
-        assert_eq!(said(&mut relay, NOW), [on], "its own");
+    let (mut relay, mut peers, base) = relay_4();
+    let newer = mission_id(&upload(2, base));
+    let before = *relay.stats();
+    for proposal in [newer, (base, 2), (base.wrapping_add(1), 0)] {
+        let mut after = relay.clone();
+        let mut peer = peers[0].clone();
+        peer.says(&mut after, NOW, &forming(11, 1, proposal, 3));
+        let (was, is) = (before, after.stats());
+        let raised = (is.view - was.view, is.mission - was.mission);
+        assert_eq!(raised, (1, 0), "{proposal:?}");
+        let answer = hello(base, 3, (base, 0), ASKS | FRESH | FLIES);
+        assert_eq!(said(&mut after, NOW), [(3, hearing(1, answer))]);
+        assert_eq!(after.stats().received, before.received + 1);
     }
+    peers[0].says(&mut relay, NOW, &forming(11, 1, (base, 0), 3));
+    let on = (5, forming(11, 1, (base, 0), 4));
+    assert_eq!(said(&mut relay, NOW), [on], "its own");
 }
 
 #[test]
@@ -261,7 +259,7 @@ fn adopted() -> (Relay, [Peer; 2], u16, Offer) {
         said(&mut relay, NOW),
         [(5, forming(11, 1, mission_id(&newer), 4))]
     );
-    assert_eq!((relay.version(), relay.view()), (0, 0));
+    assert_eq!((relay.version(), relay.view()), (0, ViewId::LOADED));
     peers[1].says(&mut relay, NOW, &forming(12, 1, mission_id(&newer), 5));
     assert_eq!(
         said(&mut relay, NOW),
@@ -273,17 +271,18 @@ fn adopted() -> (Relay, [Peer; 2], u16, Offer) {
 #[test]
 fn a_view_that_is_granted_flies_the_mission_of_its_proposal() {
     let (mut relay, peers, base, newer) = adopted();
-    assert_eq!((relay.version(), relay.view()), (2, 1));
+    assert_eq!((relay.version(), relay.view().number()), (2, 1));
     assert_eq!(digest(relay.mission()), newer.digest());
     let told = events(&mut relay);
     assert_eq!(told, [Event::Reformed, Event::Uploaded, Event::Adopted]);
     assert_eq!(relay.stats().rejected(), 0);
-    let own = newer.digest().wrapping_add(1);
+    let mark = mark(relay.view().bits());
+    let own = newer.digest().wrapping_add(mark);
     // From a pass of the same view, of another view of that mission, of the mission before, of no view of either.
     for (digest, expected) in [
         (own, [0, 0]),
         (own.wrapping_add(5), [1, 0]),
-        (base.wrapping_add(1), [1, 0]),
+        (base.wrapping_add(mark), [1, 0]),
         (base ^ 0x4000, [1, 0]),
     ] {
         let mut after = relay.clone();
@@ -301,7 +300,8 @@ fn a_view_that_is_granted_flies_the_mission_of_its_proposal() {
         let mut after = relay.clone();
         let beat = Said::Heartbeat {
             mission,
-            answer: false,
+            ask: 0,
+            answer: 0,
         };
         peers[0].clone().says(&mut after, NOW, &beat);
         assert_eq!(after.stats().mission, expected);
@@ -326,14 +326,20 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
         peers[1]
             .clone()
             .says(&mut after, NOW, &forming(12, 2, of, 5));
-        assert_eq!((after.version(), after.view()), (2, view), "{of:?}");
+        assert_eq!(
+            (after.version(), after.view().number()),
+            (2, view),
+            "{of:?}"
+        );
         if view == 2 {
             // It still holds a newer one than it flies.
             let [_, later] = both(&mut after);
-            let call = Forming {
-                number: 2,
+            let call = Greeting {
                 mission: base,
-                numbers: [3, 0, next.digest(), 3],
+                neighbour: 3,
+                newest: id(2, 1),
+                holds: (next.digest(), 3),
+                hears: 1,
                 flags: ASKS | FORMS | READY,
             };
             assert_eq!(later, [(3, Said::Hello(call))]);
@@ -383,9 +389,9 @@ fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
         } else {
             (base, 0)
         };
-        let answer = hello(base, 3, holds, FRESH | FLIES);
+        let answer = hearing(1, hello(base, 3, holds, FRESH | FLIES));
         assert_eq!(said(&mut relay, NOW), [(3, answer)]);
-        assert_eq!((relay.version(), relay.view()), (holds.1, 0));
+        assert_eq!((relay.version(), relay.view()), (holds.1, ViewId::LOADED));
         let sweep = &one_of_each(FIRST, newer.digest())[0];
         peer.says(&mut relay, NOW, sweep);
         assert_eq!(relay.stats().view, u32::from(!remembers));

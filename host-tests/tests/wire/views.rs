@@ -1,75 +1,112 @@
 //! A relay in a view of the chain: which digests it takes, what is over for it, and whose call it hands on.
 
 use uav_relay::wire::digest::digest;
-use uav_relay::{Instant, Port, Relay, Wiring};
+use uav_relay::{Event, Instant, Port, Relay, Wiring};
 
-use super::codec::Said;
-use super::forming::{ASKS, FORMS, FRESH, READY, a_hello, events, forming, soon};
+use super::codec::{Proposed, Said, SizedView};
+use super::forming::{
+    ASKS, FORMS, FRESH, READY, a_hello, events, granted, hearing, id, mark, proposed, soon,
+};
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, framed, one_of_each, sent};
 
-/// Relay `own` of 8 with its part in view `view`, which relay 3 has handed it as one of eight; it has nothing to say.
-fn in_view(own: u16, view: u16) -> (Relay, u16) {
+/// Relay `own` of 8 with its part in `view`, which relay `own` - 1 has handed it as one of eight; it has nothing to say.
+fn in_view(own: u16, view: u32) -> (Relay, u16) {
     let mut relay = relay(own, 8, Wiring::Pair);
     let mission = digest(relay.mission());
-    let proposal = Said::Proposal(forming(view, mission, [own - 1, 8, 0], 1));
-    let count = Said::Decision(forming(view, mission, [own + 1, 8, 0], 0));
-    for (port, said) in [(Port::Upstream, &proposal), (Port::Downstream, &count)] {
+    let proposal = Said::Proposal(proposed(view, (mission, 0), own - 1, 8));
+    let decision = granted(view, (mission, 0), own + 1, 8);
+    for (port, said) in [(Port::Upstream, &proposal), (Port::Downstream, &decision)] {
         relay.handle_bytes(Instant::ZERO, port, &framed(own, port, said));
         sent(&mut relay, Instant::ZERO);
     }
     events(&mut relay);
-    assert_eq!(relay.view(), view);
+    assert_eq!(relay.view().bits(), view);
     (relay, mission)
 }
 
+/// Whoever bears another digest is in another view, or flies another mission: which of the two is for a hello to say.
 #[test]
 fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission() {
     let now = Instant::ZERO;
-    for view in [1, 300] {
+    for view in [id(1, 1), id(300, 7), id(4_194_303, 1000)] {
         let (relay, mission) = in_view(4, view);
-        let own = mission.wrapping_add(view);
-        for (off, expected) in [
-            (0, &["received"][..]),
-            (1, &["received", "view"]),
-            (64, &["received", "view"]),
-            (0xFFC0, &["received", "view"]),
-            (65, &["mission", "received"]),
-            (0xFFBF, &["mission", "received"]),
-        ] {
-            let mut after = relay.clone();
-            let sweep = &one_of_each(FIRST, own.wrapping_add(off))[0];
-            after.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, sweep));
-            assert_eq!(counted(after.stats()), expected, "view {view}, {off}");
-            let calls = after.stats().view == 1;
-            let hellos = soon(&mut after, now);
-            let hellos = hellos.iter().filter(|(port, said)| {
-                let forms = matches!(said, Said::Hello(hello) if hello.flags & FORMS != 0);
-                *port == Port::Upstream && forms
-            });
-            assert_eq!(hellos.count() > 0, calls, "view {view}, {off}");
-            // An answer calls for nothing: whoever gave it gets a hello, and with that the number of the view.
-            let mut after = relay.clone();
-            let verdict = &one_of_each(FIRST, own.wrapping_add(off))[1];
-            after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, verdict));
-            let said = soon(&mut after, now);
-            if calls {
-                let hello = a_hello(view, mission, 5, READY);
-                assert_eq!(said, [(Port::Downstream, hello)]);
+        let own = mission.wrapping_add(mark(view));
+        let hello = |neighbour| hearing(1, a_hello(view, mission, neighbour, ASKS | READY));
+        for off in [0, 1, 64, 0xFFC0, 65, 0xFFBF, 0x4000] {
+            let known = off == 0;
+            let expected = if known {
+                &["received"][..]
             } else {
-                assert_eq!(said, []);
+                &["received", "view"]
+            };
+            // An answer comes from the other side, and so does what came back of a pulse.
+            for (kind, port, neighbour) in [
+                (0, Port::Upstream, 3),
+                (15, Port::Upstream, 3),
+                (1, Port::Downstream, 5),
+                (16, Port::Downstream, 5),
+            ] {
+                let mut after = relay.clone();
+                let said = &one_of_each(FIRST, own.wrapping_add(off))[kind];
+                after.handle_bytes(now, port, &framed(4, port, said));
+                let stale = known && neighbour == 5;
+                let mut expected = expected.to_vec();
+                expected.extend(stale.then_some("stale"));
+                assert_eq!(counted(after.stats()), expected, "{view:x}, {off}, {kind}");
+                let out = soon(&mut after, now);
+                if known {
+                    let hellos = out
+                        .iter()
+                        .filter(|(_, said)| matches!(said, Said::Hello(_)));
+                    assert_eq!(hellos.count(), 0, "{out:?}");
+                } else {
+                    assert_eq!(out, [(port, hello(neighbour))], "{view:x}, {off}, {kind}");
+                }
             }
         }
     }
 }
 
+/// A neighbour that has said that it is of this mission is in another view, if its passes are: somebody has missed something.
+#[test]
+fn a_pass_of_another_view_has_the_relay_ask_for_one() {
+    let now = Instant::ZERO;
+    let view = id(2, 1);
+    let (mut relay, mission) = in_view(4, view);
+    let own = mission.wrapping_add(mark(view));
+    for (port, from) in [(Port::Upstream, 4), (Port::Downstream, 4)] {
+        let hello = a_hello(0, mission, from, 0);
+        relay.handle_bytes(now, port, &framed(4, port, &hello));
+    }
+    sent(&mut relay, now);
+    for (kind, port, calls) in [
+        (0, Port::Upstream, true),
+        (8, Port::Upstream, true),
+        (15, Port::Upstream, true),
+        (1, Port::Downstream, false),
+        (16, Port::Downstream, false),
+    ] {
+        let mut after = relay.clone();
+        let said = &one_of_each(FIRST, own.wrapping_add(1))[kind];
+        after.handle_bytes(now, port, &framed(4, port, said));
+        let called = soon(&mut after, now).iter().any(|(port, said)| {
+            *port == Port::Upstream
+                && matches!(said, Said::Hello(hello) if hello.flags & FORMS != 0)
+        });
+        assert_eq!(called, calls, "{said:?}");
+    }
+}
+
 #[test]
 fn heartbeats_bear_the_digest_of_the_mission_in_every_view() {
-    let (mut relay, mission) = in_view(4, 7);
-    for (mission, expected) in [(mission, 0), (mission.wrapping_add(7), 1)] {
+    let view = id(7, 1);
+    let (mut relay, mission) = in_view(4, view);
+    for (mission, expected) in [(mission, 0), (mission.wrapping_add(mark(view)), 1)] {
         let beat = Said::Heartbeat {
             mission,
-            answer: false,
+            ask: 0,
+            answer: 0,
         };
         relay.handle_bytes(
             Instant::ZERO,
@@ -82,32 +119,36 @@ fn heartbeats_bear_the_digest_of_the_mission_in_every_view() {
 
 #[test]
 fn a_late_proposal_of_an_old_view_changes_nothing_and_a_leader_that_insists_hears_of_the_newest() {
-    let (mut relay, mission) = in_view(4, 5);
+    let (mut relay, mission) = in_view(4, id(5, 2));
     let now = Instant::ZERO;
-    for (nth, number) in [(1, 5), (2, 3), (3, 4)] {
-        // Number 5 from another place than the one it was agreed with.
-        let proposal = Said::Proposal(forming(number, mission, [2, 8, 0], 1));
+    let of = (mission, 0);
+    // View 5 from another place than the one it was agreed with.
+    for (nth, view, place) in [(1, id(5, 2), 2), (2, id(5, 1), 3), (3, id(3, 9), 3)] {
+        let proposal = Said::Proposal(proposed(view, of, place, 8));
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
         assert_eq!(soon(&mut relay, now), []);
-        assert_eq!((relay.stats().stale, relay.view()), (nth, 5));
+        assert_eq!((relay.stats().stale, relay.view().bits()), (nth, id(5, 2)));
         assert_eq!((relay.index(), relay.mission().relays()), (4, 8));
         assert_eq!(events(&mut relay), []);
     }
-    let proposal = Said::Proposal(forming(4, mission, [3, 8, 0], 1));
+    let proposal = Said::Proposal(proposed(id(4, 1), of, 3, 8));
     relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
-    let hello = a_hello(6, mission, 3, ASKS | FORMS | READY);
+    let hello = hearing(1, a_hello(id(6, 4), mission, 3, ASKS | FORMS | READY));
     assert_eq!(soon(&mut relay, now), [(Port::Upstream, hello)]);
-    assert_eq!((relay.stats().stale, relay.view()), (4, 5));
+    assert_eq!((relay.stats().stale, relay.view().bits()), (4, id(5, 2)));
 }
 
 #[test]
 fn a_hello_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() {
     let now = Instant::ZERO;
-    let (relay, mission) = in_view(4, 3);
+    let view = id(3, 2);
+    let (relay, mission) = in_view(4, view);
     for (newest, fresh, calls) in [
-        (3, false, true),
-        (4, false, true),
-        (2, false, false),
+        (view, false, true),
+        (id(3, 3), false, true),
+        (id(4, 1), false, true),
+        (id(3, 1), false, false),
+        (id(2, 9), false, false),
         (0, false, false),
         (0, true, true),
     ] {
@@ -115,13 +156,125 @@ fn a_hello_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() 
         let flags = FORMS | if fresh { FRESH } else { 0 };
         let hello = a_hello(newest, mission, 4, flags);
         after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &hello));
-        let known = newest.max(3);
-        let on = a_hello(known, mission, 3, ASKS | FORMS | READY);
+        let known = newest.max(view);
+        let on = hearing(1, a_hello(known, mission, 3, ASKS | FORMS | READY));
         let expected = calls.then_some((Port::Upstream, on));
         assert_eq!(
             soon(&mut after, now),
             expected.into_iter().collect::<Vec<_>>(),
-            "{newest} {fresh}"
+            "{newest:x} {fresh}"
         );
     }
+}
+
+/// A relay that has accepted a view, and not heard that all have, is a member of the one before yet: it says what it has accepted. Once a
+/// pass or a pulse of that view has come, all have accepted it, and it counts.
+#[test]
+fn a_view_counts_once_something_that_was_begun_in_it_has_come() {
+    let now = Instant::ZERO;
+    let view = id(3, 2);
+    let (relay, mission) = in_view(4, view);
+    let own = mission.wrapping_add(mark(view));
+    let accepted = SizedView {
+        id: view,
+        relays: 8,
+    };
+    for begun in [None, Some(0), Some(15)] {
+        let mut after = relay.clone();
+        if let Some(kind) = begun {
+            let said = &one_of_each(FIRST, own)[kind];
+            after.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, said));
+            sent(&mut after, now);
+        }
+        let told = proposed(id(4, 1), (mission, 0), 3, 8);
+        let proposal = framed(4, Port::Upstream, &Said::Proposal(told));
+        after.handle_bytes(now, Port::Upstream, &proposal);
+        let expected = if begun.is_some() {
+            Proposed {
+                agreed: accepted,
+                votes: 1,
+                proposer: false,
+                ..proposed(id(4, 1), (mission, 0), 4, 8)
+            }
+        } else {
+            Proposed {
+                successor: Some((view, accepted)),
+                ..proposed(id(4, 1), (mission, 0), 4, 8)
+            }
+        };
+        let on = (Port::Downstream, Said::Proposal(expected));
+        assert_eq!(sent(&mut after, now), [on], "{begun:?}");
+    }
+}
+
+/// A pulse goes onward, what came of it back; the next one grants the lease, and when it runs out a view is asked for.
+#[test]
+fn a_lease_is_granted_by_the_next_pulse_and_runs_out() {
+    let view = id(3, 2);
+    let (mut relay, mission) = in_view(4, view);
+    let own = mission.wrapping_add(mark(view));
+    let pulse = |number| Said::Pulse {
+        number,
+        mission: own,
+        lease: 160,
+    };
+    let pulsed = |number, done| Said::Pulsed {
+        number,
+        mission: own,
+        done,
+    };
+    let at = Instant::from_millis;
+    let hear = |relay: &mut Relay, ms, port, said: &Said| {
+        relay.handle_bytes(at(ms), port, &framed(4, port, said));
+        sent(relay, at(ms))
+    };
+    let (up, down) = (Port::Upstream, Port::Downstream);
+    assert_eq!(hear(&mut relay, 10, up, &pulse(9)), [(down, pulse(9))]);
+    assert_eq!(
+        hear(&mut relay, 15, up, &pulse(9)),
+        [(up, pulsed(9, false))]
+    );
+    assert_eq!(hear(&mut relay, 20, down, &pulsed(9, false)), []);
+    assert_eq!(relay.stats().repeated, 1);
+    assert_eq!(
+        hear(&mut relay, 30, down, &pulsed(9, true)),
+        [(up, pulsed(9, true))]
+    );
+    assert_eq!(hear(&mut relay, 35, up, &pulse(9)), [(up, pulsed(9, true))]);
+    assert_eq!(
+        relay.lease(),
+        None,
+        "the others may not have taken part yet"
+    );
+    // What does not fit is stale.
+    for (port, said) in [
+        (up, pulse(8)),
+        (down, pulsed(9, true)),
+        (down, pulsed(8, true)),
+    ] {
+        let before = relay.stats().stale;
+        assert_eq!(hear(&mut relay, 40, port, &said), []);
+        assert_eq!(relay.stats().stale, before + 1, "{said:?}");
+    }
+    assert_eq!(hear(&mut relay, 50, up, &pulse(10)), [(down, pulse(10))]);
+    assert_eq!(
+        relay.lease(),
+        Some(at(10 + 16_000)),
+        "from when it was handed on"
+    );
+    // One that begins elsewhere grants nothing.
+    assert_eq!(hear(&mut relay, 60, up, &pulse(50)), [(down, pulse(50))]);
+    assert_eq!(relay.lease(), Some(at(16_010)));
+    let mut now = at(60);
+    while relay.lease().is_some() {
+        now = relay.poll_timeout().unwrap();
+        relay.handle_timeout(now);
+        sent(&mut relay, now);
+    }
+    assert_eq!(now, at(16_010));
+    assert!(events(&mut relay).contains(&Event::LeaseLapsed));
+    let calls = soon(&mut relay, now).iter().any(|(port, said)| {
+        *port == up && matches!(said, Said::Hello(hello) if hello.flags & FORMS != 0)
+    });
+    assert!(calls, "it asks for a view");
 }

@@ -38,7 +38,7 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
 }
 
 /// Questions that may still be answered.
-const OPEN: u16 = 4;
+const OPEN: usize = 4;
 
 /// What is known of a neighbour's being alive.
 #[derive(Clone, Copy, Debug)]
@@ -48,9 +48,9 @@ pub(crate) struct Liveness {
     lost: bool,
     /// Whether it has been heard at all.
     met: bool,
-    /// The last question, 0 before any, and when it was asked.
+    /// The last question, 0 before any, and when it and those before it were asked.
     question: u16,
-    asked: Instant,
+    asked: [Instant; OPEN],
     /// Questions since it was known to be there, and the most of them before an answer lately.
     unanswered: u16,
     longest: u16,
@@ -72,7 +72,7 @@ impl Liveness {
             lost: false,
             met: false,
             question: 0,
-            asked: now,
+            asked: [now; OPEN],
             unanswered: 0,
             longest: QUESTIONS,
         }
@@ -113,20 +113,19 @@ impl Liveness {
             0 => 1,
             number => number,
         };
-        self.asked = now;
+        let [first, second, third, _] = self.asked;
+        self.asked = [now, first, second, third];
         self.unanswered = self.unanswered.saturating_add(1);
         self.question
     }
 
     /// When a question of that number was asked, if it is one of the last few.
-    pub(crate) fn answered(&self, number: u16, tick: Duration) -> Option<Instant> {
-        let before = self.question.wrapping_sub(number);
-        if number == 0 || self.question == 0 || before >= OPEN {
+    pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
+        if number == 0 || self.question == 0 {
             return None;
         }
-        let since = tick.times(u32::from(before)).as_micros();
-        let asked = self.asked.as_micros().saturating_sub(since);
-        Some(Instant::from_micros(asked))
+        let before = self.question.wrapping_sub(number);
+        self.asked.get(usize::from(before)).copied()
     }
 
     /// Its silence so far says nothing; whether it is not lost already.

@@ -312,7 +312,7 @@ impl Neighbour {
 
     /// The neighbour has answered the question of that number: when that was asked.
     pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
-        self.liveness.answered(number, self.tick)
+        self.liveness.answered(number)
     }
 
     /// Whether somebody is there, and takes this relay for its neighbour, too, as far as it has said.

@@ -112,6 +112,7 @@ impl Electorate {
     }
 
     /// The newest view that it knows to be agreed on.
+    #[cfg(test)]
     pub(crate) const fn agreed(&self) -> View {
         self.agreed
     }
@@ -159,7 +160,8 @@ impl Electorate {
             ..before
         };
         if self.member {
-            poll.votes = poll.votes.saturating_add(1);
+            // No more than there are, whatever was told: nobody would read that.
+            poll.votes = poll.votes.saturating_add(1).min(poll.agreed.relays);
             poll.proposer |= proposer == node;
             poll.lease_left = poll.lease_left.min(held.lease_left);
             poll.rest = poll.rest.min(held.rest_of(self.agreed.id));

@@ -339,6 +339,8 @@ impl ViewChange {
         let poll = self
             .electorate
             .vote(node, view, told, context.held)?;
+        // However far ahead it is, this relay has had part in it.
+        self.newest = self.newest.max(view);
         self.state = ViewState::Proposed;
         self.stragglers = Stragglers::NONE;
         self.proposed = Some(Proposed {

@@ -178,6 +178,7 @@ impl Proposal {
         )
     }
 
+    /// What is agreed on, or was decided on, was proposed before.
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (call, agreed, numbers, proposer, successor): Body = read(body)?;
         let [votes, lease_left, rest] = numbers.map(u16::from_le_bytes);
@@ -204,6 +205,12 @@ impl Proposal {
         let (mission_id, view, place) = call
             .checked()
             .filter(|_| known)
+            .filter(|(_, view, _)| {
+                agreed.id < *view
+                    && successor.is_none_or(|successor| {
+                        successor.proposal < *view && successor.view.id <= successor.proposal
+                    })
+            })
             .ok_or(MessageError::Value)?;
         Ok(Self {
             mission_id,

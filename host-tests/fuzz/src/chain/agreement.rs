@@ -1,6 +1,6 @@
 //! From any state to one agreement of all, once nothing is lost any more.
 
-use uav_relay::{Phase, Schedule};
+use uav_relay::{Phase, Schedule, ViewId};
 
 use super::{Chain, Member};
 
@@ -59,7 +59,7 @@ fn phase(member: &Member) -> Phase {
 }
 
 /// Phase, view, place in it, its size, and neighbours: what a failure shows.
-fn state(member: &Member) -> (Phase, u16, u16, u16, [Option<u16>; 2]) {
+fn state(member: &Member) -> (Phase, ViewId, u16, u16, [Option<u16>; 2]) {
     let relay = member.watched.relay();
     let left = relay.mission().relays();
     let (view, index) = (relay.view(), relay.index());

@@ -2,7 +2,7 @@
 
 use uav_relay::wire::message::Message;
 
-/// The number of the pass that a message is of.
+/// The number of the pass that a message is of; pulses have numbers of their own.
 pub(super) const fn number_of(message: &Message) -> Option<u16> {
     Some(match message {
         Message::Sweep(sweep) => sweep.number,
@@ -12,6 +12,8 @@ pub(super) const fn number_of(message: &Message) -> Option<u16> {
         Message::Token(token) => token.number,
         Message::Moved(moved) => moved.number,
         Message::Heartbeat { .. }
+        | Message::Pulse(_)
+        | Message::Pulsed(_)
         | Message::Hello(_)
         | Message::Proposal(_)
         | Message::Decision(_)
