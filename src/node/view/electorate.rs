@@ -15,6 +15,7 @@
 //!
 //! | the poll of the newest view that anybody there knows to be agreed on | decision |
 //! | --- | --- |
+//! | all relays of the mission are there, members or not | a view of them all: nobody else could hold anything |
 //! | not more than half of its members, nor half with the one that proposed it | refused |
 //! | enough, and a member has accepted a successor that may have been agreed on | that one again, of the latest proposal; the leader proposes anew from there |
 //! | enough otherwise | a view of all that are there |
@@ -227,20 +228,22 @@ pub(crate) fn rest(poll: &Poll, most: u16) -> u16 {
     poll.rest.max(lease_left).min(most)
 }
 
-/// The decision on `proposal`, which has come through `relays`, by the `poll` of them.
-pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16) -> Outcome {
+/// The decision on `proposal`, which has come through `relays` of `all`, by the `poll` of them.
+pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Outcome {
+    let whole = View {
+        id: proposal,
+        relays,
+    };
+    if relays == all {
+        return Outcome::View(whole);
+    }
     // Of two halves the one with the proposer is the larger.
     let there = 2 * u32::from(poll.votes) + u32::from(poll.proposer);
     if there <= u32::from(poll.agreed.relays) {
         return Outcome::Refused;
     }
-    Outcome::View(poll.successor.map_or(
-        View {
-            id: proposal,
-            relays,
-        },
-        |successor| successor.view,
-    ))
+    let successor = poll.successor.map(|successor| successor.view);
+    Outcome::View(successor.unwrap_or(whole))
 }
 
 #[cfg(test)]
@@ -311,7 +314,7 @@ mod tests {
         /// What is decided on a proposal to `nodes`; the last `accept` of them hear of it.
         fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Outcome {
             let poll = self.poll(nodes, proposal);
-            let outcome = decide(&poll, proposal, count(nodes));
+            let outcome = decide(&poll, proposal, count(nodes), u16::try_from(self.0.len()).unwrap());
             if let Outcome::View(view) = outcome {
                 for &node in nodes.iter().rev().take(accept) {
                     assert!(self.0[usize::from(node) - 1].accept(proposal, poll.agreed, Some(view)));
@@ -414,10 +417,22 @@ mod tests {
         assert_eq!(chain.propose(&[2, 3], id(3, 2), 2), granted(id(3, 2), 2));
     }
 
+    /// Were they refused, a chain of which most were switched off and on again would never fly any more.
+    #[test]
+    fn all_of_the_mission_are_a_view_whatever_they_remember() {
+        let mut chain = Chain::of(3);
+        assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 1), granted(id(1, 1), 3));
+        for at in [0, 1] {
+            chain.0[at] = Electorate::new(3, 1);
+        }
+        assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 3), granted(id(2, 1), 3));
+        assert_eq!(chain.propose(&[1, 2], id(3, 1), 2), granted(id(3, 1), 2));
+    }
+
     #[test]
     fn of_two_that_were_accepted_the_later_proposal_is_decided_on_again() {
         for accepted_first in [1, 3] {
-            let mut chain = Chain::of(3);
+            let mut chain = Chain::of(4);
             let early = Successor {
                 proposal: id(1, 1),
                 view: View {
@@ -489,7 +504,7 @@ mod tests {
         chain.0[2].commit();
         let poll = chain.poll(&[2, 3], id(2, 2));
         assert_eq!((poll.agreed.id, poll.votes), (id(1, 1), 1));
-        assert_eq!(decide(&poll, id(2, 2), 2), Outcome::Refused);
+        assert_eq!(decide(&poll, id(2, 2), 2, 4), Outcome::Refused);
     }
 
     #[test]

@@ -382,14 +382,18 @@ impl ViewChange {
             view, place, poll, ..
         } = proposed;
         let outcome = if context.member.settings.quorum {
-            electorate::decide(&poll, view, place)
+            electorate::decide(&poll, view, place, context.member.all)
         } else {
             Outcome::View(View {
                 id: view,
                 relays: place,
             })
         };
-        let lease_left = electorate::rest(&poll, context.longest_lease());
+        let lease_left = if place == context.member.all {
+            0
+        } else {
+            electorate::rest(&poll, context.longest_lease())
+        };
         let decided = match outcome {
             Outcome::Refused => None,
             Outcome::View(view) => Some(view),
