@@ -323,8 +323,8 @@ impl Relay {
     /// # Errors
     /// [`RecordError::Base`] if it was stored by a relay that was loaded with another mission, [`RecordError::Begun`] if the relay
     /// has begun to talk or to compute. Nothing has changed then.
-    pub fn resume_view(&mut self, record: &ViewRecord) -> Result<(), RecordError> {
-        self.node.resume_view(record)
+    pub fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
+        self.node.resume_view(now, record)
     }
 
     /// Until when it may hold what was agreed on without hearing more: by then nobody else flies anything else. `None` before that is

@@ -93,6 +93,11 @@ impl Lease {
         }
     }
 
+    /// It was in a view before it was switched on: the others may count on it for as long as a lease can take.
+    pub(crate) fn resume(&mut self, settings: &Settings) {
+        self.relied_on = self.relied_on + longest_lease(settings);
+    }
+
     /// Until when this relay may hold what was agreed on; `None` where that is not known, or has run out.
     pub(crate) const fn until(&self) -> Option<Instant> {
         match self.state {

@@ -846,9 +846,11 @@ impl Node {
     }
 
     /// A relay that has just been switched on has said what is in `record`.
-    pub(crate) fn resume_view(&mut self, record: &ViewRecord) -> Result<(), RecordError> {
+    pub(crate) fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
         let untouched = self.round.is_untouched();
-        self.view.resume(&self.member, record, untouched)
+        self.view.resume(now, &self.member, record, untouched)?;
+        self.lease.resume(&self.member.settings);
+        Ok(())
     }
 
     /// The next message to send, to which node at which side. Call until there is none.

@@ -162,6 +162,7 @@ impl ViewChange {
     /// A relay that has just been switched on, `untouched` or not, has said what is in `record`. It asks for a view.
     pub(crate) fn resume(
         &mut self,
+        now: Instant,
         member: &Member,
         record: &ViewRecord,
         untouched: bool,
@@ -178,7 +179,7 @@ impl ViewChange {
         self.newest = electorate.promised();
         if self.newest > ViewId::LOADED {
             self.asks = true;
-            self.ask_at = Some(Instant::ZERO);
+            self.ask_at = Some(now + PAUSE);
         }
         Ok(())
     }

@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(first.view_record(), relay(3).view_record());
         let digest = crate::wire::digest::digest(first.mission());
         let record = ViewRecord::new(digest, busy());
-        assert_eq!(first.resume_view(&record), Ok(()));
+        assert_eq!(first.resume_view(Instant::ZERO, &record), Ok(()));
         assert_eq!(first.view_record(), record);
         let same = ViewRecord::from_bytes(&record.to_bytes()).unwrap();
         assert_eq!(first.view_record(), same);
@@ -300,14 +300,14 @@ mod tests {
     fn a_record_is_for_a_relay_of_its_mission_that_has_not_begun() {
         let record = relay(3).view_record();
         let mut other = relay(4);
-        assert_eq!(other.resume_view(&record), Err(RecordError::Base));
+        assert_eq!(other.resume_view(Instant::ZERO, &record), Err(RecordError::Base));
         let digest = crate::wire::digest::digest(relay(3).mission());
         let stray = ViewRecord::new(digest.wrapping_add(1), busy());
-        assert_eq!(relay(3).resume_view(&stray), Err(RecordError::Base));
+        assert_eq!(relay(3).resume_view(Instant::ZERO, &stray), Err(RecordError::Base));
         let mut twice = relay(3);
         let busy = ViewRecord::new(digest, busy());
-        assert_eq!(twice.resume_view(&busy), Ok(()));
-        assert_eq!(twice.resume_view(&busy), Err(RecordError::Begun));
+        assert_eq!(twice.resume_view(Instant::ZERO, &busy), Ok(()));
+        assert_eq!(twice.resume_view(Instant::ZERO, &busy), Err(RecordError::Begun));
         // The leader of a chain begins by itself.
         let mission = *relay(3).mission();
         let identity = Identity {
@@ -322,6 +322,6 @@ mod tests {
         {
             leader.handle_timeout(leader.poll_timeout().unwrap_or(now));
         }
-        assert_eq!(leader.resume_view(&record), Err(RecordError::Begun));
+        assert_eq!(leader.resume_view(Instant::ZERO, &record), Err(RecordError::Begun));
     }
 }

@@ -56,7 +56,7 @@ impl Chain {
                 seed: rng.random(),
                 now: Instant::ZERO,
             };
-            let relay = switched_on(&setup, start, None)?;
+            let relay = switched_on(&setup, start, None, None)?;
             members.push(Member {
                 node: index,
                 lines: [Line::default(); 2],
@@ -285,7 +285,10 @@ impl Chain {
                     seed: self.rng.random(),
                     now,
                 };
-                let Ok(relay) = switched_on(&self.setup, start, member.stored.as_ref()) else {
+                // As a firmware has it in its flash before anything is sent.
+                let record = member.relay.view_record();
+                let stored = member.stored.as_ref();
+                let Ok(relay) = switched_on(&self.setup, start, stored, Some(&record)) else {
                     return;
                 };
                 member.swept += member.relay.stats().sweeps;

@@ -2,7 +2,7 @@
 
 use uav_relay::SetupError;
 use uav_relay::wire::upload::Upload;
-use uav_relay::{Identity, Instant, Relay, Settings};
+use uav_relay::{Identity, Instant, Relay, Settings, ViewRecord};
 
 use super::super::forge::NETWORK;
 use super::super::setup::Setup;
@@ -23,6 +23,7 @@ pub(super) fn switched_on(
     setup: &Setup,
     start: Start,
     stored: Option<&Upload>,
+    record: Option<&ViewRecord>,
 ) -> Result<Relay, SetupError> {
     let Start {
         index,
@@ -46,6 +47,10 @@ pub(super) fn switched_on(
     if let Some(upload) = stored {
         let resumed = relay.resume(upload);
         debug_assert_eq!(resumed, Ok(()), "it was uploaded for this mission");
+    }
+    if let Some(record) = record {
+        let resumed = relay.resume_view(now, record);
+        debug_assert_eq!(resumed, Ok(()), "it has left it itself");
     }
     Ok(relay)
 }
