@@ -298,9 +298,9 @@ impl Ledger {
         let there = [at > 0, at + 1 < scenario.relays()];
         for event in turn.events {
             match event {
-                Event::NeighbourLost(of) => self.noticed[side(*of)] = true,
-                Event::NeighbourBack(of) => self.noticed[side(*of)] = false,
-                Event::MissionMismatch(_) => prop_assert!(false, "all fly one mission"),
+                Event::NeighbourLost { side: of, .. } => self.noticed[side(*of)] = true,
+                Event::NeighbourBack { side: of, .. } => self.noticed[side(*of)] = false,
+                Event::MissionMismatch { .. } => prop_assert!(false, "all fly one mission"),
                 _ => {}
             }
         }

@@ -215,7 +215,7 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
         (tail.phase(), tail.stats().mission, tail.stats().rejected()),
         (Phase::Idle, 1, 1)
     );
-    assert_eq!(events(&mut tail), [Event::MissionMismatch(Side::Upstream)]);
+    assert_eq!(events(&mut tail), [Event::MissionMismatch { node: 1 }]);
     assert!(drain(&mut tail, now).is_empty());
     assert_eq!(tail.setpoint(), None);
 }
@@ -286,10 +286,10 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
                 .map(|event| (now.since(start).as_micros() / 1_000, event)),
         );
     }
-    assert_eq!(seen, [(15_000, Event::NeighbourLost(Side::Upstream))]);
+    assert_eq!(seen, [(15_000, Event::NeighbourLost { side: Side::Upstream, node: 1 })]);
     assert!((8..=30).contains(&asked), "{asked} heartbeats in a minute");
     tail.handle_bytes(now, Port::Upstream, &beat);
-    assert_eq!(events(&mut tail), [Event::NeighbourBack(Side::Upstream)]);
+    assert_eq!(events(&mut tail), [Event::NeighbourBack { side: Side::Upstream, node: 1 }]);
     assert_eq!(
         tail.poll_timeout(),
         Some(now + Duration::from_millis(5_000))
