@@ -163,7 +163,6 @@ impl Relay {
                         &mut self.node,
                         now,
                         self.network,
-                        self.counter,
                         port,
                         plain,
                     );
@@ -246,9 +245,6 @@ impl Relay {
     /// Linear in the length of the frame; a tag, where frames are signed.
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
-        if self.node.stands_down() {
-            return None;
-        }
         let sender = self.node.member().node;
         let mut header = Header {
             network: self.network,
@@ -258,6 +254,9 @@ impl Relay {
         };
         #[cfg(feature = "auth")]
         if let Some(session) = &mut self.session {
+            if self.node.stands_down() {
+                return None;
+            }
             // A counter is never used twice: after four billion frames a new epoch is due.
             if self.counter == u32::MAX {
                 return None;

@@ -349,11 +349,39 @@ impl Node {
             let node = self.member.node;
             self.raise_about(About::Index, Side::Upstream, node);
         }
-        let holds = self.lease.until().is_some_and(|until| until > now);
+        let holds = self.holds(now);
         let placed = self.setpoint().is_some();
         if self.namesake.hear(now, claim, holds, &settings) && placed {
             self.raise(Event::SetpointChanged);
         }
+    }
+
+    fn holds(&self, now: Instant) -> bool {
+        self.lease.until().is_some_and(|until| until > now)
+    }
+
+    /// Whether it stands down from now on, as it holds no lease any more and another node of its number takes part.
+    fn gives_way(&mut self, now: Instant) -> bool {
+        let holds = self.holds(now);
+        let placed = self.setpoint().is_some();
+        let down = self.namesake.review(now, holds, &self.member.settings);
+        if down && placed {
+            self.raise(Event::SetpointChanged);
+        }
+        down
+    }
+
+    /// What it says while it stands down: a hello to its own number, as one that has taken part in nothing.
+    fn next_to_namesake(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
+        if !self.namesake.take_hello() {
+            return None;
+        }
+        let hello = Hello {
+            fresh: true,
+            form: false,
+            ..self.hello(now, Side::Upstream, false, 0)
+        };
+        Some((Side::Upstream, self.member.node, Message::Hello(hello)))
     }
 
     /// Node `from` was heard at the port of side `through`: at that of the other side than its own, it may be heard at both.
@@ -578,10 +606,13 @@ impl Node {
     /// Handles what has run out by `now`, each layer once; the work is that of one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         if self.stands_down() {
-            if !self.namesake.handle_timeout(now) {
+            if !self.namesake.handle_timeout(now, &self.member.settings) {
                 return;
             }
             self.stand_up(now);
+        }
+        if self.gives_way(now) {
+            return;
         }
         let solved = self.is_solving(now);
         let context = of(
@@ -969,7 +1000,7 @@ impl Node {
     /// The next message to send, to which node at which side. Call until there is none.
     pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         if self.stands_down() {
-            return None;
+            return self.next_to_namesake(now);
         }
         if let Some(message) = self.next_of_a_round(now) {
             return Some(message);

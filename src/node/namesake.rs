@@ -2,32 +2,30 @@
 //!
 //! The other one *takes part* if it says a hello that is not fresh, a pass, what comes back of one, or anything of a view. Then
 //!
-//! | this relay | hears a frame under its own number | what it does |
+//! | this relay | what happens | what it does |
 //! | --- | --- | --- |
-//! | takes part, with a valid lease | any | `Event::IndexTaken`, and goes on |
-//! | is fresh, or holds no valid lease | the other one does not take part, as far as it says | `Event::IndexTaken`, and goes on |
-//! | is fresh, or holds no valid lease | the other one takes part | `Event::IndexTaken`; stands down |
-//! | stands down | any that counts | goes on standing down |
-//! | stands down | nothing that counts for twice `dead_after`, and up to an eighth more by chance | takes part again |
+//! | any | a frame under its own number, the first for twice `dead_after` | `Event::IndexTaken` |
+//! | holds a valid lease | the other one takes part | goes on |
+//! | is fresh, or holds no valid lease | the other one takes part, or did within twice `dead_after` | stands down |
+//! | stands down | every `probe_after` | says a hello to its own number, so that the other one knows; nothing where frames are signed |
+//! | stands down | the other one takes part | goes on standing down |
+//! | stands down | the other one was not heard to for twice `dead_after`, and up to an eighth more by chance | takes part again |
 //! | stands down | its firmware says that the other one is gone | takes part again |
 //!
-//! A relay that stands down says nothing, takes nothing in and has no set-point. So of two relays with one number the one that was
+//! A relay that stands down says nothing else, takes nothing in and has no set-point. So of two relays with one number the one that was
 //! switched on later is silent; if they were at the same time, both may be, until chance has one come back first.
 //!
 //! *Where frames are signed* most of what goes to others cannot be checked: the tag of a message is over nonces that only its two ends
 //! know. What can be is a handshake, since its nonces stand in it. One with the right tag and a larger epoch than this relay's counts as
 //! of a node that takes part: it can be no recorded one of this relay, and the neighbours will believe the other one and not this. Anything
-//! else may be forged or played again: it raises the event, and has nobody stand down. Of two relays with one number and two epochs the
-//! neighbours take the one with the larger, and the other one stands down once it has no lease any more.
+//! else may be forged or played again: it raises the event and has nobody stand down, but who stands down goes on with it. So of two
+//! relays with one number and two epochs the neighbours take the one with the larger, and the other one stands down once it has no lease.
 //!
-//! A relay's own frame may come back to it from its radio, so one that bears one of the last eight counters is its own.
+//! A radio must not hand a relay its own frames: it could not tell them from another's, and would stand down.
 
 use crate::jitter::Jitter;
 use crate::settings::Settings;
 use crate::time::Instant;
-
-/// A frame whose counter is so many before the next one may be this relay's own.
-const ECHO: u32 = 8;
 
 /// What a frame under this relay's own number says of its sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -39,19 +37,18 @@ pub(crate) enum Claim {
     TakesPart,
 }
 
-/// Whether a frame with that counter may be this relay's own, which sends `next` next.
-pub(crate) const fn is_echo(counter: u32, next: u32) -> bool {
-    let before = next.wrapping_sub(counter);
-    before >= 1 && before <= ECHO
-}
-
 /// What is known of another node of this relay's number.
 #[derive(Clone, Debug)]
 pub(crate) struct Namesake {
     /// When a frame under this number, or a neighbour's number at both ports, was heard last.
     heard: [Option<Instant>; 2],
+    /// When the other one was heard to take part last.
+    claimed: Option<Instant>,
     /// Until when this relay stands down, if it does.
     until: Option<Instant>,
+    /// When it says so next, and whether it is time to.
+    say_at: Instant,
+    due: bool,
     jitter: Jitter,
 }
 
@@ -68,7 +65,10 @@ impl Namesake {
     pub(crate) fn new(seed: u32) -> Self {
         Self {
             heard: [None; 2],
+            claimed: None,
             until: None,
+            say_at: Instant::ZERO,
+            due: false,
             jitter: Jitter::new(seed),
         }
     }
@@ -92,41 +92,74 @@ impl Namesake {
         holds: bool,
         settings: &Settings,
     ) -> bool {
-        let stood_down = self.stands_down();
         let counts = match claim {
-            Claim::Unproven => false,
-            Claim::There => stood_down,
-            Claim::TakesPart => stood_down || !holds,
+            Claim::TakesPart => true,
+            Claim::Unproven => self.is_claimed(now, settings),
+            Claim::There => false,
         };
         if counts {
-            self.until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
+            self.claimed = Some(now);
         }
-        counts && !stood_down
+        if counts && self.stands_down() {
+            self.wait(now, settings);
+        }
+        self.review(now, holds, settings)
+    }
+
+    fn is_claimed(&self, now: Instant, settings: &Settings) -> bool {
+        let most = settings.dead_after.times(2);
+        self.claimed
+            .is_some_and(|claimed| now.since(claimed) <= most)
+    }
+
+    fn wait(&mut self, now: Instant, settings: &Settings) {
+        self.until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
+    }
+
+    /// Whether it stands down from now on: the other one takes part, and this one `holds` no valid lease.
+    pub(crate) fn review(&mut self, now: Instant, holds: bool, settings: &Settings) -> bool {
+        let begins = !holds && !self.stands_down() && self.is_claimed(now, settings);
+        if begins {
+            self.wait(now, settings);
+            self.say_at = now + settings.probe_after;
+            self.due = true;
+        }
+        begins
     }
 
     pub(crate) const fn stands_down(&self) -> bool {
         self.until.is_some()
     }
 
+    /// Whether a hello to its own number is due; it is taken for said then.
+    pub(crate) const fn take_hello(&mut self) -> bool {
+        core::mem::replace(&mut self.due, false)
+    }
+
     /// Whether it takes part again from now on.
-    pub(crate) fn handle_timeout(&mut self, now: Instant) -> bool {
+    pub(crate) fn handle_timeout(&mut self, now: Instant, settings: &Settings) -> bool {
+        if self.say_at <= now {
+            self.say_at = now + settings.probe_after;
+            self.due = true;
+        }
         let over = self.until.is_some_and(|until| until <= now);
         over && self.clear()
     }
 
     /// The other one is gone; whether it had this relay stand down.
     pub(crate) const fn clear(&mut self) -> bool {
+        self.claimed = None;
         self.until.take().is_some()
     }
 
-    pub(crate) const fn next_timeout(&self) -> Option<Instant> {
-        self.until
+    pub(crate) fn next_timeout(&self) -> Option<Instant> {
+        self.until.map(|until| until.min(self.say_at))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Claim, Namesake, Settings, Twice, is_echo};
+    use super::{Claim, Namesake, Settings, Twice};
     use crate::time::Instant;
 
     fn at(seconds: u64) -> Instant {
@@ -152,14 +185,26 @@ mod tests {
         let settings = Settings::default();
         let mut namesake = Namesake::new(1);
         assert!(namesake.hear(at(0), Claim::TakesPart, false, &settings));
-        assert!(!namesake.hear(at(20), Claim::There, false, &settings), "it does already");
-        // What may be forged keeps nobody down.
-        namesake.hear(at(40), Claim::Unproven, false, &settings);
-        assert!(!namesake.handle_timeout(at(49)));
-        assert!(namesake.next_timeout().is_some_and(|until| until >= at(50) && until <= at(65)));
-        assert!(namesake.handle_timeout(at(65)) && !namesake.stands_down());
+        let again = namesake.hear(at(20), Claim::TakesPart, false, &settings);
+        assert!(!again, "it does already");
+        // A relay that stands down as well keeps nobody down.
+        namesake.hear(at(40), Claim::There, false, &settings);
+        assert!(!namesake.handle_timeout(at(49), &settings) && namesake.take_hello());
+        assert!(namesake.handle_timeout(at(55), &settings) && !namesake.stands_down());
         assert!(namesake.hear(at(70), Claim::TakesPart, false, &settings));
         assert!(namesake.clear() && !namesake.stands_down() && !namesake.clear());
+    }
+
+    #[test]
+    fn who_loses_its_lease_while_the_other_takes_part_stands_down_then() {
+        let settings = Settings::default();
+        let mut namesake = Namesake::new(1);
+        assert!(!namesake.hear(at(0), Claim::Unproven, false, &settings));
+        assert!(!namesake.hear(at(0), Claim::TakesPart, true, &settings));
+        // What cannot be checked begins nothing, but goes on with it.
+        assert!(!namesake.hear(at(25), Claim::Unproven, true, &settings));
+        assert!(!namesake.clone().review(at(56), false, &settings));
+        assert!(namesake.review(at(54), false, &settings));
     }
 
     #[test]
@@ -170,11 +215,5 @@ mod tests {
         assert!(news(1, Twice::Own) && news(1, Twice::Neighbour));
         assert!(!news(31, Twice::Own) && !news(60, Twice::Own));
         assert!(news(91, Twice::Own) && news(91, Twice::Neighbour));
-    }
-
-    #[test]
-    fn a_relay_does_not_take_its_own_frame_for_anothers() {
-        assert!(is_echo(7, 8) && is_echo(0, 8) && is_echo(u32::MAX, 0));
-        assert!(!is_echo(8, 8) && !is_echo(0, 9) && !is_echo(900, 8));
     }
 }

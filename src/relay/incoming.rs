@@ -2,7 +2,7 @@
 
 use super::Port;
 use crate::node::Node;
-use crate::node::namesake::{Claim, is_echo};
+use crate::node::namesake::Claim;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
@@ -17,12 +17,11 @@ pub(super) enum Addressed<'a> {
     ByNamesake(Opened<'a>),
 }
 
-/// One frame, decoded from COBS: whether it is intact, and what it is to this relay, which sends the frame of number `next` next.
+/// One frame, decoded from COBS: whether it is intact, and what it is to this relay.
 pub(super) fn addressed<'a>(
     node: &mut Node,
     now: Instant,
     network: u16,
-    next: u32,
     port: Port,
     plain: &'a [u8],
 ) -> Option<Addressed<'a>> {
@@ -45,7 +44,7 @@ pub(super) fn addressed<'a>(
         bump(&mut stats.foreign);
         return None;
     }
-    let namesake = header.sender == own && !is_echo(header.counter, next);
+    let namesake = header.sender == own;
     if header.destination != own && port == Port::Shared {
         bump(&mut stats.overheard);
         return namesake.then_some(Addressed::ByNamesake(frame));

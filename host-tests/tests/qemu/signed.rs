@@ -36,7 +36,7 @@ fn five_that_sign_settle_where_the_simulated_chain_does() {
             let mut lines = fleet.of_drone(drone).skip(1);
             assert_eq!(
                 lines.next().unwrap().text,
-                "frames are signed, epoch 77; it cannot be kept: for a test bench only"
+                "frames are signed, epoch 77; it cannot be kept: raise the epoch of the block before the next start"
             );
         }
     }
