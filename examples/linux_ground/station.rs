@@ -146,7 +146,7 @@ fn say(now: Instant, plan: &Plan, progress: Progress) -> Result<(), String> {
         ),
         Progress::Flown { by, view } => line(
             now,
-            format_args!("flown: relay {by} flies version {version}, view {view} of the chain"),
+            format_args!("flown: relay {by} flies version {version}, view {} of the chain", view.number()),
         ),
         // The others are the program's end.
         _ => Ok(()),

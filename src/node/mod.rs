@@ -46,6 +46,7 @@ use crate::settings::{Identity, Method, Settings, Wiring};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
+#[cfg(feature = "upload")]
 use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Hello, Message};

@@ -31,6 +31,10 @@ use crate::time::Instant;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Claim {
     /// Nothing that could be trusted.
+    #[cfg_attr(
+        not(feature = "auth"),
+        expect(dead_code, reason = "everything is trusted where nothing is signed")
+    )]
     Unproven,
     /// It is there, and takes part in nothing as far as it says.
     There,
@@ -174,7 +178,11 @@ mod tests {
             for claim in [Claim::Unproven, Claim::There, Claim::TakesPart] {
                 let mut namesake = Namesake::new(1);
                 let down = namesake.hear(at(0), claim, holds, &settings);
-                assert_eq!(down, claim == Claim::TakesPart && !holds, "{claim:?} {holds}");
+                assert_eq!(
+                    down,
+                    claim == Claim::TakesPart && !holds,
+                    "{claim:?} {holds}"
+                );
                 assert_eq!(namesake.stands_down(), down);
             }
         }

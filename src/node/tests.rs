@@ -261,7 +261,7 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
                 node.ask_number(NOW + step.times(2));
                 node.ask_number(now);
             }
-            let from = if ground { 0 } else { 1 };
+            let from = u16::from(!ground);
             assert!(node.handle_message(now, Side::Upstream, from, &withheld));
             assert_eq!((node.stats().stale, node.update.latest()), (1, held));
             let mut answer = None;

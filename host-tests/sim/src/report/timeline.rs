@@ -147,7 +147,9 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         return false;
     }
     match one.what {
-        "lost" => one.other == moment.other,
+        "lost" | "unheard" | "stranger" | "other key" | "old epoch" | "namesake" => {
+            one.other == moment.other
+        }
         // Each of two neighbours finds the other.
         "found" => {
             one.other == Some(moment.relay) && moment.other == Some(one.relay)
@@ -159,7 +161,6 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         "silent" | "on" => one.at_s.to_bits() == moment.at_s.to_bits(),
         "held" | "adopted" => one.version == moment.version,
         "cut" | "lapsed" => true,
-        "unheard" | "stranger" | "other key" | "old epoch" | "namesake" => one.other == moment.other,
         _ => false,
     }
 }

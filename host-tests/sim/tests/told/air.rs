@@ -3,11 +3,11 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay_sim::mission::mission as of_scenario;
-use uav_relay_sim::scenario::Scenario;
 use uav_relay::{
     Auth, Event, Ground, Identity, Instant, Key, Mission, Port, Relay, Settings, Wiring,
 };
+use uav_relay_sim::mission::mission as of_scenario;
+use uav_relay_sim::scenario::Scenario;
 
 /// How long a frame takes.
 const STEP_MS: u64 = 10;

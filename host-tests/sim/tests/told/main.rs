@@ -4,6 +4,8 @@
     clippy::unwrap_used,
     clippy::panic,
     clippy::indexing_slicing,
+    clippy::unnecessary_wraps,
+    clippy::redundant_closure_for_method_calls,
     reason = "as every test may"
 )]
 
@@ -40,8 +42,14 @@ fn who_is_lost_and_who_is_found_is_told_by_its_number() {
     lost.sort_unstable();
     assert_eq!(lost, [(2, Some(3)), (4, Some(3))]);
     let found = of(&outcome, |what| matches!(what, Turning::Found(_)));
-    assert!(found.contains(&(2, Some(4))) && found.contains(&(4, Some(2))), "{found:?}");
-    assert!(found.iter().all(|(_, other)| *other != Some(3)), "{found:?}");
+    assert!(
+        found.contains(&(2, Some(4))) && found.contains(&(4, Some(2))),
+        "{found:?}"
+    );
+    assert!(
+        found.iter().all(|(_, other)| *other != Some(3)),
+        "{found:?}"
+    );
 }
 
 /// Relay 3 does not hear relay 2: that one hears it, and has to be told why the two are no neighbours.
@@ -55,7 +63,10 @@ fn a_relay_that_is_not_heard_is_told_by_whom() {
         until: None,
     }];
     let outcome = run(setup).unwrap();
-    assert_eq!(of(&outcome, |what| what == Turning::Unheard), [(2, Some(3))]);
+    assert_eq!(
+        of(&outcome, |what| what == Turning::Unheard),
+        [(2, Some(3))]
+    );
 }
 
 /// No frame that is lost on the way is taken for a deaf node, a false key or an old epoch.

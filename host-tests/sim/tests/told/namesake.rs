@@ -62,7 +62,12 @@ fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
     for seed in 0..6 {
         let mission = mission(4);
         let mut air = Air::of(&mission, |_| None, 0.1 * (seed % 3) as f64);
-        let mut other = relay(&mission, 3, None, uav_relay::Instant::from_millis(77 + seed));
+        let mut other = relay(
+            &mission,
+            3,
+            None,
+            uav_relay::Instant::from_millis(77 + seed),
+        );
         other.handle_timeout(air.now);
         let other = air.join(other);
         air.run(400);
@@ -83,10 +88,17 @@ fn with_a_key_the_one_with_the_larger_epoch_stays() {
         air.run(90);
         let other = air.join(relay(&mission, 3, auth(KEY, epoch), air.now));
         air.run(240);
-        assert!(air.told(TAKEN).contains(&2) && air.told(TAKEN).contains(&other), "{epoch}");
+        assert!(
+            air.told(TAKEN).contains(&2) && air.told(TAKEN).contains(&other),
+            "{epoch}"
+        );
         assert_eq!(air.relays[2].setpoint().is_some(), first_stays, "{epoch}");
         assert_eq!(air.relays[2].stands_down(), !first_stays, "{epoch}");
-        assert_eq!(air.relays[other].setpoint().is_some(), !first_stays, "{epoch}");
+        assert_eq!(
+            air.relays[other].setpoint().is_some(),
+            !first_stays,
+            "{epoch}"
+        );
     }
 }
 
@@ -106,5 +118,9 @@ fn forged_frames_have_nobody_stand_down() {
         liar.handle_timeout(air.now);
     }
     assert_eq!(air.told(Event::IndexTaken { node: 2 }), [1]);
-    assert!(air.relays.iter().all(|relay| relay.setpoint().is_some() && !relay.stands_down()));
+    assert!(
+        air.relays
+            .iter()
+            .all(|relay| relay.setpoint().is_some() && !relay.stands_down())
+    );
 }

@@ -41,7 +41,12 @@ fn two_forged_handshakes_are_noise() {
 /// Relay 2 is switched on again with an epoch that it had before, or an older one: it is refused, and that is told.
 #[test]
 fn an_epoch_that_went_back_is_told_with_the_node() {
-    for (loss, again, back) in [(0.0, 1, true), (0.3, 1, true), (0.0, 5, true), (0.3, 6, false)] {
+    for (loss, again, back) in [
+        (0.0, 1, true),
+        (0.3, 1, true),
+        (0.0, 5, true),
+        (0.3, 6, false),
+    ] {
         let mission = mission(3);
         let epoch = |index| if index == 2 { 5 } else { 1 };
         let mut air = Air::of(&mission, |index| auth(KEY, epoch(index)), loss);
@@ -63,7 +68,14 @@ fn a_neighbour_that_is_heard_at_both_ports_is_told() {
     let mission = mission(3);
     let of = |index| {
         let identity = Identity { network: 7, index };
-        Relay::new(mission, identity, Settings::default(), 1, uav_relay::Instant::ZERO).unwrap()
+        Relay::new(
+            mission,
+            identity,
+            Settings::default(),
+            1,
+            uav_relay::Instant::ZERO,
+        )
+        .unwrap()
     };
     let (mut middle, mut head) = (of(2), of(1));
     let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];

@@ -28,7 +28,13 @@ const fn is_offer(bytes: &[u8]) -> bool {
 }
 
 fn station(base: &Mission, epoch: u32) -> Ground {
-    Ground::new(base, Side::Upstream, 7, Wiring::Shared, auth(KEY, epoch).unwrap())
+    Ground::new(
+        base,
+        Side::Upstream,
+        7,
+        Wiring::Shared,
+        auth(KEY, epoch).unwrap(),
+    )
 }
 
 /// The ground's offers are caught on their way, and its operator thinks better of it. Later they are played.
@@ -49,13 +55,21 @@ fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same(
         air.ground = None;
         air.run(wait);
         let offers = std::mem::take(&mut air.recorded);
-        let stale = |air: &Air| air.relays.iter().map(|relay| relay.stats().stale).sum::<u32>();
+        let stale = |air: &Air| {
+            air.relays
+                .iter()
+                .map(|relay| relay.stats().stale)
+                .sum::<u32>()
+        };
         let before = stale(&air);
         for _ in 0..5 {
             offers.iter().for_each(|offer| air.play(offer));
             air.run(1);
         }
-        assert!(air.relays.iter().all(|relay| relay.upload().is_none()), "wait {wait}");
+        assert!(
+            air.relays.iter().all(|relay| relay.upload().is_none()),
+            "wait {wait}"
+        );
         assert!(stale(&air) > before, "it is counted");
         // The next day.
         air.withheld = |_| false;
