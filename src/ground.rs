@@ -2,7 +2,7 @@
 //!
 //! | progress | what comes of the relay asked | what follows |
 //! | --- | --- | --- |
-//! | `Offering` | it holds an older mission, or has not answered | it is offered the new one, every second; after three without an answer the next one of the four nearest is |
+//! | `Offering` | it holds an older mission, or has not answered | it is asked by a hello every second, and offered the new one in answer to its own hello; after three questions without an answer the next one of the four nearest is |
 //! | `Held` | it holds the new one, and flies another yet | it is asked every second |
 //! | `Flown` | it flies it: so does every relay of its view, or it takes part in nothing until it does | done |
 //! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
@@ -114,6 +114,10 @@ pub struct Ground {
     unanswered: u8,
     /// What that relay holds, once it has said so.
     holds: Option<MissionId>,
+    /// Whether its next hello answers a question.
+    asked: bool,
+    /// The number of the hello that the next offer answers.
+    answer: Option<u16>,
     due: bool,
     again: Option<Instant>,
     deframer: Deframer,
@@ -145,6 +149,8 @@ impl Ground {
             distance: 1,
             unanswered: 0,
             holds: None,
+            asked: false,
+            answer: None,
             due: false,
             again: None,
             deframer: Deframer::new(),
@@ -165,6 +171,7 @@ impl Ground {
         self.upload = Some(upload);
         self.progress = Progress::Offering;
         self.holds = None;
+        self.answer = None;
         self.unanswered = 0;
         self.due = true;
         self.again = Some(now + PATIENCE);
@@ -231,6 +238,11 @@ impl Ground {
                 version: hello.holds.version,
             }
         } else if hello.holds < mission_id {
+            // An offer is answered, too: only a question leads to one, or the two would not come to an end.
+            if core::mem::take(&mut self.asked) {
+                self.answer = Some(hello.nonce);
+                self.due = true;
+            }
             Progress::Offering
         } else if hello.flies {
             Progress::Flown {
@@ -259,6 +271,7 @@ impl Ground {
         if self.unanswered >= QUESTIONS {
             self.unanswered = 0;
             self.holds = None;
+            self.answer = None;
             self.distance = if self.distance < self.within {
                 self.distance + 1
             } else {
@@ -310,7 +323,13 @@ impl Ground {
         }
         let upload = self.upload?;
         let to = self.to();
-        let message = if self.holds == Some(upload.id()) {
+        let older = self.holds.is_some_and(|holds| holds < upload.id());
+        let answer = self.answer.filter(|_| older && self.session.knows(to));
+        let message = if let Some(answer) = answer {
+            self.answer = None;
+            Message::Offer { upload, answer }
+        } else {
+            self.asked = true;
             Message::Hello(Hello {
                 mission: self.base,
                 newest: ViewId::LOADED,
@@ -323,9 +342,8 @@ impl Ground {
                 ready: true,
                 holds: upload.id(),
                 flies: false,
+                nonce: 0,
             })
-        } else {
-            Message::Offer(upload)
         };
         say(&mut self.session, to, &message, header, frame)
     }

@@ -22,6 +22,7 @@ use crate::time::Instant;
 use crate::view::ViewId;
 use crate::wire::deframe::{DeframeError, Deframer};
 use crate::wire::frame::{self, FrameBuf, Header};
+use incoming::Addressed;
 #[cfg(feature = "auth")]
 use crate::wire::session::Session;
 
@@ -159,10 +160,29 @@ impl Relay {
                     bump(counter);
                 }
                 Some(Ok(plain)) => {
-                    let Some((side, frame)) =
-                        incoming::addressed(&mut self.node, self.network, port, plain)
-                    else {
-                        continue;
+                    let addressed = incoming::addressed(
+                        &mut self.node,
+                        now,
+                        self.network,
+                        port,
+                        plain,
+                    );
+                    let (side, frame) = match addressed {
+                        Some(Addressed::By(side, frame)) => (side, frame),
+                        Some(Addressed::ByNamesake(frame)) => {
+                            #[cfg(feature = "auth")]
+                            let claim = match &self.session {
+                                Some(session) => Some(signed::claim(session, &frame)),
+                                None => incoming::claim(&frame),
+                            };
+                            #[cfg(not(feature = "auth"))]
+                            let claim = incoming::claim(&frame);
+                            if let Some(claim) = claim {
+                                self.node.hear_namesake(now, claim);
+                            }
+                            continue;
+                        }
+                        None => continue,
                     };
                     #[cfg(feature = "auth")]
                     if let Some(session) = &mut self.session {
@@ -206,6 +226,14 @@ impl Relay {
         self.node.clear_lost(now, side);
     }
 
+    /// The other relay that used this one's number ([`Event::IndexTaken`]) has landed, or has another number now: this one takes part
+    /// again, if it [stands down](Self::stands_down).
+    ///
+    /// Constant work.
+    pub fn clear_index_taken(&mut self, now: Instant) {
+        self.node.clear_namesake(now);
+    }
+
     /// Has the chain agree again, from the beginning of its method: in a closed loop, once it has measured where it stands.
     ///
     /// Only the leader (relay 1; in a field relay N) has something to begin; with any other relay nothing happens.
@@ -227,6 +255,9 @@ impl Relay {
         };
         #[cfg(feature = "auth")]
         if let Some(session) = &mut self.session {
+            if self.node.stands_down() {
+                return None;
+            }
             // A counter is never used twice: after four billion frames a new epoch is due.
             if self.counter == u32::MAX {
                 return None;
@@ -292,6 +323,12 @@ impl Relay {
     /// Where the relay is in the protocol.
     pub fn phase(&self) -> Phase {
         self.node.phase()
+    }
+
+    /// Whether it takes part in nothing and has no set-point, because another relay that does take part uses its number. That is over
+    /// with [`clear_index_taken`](Self::clear_index_taken), or once nothing was heard of the other for twice `Settings::dead_after`.
+    pub fn stands_down(&self) -> bool {
+        self.node.stands_down()
     }
 
     /// What has been counted since the relay was switched on.

@@ -47,7 +47,7 @@ pub struct Stats {
     pub view: u32,
     /// New views of the chain that this relay has agreed to.
     pub views: u32,
-    /// Messages of a pass, or of a view change, that is over or cannot be taken part in.
+    /// Messages of a pass, or of a view change, that is over or cannot be taken part in; offers that answer no hello of late.
     pub stale: u32,
     /// Samples of the interference that were no use: not a number, out of range, or without anything to measure for.
     pub samples_refused: u32,

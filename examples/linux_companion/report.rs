@@ -97,20 +97,67 @@ impl Report {
                 )
             }
             Event::Infeasible => line(now, format_args!("infeasible: no target can be met")),
-            Event::NeighbourLost(side) => line(
-                now,
-                format_args!("lost: no sign of life from {}", self.neighbour(side)),
-            ),
-            Event::NeighbourBack(side) => line(
-                now,
-                format_args!("back: {} is heard again", self.neighbour(side)),
-            ),
-            Event::MissionMismatch(side) => line(
+            Event::NeighbourLost { side, node } => line(
                 now,
                 format_args!(
-                    "mismatch: {} flies another mission than 0x{:04x}",
-                    self.neighbour(side),
+                    "lost: no sign of life from {} {}; look for that drone",
+                    self.node(node),
+                    stream(side)
+                ),
+            ),
+            Event::NeighbourBack { side, node } => line(
+                now,
+                format_args!("back: {} {} is heard", self.node(node), stream(side)),
+            ),
+            Event::NotHeard { node } => line(
+                now,
+                format_args!(
+                    "not heard: {} does not hear this relay; look at this one's transmitter and that one's receiver",
+                    self.node(node)
+                ),
+            ),
+            Event::MissionMismatch { node } => line(
+                now,
+                format_args!(
+                    "mismatch: {} flies another mission than 0x{:04x}; load both with the same one",
+                    self.node(node),
                     self.digest
+                ),
+            ),
+            Event::KeyMismatch { node } => line(
+                now,
+                format_args!(
+                    "key: {} signs with another key, or somebody does in its name; give both the same --key-file",
+                    self.node(node)
+                ),
+            ),
+            Event::EpochWentBack { node } => line(
+                now,
+                format_args!(
+                    "epoch: that of {0} went back and it is refused; raise the number in the --epoch-file of {0} and start it again",
+                    self.node(node)
+                ),
+            ),
+            Event::IndexTaken { node } if relay.stands_down() => line(
+                now,
+                format_args!(
+                    "index taken: another relay flies as relay {node}, and this one stands down; land one and give it its own --index"
+                ),
+            ),
+            Event::IndexTaken { node } => line(
+                now,
+                format_args!(
+                    "index taken: two relays fly as relay {node}; land one and give it its own --index"
+                ),
+            ),
+            Event::LeaseLapsed => line(
+                now,
+                format_args!("lapsed: not all relays can be reached; holds its place and asks for a new view"),
+            ),
+            Event::NoQuorum => line(
+                now,
+                format_args!(
+                    "no quorum: too few relays can be reached; bring the missing ones into reach, or land these"
                 ),
             ),
             Event::Uploaded => {
@@ -141,12 +188,19 @@ impl Report {
         )
     }
 
-    fn neighbour(&self, side: Side) -> String {
-        let index = self.identity.index;
-        match side {
-            Side::Upstream => format!("relay {} upstream", index.saturating_sub(1)),
-            Side::Downstream => format!("relay {} downstream", index.saturating_add(1)),
+    fn node(&self, node: u16) -> String {
+        match node {
+            0 => "the transmitter".to_owned(),
+            _ if node > self.relays => "the receiver".to_owned(),
+            _ => format!("relay {node}"),
         }
+    }
+}
+
+const fn stream(side: Side) -> &'static str {
+    match side {
+        Side::Upstream => "upstream",
+        Side::Downstream => "downstream",
     }
 }
 

@@ -136,8 +136,8 @@ struct CannotSign;
 
 /// What frames are signed with in this start, if they are.
 ///
-/// Where the flash cannot be written, as in an emulator, the epoch is the configuration's: for test benches only, since it does
-/// not rise from one start to the next.
+/// Where the flash cannot be written, as in an emulator, the epoch is still above all that stand there, and at least the configuration's:
+/// but it may not rise from this start to the next.
 #[cfg(feature = "auth")]
 #[inline(never)]
 fn sign() -> Result<Option<Auth>, CannotSign> {
@@ -153,17 +153,18 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
         }
     };
     let sectors = flash::EPOCHS.map(flash::Sector::records);
-    let Some(step) = epoch::next(sectors, floor) else {
+    let write = |step: epoch::Step| {
+        flash::EPOCHS.get(step.sector).is_some_and(|sector| {
+            if step.erase {
+                sector.erase();
+            }
+            sector.write(step.entry, &epoch::entry(step.epoch))
+        })
+    };
+    let Some((epoch, kept)) = epoch::begin(sectors, floor, write) else {
         log::no_epoch();
         return Err(CannotSign);
     };
-    let kept = flash::EPOCHS.get(step.sector).is_some_and(|sector| {
-        if step.erase {
-            sector.erase();
-        }
-        sector.write(step.entry, &epoch::entry(step.epoch))
-    });
-    let epoch = if kept { step.epoch } else { floor };
     log::signs(epoch, kept);
     Ok(Some(Auth {
         key: Key::new(key),

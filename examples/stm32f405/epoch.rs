@@ -4,6 +4,11 @@
 //! the largest; when that is full the other one is erased and gone on with, so that a loss of power at any moment leaves the
 //! largest epoch that was ever used where it is. An entry that a loss of power has cut short is no epoch, and its epoch has not
 //! been used: it counts only once it has been read back. 16 384 starts fill a sector of 128 KiB.
+//!
+//! An entry that cannot be written is tried at the next places. If all of them fail, the epoch is used all the same: it is above all that
+//! were kept, so the neighbours believe it, whereas with an older one they would refuse this drone for as long as they fly. What is lost is
+//! the start after: it may come to the same epoch, and be refused until the neighbours are switched off and on. So that is logged as
+//! an error, and the drone is not to fly again before its block has a larger epoch and its flash is sound.
 
 /// Where the two sectors begin: sectors 9 and 10 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x080A_0000, 0x080C_0000];
@@ -60,6 +65,29 @@ pub fn next(sectors: [&[Entry]; 2], floor: u32) -> Option<Step> {
             erase: other.used > 0,
         }
     })
+}
+
+/// Places that are tried at most.
+const TRIES: usize = 4;
+
+/// The epoch of this start, and whether it stands in the flash; `None` after the last one. `write` takes the entry of a step, erases before
+/// that where it says so, and tells whether the entry reads back.
+pub fn begin(
+    sectors: [&[Entry]; 2],
+    floor: u32,
+    mut write: impl FnMut(Step) -> bool,
+) -> Option<(u32, bool)> {
+    let first = next(sectors, floor)?;
+    let room = sectors.get(first.sector).map_or(0, |entries| entries.len());
+    let places = (first.entry..room).take(TRIES);
+    let kept = places.zip(0..).any(|(entry, tried)| {
+        write(Step {
+            entry,
+            erase: first.erase && tried == 0,
+            ..first
+        })
+    });
+    Some((first.epoch, kept))
 }
 
 /// What stands in a sector.

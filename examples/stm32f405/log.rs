@@ -65,8 +65,8 @@ pub(crate) fn signs(epoch: u32, kept: bool) {
     if kept {
         defmt::info!("frames are signed, epoch {=u32}", epoch);
     } else {
-        defmt::warn!(
-            "frames are signed, epoch {=u32}; it cannot be kept: for a test bench only",
+        defmt::error!(
+            "frames are signed, epoch {=u32}; it cannot be kept: raise the epoch of the block before the next start",
             epoch
         );
     }

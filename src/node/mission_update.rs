@@ -5,24 +5,53 @@
 //! view is to fly, and only a relay that holds just that one hands it on. So a view that is granted is of relays that hold it
 //! all, durably or not: one that misses the decision, or forgets what it held, can take part in nothing before it flies it, too.
 //!
+//! An offer answers a hello: it bears the number of one that the receiver said lately. The number is another one after `dead_after`, and
+//! the one before it is good until then as well, neither for longer than twice `dead_after` after it was last said. So an offer that was
+//! recorded or withheld is worth nothing later, though its tag is right.
+//!
 //! | between neighbours | what follows |
 //! | --- | --- |
 //! | a hello of a node that holds an older mission | it is offered the newer one |
 //! | a hello of a node that holds a newer mission | a hello, so that it is offered here |
 //! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hello; an offer to the relay before, toward the leader; a request for a view |
 //! | an offer of one that is not newer | a hello |
+//! | an offer that answers no hello of late | it is counted as stale; a hello, which the next one can answer |
 //! | a proposal is due, and the node after holds an older mission or has not said which | it is offered the newer one first |
 //! | a proposal that does not name the mission held | a hello, and no part in it |
 //! | a decision on a view that was granted | its mission is flown: `Event::Adopted` |
 
 use super::context::Member;
+#[cfg(feature = "upload")]
+use crate::jitter::Jitter;
 use crate::mission::Mission;
+#[cfg(feature = "upload")]
+use crate::settings::Settings;
+use crate::time::Instant;
 use crate::wire::digest::MissionId;
 #[cfg(feature = "upload")]
 use crate::wire::upload::{Upload, UploadError};
 
 /// Whether this crate was built to take a newer mission in flight.
 const UPLOAD: bool = cfg!(feature = "upload");
+
+/// A number that hellos bear, for the offers that answer them; 0 for none.
+#[cfg(feature = "upload")]
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    number: u16,
+    first: Instant,
+    last: Instant,
+}
+
+#[cfg(feature = "upload")]
+impl Asked {
+    /// Whether an offer of that number answers one of the last twice `dead_after`.
+    fn is(&self, number: u16, now: Instant, settings: &Settings) -> bool {
+        number != 0
+            && number == self.number
+            && now.since(self.last).as_micros() <= settings.dead_after.times(2).as_micros()
+    }
+}
 
 /// What one relay holds.
 #[derive(Clone, Debug)]
@@ -32,6 +61,9 @@ pub(crate) struct MissionUpdate {
     /// The same, if it was uploaded.
     #[cfg(feature = "upload")]
     upload: Option<Upload>,
+    /// The number that hellos bear now, and the one before.
+    #[cfg(feature = "upload")]
+    asked: [Asked; 2],
 }
 
 /// Whether newer missions are taken in flight: only where frames are signed.
@@ -41,11 +73,21 @@ pub(crate) const fn takes_uploads(member: &Member) -> bool {
 
 impl MissionUpdate {
     /// A relay that holds the mission that it was loaded with.
-    pub(crate) const fn new(loaded: MissionId) -> Self {
+    pub(crate) const fn new(loaded: MissionId, seed: u32, now: Instant) -> Self {
+        #[cfg(not(feature = "upload"))]
+        let _ = (seed, now);
+        #[cfg(feature = "upload")]
+        let asked = Asked {
+            number: Jitter::new(seed).number(),
+            first: now,
+            last: now,
+        };
         Self {
             latest: loaded,
             #[cfg(feature = "upload")]
             upload: None,
+            #[cfg(feature = "upload")]
+            asked: [asked, Asked { number: 0, ..asked }],
         }
     }
 
@@ -73,6 +115,28 @@ impl MissionUpdate {
 
 #[cfg(feature = "upload")]
 impl MissionUpdate {
+    /// The number of a hello that is said now.
+    pub(crate) fn ask(&mut self, now: Instant, settings: &Settings) -> u16 {
+        let [current, before] = &mut self.asked;
+        if now.since(current.first) >= settings.dead_after {
+            *before = *current;
+            current.number = match current.number.wrapping_add(1) {
+                0 => 1,
+                number => number,
+            };
+            current.first = now;
+        }
+        current.last = now;
+        current.number
+    }
+
+    /// Whether an offer of that number answers a hello of late.
+    pub(crate) fn asked(&self, answer: u16, now: Instant, settings: &Settings) -> bool {
+        self.asked
+            .iter()
+            .any(|asked| asked.is(answer, now, settings))
+    }
+
     /// Holds `upload` from now on, if it is for this relay and newer than what it holds; whether it is.
     pub(crate) fn hold(&mut self, member: &Member, upload: Upload) -> bool {
         let newer = upload.id() > self.latest && fits(member, &upload);

@@ -17,6 +17,7 @@
 //! | `context` | what a relay is and flies, as every layer is handed it, and what a layer asks of the others |
 //! | `retransmit` | how long an answer is awaited, and when a message is sent again |
 //! | `numbering` | what a number that is not the expected one means |
+//! | `namesake` | another node with this relay's number, and which of the two stands down |
 //! | `timing` | what the layers have in common in keeping time |
 //! | `steering` | the setpoint on its way to the agreed place |
 //! | [`sample`] | the interference that a relay measures |
@@ -27,6 +28,7 @@
 pub(crate) mod context;
 mod lease;
 pub(crate) mod mission_update;
+pub(crate) mod namesake;
 pub(crate) mod neighbour;
 mod numbering;
 mod retransmit;
@@ -36,7 +38,7 @@ mod steering;
 mod timing;
 pub(crate) mod view;
 
-use crate::event::{Event, Pending};
+use crate::event::{About, Event, Pending};
 use crate::guard::HoldReason;
 use crate::mission::{Heading, Mission};
 use crate::place::Placement;
@@ -52,6 +54,7 @@ use crate::wire::upload::{Upload, UploadError};
 use context::{Context, Decided, Effects, Member};
 use lease::Lease;
 use mission_update::{MissionUpdate, takes_uploads};
+use namesake::{Claim, Namesake, Twice};
 use neighbour::Neighbours;
 use neighbour::state::{CANDIDATES, Candidate};
 use round::Round;
@@ -67,6 +70,9 @@ use view::record::{RecordError, ViewRecord};
 struct Telemetry {
     events: Pending,
     stats: Stats,
+    /// Whether a lapse of the lease, and a refusal, have been told since a view was agreed on.
+    told_lapsed: bool,
+    told_refused: bool,
 }
 
 /// A relay's share of the protocol.
@@ -80,6 +86,7 @@ pub(crate) struct Node {
     round: Round,
     steering: Steering,
     meter: Meter,
+    namesake: Namesake,
     telemetry: Telemetry,
 }
 
@@ -126,12 +133,13 @@ impl Node {
         let member = Member::new(mission, settings, identity.index);
         let neighbours = Neighbours::new(identity.index, member.all, seed.rotate_left(8), now, &settings);
         let mut node = Self {
-            update: MissionUpdate::new(member.active),
+            update: MissionUpdate::new(member.active, seed.rotate_left(4), now),
             view: ViewChange::new(member.all, mission.leader(), !seed),
             lease: Lease::new(!seed.rotate_left(16), now, &settings),
             round: Round::new(leads, number, profile, seed),
             steering: Steering::new(&settings, neighbours.nodes(), seed, now),
             meter: Meter::new(settings.measure),
+            namesake: Namesake::new(seed.rotate_left(24)),
             telemetry: Telemetry::default(),
             member,
             neighbours,
@@ -218,6 +226,10 @@ impl Node {
         self.telemetry.events.raise(event);
     }
 
+    fn raise_about(&mut self, about: About, side: Side, node: u16) {
+        self.telemetry.events.raise_about(about, side, node);
+    }
+
     /// Has the other layers know what one of them came to.
     fn apply(&mut self, now: Instant, effects: Effects) {
         let stats = &mut self.telemetry.stats;
@@ -241,7 +253,7 @@ impl Node {
                 self.confirm(now, side, at);
             }
         }
-        if effects.lapsed {
+        if effects.lapsed && !core::mem::replace(&mut self.telemetry.told_lapsed, true) {
             self.raise(Event::LeaseLapsed);
         }
         if effects.view_proposed {
@@ -309,6 +321,114 @@ impl Node {
         }
     }
 
+    /// Node `from` at `side` has said that it is there, and not shown that it has heard this relay.
+    #[cfg(feature = "auth")]
+    pub(crate) fn called(&mut self, side: Side, from: u16) {
+        self.is_signed_right(side, from);
+        if self.searches() {
+            self.says_it_hears(side, from, false);
+        }
+    }
+
+    /// A handshake under the number of node `from` at `side` was signed with another key, or altered.
+    #[cfg(feature = "auth")]
+    pub(crate) fn is_forged(&mut self, side: Side, from: u16) {
+        let distance = from.abs_diff(self.member.node);
+        if self.neighbours.at_mut(side).is_forged(distance) {
+            self.raise_about(About::Key, side, from);
+        }
+    }
+
+    /// Node `from` at `side` has the key.
+    #[cfg(feature = "auth")]
+    pub(crate) fn is_signed_right(&mut self, side: Side, from: u16) {
+        let distance = from.abs_diff(self.member.node);
+        self.neighbours.at_mut(side).is_signed_right(distance);
+    }
+
+    /// Node `from` at `side` goes on with an older epoch than it had.
+    #[cfg(feature = "auth")]
+    pub(crate) fn went_back(&mut self, side: Side, from: u16) {
+        self.raise_about(About::Epoch, side, from);
+    }
+
+    /// A frame under this relay's own number, from another node.
+    pub(crate) fn hear_namesake(&mut self, now: Instant, claim: Claim) {
+        let settings = self.member.settings;
+        if self.namesake.is_news(now, Twice::Own, &settings) {
+            let node = self.member.node;
+            self.raise_about(About::Index, Side::Upstream, node);
+        }
+        let holds = self.holds(now);
+        let placed = self.setpoint().is_some();
+        if self.namesake.hear(now, claim, holds, &settings) && placed {
+            self.raise(Event::SetpointChanged);
+        }
+    }
+
+    fn holds(&self, now: Instant) -> bool {
+        self.lease.until().is_some_and(|until| until > now)
+    }
+
+    /// Whether it stands down from now on, as it holds no lease any more and another node of its number takes part.
+    fn gives_way(&mut self, now: Instant) -> bool {
+        let holds = self.holds(now);
+        let placed = self.setpoint().is_some();
+        let down = self.namesake.review(now, holds, &self.member.settings);
+        if down && placed {
+            self.raise(Event::SetpointChanged);
+        }
+        down
+    }
+
+    /// What it says while it stands down: a hello to its own number, as one that has taken part in nothing.
+    fn next_to_namesake(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
+        if !self.namesake.take_hello() {
+            return None;
+        }
+        let hello = Hello {
+            fresh: true,
+            form: false,
+            ..self.hello(now, Side::Upstream, false, 0)
+        };
+        Some((Side::Upstream, self.member.node, Message::Hello(hello)))
+    }
+
+    /// Node `from` was heard at the port of side `through`: at that of the other side than its own, it may be heard at both.
+    pub(crate) fn hear_at_both(&mut self, now: Instant, through: Side, from: u16) {
+        let Some(side) = self.side_of(from).filter(|side| *side != through) else {
+            return;
+        };
+        let settings = self.member.settings;
+        if self.neighbours.at(side).is_there()
+            && self.namesake.is_news(now, Twice::Neighbour, &settings)
+        {
+            self.raise_about(About::Index, side, from);
+        }
+    }
+
+    /// Whether it takes part in nothing, because another relay has its number.
+    pub(crate) const fn stands_down(&self) -> bool {
+        self.namesake.stands_down()
+    }
+
+    /// The other relay with this number is gone.
+    pub(crate) fn clear_namesake(&mut self, now: Instant) {
+        if self.namesake.clear() {
+            self.stand_up(now);
+        }
+    }
+
+    /// It takes part again: in nothing that goes on without it.
+    fn stand_up(&mut self, now: Instant) {
+        if self.setpoint().is_some() {
+            self.raise(Event::SetpointChanged);
+        }
+        if !self.round.is_fresh() {
+            self.view.ask(now);
+        }
+    }
+
     /// What could not be said to the neighbour after can be now.
     fn resend(&mut self) {
         self.view.resend();
@@ -325,9 +445,12 @@ impl Node {
         from: u16,
         message: &Message,
     ) -> bool {
+        if self.stands_down() {
+            return false;
+        }
         #[cfg(feature = "upload")]
         if self.ground_side(from).is_some() {
-            return self.on_ground(now, side, message);
+            return self.on_ground(now, side, from, message);
         }
         let taken = self.neighbours.at(side).node() == from;
         let distance = from.abs_diff(self.member.node);
@@ -338,20 +461,20 @@ impl Node {
             .at_mut(side)
             .heard(distance, taken, now, &member.settings);
         if let Message::Hello(hello) = message {
-            if self.is_of_mission(side, hello.mission) {
+            if self.is_of_mission(side, from, hello.mission) {
                 self.on_hello(now, side, from, *hello);
                 self.steer(now);
             }
             return true;
         }
         #[cfg(feature = "upload")]
-        if let Message::Offer(upload) = message
+        if let Message::Offer { upload, answer } = message
             && !taken
             && takes_uploads(&self.member)
         {
             // It takes this relay for its neighbour: a hello alone would only make it say the same again.
-            if self.is_of_mission(side, upload.base()) {
-                self.on_offer(now, side, from, upload);
+            if self.is_of_mission(side, from, upload.base()) {
+                self.on_offer(now, side, from, upload, *answer);
             }
             return true;
         }
@@ -386,7 +509,7 @@ impl Node {
         let (active, latest) = (self.member.active, self.update.latest());
         let proposes = message.is_of_a_proposal();
         if !proposes && !message.is_of_a_view() {
-            return self.is_of_mission(side, digest);
+            return self.is_of_mission(side, from, digest);
         }
         let known = match message {
             Message::Proposal(proposal) => proposal.mission_id == latest,
@@ -406,17 +529,17 @@ impl Node {
         known
     }
 
-    fn is_of_mission(&mut self, side: Side, digest: u16) -> bool {
+    fn is_of_mission(&mut self, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.member.digest;
         if !same {
-            self.refuse_mission(side);
+            self.refuse_mission(side, from);
         }
         same
     }
 
-    fn refuse_mission(&mut self, side: Side) {
+    fn refuse_mission(&mut self, side: Side, from: u16) {
         bump(&mut self.telemetry.stats.mission);
-        self.raise(Event::MissionMismatch(side));
+        self.raise_about(About::Mission, side, from);
     }
 
     /// The neighbour at `side` was there `at` that time or later: it has answered what this relay said then.
@@ -424,8 +547,10 @@ impl Node {
         let Self {
             member, neighbours, ..
         } = self;
-        if neighbours.at_mut(side).confirmed(now, at, &member.settings) {
-            self.raise(Event::NeighbourBack(side));
+        let neighbour = neighbours.at_mut(side);
+        if neighbour.confirmed(now, at, &member.settings) {
+            let node = neighbour.node();
+            self.raise_about(About::Back, side, node);
         }
     }
 
@@ -445,7 +570,9 @@ impl Node {
                 return self.apply(now, effects);
             }
             #[cfg(feature = "upload")]
-            Message::Offer(upload) => return self.on_offer(now, side, from, upload),
+            Message::Offer { upload, answer } => {
+                return self.on_offer(now, side, from, upload, *answer);
+            }
             _ => {}
         }
         if message.is_of_a_view() && !self.neighbours.at(side).is_agreed() {
@@ -499,6 +626,15 @@ impl Node {
 
     /// Handles what has run out by `now`, each layer once; the work is that of one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
+        if self.stands_down() {
+            if !self.namesake.handle_timeout(now, &self.member.settings) {
+                return;
+            }
+            self.stand_up(now);
+        }
+        if self.gives_way(now) {
+            return;
+        }
         let solved = self.is_solving(now);
         let context = of(
             now,
@@ -577,10 +713,11 @@ impl Node {
         if solving && neighbour.excuse(now, settings) {
             return;
         }
+        let node = neighbour.node();
         let lost = neighbour.handle_timeout(now, settings, lease.span(settings), searches);
         steering.link(side, Some(neighbour.node()).filter(|node| *node != 0));
         if lost {
-            self.raise(Event::NeighbourLost(side));
+            self.raise_about(About::Lost, side, node);
         }
         self.review(now);
     }
@@ -624,7 +761,8 @@ impl Node {
                     Side::Downstream => own.saturating_add(distance),
                 };
                 if to >= 1 && to <= all && self.side_of(to).is_some() {
-                    return Some((side, to, self.hello(now, side, ask)));
+                    let nonce = self.ask_number(now);
+                    return Some((side, to, self.hello(now, side, ask, nonce)));
                 }
             }
         }
@@ -647,7 +785,19 @@ impl Node {
         }
     }
 
-    fn hello(&self, now: Instant, side: Side, ask: bool) -> Hello {
+    /// The number of a hello that is said now, for the offer that answers it.
+    #[cfg(feature = "upload")]
+    fn ask_number(&mut self, now: Instant) -> u16 {
+        self.update.ask(now, &self.member.settings)
+    }
+
+    #[cfg(not(feature = "upload"))]
+    #[expect(clippy::unused_self, reason = "as the other one")]
+    const fn ask_number(&mut self, _: Instant) -> u16 {
+        0
+    }
+
+    fn hello(&self, now: Instant, side: Side, ask: bool, nonce: u16) -> Hello {
         let latest = self.update.latest();
         Hello {
             mission: self.member.digest,
@@ -661,6 +811,7 @@ impl Node {
             hears: self.neighbours.at(side).hears(now, &self.member.settings),
             holds: latest,
             flies: self.member.active == latest,
+            nonce,
         }
     }
 
@@ -669,12 +820,22 @@ impl Node {
         let own = self.member.node;
         let known = self.view.newest();
         self.view.heard_of(hello.newest);
+        if self.searches() {
+            let heard = hears(own, from, hello.hears);
+            // One that asks for nothing may be the answer to what was heard just now.
+            if heard || hello.ask {
+                self.says_it_hears(side, from, heard);
+            }
+        }
         if hello.ask {
             self.owe_hello(side, from, false);
         }
         if self.neighbours.at(side).node() == from {
             #[cfg(feature = "upload")]
-            self.compare(side, from, hello.holds);
+            {
+                self.neighbours.at_mut(side).asked = hello.nonce;
+                self.compare(side, from, hello.holds);
+            }
             self.neighbours.at_mut(side).holds = Some(hello.holds);
             if self.searches() {
                 let two_way = hears(own, from, hello.hears);
@@ -690,6 +851,14 @@ impl Node {
             self.consider(now, side, from, hello);
         }
         self.review(now);
+    }
+
+    /// Node `from` at `side` has said whether it hears this relay.
+    fn says_it_hears(&mut self, side: Side, from: u16, heard: bool) {
+        let distance = from.abs_diff(self.member.node);
+        if self.neighbours.at_mut(side).says_it_hears(distance, heard) {
+            self.raise_about(About::NotHeard, side, from);
+        }
     }
 
     /// A hello from node `from` at `side`, which is not taken for the neighbour there.
@@ -720,8 +889,12 @@ impl Node {
         };
         if neighbour.consider(candidate, now, &member.settings) {
             neighbour.holds = Some(hello.holds);
+            #[cfg(feature = "upload")]
+            {
+                neighbour.asked = hello.nonce;
+            }
             steering.link(side, Some(from));
-            self.raise(Event::NeighbourBack(side));
+            self.raise_about(About::Back, side, from);
             self.owe_hello(side, from, true);
             self.told(now, side, pairs);
         }
@@ -759,7 +932,9 @@ impl Node {
                 return;
             }
             Decided::Refused => {
-                self.raise(Event::NoQuorum);
+                if !core::mem::replace(&mut self.telemetry.told_refused, true) {
+                    self.raise(Event::NoQuorum);
+                }
                 return self.neighbours.refuse();
             }
         };
@@ -783,6 +958,8 @@ impl Node {
         self.lease.renew(proposed.view, rest);
         self.round.renew(rest, leads, works);
         bump(&mut self.telemetry.stats.views);
+        self.telemetry.told_lapsed = false;
+        self.telemetry.told_refused = false;
         self.raise(Event::Reformed);
         if id != self.update.latest() {
             // A newer one has come in the meantime.
@@ -814,7 +991,8 @@ impl Node {
     /// The leader begins again, at `now`; nobody else has anything to begin.
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
-        if leads && !self.view.has_no_quorum() && self.view.awaited().is_none() {
+        let may = leads && !self.view.has_no_quorum() && !self.stands_down();
+        if may && self.view.awaited().is_none() {
             let context = of(
                 now,
                 &self.member,
@@ -855,6 +1033,9 @@ impl Node {
 
     /// The next message to send, to which node at which side. Call until there is none.
     pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
+        if self.stands_down() {
+            return self.next_to_namesake(now);
+        }
         if let Some(message) = self.next_of_a_round(now) {
             return Some(message);
         }
@@ -907,7 +1088,8 @@ impl Node {
         {
             #[cfg(feature = "upload")]
             if let Some(upload) = self.update.offer_to(self.neighbours.at(onward).holds) {
-                return Some((onward, to, Message::Offer(upload)));
+                let answer = self.neighbours.at(onward).asked;
+                return Some((onward, to, Message::Offer { upload, answer }));
             }
             return Some((onward, to, message));
         }
@@ -946,6 +1128,9 @@ impl Node {
     }
 
     pub(crate) fn poll_timeout(&self) -> Option<Instant> {
+        if self.stands_down() {
+            return self.namesake.next_timeout();
+        }
         [
             self.neighbours.next_timeout(),
             self.view.next_timeout(),
@@ -965,6 +1150,9 @@ impl Node {
 
     /// Where to fly now.
     pub(crate) fn setpoint(&self) -> Option<Placement> {
+        if self.stands_down() {
+            return None;
+        }
         self.steering.setpoint(self.wanted())
     }
 
@@ -1017,14 +1205,16 @@ impl Node {
 #[cfg(feature = "upload")]
 impl Node {
     /// A message from the ground at `side`; whether it is one for the ground to say.
-    fn on_ground(&mut self, now: Instant, side: Side, message: &Message) -> bool {
+    fn on_ground(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
         let base = self.member.digest;
         match message {
-            Message::Offer(_) | Message::Hello(_) if message.mission() != Some(base) => {
-                self.refuse_mission(side);
+            Message::Offer { .. } | Message::Hello(_) if message.mission() != Some(base) => {
+                self.refuse_mission(side, from);
             }
-            Message::Offer(upload) => {
-                self.hold(now, *upload);
+            Message::Offer { upload, answer } => {
+                if self.is_asked(now, *answer) {
+                    self.hold(now, *upload);
+                }
                 self.neighbours.at_mut(side).ground = true;
             }
             Message::Hello(hello) => self.neighbours.at_mut(side).ground |= hello.ask,
@@ -1042,19 +1232,32 @@ impl Node {
             Side::Upstream => 0,
             Side::Downstream => self.member.all.saturating_add(1),
         };
+        let nonce = self.ask_number(now);
         let hello = Hello {
             neighbour: 0,
             form: false,
-            ..self.hello(now, side, false)
+            ..self.hello(now, side, false, nonce)
         };
         Some((to, hello))
     }
 
-    /// An offer from node `from` at `side`, for relays that were loaded with the same mission. Answered only by who holds as new
-    /// a mission then: any other answer would be answered by the same offer.
-    fn on_offer(&mut self, now: Instant, side: Side, from: u16, upload: &Upload) {
+    /// Whether an offer of that number answers a hello of late; one that does not is counted.
+    fn is_asked(&mut self, now: Instant, answer: u16) -> bool {
+        let asked = self.update.asked(answer, now, &self.member.settings);
+        if !asked {
+            bump(&mut self.telemetry.stats.stale);
+        }
+        asked
+    }
+
+    /// An offer from node `from` at `side`, for relays that were loaded with the same mission. One that answers a hello of late is
+    /// answered only by who holds as new a mission then: any other answer would be answered by the same offer.
+    fn on_offer(&mut self, now: Instant, side: Side, from: u16, upload: &Upload, answer: u16) {
         if !takes_uploads(&self.member) {
             return bump(&mut self.telemetry.stats.unsigned);
+        }
+        if !self.is_asked(now, answer) {
+            return self.owe_hello(side, from, false);
         }
         let id = upload.id();
         let neighbour = self.neighbours.at_mut(side);
@@ -1137,9 +1340,9 @@ impl Node {
     fn next_offer(&mut self, side: Side) -> Option<(u16, Message)> {
         let neighbour = self.neighbours.at_mut(side);
         let due = core::mem::take(&mut neighbour.offer);
-        let (to, holds) = (neighbour.node(), neighbour.holds);
+        let (to, holds, answer) = (neighbour.node(), neighbour.holds, neighbour.asked);
         let upload = self.update.offer_to(holds)?;
-        (due && to != 0).then_some((to, Message::Offer(upload)))
+        (due && to != 0).then_some((to, Message::Offer { upload, answer }))
     }
 }
 

@@ -1,13 +1,14 @@
 //! What one relay does with an offer and a proposal, and says of them.
 
-use super::{Hello, Message, MissionId, Node, Side, Upload};
+use super::{Event, Hello, Message, MissionId, Node, Side, Upload};
 use crate::mission::tests::paper;
 use crate::mission::{Interference, Interferer, Mission, MissionConfig};
 use crate::settings::{Identity, Settings, Wiring};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::view::{View, ViewId};
 use crate::wire::auth::{Auth, Key};
 use crate::wire::message::{Poll, Proposal};
+use crate::wire::upload::LENGTH;
 
 const NOW: Instant = Instant::from_millis(10_000);
 
@@ -63,7 +64,7 @@ fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
         let message = match message {
             Message::Hello(hello) => Message::Hello(hello),
             Message::Proposal(proposal) => Message::Proposal(proposal),
-            Message::Offer(upload) => Message::Offer(upload),
+            Message::Offer { upload, answer } => Message::Offer { upload, answer },
             Message::Heartbeat {
                 mission,
                 ask,
@@ -94,6 +95,7 @@ fn hello(node: &Node, holds: MissionId) -> Message {
         hears: 0x0F,
         holds,
         flies: true,
+        nonce: 9,
     })
 }
 
@@ -111,6 +113,17 @@ fn proposal(mission_id: MissionId) -> Message {
             })
         },
     })
+}
+
+/// An offer that answers a hello that is said just now.
+fn offer(node: &mut Node, upload: Upload) -> Message {
+    let answer = node.ask_number(NOW);
+    Message::Offer { upload, answer }
+}
+
+/// What it offers to a node that said number `answer` in its last hello.
+fn offered(upload: Upload, answer: u16) -> Message {
+    Message::Offer { upload, answer }
 }
 
 #[test]
@@ -133,7 +146,8 @@ fn who_does_not_hold_the_mission_hands_no_proposal_on_and_says_what_it_holds() {
 fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
     let mut node = relay(true);
     let new = upload(1);
-    node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(new));
+    let said_now = offer(&mut node, new);
+    node.handle_message(NOW, Side::Upstream, 1, &said_now);
     assert_eq!(node.update.latest(), new.id());
     assert_ne!(node.member.active, new.id());
     let told = said(&mut node);
@@ -142,7 +156,7 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
         "{told:?}"
     );
     node.handle_message(NOW, Side::Upstream, 1, &proposal(new.id()));
-    assert_eq!(said(&mut node), [(3, Message::Offer(new))]);
+    assert_eq!(said(&mut node), [(3, offered(new, 0))]);
     // It says that it holds it.
     let holds = hello(&node, new.id());
     node.handle_message(NOW, Side::Downstream, 3, &holds);
@@ -167,17 +181,18 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
     let new = upload(1);
     node.handle_upload(NOW, &new).unwrap();
     // The neighbour that the leader is beyond is offered it at once.
-    assert_eq!(said(&mut node), [(1, Message::Offer(new))]);
+    assert_eq!(said(&mut node), [(1, offered(new, 0))]);
     let behind = hello(&node, older);
     node.handle_message(NOW, Side::Downstream, 3, &behind);
-    assert_eq!(said(&mut node), [(3, Message::Offer(new))]);
+    assert_eq!(said(&mut node), [(3, offered(new, 9))]);
 }
 
 #[test]
 fn without_a_key_nothing_is_taken() {
     let mut node = relay(false);
     let held = node.update.latest();
-    node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(upload(1)));
+    let said_now = offer(&mut node, upload(1));
+    node.handle_message(NOW, Side::Upstream, 1, &said_now);
     assert_eq!((node.stats().unsigned, node.update.latest()), (1, held));
     assert_eq!(node.upload(), None);
     assert_eq!(said(&mut node), []);
@@ -197,9 +212,11 @@ fn an_offer_for_other_relays_is_refused() {
         ..paper(3)
     });
     let stray = Upload::new(&other.unwrap(), 1, paper(3)).unwrap();
-    node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(stray));
+    let said_now = offer(&mut node, stray);
+    node.handle_message(NOW, Side::Upstream, 1, &said_now);
     assert_eq!((node.stats().mission, node.update.latest()), (1, held));
-    node.on_ground(NOW, Side::Upstream, &Message::Offer(stray));
+    let said_now = offer(&mut node, stray);
+    node.on_ground(NOW, Side::Upstream, 0, &said_now);
     assert_eq!((node.stats().mission, node.update.latest()), (2, held));
 }
 
@@ -209,7 +226,8 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     let five = Mission::try_new(paper(5)).unwrap();
     let mut node = relay_of(five, 3, true);
     let new = upload_to(&five, 1);
-    assert!(node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(new)));
+    let first = offer(&mut node, new);
+    assert!(node.handle_message(NOW, Side::Upstream, 1, &first));
     assert_eq!(
         (
             node.update.latest(),
@@ -225,6 +243,112 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
         "{told:?}"
     );
     let stray = upload_to(&base(), 2);
-    node.handle_message(NOW, Side::Upstream, 1, &Message::Offer(stray));
+    let said_now = offer(&mut node, stray);
+    node.handle_message(NOW, Side::Upstream, 1, &said_now);
     assert_eq!((node.stats().mission, node.update.latest()), (1, new.id()));
+}
+
+/// Hours later, or just too late, an offer is nothing but a reason to say a hello; one that answers that is taken.
+#[test]
+fn an_offer_that_was_withheld_is_refused_and_counted() {
+    let late = |seconds: u64| NOW + Settings::default().dead_after.times(2) + Duration::from_millis(1_000 * seconds);
+    for ground in [false, true] {
+        for (now, hellos) in [(late(1), false), (late(1), true), (late(7_200), true)] {
+            let mut node = relay(true);
+            let held = node.update.latest();
+            let withheld = offer(&mut node, upload(1));
+            if hellos {
+                // It goes on saying hellos; their number is another one by then.
+                let step = Settings::default().dead_after;
+                node.ask_number(NOW + step);
+                node.ask_number(NOW + step.times(2));
+                node.ask_number(now);
+            }
+            let from = u16::from(!ground);
+            assert!(node.handle_message(now, Side::Upstream, from, &withheld));
+            assert_eq!((node.stats().stale, node.update.latest()), (1, held));
+            let mut answer = None;
+            while let Some((_, to, message)) = node.poll_message(now) {
+                if let Message::Hello(hello) = message
+                    && to == from
+                {
+                    answer = Some(hello.nonce);
+                }
+            }
+            let fresh = offered(upload(1), answer.unwrap());
+            assert_ne!(fresh, withheld);
+            assert!(node.handle_message(now, Side::Upstream, from, &fresh));
+            assert_eq!((node.stats().stale, node.update.latest()), (1, upload(1).id()));
+        }
+    }
+}
+
+#[test]
+fn what_is_stored_of_an_upload_does_not_depend_on_what_it_answers() {
+    let mut bodies = [[0; 88]; 2];
+    for (body, answer) in bodies.iter_mut().zip([1, 0xFFFF]) {
+        assert_eq!(offered(upload(3), answer).encode(body), Some(LENGTH + 2));
+    }
+    let mut stored = [0; LENGTH];
+    assert_eq!(upload(3).encode(&mut stored), Some(LENGTH));
+    assert_eq!((&bodies[0][..LENGTH], &bodies[1][..LENGTH]), (&stored[..], &stored[..]));
+    assert_eq!(Upload::decode(&stored), Some(upload(3)));
+    assert_eq!(Upload::decode(&bodies[0][..LENGTH + 2]), None);
+}
+
+/// The hello of node 1, which hears relay 2 or not.
+fn hello_of(node: &Node, hears: u8) -> Message {
+    let Message::Hello(hello) = hello(node, node.update.latest()) else {
+        unreachable!();
+    };
+    Message::Hello(Hello {
+        ask: true,
+        hears,
+        ..hello
+    })
+}
+
+fn events(node: &mut Node) -> heapless::Vec<Event, 16> {
+    core::iter::from_fn(|| node.poll_event()).collect()
+}
+
+#[test]
+fn a_node_that_does_not_hear_this_relay_is_told_of_once_until_it_does() {
+    let mut node = relay(false);
+    events(&mut node);
+    let deaf = hello_of(&node, 0);
+    for round in 1..=2 {
+        for times in 1..=30 {
+            node.handle_message(NOW, Side::Upstream, 1, &deaf);
+            let told = events(&mut node).contains(&Event::NotHeard { node: 1 });
+            assert_eq!(told, times == 8, "{round} {times}");
+        }
+        let hears = hello_of(&node, 1);
+        node.handle_message(NOW, Side::Upstream, 1, &hears);
+    }
+}
+
+#[test]
+fn a_loss_and_a_mission_that_differs_are_told_with_the_node() {
+    let mut node = relay(false);
+    let lost = events(&mut node);
+    let Message::Hello(hello) = hello_of(&node, 1) else {
+        unreachable!();
+    };
+    let other = Message::Hello(Hello {
+        mission: hello.mission ^ 1,
+        ..hello
+    });
+    node.handle_message(NOW, Side::Upstream, 1, &other);
+    assert_eq!(events(&mut node)[..], [Event::MissionMismatch { node: 1 }], "{lost:?}");
+    let mut told = heapless::Vec::<Event, 16>::new();
+    for seconds in 10..200 {
+        node.handle_timeout(Instant::from_millis(1_000 * seconds));
+        while node.poll_message(Instant::from_millis(1_000 * seconds)).is_some() {}
+        told.extend(events(&mut node));
+    }
+    for (side, other) in [(Side::Upstream, 1), (Side::Downstream, 3)] {
+        let lost = Event::NeighbourLost { side, node: other };
+        assert_eq!(told.iter().filter(|event| **event == lost).count(), 1, "{told:?}");
+    }
 }

@@ -2,19 +2,29 @@
 
 use super::Port;
 use crate::node::Node;
+use crate::node::namesake::Claim;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::frame::{self, FrameError, Opened};
 use crate::wire::message::Message;
 
-/// One frame, decoded from COBS: whether it is intact, and by which neighbour for this relay.
+/// An intact frame that says something to this relay.
+pub(super) enum Addressed<'a> {
+    /// By a neighbour, or a node that might become one.
+    By(Side, Opened<'a>),
+    /// Under this relay's own number, whoever it is for.
+    ByNamesake(Opened<'a>),
+}
+
+/// One frame, decoded from COBS: whether it is intact, and what it is to this relay.
 pub(super) fn addressed<'a>(
     node: &mut Node,
+    now: Instant,
     network: u16,
     port: Port,
     plain: &'a [u8],
-) -> Option<(Side, Opened<'a>)> {
+) -> Option<Addressed<'a>> {
     let own = node.member().node;
     let stats = node.stats_mut();
     let frame = match frame::open(plain) {
@@ -34,9 +44,10 @@ pub(super) fn addressed<'a>(
         bump(&mut stats.foreign);
         return None;
     }
+    let namesake = header.sender == own;
     if header.destination != own && port == Port::Shared {
         bump(&mut stats.overheard);
-        return None;
+        return namesake.then_some(Addressed::ByNamesake(frame));
     }
     let through = match port {
         Port::Upstream => Some(Side::Upstream),
@@ -47,10 +58,33 @@ pub(super) fn addressed<'a>(
         .side_of(header.sender)
         .filter(|side| through.is_none_or(|through| through == *side))
         .filter(|_| header.destination == own);
-    if side.is_none() {
-        bump(&mut node.stats_mut().misaddressed);
+    if let Some(side) = side {
+        return Some(Addressed::By(side, frame));
     }
-    side.map(|side| (side, frame))
+    bump(&mut node.stats_mut().misaddressed);
+    if namesake {
+        return Some(Addressed::ByNamesake(frame));
+    }
+    if let Some(through) = through {
+        node.hear_at_both(now, through, header.sender);
+    }
+    None
+}
+
+/// What a frame under this relay's own number says of its sender, at a relay that asks for no tag; `None` if nothing.
+pub(super) fn claim(frame: &Opened<'_>) -> Option<Claim> {
+    if frame.tag.is_some() {
+        return None;
+    }
+    let message = Message::decode(frame.body).ok()?;
+    let fresh = matches!(message, Message::Hello(hello) if hello.fresh);
+    let hello = matches!(message, Message::Hello(_));
+    let takes_part = hello && !fresh || message.is_of_a_view() || message.is_of_a_proposal();
+    Some(if takes_part {
+        Claim::TakesPart
+    } else {
+        Claim::There
+    })
 }
 
 /// A frame from a neighbour, at a relay that asks for no tag.

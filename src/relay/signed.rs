@@ -2,6 +2,7 @@
 
 use super::incoming::read;
 use crate::node::Node;
+use crate::node::namesake::Claim;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
@@ -19,17 +20,41 @@ pub(super) fn receive(
 ) {
     match session.check(frame.header.sender, frame) {
         Checked::Fresh { first } => {
+            node.is_signed_right(side, frame.header.sender);
             node.meet(side, frame.header.sender, first);
             read(node, now, side, frame);
         }
         Checked::Handshake { first } => {
             bump(&mut node.stats_mut().handshakes);
+            node.is_signed_right(side, frame.header.sender);
             node.meet(side, frame.header.sender, first);
         }
-        Checked::Unproven => bump(&mut node.stats_mut().handshakes),
+        Checked::Unproven => {
+            bump(&mut node.stats_mut().handshakes);
+            node.called(side, frame.header.sender);
+        }
         Checked::Unsigned => bump(&mut node.stats_mut().unsigned),
-        Checked::Forged => bump(&mut node.stats_mut().forged),
+        Checked::Forged => {
+            bump(&mut node.stats_mut().forged);
+            // The tag of anything else is wrong, too, while the two do not know each other's nonces yet.
+            if frame.handshake {
+                node.is_forged(side, frame.header.sender);
+            }
+        }
         Checked::Replayed => bump(&mut node.stats_mut().replayed),
+        Checked::WentBack => {
+            bump(&mut node.stats_mut().replayed);
+            node.went_back(side, frame.header.sender);
+        }
+    }
+}
+
+/// What a frame under this relay's own number says of its sender.
+pub(super) fn claim(session: &Session, frame: &Opened<'_>) -> Claim {
+    if session.is_ahead(frame) {
+        Claim::TakesPart
+    } else {
+        Claim::Unproven
     }
 }
 

@@ -8,7 +8,7 @@
 //!
 //! | a handshake with the right tag and | does |
 //! | --- | --- |
-//! | a nonce below the one known, or a counter that has been taken | nothing; it is counted as a replay |
+//! | a nonce below the one known, or a counter that has been taken | nothing; it is counted as a replay. Five of one older epoch in a row with rising counters, and nothing newer between them, are told: the node's epoch went back |
 //! | a nonce above the one known | the node has been switched on since: a new session begins |
 //! | this relay's own nonce | it is proof that the node is there now |
 //! | a question, and none of that to learn by it here | nothing but the answer |
@@ -31,6 +31,9 @@ pub(crate) const HELLO: usize = 17;
 /// Nodes that a relay remembers at once.
 const PEERS: usize = 8;
 
+/// So many handshakes of an older epoch in a row are no delayed ones.
+const WENT_BACK: u8 = 5;
+
 /// One node that this relay talks to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
@@ -46,6 +49,37 @@ struct Peer {
     /// The largest nonce it has shown, 0 before any.
     other: u64,
     taken: Window,
+    older: Older,
+}
+
+/// Handshakes of an older epoch, or of the same one begun anew.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+struct Older {
+    epoch: u32,
+    /// One more than the counter of the last.
+    next: u32,
+    /// How many came in a row, one after the other by their counters.
+    times: u8,
+}
+
+impl Older {
+    /// One more; whether it is the last of so many that the node itself has to be there. A frame that is played again is none.
+    const fn count(&mut self, epoch: u32, counter: u32) -> bool {
+        if epoch != self.epoch || self.times == 0 {
+            *self = Self {
+                epoch,
+                next: counter.saturating_add(1),
+                times: 1,
+            };
+            return false;
+        }
+        if counter < self.next {
+            return false;
+        }
+        self.next = counter.saturating_add(1);
+        self.times = self.times.saturating_add(1);
+        self.times == WENT_BACK
+    }
 }
 
 impl Peer {
@@ -86,6 +120,8 @@ pub(crate) enum Checked {
     Forged,
     /// A member's, taken before or too old to tell.
     Replayed,
+    /// The same, and the last of so many in a row that the node itself goes on with an older epoch.
+    WentBack,
 }
 
 impl Session {
@@ -185,19 +221,14 @@ impl Session {
         }
         let first = !peer.proven;
         peer.proven = true;
+        peer.older.times = 0;
         Checked::Fresh { first }
     }
 
     /// A handshake; `None` if its tag is wrong.
     fn meet(&mut self, sender: u16, frame: &Opened<'_>, told: [u8; TAG]) -> Option<Checked> {
-        let (other, rest) = frame.body.split_first_chunk::<8>()?;
-        let (known, &[asks @ (0 | 1)]) = rest.split_first_chunk::<8>()? else {
-            return None;
-        };
-        let nonces = Nonces {
-            sender: u64::from_le_bytes(*other),
-            receiver: u64::from_le_bytes(*known),
-        };
+        let nonces = said(frame)?;
+        let asks = frame.body.last().copied()?;
         if nonces.sender == 0 || !is_same(self.with(nonces).tag(frame.signed), told) {
             return None;
         }
@@ -213,9 +244,16 @@ impl Session {
         let proof = nonces.receiver == peer.nonces(epoch).sender;
         // A node that has shown this relay's nonce does not forget it without a new one of its own.
         let old = nonces.sender < peer.other || peer.proven && !proof;
-        if old || !peer.taken.take(frame.header.counter) {
+        if old {
+            let [.., a, b, c, d] = nonces.sender.to_le_bytes();
+            let epoch = u32::from_le_bytes([a, b, c, d]);
+            let back = peer.older.count(epoch, frame.header.counter);
+            return Some(if back { Checked::WentBack } else { Checked::Replayed });
+        }
+        if !peer.taken.take(frame.header.counter) {
             return Some(Checked::Replayed);
         }
+        peer.older.times = 0;
         peer.handshake |= asks == 1 && (begins || !proof || peer.proven);
         if !proof {
             return Some(Checked::Unproven);
@@ -223,6 +261,16 @@ impl Session {
         let first = !peer.proven;
         peer.proven = true;
         Some(Checked::Handshake { first })
+    }
+
+    /// Whether `frame`, under this relay's own number, is a handshake with the right tag and a larger epoch than its own: whatever was
+    /// recorded of this relay has a smaller one. Work: that of one tag.
+    pub(crate) fn is_ahead(&self, frame: &Opened<'_>) -> bool {
+        let Some((nonces, told)) = said(frame).zip(frame.tag) else {
+            return false;
+        };
+        nonces.sender >> 32 > u64::from(self.auth.epoch)
+            && is_same(self.with(nonces).tag(frame.signed), told)
     }
 
     fn find(&self, node: u16) -> Option<&Peer> {
@@ -256,6 +304,7 @@ impl Session {
             own: made,
             other: 0,
             taken: Window::default(),
+            older: Older::default(),
         };
         if let Err(peer) = self.peers.push(peer) {
             let (pinned, clock) = (self.pinned, self.clock);
@@ -269,6 +318,18 @@ impl Session {
             }
         }
     }
+}
+
+/// The nonces of its sender and its receiver that stand in a handshake; `None` if `frame` is none.
+fn said(frame: &Opened<'_>) -> Option<Nonces> {
+    let (other, rest) = frame.body.split_first_chunk::<8>()?;
+    let (known, &[0 | 1]) = rest.split_first_chunk::<8>()? else {
+        return None;
+    };
+    frame.handshake.then_some(Nonces {
+        sender: u64::from_le_bytes(*other),
+        receiver: u64::from_le_bytes(*known),
+    })
 }
 
 #[cfg(test)]

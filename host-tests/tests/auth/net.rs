@@ -302,7 +302,7 @@ impl Net {
                 self.stored[usize::from(index) - 1] = self.relay(index).upload().copied();
             }
             assert!(
-                !matches!(event, Event::NeighbourLost(_)),
+                !matches!(event, Event::NeighbourLost { .. }),
                 "{index}: {event:?} at {now:?}"
             );
         }

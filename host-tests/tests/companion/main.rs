@@ -319,6 +319,6 @@ fn neighbours_with_different_missions_say_so() {
         ]
         .concat(),
     );
-    second.line("mismatch: relay 1 upstream flies another mission than 0x");
+    second.line("mismatch: relay 1 flies another mission than 0x");
     assert!(!second.has_said("setpoint") && !first.has_said("setpoint"));
 }

@@ -1,6 +1,6 @@
 //! The epoch that a drone keeps in its flash: it rises, whatever happens.
 
-use host_tests::firmware::epoch::{Entry, Step, entry, next};
+use host_tests::firmware::epoch::{Entry, Step, begin, entry, next};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::seed;
@@ -111,4 +111,41 @@ fn no_epoch_comes_twice_whenever_power_fails() {
     }
     println!("failures: {failures:?}");
     assert!(failures.iter().all(|&failures| failures > 100));
+}
+
+/// A place that cannot be written costs nothing; a flash that cannot be written at all does not put the epoch back.
+#[test]
+fn a_write_that_fails_never_puts_the_epoch_back() {
+    for worn in 0..=5 {
+        let mut flash = Flash::blank(40);
+        for _ in 0..10 {
+            flash.start(3);
+        }
+        let before = flash.0.clone();
+        let mut tried = Vec::new();
+        let begun = begin([&before[0], &before[1]], 3, |step| {
+            tried.push(step.entry);
+            let sound = tried.len() > worn;
+            // A worn place takes half of what is written.
+            let [epoch, complement] = entry(step.epoch);
+            flash.program(step, if sound { [epoch, complement] } else { [epoch, u32::MAX] });
+            sound
+        });
+        let (epoch, kept) = begun.unwrap();
+        assert_eq!((epoch, kept, tried.len()), (13, worn < 4, (worn + 1).min(4)));
+        let again = flash.next(3).unwrap();
+        assert_eq!(again.epoch, if kept { 14 } else { 13 });
+        assert!(again.entry > *tried.last().unwrap(), "a worn place is left alone");
+    }
+    // The last place of a sector, and none that can be written.
+    let full = vec![entry(7); 8];
+    let blank = vec![BLANK; 8];
+    let mut steps = Vec::new();
+    let begun = begin([&full, &blank], 1, |step| {
+        steps.push((step.sector, step.entry, step.erase));
+        false
+    });
+    assert_eq!(begun, Some((8, false)));
+    assert_eq!(steps[0], (1, 0, false));
+    assert_eq!(begin([&[], &[]], 9, |_| true), Some((9, false)), "an emulator");
 }

@@ -105,7 +105,7 @@ impl<'a> World<'a> {
         };
         let missed = events
             .iter()
-            .filter(|event| matches!(event, Event::NeighbourLost(_)));
+            .filter(|event| matches!(event, Event::NeighbourLost { .. }));
         missed.for_each(|_| self.tally.add("neighbours missed"));
         if events.contains(&Event::Reformed) {
             self.tally.add("views agreed on");

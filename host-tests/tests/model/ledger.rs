@@ -382,7 +382,7 @@ impl Ledger {
         let there = [at > 0, at + 1 < scenario.relays()];
         for event in turn.events {
             match event {
-                Event::NeighbourLost(of) => {
+                Event::NeighbourLost { side: of, .. } => {
                     let signs = &mut self.signs[side(*of)];
                     let silence = turn.now.since(signs.surely);
                     prop_assert!(
@@ -392,8 +392,8 @@ impl Ledger {
                     );
                     signs.missed = true;
                 }
-                Event::NeighbourBack(of) => self.signs[side(*of)].missed = false,
-                Event::MissionMismatch(_) => prop_assert!(false, "all fly one mission"),
+                Event::NeighbourBack { side: of, .. } => self.signs[side(*of)].missed = false,
+                Event::MissionMismatch { .. } => prop_assert!(false, "all fly one mission"),
                 _ => {}
             }
         }

@@ -36,7 +36,7 @@ fn five_that_sign_settle_where_the_simulated_chain_does() {
             let mut lines = fleet.of_drone(drone).skip(1);
             assert_eq!(
                 lines.next().unwrap().text,
-                "frames are signed, epoch 77; it cannot be kept: for a test bench only"
+                "frames are signed, epoch 77; it cannot be kept: raise the epoch of the block before the next start"
             );
         }
     }
@@ -62,9 +62,9 @@ fn a_drone_without_the_key_takes_no_part() {
             let mut lines = lines.iter().filter(|line: &&Line| line.drone == drone);
             lines.any(|line| line.text == text)
         };
-        lost(2, "event NeighbourLost(Downstream)")
-            && lost(3, "event NeighbourLost(Downstream)")
-            && lost(4, "event NeighbourLost(Upstream)")
+        lost(2, "event NeighbourLost { side: Downstream, node: 3 }")
+            && lost(3, "event NeighbourLost { side: Downstream, node: 4 }")
+            && lost(4, "event NeighbourLost { side: Upstream, node: 3 }")
     });
     assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));
     let counters = [1, 2, 3, 4].map(|drone| fleet.counters(drone));

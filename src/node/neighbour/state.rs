@@ -27,6 +27,34 @@ use crate::wire::digest::MissionId;
 /// Nodes on one side that are sent a hello.
 pub(crate) const CANDIDATES: u16 = 4;
 
+/// So many times in a row a node has to say that it does not hear this relay: an answer or two may be lost.
+const UNHEARD: u8 = 8;
+
+/// Handshakes in a row under a node's number that are signed with another key.
+#[cfg(feature = "auth")]
+const FORGED: u8 = 3;
+
+/// How often something was so for each of the nearest nodes, in a row; the nearest first.
+#[derive(Clone, Copy, Debug, Default)]
+struct InRow([u8; CANDIDATES as usize]);
+
+impl InRow {
+    /// It was so once more, of the node `distance` nodes away, or it was not; whether it has been so `most` times just now.
+    fn count(&mut self, distance: u16, so: bool, most: u8) -> bool {
+        let at = usize::from(distance).wrapping_sub(1);
+        let Some(times) = self.0.get_mut(at) else {
+            return false;
+        };
+        if !so {
+            *times = 0;
+            return false;
+        }
+        let reached = *times + 1 == most;
+        *times = times.saturating_add(1).min(most);
+        reached
+    }
+}
+
 /// Doublings of the hold-down.
 const DOUBLINGS: u8 = 4;
 
@@ -135,6 +163,11 @@ pub(crate) struct Neighbour {
     near: Option<Instant>,
     /// The nodes heard since `since`, and in the span before: bit 0 is the nearest one.
     hearing: Hearing,
+    /// How often each of them said that it does not hear this relay.
+    unheard: InRow,
+    /// How often a handshake under its number was signed with another key.
+    #[cfg(feature = "auth")]
+    forged: InRow,
     losses: u8,
     /// How long after one question the next one is asked.
     tick: Duration,
@@ -142,6 +175,9 @@ pub(crate) struct Neighbour {
     signs: Signs,
     /// The newest mission that the node taken holds, as far as it has said.
     pub(crate) holds: Option<MissionId>,
+    /// The number of its last hello, which an offer to it answers; 0 before any.
+    #[cfg(feature = "upload")]
+    pub(crate) asked: u16,
     /// Whether a newer one is to be offered to it.
     #[cfg(feature = "upload")]
     pub(crate) offer: bool,
@@ -192,6 +228,9 @@ impl Neighbour {
                 now: 0,
                 before: 0,
             },
+            unheard: InRow::default(),
+            #[cfg(feature = "auth")]
+            forged: InRow::default(),
             losses: 0,
             tick: tick(settings, all),
             jitter: Jitter::new(seed),
@@ -200,6 +239,8 @@ impl Neighbour {
                 answer: 0,
             },
             holds: None,
+            #[cfg(feature = "upload")]
+            asked: 0,
             #[cfg(feature = "upload")]
             offer: false,
             #[cfg(feature = "upload")]
@@ -289,6 +330,28 @@ impl Neighbour {
         let mut hearing = self.hearing;
         hearing.age(now, settings);
         hearing.now | hearing.before
+    }
+
+    /// The node `distance` nodes away has said whether it hears this relay; whether it does not, for the last of so many times in a row.
+    pub(crate) fn says_it_hears(&mut self, distance: u16, heard: bool) -> bool {
+        self.unheard.count(distance, !heard, UNHEARD)
+    }
+
+    /// A handshake under the number of the node `distance` nodes away was signed with another key; whether that is certain now.
+    #[cfg(feature = "auth")]
+    pub(crate) fn is_forged(&mut self, distance: u16) -> bool {
+        self.forged.count(distance, true, FORGED)
+    }
+
+    /// The node `distance` nodes away has the key.
+    #[cfg(feature = "auth")]
+    pub(crate) fn is_signed_right(&mut self, distance: u16) {
+        self.forged.count(distance, false, FORGED);
+    }
+
+    /// Whether the node taken has been heard and is not lost.
+    pub(crate) const fn is_there(&self) -> bool {
+        self.liveness.is_there()
     }
 
     /// The neighbour was there `at` that time or later; whether it had been lost until now.

@@ -36,38 +36,34 @@ pub struct Hello {
     pub holds: MissionId,
     /// Whether that is the one it flies.
     pub flies: bool,
+    /// A number for the offer that answers it; 0 at a node that takes none.
+    pub nonce: u16,
 }
 
 type Word = [u8; 2];
 
 impl Hello {
-    /// The mission; the neighbour; how many are behind; the newest view; digest and version of what it holds; whom it hears; flags from bit 0: asks for
+    /// The mission; the neighbour; how many are behind; the newest view; digest and version of what it holds; the number for an offer; whom it hears; flags from bit 0: asks for
     /// a hello, asks for a new view, fresh, ready, flies what it holds.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let flags = [self.ask, self.form, self.fresh, self.ready, self.flies]
             .into_iter()
             .rev()
             .fold(0_u8, |flags, flag| flags << 1 | u8::from(flag));
-        let [digest, version] = [self.holds.digest, self.holds.version].map(u16::to_le_bytes);
+        let last = [self.holds.digest, self.holds.version, self.nonce].map(u16::to_le_bytes);
         let newest = self.newest.bits().to_le_bytes();
         let near = [self.mission, self.neighbour, self.behind].map(u16::to_le_bytes);
         write(
-            &(
-                tag::HELLO,
-                near,
-                newest,
-                [digest, version],
-                [self.hears, flags],
-            ),
+            &(tag::HELLO, near, newest, last, [self.hears, flags]),
             buffer,
         )
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let ([mission, neighbour, behind], newest, [digest, version], [hears, flags]): (
+        let ([mission, neighbour, behind], newest, [digest, version, nonce], [hears, flags]): (
             [Word; 3],
             [u8; 4],
-            [Word; 2],
+            [Word; 3],
             [u8; 2],
         ) = read(body)?;
         let neighbour = u16::from_le_bytes(neighbour);
@@ -87,6 +83,7 @@ impl Hello {
             behind,
             flies: flags & 16 != 0,
             hears,
+            nonce: u16::from_le_bytes(nonce),
             holds: MissionId {
                 version: u16::from_le_bytes(version),
                 digest: u16::from_le_bytes(digest),

@@ -80,7 +80,12 @@ pub enum Message {
     },
     /// Either way, also from the ground: a mission that is newer than the one that the receiver holds.
     #[cfg(feature = "upload")]
-    Offer(Upload),
+    Offer {
+        /// The mission.
+        upload: Upload,
+        /// The number of the receiver's hello that it answers, 0 for none.
+        answer: u16,
+    },
 }
 
 impl Message {
@@ -100,7 +105,7 @@ impl Message {
             Self::Proposal(proposal) => Some(proposal.mission_id.digest),
             Self::Decision(count) => Some(count.mission_id.digest),
             #[cfg(feature = "upload")]
-            Self::Offer(upload) => Some(upload.base()),
+            Self::Offer { upload, .. } => Some(upload.base()),
         }
     }
 
@@ -163,7 +168,7 @@ impl Message {
             Self::Decision(decision) => decision.encode(buffer),
             Self::Fence { mission, fence } => fence::encode(*mission, fence, buffer),
             #[cfg(feature = "upload")]
-            Self::Offer(upload) => offer::encode(upload, buffer),
+            Self::Offer { upload, answer } => offer::encode(upload, *answer, buffer),
         }
     }
 
@@ -211,26 +216,11 @@ impl Message {
                 Ok(Self::Fence { mission, fence })
             }
             #[cfg(feature = "upload")]
-            tag::OFFER => offer::decode(body).map(Self::Offer),
+            tag::OFFER => {
+                let (upload, answer) = offer::decode(body)?;
+                Ok(Self::Offer { upload, answer })
+            }
             _ => Err(MessageError::Encoding),
-        }
-    }
-}
-
-/// Stored, an upload is the body of its offer.
-#[cfg(feature = "upload")]
-impl Upload {
-    /// Writes it as it is to be stored, [`LENGTH`](crate::wire::upload::LENGTH) bytes, into `buffer`; `None` if it does not fit.
-    pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        Message::Offer(*self).encode(buffer)
-    }
-
-    /// Reads it back; `None` if `bytes` are anything but one upload in range. Whether they were stored whole is for a check
-    /// sequence around them to say.
-    pub fn decode(bytes: &[u8]) -> Option<Self> {
-        match Message::decode(bytes) {
-            Ok(Message::Offer(upload)) => Some(upload),
-            _ => None,
         }
     }
 }

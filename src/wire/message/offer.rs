@@ -8,13 +8,32 @@ use crate::channel::Channel;
 use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
 use crate::wire::upload::Upload;
 
-pub(super) fn encode(upload: &Upload, buffer: &mut [u8]) -> Option<usize> {
-    write(&(tag::OFFER, OfferBody::of(upload)), buffer)
+pub(super) fn encode(upload: &Upload, answer: u16, buffer: &mut [u8]) -> Option<usize> {
+    let answer = answer.to_le_bytes();
+    write(&(tag::OFFER, OfferBody::of(upload), answer), buffer)
 }
 
-pub(super) fn decode(body: &[u8]) -> Result<Upload, MessageError> {
-    let body: OfferBody = read(body)?;
-    body.checked().ok_or(MessageError::Value)
+pub(super) fn decode(body: &[u8]) -> Result<(Upload, u16), MessageError> {
+    let (body, answer): (OfferBody, [u8; 2]) = read(body)?;
+    let upload = body.checked().ok_or(MessageError::Value)?;
+    Ok((upload, u16::from_le_bytes(answer)))
+}
+
+/// As it is stored: without what it answers, which says nothing of the mission.
+impl Upload {
+    /// Writes it as it is to be stored, [`LENGTH`](crate::wire::upload::LENGTH) bytes, into `buffer`; `None` if it does not fit.
+    pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        write(&(tag::OFFER, OfferBody::of(self)), buffer)
+    }
+
+    /// Reads it back; `None` if `bytes` are anything but one upload in range. Whether they were stored whole is for a check
+    /// sequence around them to say.
+    pub fn decode(bytes: &[u8]) -> Option<Self> {
+        let (&tag::OFFER, body) = bytes.split_first()? else {
+            return None;
+        };
+        read::<OfferBody>(body).ok()?.checked()
+    }
 }
 
 /// The wire form: version and base, and the numbers in the order of the digest, the bands last.

@@ -285,3 +285,58 @@ fn after_the_last_nonce_nobody_new_is_met() {
     assert_eq!(own.take_handshake(), None);
     assert_eq!(own.handshake(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
 }
+
+/// A node that has begun again with an older epoch, or with the same, says handshakes for ever; what was recorded is one frame.
+#[test]
+fn an_epoch_that_went_back_is_told_once_and_a_frame_that_is_played_again_is_not() {
+    for epoch in [1, 7] {
+        let mut own = session();
+        let mut counters = [0; 2];
+        met(&mut own, 2, 7, &mut counters);
+        let mut back = Session::new(Auth { key: KEY, epoch });
+        back.greet(1);
+        let mut told = 0;
+        for counter in 0..20 {
+            let plain = frame(&mut back, (2, 1), true, counter);
+            for _ in 0..5 {
+                match check(&mut own, &plain) {
+                    Checked::WentBack => told += 1,
+                    other => assert_eq!(other, Checked::Replayed),
+                }
+            }
+            assert_eq!(told, u32::from(counter >= 4), "{epoch} {counter}");
+        }
+    }
+}
+
+#[test]
+fn what_the_node_itself_says_in_between_keeps_old_handshakes_from_being_told() {
+    let mut own = session();
+    let mut counters = [0; 2];
+    let mut other = met(&mut own, 2, 7, &mut counters);
+    let mut back = Session::new(Auth { key: KEY, epoch: 3 });
+    back.greet(1);
+    for counter in 0..20 {
+        let old = frame(&mut back, (2, 1), true, counter);
+        assert_eq!(check(&mut own, &old), Checked::Replayed);
+        let fresh = frame(&mut other, (2, 1), false, 100 + counter);
+        assert_eq!(check(&mut own, &fresh), Checked::Fresh { first: false });
+    }
+}
+
+#[test]
+fn only_a_handshake_with_the_key_and_a_larger_epoch_is_ahead() {
+    let own = session();
+    for (key, epoch, handshake, ahead) in [
+        (KEY, 6, true, true),
+        (KEY, 5, true, false),
+        (KEY, 4, true, false),
+        (KEY, 6, false, false),
+        (Key::new([1; 32]), 6, true, false),
+    ] {
+        let mut other = Session::new(Auth { key, epoch });
+        other.greet(2);
+        let plain = frame(&mut other, (1, 2), handshake, 0);
+        assert_eq!(own.is_ahead(&frame::open(&plain).unwrap()), ahead, "{epoch} {handshake}");
+    }
+}

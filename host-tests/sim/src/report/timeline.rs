@@ -21,9 +21,9 @@ pub struct MomentReport {
     /// transmitter, and the receiver comes after the last relay.
     pub relay: u16,
     /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted`, `healed`, `deaf`, `hears`, `offered`,
-    /// `held` or `adopted`.
+    /// `held`, `adopted`, `lapsed`, `unheard`, `stranger`, `other key`, `old epoch` or `namesake`.
     pub what: &'static str,
-    /// The neighbour that was lost or found, or the relay that is not heard.
+    /// The neighbour that was lost or found, the relay that is not heard, or the one that is told of.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other: Option<u16>,
     /// Number of the view that was formed.
@@ -49,6 +49,12 @@ impl MomentReport {
             Turning::Found(_) => "found",
             Turning::Reformed { .. } => "formed",
             Turning::Cut => "cut",
+            Turning::Lapsed => "lapsed",
+            Turning::Unheard => "unheard",
+            Turning::Stranger => "stranger",
+            Turning::OtherKey => "other key",
+            Turning::OldEpoch => "old epoch",
+            Turning::Namesake => "namesake",
             Turning::Converged => "converged",
             Turning::Infeasible => "infeasible",
             Turning::Parted => "parted",
@@ -141,7 +147,9 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         return false;
     }
     match one.what {
-        "lost" => one.other == moment.other,
+        "lost" | "unheard" | "stranger" | "other key" | "old epoch" | "namesake" => {
+            one.other == moment.other
+        }
         // Each of two neighbours finds the other.
         "found" => {
             one.other == Some(moment.relay) && moment.other == Some(one.relay)
@@ -152,7 +160,7 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         "converged" => one.sir.map(f64::to_bits) == moment.sir.map(f64::to_bits),
         "silent" | "on" => one.at_s.to_bits() == moment.at_s.to_bits(),
         "held" | "adopted" => one.version == moment.version,
-        "cut" => true,
+        "cut" | "lapsed" => true,
         _ => false,
     }
 }
@@ -180,6 +188,11 @@ impl Group {
             "healed" => format!("joined after {}", one.relay),
             "deaf" => format!("{} deaf to {}", one.relay, one.other.unwrap_or_default()),
             "hears" => format!("{} hears {}", one.relay, one.other.unwrap_or_default()),
+            "unheard" => format!("{} does not hear {who}", one.other.unwrap_or_default()),
+            "stranger" => format!("{}: another mission", one.other.unwrap_or_default()),
+            "other key" => format!("{}: another key", one.other.unwrap_or_default()),
+            "old epoch" => format!("{}: an old epoch", one.other.unwrap_or_default()),
+            "namesake" => format!("{} used twice", one.other.unwrap_or_default()),
             "offered" | "held" | "adopted" => {
                 format!("mission {} {}", one.version.unwrap_or_default(), one.what)
             }
@@ -210,6 +223,12 @@ impl Group {
                 count(one.relays.unwrap_or_default().into()),
                 one.view.unwrap_or_default()
             ),
+            "lapsed" => format!("{who} cannot be certain of the others any more"),
+            "unheard" => format!("relay {other} does not hear {who}"),
+            "stranger" => format!("{who} found that relay {other} flies another mission"),
+            "other key" => format!("{who} found that relay {other} signs with another key"),
+            "old epoch" => format!("{who} found that the epoch of relay {other} went back"),
+            "namesake" => format!("{who} found that number {other} is used twice"),
             "cut" => format!("{who} cut off: too few to go on without the others"),
             "converged" => format!(
                 "converged: {}, SIR {:.3}",

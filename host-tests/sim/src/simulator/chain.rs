@@ -65,7 +65,6 @@ impl Chain {
                 swept: 0,
                 stored: None,
                 safe: None,
-                beside: relay.neighbours(),
                 relay,
                 wake: None,
             });
@@ -293,7 +292,6 @@ impl Chain {
                 };
                 member.swept += member.relay.stats().sweeps;
                 member.starts = start.number;
-                member.beside = relay.neighbours();
                 member.relay = relay;
                 member.killed = None;
                 member.wake = None;

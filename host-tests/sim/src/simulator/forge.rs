@@ -148,6 +148,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
             behind: place,
             holds: mission_id,
             flies: true,
+            nonce: rng.random(),
         }),
         (3, _) => Message::Proposal(Proposal {
             mission_id,
@@ -162,7 +163,10 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
                 successor: None,
             },
         }),
-        (4, Some(offer)) => Message::Offer(offer),
+        (4, Some(upload)) => Message::Offer {
+            upload,
+            answer: rng.random(),
+        },
         _ => Message::Decision(Decision {
             mission_id,
             proposal: view,

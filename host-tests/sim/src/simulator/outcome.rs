@@ -33,6 +33,18 @@ pub enum Turning {
     },
     /// Its part of the chain is too small to go on.
     Cut,
+    /// It is not certain any more that all hold what was agreed on.
+    Lapsed,
+    /// The other one says that it does not hear it.
+    Unheard,
+    /// The other one flies another mission.
+    Stranger,
+    /// The other one signs with another key.
+    OtherKey,
+    /// The other one's epoch went back.
+    OldEpoch,
+    /// The number of the other one, or its own, is used twice.
+    Namesake,
     /// It took its place in an agreement.
     Converged,
     /// No target can be met.
@@ -62,7 +74,7 @@ pub struct Moment {
     pub relay: u16,
     /// What.
     pub what: Turning,
-    /// The neighbour that was lost or found, or the relay that is not heard, from 1.
+    /// The neighbour that was lost or found, the relay that is not heard, or the one that is told of, from 1.
     pub other: Option<u16>,
     /// The target that the relay holds its place for, linear.
     pub target: Option<f32>,

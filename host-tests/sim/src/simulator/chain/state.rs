@@ -32,8 +32,6 @@ pub(super) struct Member {
     pub(super) stored: Option<Upload>,
     /// Where it was told to fly when that was last found to be within its limits.
     pub(super) safe: Option<Placement>,
-    /// Its neighbours toward Tx and Rx when it was heard last.
-    pub(super) beside: [Option<u16>; 2],
     /// The wake-up in the queue that counts: the earliest one. Any other is void.
     pub(super) wake: Option<Instant>,
 }

@@ -1,6 +1,6 @@
 //! The story of a run: what is worth a line in it.
 
-use uav_relay::{Event, Side};
+use uav_relay::Event;
 
 use super::super::outcome::{Moment, Turning};
 use super::state::{Chain, Member};
@@ -12,19 +12,21 @@ impl Chain {
             && let Some(event) = member.relay.poll_event()
         {
             let by = member.node;
-            let at = |side| usize::from(side == Side::Downstream);
             let (what, other) = match event {
-                Event::NeighbourLost(side) => {
+                Event::NeighbourLost { side, node } => {
                     self.outcome.noticed.insert((by, side), self.now);
-                    // It may have let go of it already.
-                    let lost = member.beside.get(at(side)).copied().flatten();
-                    (Turning::Lost(side), lost)
+                    (Turning::Lost(side), Some(node))
                 }
-                Event::NeighbourBack(side) => {
+                Event::NeighbourBack { side, node } => {
                     self.outcome.noticed.remove(&(by, side));
-                    let found = member.relay.neighbours().get(at(side)).copied().flatten();
-                    (Turning::Found(side), found)
+                    (Turning::Found(side), Some(node))
                 }
+                Event::NotHeard { node } => (Turning::Unheard, Some(node)),
+                Event::MissionMismatch { node } => (Turning::Stranger, Some(node)),
+                Event::KeyMismatch { node } => (Turning::OtherKey, Some(node)),
+                Event::EpochWentBack { node } => (Turning::OldEpoch, Some(node)),
+                Event::IndexTaken { node } => (Turning::Namesake, Some(node)),
+                Event::LeaseLapsed => (Turning::Lapsed, None),
                 Event::Converged => {
                     self.holding += 1;
                     (Turning::Converged, None)
@@ -54,9 +56,6 @@ impl Chain {
                 _ => continue,
             };
             self.tell(index, what, other);
-        }
-        if let Some(member) = self.members.get_mut(index) {
-            member.beside = member.relay.neighbours();
         }
     }
 

@@ -1,0 +1,109 @@
+//! What an operator is told: the node and the cause.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::unnecessary_wraps,
+    clippy::redundant_closure_for_method_calls,
+    reason = "as every test may"
+)]
+
+mod air;
+mod namesake;
+mod signed;
+mod withheld;
+
+use air::mission;
+use uav_relay::Instant;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::deaf::Deaf;
+use uav_relay_sim::simulator::outcome::{Moment, Outcome, Turning};
+use uav_relay_sim::simulator::setup::Setup;
+
+fn at(seconds: u64) -> Instant {
+    Instant::from_millis(1_000 * seconds)
+}
+
+fn of(outcome: &Outcome, what: fn(Turning) -> bool) -> Vec<(u16, Option<u16>)> {
+    let moments = outcome.moments.iter().filter(|moment| what(moment.what));
+    moments
+        .map(|&Moment { relay, other, .. }| (relay, other))
+        .collect()
+}
+
+/// A dead drone is lost, and whoever is found in its place bears its own number.
+#[test]
+fn who_is_lost_and_who_is_found_is_told_by_its_number() {
+    let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(200));
+    setup.kills = vec![(3, at(60))];
+    let outcome = run(setup).unwrap();
+    let mut lost = of(&outcome, |what| matches!(what, Turning::Lost(_)));
+    lost.sort_unstable();
+    assert_eq!(lost, [(2, Some(3)), (4, Some(3))]);
+    let found = of(&outcome, |what| matches!(what, Turning::Found(_)));
+    assert!(
+        found.contains(&(2, Some(4))) && found.contains(&(4, Some(2))),
+        "{found:?}"
+    );
+    assert!(
+        found.iter().all(|(_, other)| *other != Some(3)),
+        "{found:?}"
+    );
+}
+
+/// Relay 3 does not hear relay 2: that one hears it, and has to be told why the two are no neighbours.
+#[test]
+fn a_relay_that_is_not_heard_is_told_by_whom() {
+    let mut setup = Setup::on_shared_channel(mission(4)).soaked(at(300));
+    setup.deaf = vec![Deaf {
+        by: 3,
+        of: 2,
+        from: at(60),
+        until: None,
+    }];
+    let outcome = run(setup).unwrap();
+    assert_eq!(
+        of(&outcome, |what| what == Turning::Unheard),
+        [(2, Some(3))]
+    );
+}
+
+/// No frame that is lost on the way is taken for a deaf node, a false key or an old epoch.
+#[test]
+fn a_bad_channel_has_nobody_told_of_what_is_not_so() {
+    for seed in 1..=3 {
+        let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(300));
+        setup.faults.loss = 0.3;
+        setup.faults.corrupt = 0.1;
+        setup.auth = true;
+        setup.seed = seed;
+        let outcome = run(setup).unwrap();
+        let told = of(&outcome, |what| {
+            let causes = [
+                Turning::Unheard,
+                Turning::Stranger,
+                Turning::OtherKey,
+                Turning::OldEpoch,
+                Turning::Namesake,
+            ];
+            causes.contains(&what)
+        });
+        assert_eq!(told, [], "seed {seed}");
+    }
+}
+
+/// Two of five are too few. They go on asking, and are told once.
+#[test]
+fn a_quorum_lost_is_told_once_until_a_view_is_agreed_on() {
+    let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(600));
+    setup.kills = vec![(1, at(60)), (2, at(60)), (3, at(60))];
+    let outcome = run(setup).unwrap();
+    for what in [Turning::Cut, Turning::Lapsed] {
+        let mut told = outcome.moments.clone();
+        told.retain(|moment| moment.what == what);
+        let mut by: Vec<u16> = told.iter().map(|moment| moment.relay).collect();
+        by.sort_unstable();
+        assert_eq!(by, [4, 5], "{what:?}");
+    }
+}

@@ -1,0 +1,126 @@
+//! A number that is used twice.
+
+use crate::air::mission;
+use uav_relay::Event;
+
+use crate::air::{Air, KEY, auth, relay};
+
+const TAKEN: Event = Event::IndexTaken { node: 3 };
+
+/// A chain of five flies; another relay 3 is switched on.
+fn joined(loss: f64) -> (Air, usize) {
+    let mission = mission(5);
+    let mut air = Air::of(&mission, |_| None, loss);
+    air.run(90);
+    assert!(air.relays.iter().all(|relay| relay.setpoint().is_some()));
+    assert!(air.told(TAKEN).is_empty());
+    let other = air.join(relay(&mission, 3, None, air.now));
+    (air, other)
+}
+
+#[test]
+fn the_later_of_two_relays_with_one_number_has_no_set_point_and_both_are_told() {
+    for loss in [0.0, 0.3] {
+        let (mut air, other) = joined(loss);
+        let places: Vec<_> = air.relays.iter().map(|relay| relay.setpoint()).collect();
+        for _ in 0..120 {
+            air.run(1);
+            assert_eq!(air.relays[other].setpoint(), None);
+        }
+        assert!(air.relays[other].stands_down() && !air.relays[2].stands_down());
+        let mut told = air.told(TAKEN);
+        told.sort_unstable();
+        assert_eq!(told, [2, other], "loss {loss}");
+        let after: Vec<_> = air.relays.iter().map(|relay| relay.setpoint()).collect();
+        assert_eq!(after[..5], places[..5]);
+    }
+}
+
+#[test]
+fn the_later_one_takes_part_once_the_other_is_gone() {
+    for by_hand in [false, true] {
+        let (mut air, other) = joined(0.0);
+        air.run(10);
+        assert!(air.relays[other].stands_down());
+        air.off[2] = true;
+        if by_hand {
+            let now = air.now;
+            air.relays[other].clear_index_taken(now);
+            assert!(!air.relays[other].stands_down());
+        }
+        air.run(20);
+        assert_eq!(air.relays[other].stands_down(), !by_hand);
+        air.run(100);
+        assert!(!air.relays[other].stands_down());
+        assert!(air.relays[other].setpoint().is_some(), "it is relay 3 now");
+    }
+}
+
+/// Switched on at once: at no time do both have a set-point for long, and in the end one flies and the other is silent.
+#[test]
+fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
+    for seed in 0..6 {
+        let mission = mission(4);
+        let mut air = Air::of(&mission, |_| None, 0.1 * (seed % 3) as f64);
+        let mut other = relay(
+            &mission,
+            3,
+            None,
+            uav_relay::Instant::from_millis(77 + seed),
+        );
+        other.handle_timeout(air.now);
+        let other = air.join(other);
+        air.run(400);
+        let down = [2, other].map(|at| air.relays[at].stands_down());
+        assert_eq!(down[0], !down[1], "seed {seed}");
+        let flies = if down[0] { other } else { 2 };
+        assert!(air.relays[flies].setpoint().is_some());
+        assert!(air.told(TAKEN).contains(&2) && air.told(TAKEN).contains(&other));
+    }
+}
+
+/// With a key the neighbours believe the one with the larger epoch; the other stands down once it holds nothing any more.
+#[test]
+fn with_a_key_the_one_with_the_larger_epoch_stays() {
+    for (epoch, first_stays) in [(1, true), (9, false)] {
+        let mission = mission(5);
+        let mut air = Air::of(&mission, |_| auth(KEY, 5), 0.0);
+        air.run(90);
+        let other = air.join(relay(&mission, 3, auth(KEY, epoch), air.now));
+        air.run(240);
+        assert!(
+            air.told(TAKEN).contains(&2) && air.told(TAKEN).contains(&other),
+            "{epoch}"
+        );
+        assert_eq!(air.relays[2].setpoint().is_some(), first_stays, "{epoch}");
+        assert_eq!(air.relays[2].stands_down(), !first_stays, "{epoch}");
+        assert_eq!(
+            air.relays[other].setpoint().is_some(),
+            !first_stays,
+            "{epoch}"
+        );
+    }
+}
+
+/// Who lacks the key can have it told, and nothing more: nobody stands down.
+#[test]
+fn forged_frames_have_nobody_stand_down() {
+    let mission = mission(3);
+    let mut air = Air::of(&mission, |_| auth(KEY, 1), 0.0);
+    air.run(60);
+    let mut liar = relay(&mission, 2, auth([1; 32], 99), air.now);
+    let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];
+    for _ in 0..60 {
+        while let Some(transmit) = liar.poll_transmit(air.now, &mut frame) {
+            air.play(&frame[..transmit.len]);
+        }
+        air.run(1);
+        liar.handle_timeout(air.now);
+    }
+    assert_eq!(air.told(Event::IndexTaken { node: 2 }), [1]);
+    assert!(
+        air.relays
+            .iter()
+            .all(|relay| relay.setpoint().is_some() && !relay.stands_down())
+    );
+}

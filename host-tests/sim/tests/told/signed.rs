@@ -1,0 +1,95 @@
+//! Another key, and an epoch that went back.
+
+use crate::air::mission;
+use uav_relay::{Event, Identity, Port, Relay, Settings};
+
+use crate::air::{Air, KEY, auth, relay};
+
+/// Relay 2 of three has another key. Its neighbours and it are told, once.
+#[test]
+fn another_key_is_told_with_the_node() {
+    for loss in [0.0, 0.3] {
+        let key = |index| if index == 2 { [1; 32] } else { KEY };
+        let mut air = Air::of(&mission(3), |index| auth(key(index), 1), loss);
+        air.run(60);
+        let mut told = air.told(Event::KeyMismatch { node: 2 });
+        told.sort_unstable();
+        assert_eq!(told, [0, 2]);
+        for node in [1, 3] {
+            assert_eq!(air.told(Event::KeyMismatch { node }), [1]);
+        }
+    }
+}
+
+/// What was recorded of a node is worth nothing, and tells nothing of it.
+#[test]
+fn two_forged_handshakes_are_noise() {
+    let mission = mission(3);
+    let mut air = Air::of(&mission, |_| auth(KEY, 1), 0.0);
+    let mut stranger = relay(&mission, 2, auth([1; 32], 9), air.now);
+    let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];
+    air.run(30);
+    for _ in 0..2 {
+        let transmit = stranger.poll_transmit(air.now, &mut frame).unwrap();
+        air.play(&frame[..transmit.len]);
+        air.run(30);
+    }
+    assert!(air.relays[0].stats().forged > 0);
+    assert!(air.told(Event::KeyMismatch { node: 2 }).is_empty());
+}
+
+/// Relay 2 is switched on again with an epoch that it had before, or an older one: it is refused, and that is told.
+#[test]
+fn an_epoch_that_went_back_is_told_with_the_node() {
+    for (loss, again, back) in [
+        (0.0, 1, true),
+        (0.3, 1, true),
+        (0.0, 5, true),
+        (0.3, 6, false),
+    ] {
+        let mission = mission(3);
+        let epoch = |index| if index == 2 { 5 } else { 1 };
+        let mut air = Air::of(&mission, |index| auth(KEY, epoch(index)), loss);
+        air.run(60);
+        assert!(air.relays.iter().all(|relay| relay.setpoint().is_some()));
+        air.relays[1] = relay(&mission, 2, auth(KEY, again), air.now);
+        air.run(90);
+        let mut told = air.told(Event::EpochWentBack { node: 2 });
+        told.sort_unstable();
+        let expected: &[usize] = if back { &[0, 2] } else { &[] };
+        assert_eq!(told, expected, "epoch {again}, loss {loss}");
+        assert_eq!(air.relays[1].setpoint().is_none(), back);
+    }
+}
+
+/// Over two wires: the drone on the other port bears the number of the one on this port.
+#[test]
+fn a_neighbour_that_is_heard_at_both_ports_is_told() {
+    let mission = mission(3);
+    let of = |index| {
+        let identity = Identity { network: 7, index };
+        Relay::new(
+            mission,
+            identity,
+            Settings::default(),
+            1,
+            uav_relay::Instant::ZERO,
+        )
+        .unwrap()
+    };
+    let (mut middle, mut head) = (of(2), of(1));
+    let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];
+    let now = uav_relay::Instant::from_millis(6_000);
+    while let Some(at) = head.poll_timeout().filter(|at| *at <= now) {
+        head.handle_timeout(at);
+    }
+    let mut told = Vec::new();
+    while let Some(transmit) = head.poll_transmit(now, &mut frame) {
+        for port in [Port::Upstream, Port::Downstream] {
+            middle.handle_bytes(now, port, &frame[..transmit.len]);
+        }
+        told.extend(std::iter::from_fn(|| middle.poll_event()));
+    }
+    assert_eq!(told, [Event::IndexTaken { node: 1 }]);
+    assert!(!middle.stands_down());
+}
