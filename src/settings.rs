@@ -4,6 +4,7 @@ use crate::guard::config::GuardConfig;
 use crate::mission::{Mission, Profile};
 use crate::optimiser::local::Local;
 use crate::optimiser::search::Schedule;
+use crate::place::Placement;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
 
@@ -74,6 +75,47 @@ pub struct Measure {
     pub samples: u32,
 }
 
+/// What a relay does while its part of the chain is too small to fly anything, so that it is in nobody's way.
+///
+/// Set it alike on all relays: then those that leave keep their order and their distances.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum WithoutQuorum {
+    /// It stays where it was agreed to be.
+    #[default]
+    Hold,
+    /// It leaves the line, along y and upward from there.
+    Leave {
+        /// How far to the side, m: -1e4 to 1e4.
+        y_m: f32,
+        /// How far up, m: 0 to 1e4.
+        up_m: f32,
+    },
+}
+
+impl WithoutQuorum {
+    fn is_valid(self) -> bool {
+        match self {
+            Self::Hold => true,
+            Self::Leave { y_m, up_m } => {
+                (-1e4..=1e4).contains(&y_m) && (0.0..=1e4).contains(&up_m)
+            }
+        }
+    }
+
+    /// Where a relay is to be then that was agreed to be at `place`.
+    pub(crate) fn place(self, place: Placement) -> Placement {
+        match self {
+            Self::Hold => place,
+            Self::Leave { y_m, up_m } => Placement {
+                y_m: place.y_m + y_m,
+                altitude_m: place.altitude_m + up_m,
+                ..place
+            },
+        }
+    }
+}
+
 /// What a firmware may choose.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -102,9 +144,11 @@ pub struct Settings {
     pub probe_after: Duration,
     /// After this long without one it counts as lost; above `probe_after`.
     pub dead_after: Duration,
-    /// Whether a part of the chain goes on without the others only if it has a quorum: more than half of the relays of the view
-    /// before, or half with its leader. Without that, the parts of a chain that is split would get in each other's way.
+    /// Whether a part of the chain goes on without the others only if it has a quorum: more than half of the members of the view
+    /// before, or half with the one that proposed it. Without that, the parts of a chain that is split would get in each other's way.
     pub quorum: bool,
+    /// What the relay does where its part has none.
+    pub without_quorum: WithoutQuorum,
     /// Whether setpoints lead to the agreed place only as far as the neighbours have made room, and inside which box. The relay
     /// then has to be told where it is: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
@@ -126,6 +170,7 @@ impl Default for Settings {
             probe_after: Duration::from_millis(5_000),
             dead_after: Duration::from_millis(15_000),
             quorum: true,
+            without_quorum: WithoutQuorum::Hold,
             guard: None,
         }
     }
@@ -155,6 +200,8 @@ pub enum SetupError {
     Epoch,
     /// `probe_after` is zero, or `dead_after` not above it.
     Silence,
+    /// `without_quorum.y_m` is not within -1e4 to 1e4, or `without_quorum.up_m` not within 0 to 1e4.
+    WithoutQuorum,
     /// A number of `guard` is not within its range, or the crate was built without the feature for it.
     Guard,
 }
@@ -175,6 +222,9 @@ impl core::fmt::Display for SetupError {
             Self::HopTime => "hop_time must be above 0",
             Self::Epoch => "auth.epoch must be above 0, and above that of every start before",
             Self::Silence => "probe_after must be above 0 and dead_after above probe_after",
+            Self::WithoutQuorum => {
+                "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4"
+            }
             Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, hover of 0 to 1e3, and its feature on",
         })
     }
@@ -235,6 +285,9 @@ pub(crate) fn check(
     }
     if settings.probe_after.as_micros() == 0 || settings.dead_after <= settings.probe_after {
         return Err(SetupError::Silence);
+    }
+    if !settings.without_quorum.is_valid() {
+        return Err(SetupError::WithoutQuorum);
     }
     if settings
         .guard

@@ -273,9 +273,19 @@ impl Node {
         }
     }
 
+    /// Where to be in the end: at the place agreed on, or beside it while others may fly there.
+    fn wanted(&self) -> Option<Placement> {
+        let agreed = self.round.setpoint()?;
+        Some(if self.view.has_no_quorum() {
+            self.member.settings.without_quorum.place(agreed)
+        } else {
+            agreed
+        })
+    }
+
     /// Moves the setpoint as far as it may go by what is known now.
     fn steer(&mut self, now: Instant) {
-        if self.steering.steer(now, self.round.setpoint()) {
+        if self.steering.steer(now, self.wanted()) {
             self.raise(Event::SetpointChanged);
         }
     }
@@ -933,7 +943,7 @@ impl Node {
 
     /// Where to fly now.
     pub(crate) fn setpoint(&self) -> Option<Placement> {
-        self.steering.setpoint(self.round.setpoint())
+        self.steering.setpoint(self.wanted())
     }
 
     /// What keeps the relay from its place at `side`.

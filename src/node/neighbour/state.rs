@@ -5,7 +5,7 @@
 //! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead after a hold-down, if it is better | - |
 //! | `Pairing` | `Searching` | - | as above | after a span `Searching` |
 //! | `Searching` | - | - | taken; one that comes and goes after a hold-down | after a span `NoPeer` |
-//! | `NoPeer` | - | - | taken, if it takes this relay; else, or if it comes and goes, after a hold-down | the four nearest nodes are sent a hello every `dead_after`, and more often once one was heard |
+//! | `NoPeer` | - | - | taken, if it takes this relay; else, or if it comes and goes, after a hold-down | the four nearest nodes are sent a hello every `dead_after`, every half of `probe_after` once one was heard |
 //!
 //! A span is `dead_after` less `probe_after`. A node that has been taken is paired with until it says that it has taken this relay, too.
 //! A node that takes another one is not taken. *Better* is a nearer node that has somebody beyond it who hears it, and a farther one by which more
@@ -20,7 +20,7 @@
 use super::liveness::{Liveness, tick};
 use crate::jitter::Jitter;
 use crate::node::context::Proposer;
-use crate::settings::Settings;
+use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
 
@@ -161,7 +161,13 @@ impl Neighbour {
         let look_at = if node == 0 {
             None
         } else {
-            Some(now + settings.probe_after)
+            // Where others may have closed up since, it makes itself known soon.
+            let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
+            let wait = match settings.wiring {
+                Wiring::Pair => settings.probe_after,
+                Wiring::Shared => soon,
+            };
+            Some(now + wait)
         };
         Self {
             look_at,
@@ -398,9 +404,13 @@ impl Neighbour {
             }
             NeighbourState::NoPeer => {
                 self.hello_all();
-                if !self.is_near(now, settings) {
-                    look_again = now + self.jitter.spread(settings.dead_after);
-                }
+                let often = Duration::from_micros(settings.probe_after.as_micros() / 2);
+                let wait = if self.is_near(now, settings) {
+                    often
+                } else {
+                    settings.dead_after
+                };
+                look_again = now + self.jitter.spread(wait);
             }
         }
         self.look_at = Some(look_again);
