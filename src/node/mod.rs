@@ -410,13 +410,7 @@ impl Node {
 
     /// The neighbour at `side` was there `at` that time or later: it has answered what this relay said then.
     fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
-        let Self {
-            member, neighbours, ..
-        } = self;
-        if neighbours
-            .at_mut(side)
-            .confirmed(now, at, &member.settings)
-        {
+        if self.neighbours.at_mut(side).confirmed(now, at) {
             self.raise(Event::NeighbourBack(side));
         }
     }
@@ -721,10 +715,7 @@ impl Node {
 
     /// The neighbour at `side` has said, one way or the other, whether it takes this relay for its own.
     fn told(&mut self, now: Instant, side: Side, mutual: bool) {
-        let Self {
-            member, neighbours, ..
-        } = self;
-        if !neighbours.at_mut(side).told(mutual, now, &member.settings) || !mutual {
+        if !self.neighbours.at_mut(side).told(mutual, now) || !mutual {
             return;
         }
         let newer = self.view.newest() > self.member.view;
