@@ -462,10 +462,12 @@ impl Node {
             Message::Pulsed(_) => self.lease.handle(&context, message),
             Message::Pulse(_) => {
                 self.view.commit(self.member.view);
+                self.lease.commit();
                 self.lease.handle(&context, message)
             }
             _ if message.is_of_a_view() && message.is_onward() => {
                 self.view.commit(self.member.view);
+                self.lease.commit();
                 self.round.handle(&context, message)
             }
             _ => self.round.handle(&context, message),
@@ -764,6 +766,9 @@ impl Node {
         let works = self.member.settings.method == Method::Joint;
         let rest = now + Duration::from_millis(100).times(u32::from(lease_left));
         self.lease.renew(proposed.view, rest);
+        if leads {
+            self.lease.commit();
+        }
         self.round.renew(rest, leads, works);
         bump(&mut self.telemetry.stats.views);
         self.raise(Event::Reformed);
