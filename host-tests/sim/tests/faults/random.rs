@@ -155,6 +155,12 @@ fn whatever_happens_one_group_flies_at_most() {
     fly(number("SEED", 1), number("COUNT", 300));
 }
 
+/// A view that only the last relay had accepted was followed by one without those that had voted for it, and held their lease.
+#[test]
+fn what_was_decided_and_not_heard_of_ends_no_lease() {
+    fly(6_450, 1);
+}
+
 #[test]
 #[ignore = "takes some minutes"]
 fn in_ten_thousand_sequences_one_group_flies_at_most() {
