@@ -1,5 +1,7 @@
 //! At random: whatever happens, no two groups fly agreements of their own.
 
+use std::fmt::Write as _;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Duration;
@@ -99,7 +101,8 @@ fn command(setup: &Setup) -> String {
         line += " --auth";
     }
     for cut in &setup.partitions {
-        line += &format!(
+        _ = write!(
+            line,
             " --partition {}@{}{}",
             cut.after,
             seconds(cut.from),
@@ -107,7 +110,8 @@ fn command(setup: &Setup) -> String {
         );
     }
     for deaf in &setup.deaf {
-        line += &format!(
+        _ = write!(
+            line,
             " --deaf {}:{}@{}{}",
             deaf.by,
             deaf.of,
@@ -116,10 +120,10 @@ fn command(setup: &Setup) -> String {
         );
     }
     for (relay, at) in &setup.kills {
-        line += &format!(" --kill {relay}@{}", seconds(*at));
+        _ = write!(line, " --kill {relay}@{}", seconds(*at));
     }
     for (relay, at) in &setup.boots {
-        line += &format!(" --boot {relay}@{}", seconds(*at));
+        _ = write!(line, " --boot {relay}@{}", seconds(*at));
     }
     line
 }
