@@ -57,11 +57,12 @@ fn a_hundred_agree_and_hold() {
     agree_and_hold(100, 0.0, 1);
 }
 
+/// With 30 % lost two of four seeds of fifty had not agreed after ten minutes: this does not hold yet.
 #[test]
-#[ignore = "takes a minute"]
+#[ignore = "takes a minute, and fails"]
 fn fifty_and_a_hundred_agree_and_hold_even_where_30_percent_are_lost() {
-    for relays in [50, 100] {
-        for loss in [0.0, 0.3] {
+    for loss in [0.0, 0.3] {
+        for relays in [50, 100] {
             agree_and_hold(relays, loss, 4);
         }
     }
