@@ -3,6 +3,7 @@
 #![doc = include_str!("tour.md")]
 
 pub mod channel;
+mod channel_load;
 #[cfg(doc)]
 pub mod docs;
 mod event;
@@ -30,6 +31,7 @@ mod view;
 pub mod wire;
 
 pub use channel::Channel;
+pub use channel_load::ChannelLoad;
 pub use event::Event;
 pub use field::{Field, FieldPoint};
 #[cfg(feature = "upload")]

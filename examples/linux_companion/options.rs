@@ -7,7 +7,8 @@ use clap::{Parser, ValueEnum};
 use uav_relay::serial::byte_time;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
-    Adjust, Duration, Field, FieldPoint, Identity, Interference, Mission, Settings, Wiring,
+    Adjust, ChannelLoad, Duration, Field, FieldPoint, Identity, Interference, Mission, Settings,
+    Wiring,
 };
 
 use crate::command::{self, named};
@@ -16,6 +17,9 @@ use crate::mission::{self, MissionOptions};
 
 /// A frame's way through two kernels and two USB adapters, and the computing: an adapter alone may wait 16 ms.
 const LATENCY: Duration = Duration::from_millis(40);
+
+/// What a frame takes on a radio channel beside its bytes, in bytes: its header, and turning from receiving to sending.
+const RADIO: u16 = 12;
 
 /// One relay of a chain, over ttys. Options of the mission must be the same for all relays; their defaults are the paper's
 /// multi-hop scenario.
@@ -143,20 +147,23 @@ fn plan(options: &Options) -> Result<Plan, String> {
         ));
     }
     let ttys = ttys(options)?;
+    let wiring = match ttys {
+        Ttys::Pair { .. } => Wiring::Pair,
+        Ttys::Shared(_) => Wiring::Shared,
+    };
     let frame = u32::try_from(MAX_FRAME).unwrap_or(u32::MAX);
+    let turns = match wiring {
+        Wiring::Pair => byte_time(options.baud).times(frame),
+        Wiring::Shared => carried(options)?,
+    };
     let settings = Settings {
         method: match options.method {
             Method::Align => uav_relay::Method::Align,
             Method::Joint => uav_relay::Method::Joint,
             Method::Adjust => uav_relay::Method::Adjust(Adjust::default()),
         },
-        wiring: match ttys {
-            Ttys::Pair { .. } => Wiring::Pair,
-            Ttys::Shared(_) => Wiring::Shared,
-        },
-        hop_time: Duration::from_micros(
-            byte_time(options.baud).times(frame).as_micros() + LATENCY.as_micros(),
-        ),
+        wiring,
+        hop_time: Duration::from_micros(turns.as_micros() + LATENCY.as_micros()),
         probe_after: Duration::from_millis(options.probe_after_ms),
         dead_after: Duration::from_millis(options.dead_after_ms),
         ..Settings::default()
@@ -172,6 +179,26 @@ fn plan(options: &Options) -> Result<Plan, String> {
         ttys,
         baud: options.baud,
     })
+}
+
+/// How long a frame takes on a channel that all relays share, which has to carry them.
+fn carried(options: &Options) -> Result<Duration, String> {
+    let load = ChannelLoad {
+        in_range: options.of,
+        overhead: RADIO,
+    };
+    let least = load.least_baud(Duration::from_millis(options.probe_after_ms));
+    if options.baud >= least {
+        return Ok(load.hop_time(options.baud, Duration::from_micros(0)));
+    }
+    let longer = load
+        .least_probe_after(options.baud)
+        .as_micros()
+        .div_ceil(1_000);
+    Err(format!(
+        "--baud {}: must be at least {least} where {} relays share a channel, or --probe-after-ms {longer}",
+        options.baud, options.of
+    ))
 }
 
 fn secret(options: &Options) -> Result<Option<Secret>, String> {

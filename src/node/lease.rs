@@ -67,6 +67,8 @@ pub(crate) struct Lease {
     relied_on: Instant,
     /// The view accepted last, and until when its places are not to be taken.
     rest: (ViewId, Instant),
+    /// Whether all are known to have accepted it: until then members of a view before may hold what was agreed on there.
+    accepted: bool,
     /// At the leader: when the next pulse begins, and how long they took lately.
     next_at: Option<Instant>,
     slowest: Duration,
@@ -86,6 +88,7 @@ impl Lease {
             current: None,
             relied_on: now + settings.dead_after,
             rest: (ViewId::LOADED, now),
+            accepted: true,
             next_at: None,
             slowest: Duration::from_micros(0),
             retransmit: Retransmit::new(seed),
@@ -118,18 +121,24 @@ impl Lease {
         Held {
             lease_left: tenths(self.relied_on.since(now)),
             view,
-            rest: tenths(until.since(now)),
+            rest: self.accepted.then(|| tenths(until.since(now))),
         }
     }
 
     /// `view` is accepted, whose places are not to be taken before `rest`.
     pub(crate) fn renew(&mut self, view: ViewId, rest: Instant) {
         self.rest = (view, rest);
+        self.accepted = false;
         self.state = LeaseState::Open;
         self.current = None;
         self.next_at = None;
         self.due = LeaseDue::default();
         self.retransmit.stop();
+    }
+
+    /// All have accepted the view that this relay is in.
+    pub(crate) const fn commit(&mut self) {
+        self.accepted = true;
     }
 
     /// The leader has heard that all agree on their places: there is something to hold from now on.

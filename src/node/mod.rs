@@ -544,11 +544,8 @@ impl Node {
 
     /// The neighbour at `side` was there `at` that time or later: it has answered what this relay said then.
     fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
-        let Self {
-            member, neighbours, ..
-        } = self;
-        let neighbour = neighbours.at_mut(side);
-        if neighbour.confirmed(now, at, &member.settings) {
+        let neighbour = self.neighbours.at_mut(side);
+        if neighbour.confirmed(now, at) {
             let node = neighbour.node();
             self.raise_about(About::Back, side, node);
         }
@@ -603,10 +600,12 @@ impl Node {
             Message::Pulsed(_) => self.lease.handle(&context, message),
             Message::Pulse(_) => {
                 self.view.commit(self.member.view);
+                self.lease.commit();
                 self.lease.handle(&context, message)
             }
             _ if message.is_of_a_view() && message.is_onward() => {
                 self.view.commit(self.member.view);
+                self.lease.commit();
                 self.round.handle(&context, message)
             }
             _ => self.round.handle(&context, message),
@@ -902,10 +901,7 @@ impl Node {
 
     /// The neighbour at `side` has said, one way or the other, whether it takes this relay for its own.
     fn told(&mut self, now: Instant, side: Side, mutual: bool) {
-        let Self {
-            member, neighbours, ..
-        } = self;
-        if !neighbours.at_mut(side).told(mutual, now, &member.settings) || !mutual {
+        if !self.neighbours.at_mut(side).told(mutual, now) || !mutual {
             return;
         }
         let newer = self.view.newest() > self.member.view;
@@ -956,6 +952,9 @@ impl Node {
         let works = self.member.settings.method == Method::Joint;
         let rest = now + Duration::from_millis(100).times(u32::from(lease_left));
         self.lease.renew(proposed.view, rest);
+        if leads {
+            self.lease.commit();
+        }
         self.round.renew(rest, leads, works);
         bump(&mut self.telemetry.stats.views);
         self.telemetry.told_lapsed = false;

@@ -1,6 +1,6 @@
 //! Which groups fly an agreement of their own.
 
-use uav_relay::Phase;
+use uav_relay::{Phase, ViewId};
 use uav_relay_sim::simulator::flying::{Seen, groups, has_agreed};
 
 /// Relay `index` of `relays` in view `view`.

@@ -1,8 +1,8 @@
 //! When a neighbour counts as lost.
 //!
 //! A sign of life answers something that this relay said: a heartbeat with the number of its question, or what comes back of a pulse. It counts
-//! from when that was said, so what was recorded and is played later is none. After `Settings::probe_after` without one the neighbour
-//! is asked again and again. It is lost once all of this holds:
+//! from when that was said, so what was recorded and is played later is none. After `Settings::probe_after` without one, or the time that a
+//! message takes through the whole chain and back where that is longer, the neighbour is asked again and again. It is lost once all of this holds:
 //!
 //! | | lost not before | because |
 //! | --- | --- | --- |
@@ -35,6 +35,13 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     let round = settings.hop_time.times(2 * u32::from(all));
     let most = (span / u64::from(QUESTIONS)).max(1);
     Duration::from_micros(round.as_micros().clamp(span / 64 + 1, most.max(span / 64 + 1)))
+}
+
+/// How long a sign of life is waited for until one is asked for: `Settings::probe_after`, or until what is sent onward can have gone through a
+/// chain of `all` relays and come back.
+pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
+    let round = settings.hop_time.times(2 * u32::from(all) + 2);
+    round.min(longest_lease(settings)).max(settings.probe_after)
 }
 
 /// Questions that may still be answered.

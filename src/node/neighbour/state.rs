@@ -17,7 +17,7 @@
 //! `dead_after` without another. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be
 //! about to take it, too.
 
-use super::liveness::{Liveness, tick};
+use super::liveness::{Liveness, patience, tick};
 use crate::jitter::Jitter;
 use crate::node::context::Proposer;
 use crate::settings::{Settings, Wiring};
@@ -171,6 +171,8 @@ pub(crate) struct Neighbour {
     losses: u8,
     /// How long after one question the next one is asked.
     tick: Duration,
+    /// How long a sign of life is waited for until one is asked for.
+    patience: Duration,
     jitter: Jitter,
     signs: Signs,
     /// The newest mission that the node taken holds, as far as it has said.
@@ -200,7 +202,7 @@ impl Neighbour {
             // Where others may have closed up since, it makes itself known soon.
             let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
             let wait = match settings.wiring {
-                Wiring::Pair => settings.probe_after,
+                Wiring::Pair => patience(settings, all),
                 Wiring::Shared => soon,
             };
             Some(now + wait)
@@ -233,6 +235,7 @@ impl Neighbour {
             forged: InRow::default(),
             losses: 0,
             tick: tick(settings, all),
+            patience: patience(settings, all),
             jitter: Jitter::new(seed),
             signs: Signs {
                 ask: false,
@@ -355,10 +358,10 @@ impl Neighbour {
     }
 
     /// The neighbour was there `at` that time or later; whether it had been lost until now.
-    pub(crate) fn confirmed(&mut self, now: Instant, at: Instant, settings: &Settings) -> bool {
+    pub(crate) fn confirmed(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.confirmed(at);
         if self.is_mutual() {
-            let next = (at + settings.probe_after).max(now + self.tick);
+            let next = (at + self.patience).max(now + self.tick);
             // Another node than before is to be counted once its grace is over.
             let waits = self.node != self.counted && now < self.grace;
             self.look_at = Some(if waits { next.min(self.grace) } else { next });
@@ -389,11 +392,9 @@ impl Neighbour {
     }
 
     /// The neighbour has said whether it takes this relay for its own; whether that is new.
-    pub(crate) fn told(&mut self, mutual: bool, now: Instant, settings: &Settings) -> bool {
+    pub(crate) fn told(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
-            (NeighbourState::Pairing { .. }, true) => {
-                (NeighbourState::Linked, settings.probe_after)
-            }
+            (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
             (NeighbourState::Linked, false) => {
                 (NeighbourState::Pairing { since: now }, self.tick)
             }

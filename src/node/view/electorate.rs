@@ -60,9 +60,9 @@ pub(crate) struct Electorate {
 pub(crate) struct Held {
     /// By members of its view that rely on this relay.
     pub(crate) lease_left: u16,
-    /// By members of views before `view`.
+    /// By members of views before `view`; `None` as long as they may not have accepted that.
     pub(crate) view: ViewId,
-    pub(crate) rest: u16,
+    pub(crate) rest: Option<u16>,
 }
 
 impl Held {
@@ -70,16 +70,15 @@ impl Held {
     pub(super) const NONE: Self = Self {
         lease_left: 0,
         view: ViewId::LOADED,
-        rest: 0,
+        rest: Some(0),
     };
 
     fn rest_of(&self, view: ViewId) -> u16 {
         if view == ViewId::LOADED {
             0
-        } else if view == self.view {
-            self.rest
         } else {
-            u16::MAX
+            let known = self.rest.filter(|_| view == self.view);
+            known.unwrap_or(u16::MAX)
         }
     }
 }
@@ -274,7 +273,7 @@ mod tests {
         Held {
             lease_left,
             view: ViewId::LOADED,
-            rest: 0,
+            rest: Some(0),
         }
     }
 

@@ -31,6 +31,7 @@ use station::stations;
 use super::attack::Struck;
 use super::bursts::Bursts;
 use super::faults::Injected;
+use super::flying::Seen;
 use super::link::Line;
 use super::medium::{Access, AirCounts, Medium};
 use super::outcome::{Ending, Outcome, RelayEnd, Turning};
@@ -242,6 +243,7 @@ impl Chain {
                 relays: member.relay.mission().relays(),
                 view: member.relay.view().number(),
                 version: member.relay.version(),
+                seen: Seen::of(&member.relay, member.killed.is_none()),
             })
             .collect();
         self.outcome

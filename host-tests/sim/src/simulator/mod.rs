@@ -11,6 +11,7 @@
 //! | [`setup`], [`outcome`] | what a chain is run with, and what came of it |
 //! | [`drones`] | drones that fly straight to where they are told |
 //! | [`flying`] | groups of relays with an agreement of their own |
+//! | [`longest`] | which relays can be in one chain |
 //! | [`optimum`] | where exactly these relays would be if nothing had happened |
 //! | [`watch`] | how much of the time the chain is right |
 //! | [`many`] | the same run with many seeds |
@@ -25,6 +26,7 @@ pub mod faults;
 pub mod flying;
 pub mod forge;
 pub mod link;
+pub mod longest;
 pub mod many;
 pub mod medium;
 pub mod optimum;

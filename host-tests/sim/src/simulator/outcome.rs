@@ -6,6 +6,7 @@ use uav_relay::{Instant, Placement, Profile, Side, Stats};
 
 use super::attack::Struck;
 use super::faults::Injected;
+use super::flying::Seen;
 use super::medium::AirCounts;
 use super::watch::Watched;
 
@@ -122,6 +123,8 @@ pub struct RelayEnd {
     pub view: u32,
     /// Version of the mission that it flies.
     pub version: u16,
+    /// What it showed.
+    pub seen: Seen,
 }
 
 /// What came of a run.

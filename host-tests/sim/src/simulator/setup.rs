@@ -2,7 +2,9 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::{Auth, Instant, Key, Mission, Profile, Settings, Side, Upload, Wiring};
+use uav_relay::{
+    Auth, ChannelLoad, Duration, Instant, Key, Mission, Profile, Settings, Side, Upload, Wiring,
+};
 
 use super::attack::Attack;
 use super::deaf::Deaf;
@@ -175,6 +177,26 @@ impl Setup {
             in_range: near,
             overhead,
         }
+    }
+
+    /// What the relays that share a channel put on it; `None` where nobody is in another's way.
+    pub fn load(&self) -> Option<ChannelLoad> {
+        let shared = self.settings.wiring == Wiring::Shared && self.access != Access::Ideal;
+        let Channel {
+            in_range, overhead, ..
+        } = self.channel();
+        shared.then_some(ChannelLoad {
+            in_range: u16::try_from(in_range).unwrap_or(u16::MAX),
+            overhead: u16::try_from(overhead).unwrap_or(u16::MAX),
+        })
+    }
+
+    /// How long a sweep takes from one relay to the next, and a millisecond for computing.
+    pub fn hop_time(&self) -> Duration {
+        let latency = Duration::from_micros(self.link.latency.as_micros() + 1_000);
+        self.load().map_or(self.link.hop_time(), |load| {
+            load.hop_time(self.link.baud, latency)
+        })
     }
 
     /// How a relay that is switched on for the `start`th time, from 1, proves who it is.

@@ -11,7 +11,8 @@ use super::optimum::Optima;
 pub struct Watched {
     /// When all relays of a view held their places for the first time.
     pub first_agreement: Option<Instant>,
-    /// The share of the time since then in which all relays that can be in one chain held its optimum; 0 without an agreement.
+    /// The share of the time since then in which all relays that can be in one chain (a longest one) held its optimum; 0 without an
+    /// agreement.
     pub availability: Option<f64>,
     /// The longest time since then in which they did not.
     pub longest_wrong: Option<Duration>,

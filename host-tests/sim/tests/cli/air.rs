@@ -29,6 +29,33 @@ fn a_slow_link_takes_longer() {
 }
 
 #[test]
+fn what_the_channel_cannot_carry_is_refused_before_flight() {
+    for (uavs, sharing, least) in [
+        ("2", "csma", 4_694),
+        ("8", "csma", 32_854),
+        ("8", "aloha", 32_854),
+        ("100", "csma", 37_547),
+    ] {
+        let below = (least - 1).to_string();
+        let arguments = ["--uavs", uavs, "--air", sharing, "--baud", &below];
+        let (status, line) = refusal(&arguments);
+        assert_eq!(status, 2, "{arguments:?}");
+        let says = format!("--baud {below}: must be within {least} to 10000000: ");
+        assert!(line.starts_with(&says), "{line}");
+    }
+    for (sharing, baud) in [("csma", "32854"), ("ideal", "9600")] {
+        let report = json(&["--uavs", "8", "--air", sharing, "--baud", baud]);
+        assert!(report["sir"].as_f64().unwrap() > 1.0, "{sharing}");
+    }
+    assert!(
+        json(&["--baud", "9600", "--wires"])["sir"]
+            .as_f64()
+            .unwrap()
+            > 1.0
+    );
+}
+
+#[test]
 fn a_soak_goes_on_to_its_end_and_says_how_much_of_it_was_right() {
     let arguments = ["--soak", "200", "--kill", "4@20", "--boot", "4@60"];
     let report = json(&arguments);

@@ -92,6 +92,16 @@ impl Air {
             (_, Some(Sharing::Aloha)) => Access::Aloha,
             (_, Some(Sharing::Csma) | None) => Access::Csma,
         };
+        if let Some(load) = setup.load() {
+            let least = load.least_baud(setup.settings.probe_after);
+            if self.baud < least {
+                let line = format!(
+                    "--baud {}: must be within {least} to 10000000: {} relays share the channel at one place",
+                    self.baud, load.in_range
+                );
+                return Err(Failure::input(line));
+            }
+        }
         if let Some(until) = self.soak {
             setup.soak = Some(until);
             setup.deadline = until;

@@ -4,6 +4,9 @@ use uav_relay::Wiring;
 
 use super::state::Chain;
 
+/// A relay takes one that is so many places away at most for its neighbour, however far it is heard.
+const NEIGHBOUR: usize = 4;
+
 impl Chain {
     /// How many relays away a relay is heard.
     pub(super) fn reach(&self) -> usize {
@@ -30,9 +33,10 @@ impl Chain {
                 .any(|deaf| deaf.applies(number(by), number(of), self.now))
     }
 
-    /// Whether relays `one` and `other` (from 0) are near enough to each other and hear each other now.
+    /// Whether relays `one` and `other` (from 0) can be neighbours in a chain now: they hear each other, and not too many are between.
     pub(super) fn are_linked(&self, one: usize, other: usize) -> bool {
-        one.abs_diff(other) <= self.reach() && self.hears(one, other) && self.hears(other, one)
+        let most = self.reach().min(NEIGHBOUR);
+        one.abs_diff(other) <= most && self.hears(one, other) && self.hears(other, one)
     }
 
     /// The relays that hear what relay `index` (from 0) sends on a shared channel.

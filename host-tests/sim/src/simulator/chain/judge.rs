@@ -1,6 +1,7 @@
 //! The run under watch: what has changed, and whether the chain is right.
 
 use super::super::flying::Seen;
+use super::super::longest::longest;
 use super::super::queue::Happening;
 use super::super::watch::Watch;
 use super::state::{Chain, Member};
@@ -56,17 +57,26 @@ impl Chain {
         }
     }
 
-    /// Whether the largest part of the chain holds its optimum; of several that are as large, any one.
+    /// Whether a longest chain that there can be of the relays that are on holds its optimum; of several, any one.
+    ///
+    /// Where all of those are too few for a quorum nobody may fly, and that counts as wrong like any other time without a chain.
     fn is_right(&mut self) -> bool {
-        let parts = self.linked_parts();
-        let most = parts.iter().map(Vec::len).max().unwrap_or(0);
-        let largest = parts.iter().filter(|part| part.len() == most && most > 0);
-        for part in largest {
-            let seen: Vec<Seen> = part
+        let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
+        let on: Vec<usize> = (0..self.members.len()).filter(on).collect();
+        let links = |one, other| self.are_linked(one, other);
+        let holds = |at: usize| {
+            self.watch
+                .seen
+                .get(at)
+                .is_some_and(|one| one.place.is_some())
+        };
+        let (_, chains) = longest(&on, links, holds);
+        for chain in chains {
+            let seen: Vec<Seen> = chain
                 .iter()
                 .filter_map(|at| self.watch.seen.get(*at).copied())
                 .collect();
-            let nodes: Vec<u16> = part
+            let nodes: Vec<u16> = chain
                 .iter()
                 .map(|at| u16::try_from(at + 1).unwrap_or(u16::MAX))
                 .collect();
@@ -78,24 +88,6 @@ impl Chain {
             }
         }
         false
-    }
-
-    /// The relays that are on, part by part (from 0): in one part are those that links which hear both ways connect.
-    fn linked_parts(&self) -> Vec<Vec<usize>> {
-        let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
-        let mut left: Vec<usize> = (0..self.members.len()).filter(on).collect();
-        let mut parts = Vec::new();
-        while let Some(first) = left.pop() {
-            let mut part = vec![first];
-            let mut looked = 0;
-            while let Some(one) = part.get(looked).copied() {
-                looked += 1;
-                part.extend(left.extract_if(.., |other| self.are_linked(one, *other)));
-            }
-            part.sort_unstable();
-            parts.push(part);
-        }
-        parts
     }
 }
 

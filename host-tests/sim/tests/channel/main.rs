@@ -1,0 +1,29 @@
+//! What a channel that relays share can carry: how many relays agree on it and hold what they agreed on, and by how many messages.
+//!
+//! `-- --ignored --nocapture` prints the tables of long chains.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs
+)]
+
+mod least_baud;
+mod messages;
+
+use uav_relay::{Instant, Mission};
+use uav_relay_sim::mission;
+use uav_relay_sim::scenario::Scenario;
+
+/// The paper's chain of so many relays, which may stand 0.1 m apart.
+fn close(relays: u16) -> Mission {
+    let scenario = Scenario {
+        min_separation_m: 0.1,
+        ..Scenario::default()
+    };
+    mission::mission(&scenario, relays, 1e-4).unwrap().0
+}
+
+fn seconds(at: Instant) -> f64 {
+    at.as_micros() as f64 / 1e6
+}

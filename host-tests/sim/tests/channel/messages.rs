@@ -1,0 +1,57 @@
+//! How many messages it takes until a chain has agreed.
+
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::many::run_seeds;
+use uav_relay_sim::simulator::medium::Access;
+use uav_relay_sim::simulator::outcome::Ending;
+use uav_relay_sim::simulator::setup::Setup;
+
+use super::*;
+
+/// Without faults one sweep goes to the end and back, whatever the length of the way.
+#[test]
+fn without_faults_one_sweep_is_enough() {
+    for relays in [2, 8, 50, 100, 200, 300, 600, 1_000] {
+        let outcome = run(Setup::new(close(relays))).unwrap();
+        assert_eq!(outcome.ending, Ending::Settled, "{relays} relays");
+        let (sent, ended) = (outcome.messages, seconds(outcome.ended));
+        println!(
+            "{relays} relays: {sent} messages, {} sweeps, {ended:.3} s",
+            outcome.sweeps
+        );
+        assert_eq!(sent, 2 * u64::from(relays - 1), "{relays} relays");
+    }
+}
+
+/// 30 % lost, 15 % changed, 10 % twice, 10 % late.
+#[test]
+#[ignore = "prints a table"]
+fn on_a_bad_day() {
+    println!("| N | links | settled | time, median | worst | messages, median | most |");
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    for relays in [8, 25, 50, 100, 200] {
+        for (name, mut setup) in [
+            ("wires", Setup::new(close(relays))),
+            ("csma", Setup::on_air(close(relays), Access::Csma)),
+        ] {
+            setup.faults = Faults::BAD_DAY;
+            setup.deadline = Instant::from_millis(3_600_000);
+            let ends = run_seeds(&setup, 1..=10, |_, end| {
+                (end.ending, seconds(end.ended), end.messages)
+            });
+            let mut ends = ends.unwrap();
+            let settled = ends
+                .iter()
+                .filter(|(ending, ..)| *ending == Ending::Settled)
+                .count();
+            ends.sort_by(|one, other| one.1.total_cmp(&other.1));
+            let (median, worst) = (ends[5].1, ends[9].1);
+            ends.sort_by_key(|(.., messages)| *messages);
+            println!(
+                "| {relays} | {name} | {settled} of 10 | {median:.1} s | {worst:.1} s | {} | {} |",
+                ends[5].2, ends[9].2
+            );
+        }
+    }
+}
