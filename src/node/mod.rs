@@ -881,6 +881,7 @@ impl Node {
         let pairs = hello.neighbour == own;
         let candidate = Candidate {
             node: from,
+            distance: from.abs_diff(own),
             pairs,
             nearer: from.abs_diff(own) < neighbour.node().abs_diff(own),
             ready: hello.ready,

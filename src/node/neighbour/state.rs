@@ -4,7 +4,7 @@
 //! | --- | --- | --- | --- | --- |
 //! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead after a hold-down, if it is better | - |
 //! | `Pairing` | `Searching` | - | as above | after a span `Searching` |
-//! | `Searching` | - | - | taken; one that comes and goes after a hold-down | after a span `NoPeer` |
+//! | `Searching` | - | - | taken, a farther one not before nearer ones could be heard; one that comes and goes after a hold-down | after a span `NoPeer` |
 //! | `NoPeer` | - | - | taken, if it takes this relay; else, or if it comes and goes, after a hold-down | the four nearest nodes are sent a hello every `dead_after`, every half of `probe_after` once one was heard |
 //!
 //! A span is `dead_after` less `probe_after`. A node that has been taken is paired with until it says that it has taken this relay, too.
@@ -68,6 +68,8 @@ const MEMORY: u32 = 32;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) node: u16,
+    /// How many places away it is.
+    pub(crate) distance: u16,
     /// Whether it takes this relay for its neighbour.
     pub(crate) pairs: bool,
     /// Whether it is nearer than the one taken.
@@ -79,6 +81,11 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
+    /// How many nodes there may be between it and the one that was lost.
+    const fn beyond(&self) -> u16 {
+        self.distance.saturating_sub(2)
+    }
+
     /// Whether it is to take the place of another one.
     const fn is_better(&self) -> bool {
         if self.nearer { self.ready } else { self.longer }
@@ -523,7 +530,11 @@ impl Neighbour {
         // A link that comes and goes has to stay for a while first.
         let flaps = node == self.lost && self.losses > FORGIVEN;
         let takes = match self.state {
-            NeighbourState::Searching { .. } => !flaps || self.passes(node, now, settings),
+            NeighbourState::Searching { since } => {
+                // One that is nearer may be about to be heard.
+                let wait = self.tick.times(u32::from(candidate.beyond()) * 2);
+                now.since(since) >= wait && (!flaps || self.passes(node, now, settings))
+            }
             NeighbourState::NoPeer => {
                 candidate.pairs && !flaps || self.passes(node, now, settings)
             }
