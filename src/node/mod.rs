@@ -839,7 +839,9 @@ impl Node {
             if self.searches() {
                 let two_way = hears(own, from, hello.hears);
                 self.neighbours.at_mut(side).hears_back(two_way);
-                let mutual = hello.neighbour == own && two_way;
+                // A run of lost frames does not undo what was heard before: silence has its own measure.
+                let linked = self.neighbours.at(side).is_mutual();
+                let mutual = hello.neighbour == own && (two_way || linked);
                 self.told(now, side, mutual);
             }
             let waits = self.view.awaited().is_some();

@@ -99,6 +99,11 @@ impl Liveness {
         self.met && !self.lost
     }
 
+    /// Whether few frames were lost on the channel lately.
+    pub(crate) const fn is_clear(&self) -> bool {
+        self.longest <= QUESTIONS
+    }
+
     /// A frame has come.
     pub(crate) const fn met(&mut self) {
         self.met = true;

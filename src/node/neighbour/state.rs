@@ -505,7 +505,9 @@ impl Neighbour {
     fn lose(&mut self, now: Instant, settings: &Settings) {
         let long = now.since(self.lost_at) >= settings.dead_after.times(MEMORY);
         let before = if long { 0 } else { self.losses };
-        self.losses = before.saturating_add(1);
+        // Where many frames are lost, it is the channel that comes and goes.
+        let one = u8::from(self.liveness.is_clear());
+        self.losses = before.saturating_add(one);
         self.lost = self.node;
         self.lost_at = now;
     }
