@@ -223,8 +223,9 @@ impl Lease {
         let first = self.state == LeaseState::Open;
         self.grant(context.now, current);
         let took = context.now.since(current.handed_on);
-        let eighth = self.slowest.as_micros() / 8;
-        let lately = self.slowest.as_micros().saturating_sub(eighth);
+        // A run of lost frames is remembered for some minutes.
+        let part = self.slowest.as_micros() / 64;
+        let lately = self.slowest.as_micros().saturating_sub(part);
         self.slowest = took.max(Duration::from_micros(lately));
         let wait = if first {
             PAUSE
