@@ -761,7 +761,9 @@ impl Node {
                 };
                 if to >= 1 && to <= all && self.side_of(to).is_some() {
                     let nonce = self.ask_number(now);
-                    return Some((side, to, self.hello(now, side, ask, nonce)));
+                    let ready = self.is_between(now, side, to);
+                    let hello = self.hello(now, side, ask, nonce);
+                    return Some((side, to, Hello { ready, ..hello }));
                 }
             }
         }
@@ -796,6 +798,20 @@ impl Node {
         0
     }
 
+    /// Whether this relay could come between node `other` at `side` and the one that it takes there: whether that one is heard, and
+    /// hears this relay.
+    fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
+        let own = self.member.node;
+        let beyond = self.neighbours.at(side).taken_by(other.abs_diff(own));
+        let there = match side {
+            Side::Upstream => beyond > own,
+            Side::Downstream => beyond != 0 && beyond < own,
+        };
+        let settings = &self.member.settings;
+        let far = self.neighbours.at(side.other());
+        there && far.is_two_way(beyond.abs_diff(own), now, settings)
+    }
+
     fn hello(&self, now: Instant, side: Side, ask: bool, nonce: u16) -> Hello {
         let latest = self.update.latest();
         Hello {
@@ -805,7 +821,7 @@ impl Node {
             ask,
             form: self.view.asks() && side == self.back(),
             fresh: self.round.is_fresh(),
-            ready: self.neighbours.at(side.other()).is_ready(),
+            ready: false,
             behind: self.beyond(side.other()).saturating_add(1),
             hears: self.neighbours.at(side).hears(now, &self.member.settings),
             holds: latest,
@@ -825,6 +841,13 @@ impl Node {
             if heard || hello.ask {
                 self.says_it_hears(side, from, heard);
             }
+            let Self {
+                member, neighbours, ..
+            } = self;
+            let distance = from.abs_diff(own);
+            neighbours
+                .at_mut(side)
+                .says(distance, hello.neighbour, heard, now, &member.settings);
         }
         if hello.ask {
             self.owe_hello(side, from, false);
@@ -838,7 +861,6 @@ impl Node {
             self.neighbours.at_mut(side).holds = Some(hello.holds);
             if self.searches() {
                 let two_way = hears(own, from, hello.hears);
-                self.neighbours.at_mut(side).hears_back(two_way);
                 // A run of lost frames does not undo what was heard before: silence has its own measure.
                 let linked = self.neighbours.at(side).is_mutual();
                 let mutual = hello.neighbour == own && (two_way || linked);

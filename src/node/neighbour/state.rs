@@ -122,7 +122,35 @@ struct Hearing {
     before: u8,
 }
 
+/// The bit of the node `distance` places away.
+const fn mask(distance: u16) -> u8 {
+    if distance >= 1 && distance <= CANDIDATES {
+        1 << (distance - 1)
+    } else {
+        0
+    }
+}
+
 impl Hearing {
+    const fn new(now: Instant) -> Self {
+        Self {
+            since: now,
+            now: 0,
+            before: 0,
+        }
+    }
+
+    fn add(&mut self, distance: u16, now: Instant, settings: &Settings) {
+        self.age(now, settings);
+        self.now |= mask(distance);
+    }
+
+    /// Those of the last two spans.
+    fn recent(mut self, now: Instant, settings: &Settings) -> u8 {
+        self.age(now, settings);
+        self.now | self.before
+    }
+
     /// Forgets who was not heard for two spans of `probe_after`.
     fn age(&mut self, now: Instant, settings: &Settings) {
         let span = now.since(self.since);
@@ -161,8 +189,12 @@ pub(crate) struct Neighbour {
     state: NeighbourState,
     liveness: Liveness,
     hold_down: Option<HoldDown>,
-    /// Whether the node taken has said that it hears this relay.
-    two_way: bool,
+    /// How far away the node taken is.
+    distance: u16,
+    /// The nodes that have said that they hear this relay.
+    both_ways: Hearing,
+    /// Whom the nodes on this side take here, the nearest first; 0 for none.
+    taken_by: [u16; CANDIDATES as usize],
     /// The node that was lost last, and when.
     lost: u16,
     lost_at: Instant,
@@ -228,15 +260,13 @@ impl Neighbour {
             },
             liveness: Liveness::new(now),
             hold_down: None,
-            two_way: false,
+            distance: 1,
+            both_ways: Hearing::new(now),
+            taken_by: [0; CANDIDATES as usize],
             lost: 0,
             lost_at: now,
             near: None,
-            hearing: Hearing {
-                since: now,
-                now: 0,
-                before: 0,
-            },
+            hearing: Hearing::new(now),
             unheard: InRow::default(),
             #[cfg(feature = "auth")]
             forged: InRow::default(),
@@ -270,14 +300,33 @@ impl Neighbour {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Whether somebody is there that hears this relay, and is heard.
-    pub(crate) fn is_ready(&self) -> bool {
-        match self.state {
-            NeighbourState::Linked | NeighbourState::Pairing { .. } => {
-                self.two_way && self.liveness.is_there()
-            }
-            NeighbourState::NoPeer | NeighbourState::Searching { .. } => false,
+    /// Whether the node `distance` places away is heard, and hears this relay.
+    pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
+        let known = mask(distance) & self.both_ways.recent(now, settings) != 0;
+        known || self.is_mutual() && self.distance == distance && self.liveness.is_there()
+    }
+
+    /// Node `distance` places away has said which one it takes on this side, and whether it hears this relay.
+    pub(crate) fn says(
+        &mut self,
+        distance: u16,
+        neighbour: u16,
+        hears: bool,
+        now: Instant,
+        settings: &Settings,
+    ) {
+        if let Some(taken) = self.taken_by.get_mut(usize::from(distance).wrapping_sub(1)) {
+            *taken = neighbour;
         }
+        if hears {
+            self.both_ways.add(distance, now, settings);
+        }
+    }
+
+    /// The node that the one `distance` places away takes on this side, as it said last; 0 for none.
+    pub(crate) fn taken_by(&self, distance: u16) -> u16 {
+        let known = self.taken_by.get(usize::from(distance).wrapping_sub(1));
+        known.copied().unwrap_or(0)
     }
 
     /// Whether it is certain who is there, and somebody else than when a proposal was decided last.
@@ -326,10 +375,7 @@ impl Neighbour {
 
     /// An intact frame from the node `distance` nodes away, which is the one `taken` or not.
     pub(crate) fn heard(&mut self, distance: u16, taken: bool, now: Instant, settings: &Settings) {
-        self.hearing.age(now, settings);
-        if (1..=CANDIDATES).contains(&distance) {
-            self.hearing.now |= 1 << (distance - 1);
-        }
+        self.hearing.add(distance, now, settings);
         if taken {
             self.liveness.met();
         }
@@ -337,9 +383,7 @@ impl Neighbour {
 
     /// The nodes that were heard lately: bit 0 is the nearest one.
     pub(crate) fn hears(&self, now: Instant, settings: &Settings) -> u8 {
-        let mut hearing = self.hearing;
-        hearing.age(now, settings);
-        hearing.now | hearing.before
+        self.hearing.recent(now, settings)
     }
 
     /// The node `distance` nodes away has said whether it hears this relay; whether it does not, for the last of so many times in a row.
@@ -391,11 +435,6 @@ impl Neighbour {
     /// Whether somebody is there, and takes this relay for its neighbour, too, as far as it has said.
     pub(crate) fn is_mutual(&self) -> bool {
         self.state == NeighbourState::Linked
-    }
-
-    /// The neighbour has said whether it hears this relay.
-    pub(crate) const fn hears_back(&mut self, two_way: bool) {
-        self.two_way = two_way;
     }
 
     /// The neighbour has said whether it takes this relay for its own; whether that is new.
@@ -552,7 +591,7 @@ impl Neighbour {
         }
         self.signs = Signs::default();
         self.node = node;
-        self.two_way = true;
+        self.distance = candidate.distance;
         self.state = NeighbourState::Pairing { since: now };
         self.liveness.renew(now);
         self.hold_down = None;

@@ -26,7 +26,7 @@ pub struct Hello {
     pub form: bool,
     /// Whether it has been switched on and has had no part in anything yet.
     pub fresh: bool,
-    /// Whether it has a neighbour on its other side that hears it, too.
+    /// Whether it could come between the receiver and the node that the receiver takes there: whether it and that one hear each other.
     pub ready: bool,
     /// How many relays hang together from it on toward its other side, itself included: 1 to 1000.
     pub behind: u16,
