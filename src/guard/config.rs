@@ -27,6 +27,15 @@ pub struct Geofence {
     pub most_altitude_m: f32,
 }
 
+impl Geofence {
+    /// Whether `place` is in the box.
+    pub fn contains(&self, place: Placement) -> bool {
+        (self.least_x_m..=self.most_x_m).contains(&place.x_m)
+            && (self.least_y_m..=self.most_y_m).contains(&place.y_m)
+            && (self.least_altitude_m..=self.most_altitude_m).contains(&place.altitude_m)
+    }
+}
+
 /// What a guard is told before flight.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -7,13 +7,11 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::guard::Guard;
 use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Instant, Placement, Side};
+use uav_relay_sim::simulator::drones::{Body, Point};
 
 pub(crate) fn instant(at_s: f64) -> Instant {
     Instant::from_micros((at_s * 1e6).round() as u64)
 }
-
-/// A place in the air: x, y and altitude, m.
-pub(crate) type Point = [f64; 3];
 
 /// From one place to another, m.
 pub(crate) fn way(from: Point, to: Point) -> Point {
@@ -32,7 +30,7 @@ pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
 
 #[derive(Debug)]
 pub(crate) struct Drone {
-    pub(crate) at: Point,
+    pub(crate) body: Body,
     /// Where it was a step before.
     pub(crate) was: Point,
     /// What the flight controller flies to.
@@ -67,7 +65,7 @@ pub(crate) struct Board {
 impl Drone {
     pub(crate) fn hovering(at: Point, links: [Option<usize>; 2]) -> Self {
         Self {
-            at,
+            body: Body::hovering(at),
             was: at,
             goal: at,
             orders: VecDeque::new(),
@@ -111,14 +109,8 @@ impl Drone {
         while self.orders.front().is_some_and(|(due, _)| *due <= now_s) {
             self.goal = self.orders.pop_front().unwrap().1;
         }
-        self.was = self.at;
-        let to_go = way(self.at, self.goal);
-        let (left, step) = (length(to_go), self.speed * step_s);
-        self.at = if left <= step {
-            self.goal
-        } else {
-            along(self.at, to_go, step / left)
-        };
+        self.was = self.body.at;
+        self.body.fly(self.goal, self.speed, f64::INFINITY, step_s);
     }
 
     /// Has the flight controller report, and hands the guard what has arrived.
@@ -127,7 +119,7 @@ impl Drone {
             self.next_report_s = now_s + rng.random_range(0.02..=1.0) * board.every_s;
             let off = hover_m * rng.random_range(-1.0..=1.0);
             let arrives_s = now_s + rng.random_range(0.0..=1.0) * board.stale_s;
-            let [x, y, h] = self.at;
+            let [x, y, h] = self.body.at;
             self.reports.push_back((now_s, arrives_s, [x + off, y, h]));
         }
         while self.reports.front().is_some_and(|report| report.1 <= now_s) {
@@ -182,7 +174,8 @@ impl Drone {
 
     /// From the lowest to the highest x where it may be from now on if nobody tells it anything any more.
     pub(crate) fn stretch(&self) -> (f64, f64) {
-        let mut ends = (self.at[0].min(self.goal[0]), self.at[0].max(self.goal[0]));
+        let at = self.body.at[0];
+        let mut ends = (at.min(self.goal[0]), at.max(self.goal[0]));
         for (_, [x, ..]) in &self.orders {
             ends = (ends.0.min(*x), ends.1.max(*x));
         }

@@ -20,7 +20,9 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::guard::config::{Geofence, GuardConfig};
 use uav_relay::{Duration, Side};
 
-use crate::drone::{Board, Point, length, place, way};
+use uav_relay_sim::simulator::drones::Point;
+
+use crate::drone::{Board, length, place, way};
 use crate::medium::Faults;
 use crate::world::{World, beside};
 
@@ -350,7 +352,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
             left.iter()
                 .map(|k| (
                     k,
-                    world.drones[*k].at[0],
+                    world.drones[*k].body.at[0],
                     targets.len(),
                     world.drones[*k].guard
                 ))
@@ -360,7 +362,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     }
     let off = f64::from(world.confines.hover_m) + world.allowed_m();
     for (k, target) in left.iter().zip(&targets) {
-        let at = world.drones[*k].at;
+        let at = world.drones[*k].body.at;
         assert!(
             way(at, *target).iter().all(|part| part.abs() <= off),
             "{at:?} {target:?}"
