@@ -6,8 +6,9 @@ use crate::time::Duration;
 
 use super::fence::is_place;
 
-/// How long a setpoint takes to the flight controller at most, unless told otherwise.
-const LAG: Duration = Duration::from_millis(200);
+/// How long a relay may fly away from a new setpoint, unless told otherwise: it takes 0.2 s to the flight controller, and a multicopter
+/// that brakes with 3 m/s^2 stops from 11 m/s in what is left.
+const LAG: Duration = Duration::from_millis(4_000);
 
 /// Where setpoints may be.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -47,14 +48,15 @@ pub struct GuardConfig {
     /// How far off its setpoint a relay may be reported that hovers there, m: 0 to 1e3. This much is taken from the separation at
     /// each of two relays.
     pub hover_m: f32,
-    /// How long after [`Guard::steer`](super::Guard::steer) gave a setpoint the flight controller has it at the latest.
+    /// How long after [`Guard::steer`](super::Guard::steer) gave a setpoint the relay flies toward it at the latest: the way of the
+    /// setpoint to the flight controller, and the time to stop from the greatest speed along x.
     pub lag: Duration,
 }
 
 impl GuardConfig {
     /// Those of a mission: its separation, its distance, and its band of altitudes, widened to the one that this relay holds.
     ///
-    /// `hover_m` is 0 and `lag` 0.2 s.
+    /// `hover_m` is 0 and `lag` 4 s.
     pub fn of(mission: &Mission, profile: Profile) -> Self {
         let config = mission.config();
         Self {

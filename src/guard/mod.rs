@@ -193,7 +193,7 @@ impl Guard {
 
     /// Moves the setpoint as far as is granted by now, and gives it; `None` before there is a place to go to and a report.
     ///
-    /// `now` is when the setpoint is handed on: the flight controller has it [`GuardConfig::lag`] later.
+    /// `now` is when the setpoint is handed on: the relay flies toward it [`GuardConfig::lag`] later.
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
         let target = self.target?;
         let Some(before) = self.setpoint else {

@@ -200,9 +200,7 @@ impl Lease {
         };
         current.done = Some(context.now);
         let current = *current;
-        self.relied_on = self
-            .relied_on
-            .max(context.now + from_tenths(current.span));
+        self.relied_on = self.relied_on.max(context.now + from_tenths(current.span));
         self.retransmit.stop();
         if !context.leads() {
             self.due.back = true;
@@ -282,7 +280,9 @@ impl Lease {
     /// What is to be sent onward; it is taken for sent then.
     pub(crate) fn take_onward(&mut self, context: &Context<'_>) -> Option<Message> {
         let due = core::mem::take(&mut self.due.onward);
-        let current = self.current.filter(|current| due && current.done.is_none())?;
+        let current = self
+            .current
+            .filter(|current| due && current.done.is_none())?;
         self.retransmit.sent(context.now, trip(context));
         Some(Message::Pulse(Pulse {
             number: current.number,

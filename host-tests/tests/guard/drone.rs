@@ -40,6 +40,10 @@ pub(crate) struct Drone {
     /// Positions on their way to the guard: when each was measured, when each gets there.
     reports: VecDeque<(f64, f64, Point)>,
     pub(crate) speed: f64,
+    /// How fast that changes, m/s^2.
+    pub(crate) acceleration: f64,
+    /// How long a setpoint is on its way, s: at most the guard's lag.
+    pub(crate) latency_s: f64,
     /// `None` while it is switched off.
     pub(crate) guard: Option<Guard>,
     /// Which nodes are its neighbours.
@@ -71,6 +75,8 @@ impl Drone {
             orders: VecDeque::new(),
             reports: VecDeque::new(),
             speed: 0.0,
+            acceleration: f64::INFINITY,
+            latency_s: f64::INFINITY,
             guard: None,
             links,
             flies: true,
@@ -110,7 +116,8 @@ impl Drone {
             self.goal = self.orders.pop_front().unwrap().1;
         }
         self.was = self.body.at;
-        self.body.fly(self.goal, self.speed, f64::INFINITY, step_s);
+        self.body
+            .fly(self.goal, self.speed, self.acceleration, step_s);
     }
 
     /// Has the flight controller report, and hands the guard what has arrived.
@@ -154,7 +161,7 @@ impl Drone {
             (fence.least_altitude_m..=fence.most_altitude_m).contains(&setpoint.altitude_m),
             "{setpoint:?}"
         );
-        let lag_s = confines.lag.as_micros() as f64 / 1e6;
+        let lag_s = self.latency_s.min(confines.lag.as_micros() as f64 / 1e6);
         // In the order in which they were given.
         let before_s = self.orders.back().map_or(0.0, |order| order.0);
         let due_s = (now_s + lag_s * rng.random_range(0.0..=0.99)).max(before_s);
@@ -175,7 +182,9 @@ impl Drone {
     /// From the lowest to the highest x where it may be from now on if nobody tells it anything any more.
     pub(crate) fn stretch(&self) -> (f64, f64) {
         let at = self.body.at[0];
-        let mut ends = (at.min(self.goal[0]), at.max(self.goal[0]));
+        let stop = self.body.stops_at(self.acceleration)[0];
+        let (low, high) = (at.min(stop), at.max(stop));
+        let mut ends = (low.min(self.goal[0]), high.max(self.goal[0]));
         for (_, [x, ..]) in &self.orders {
             ends = (ends.0.min(*x), ends.1.max(*x));
         }

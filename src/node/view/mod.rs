@@ -287,9 +287,7 @@ impl ViewChange {
         told: Option<Poll>,
     ) -> Option<Effects> {
         let node = context.member.node;
-        let poll = self
-            .electorate
-            .vote(node, view, told, context.held)?;
+        let poll = self.electorate.vote(node, view, told, context.held)?;
         self.state = ViewState::Proposed;
         self.stragglers = Stragglers::NONE;
         self.proposed = Some(Proposed {
@@ -568,4 +566,3 @@ const fn trip(context: &Context<'_>) -> Trip {
         slow: false,
     }
 }
-

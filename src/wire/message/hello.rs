@@ -52,7 +52,13 @@ impl Hello {
         let newest = self.newest.bits().to_le_bytes();
         let near = [self.mission, self.neighbour, self.behind].map(u16::to_le_bytes);
         write(
-            &(tag::HELLO, near, newest, [digest, version], [self.hears, flags]),
+            &(
+                tag::HELLO,
+                near,
+                newest,
+                [digest, version],
+                [self.hears, flags],
+            ),
             buffer,
         )
     }

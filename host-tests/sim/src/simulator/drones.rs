@@ -74,6 +74,14 @@ impl Body {
         }
     }
 
+    /// Where it stops, if it brakes from now on.
+    pub fn stops_at(&self, acceleration_mps2: f64) -> Point {
+        let braked = self
+            .velocity_mps
+            .map(|speed| speed * speed.abs() / (2.0 * acceleration_mps2));
+        sum(self.at, braked)
+    }
+
     /// Flies toward `goal` for `step_s` seconds.
     pub fn fly(&mut self, goal: Point, speed_mps: f64, acceleration_mps2: f64, step_s: f64) {
         let axes = self.at.iter_mut().zip(&mut self.velocity_mps);
