@@ -2,6 +2,7 @@
 
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
+use crate::settings::WithoutQuorum;
 use crate::time::Duration;
 
 use super::fence::is_place;
@@ -56,6 +57,9 @@ pub struct GuardConfig {
 impl GuardConfig {
     /// Those of a mission: its separation, its distance, and its band of altitudes, widened to the one that this relay holds.
     ///
+    /// Where relays leave the line without a quorum ([`Settings::without_quorum`](crate::Settings)), the box needs
+    /// [room](Self::with_room_for) for that: they go no farther than it.
+    ///
     /// `hover_m` is 0 and `lag` 4 s.
     pub fn of(mission: &Mission, profile: Profile) -> Self {
         let config = mission.config();
@@ -72,6 +76,17 @@ impl GuardConfig {
             hover_m: 0.0,
             lag: LAG,
         }
+    }
+
+    /// The same with a box that has room for relays that leave the line without a quorum.
+    pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
+        if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
+            let fence = &mut self.fence;
+            fence.least_y_m += y_m.min(0.0);
+            fence.most_y_m += y_m.max(0.0);
+            fence.most_altitude_m += up_m;
+        }
+        self
     }
 
     /// Whether every number is within its range.

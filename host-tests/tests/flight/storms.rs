@@ -75,6 +75,8 @@ fn storm(seed: u64) -> Setup {
             up_m: rng.random_range(0.0..30.0),
         };
         setup.settings.without_quorum = leaves;
+        let guard = setup.settings.guard;
+        setup.settings.guard = guard.map(|guard| guard.with_room_for(leaves));
     }
     go_on_until(&mut setup, seconds(STORM_S + 60));
     setup
