@@ -135,7 +135,7 @@ fn nothing_leaves_the_box_and_nonsense_is_counted() {
 #[test]
 fn a_squeezed_relay_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
-    for side in [Side::Upstream, Side::Downstream] {
+    for side in [Side::Downstream, Side::Upstream] {
         let handshake = Fence {
             association: 9,
             echo: 0,
