@@ -50,6 +50,7 @@ fn two_that_know_where_they_are_make_room_for_each_other() {
         assert!(!relay.has_said("setpoint: "), "nobody knows where it is");
     }
     let began = Instant::now();
+    let mut setpoints = [0; 2];
     let mut there = [false; 2];
     while there != [true; 2] {
         for (k, relay) in chain.relays.iter_mut().enumerate() {
@@ -59,7 +60,13 @@ fn two_that_know_where_they_are_make_room_for_each_other() {
                 let [x, y, h] = bits(&line)[..3] else {
                     panic!("{line}")
                 };
-                at[k] = [x, y, h].map(f32::from_bits);
+                let to = [x, y, h].map(f32::from_bits);
+                assert!(
+                    setpoints[k] > 0 || to == at[k],
+                    "it is to stay first: {to:?}"
+                );
+                at[k] = to;
+                setpoints[k] += 1;
             }
             there[k] = at[k].map(f32::to_bits) == expected[k][..3];
             let x_m = at.map(|at| at[0]);
