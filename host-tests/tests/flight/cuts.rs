@@ -17,10 +17,23 @@ fn pairs() -> impl Iterator<Item = (u16, u16)> {
 
 #[test]
 fn all_are_in_one_view_soon_after_the_last_of_two_cuts_has_healed() {
+    judge(&[[20, 120, 60, 160], [20, 60, 40, 90], [20, 200, 100, 150]]);
+}
+
+/// With the link in the middle of a part heard again a second before the one to the others, 4 pairs of 42 take 259 s, and one has
+/// not come together after 300 s.
+#[test]
+#[ignore = "not so yet, with or without a guard"]
+fn all_are_in_one_view_soon_after_two_cuts_that_heal_a_second_apart() {
+    judge(&[[30, 200, 31, 201]]);
+}
+
+/// Has every pair of cuts fly, from, until, from and until these times, s.
+fn judge(all: &[[u64; 4]]) {
     let mut took = Vec::new();
     let mut failed = Vec::new();
     let mut least_m = f64::INFINITY;
-    for times in [[20, 120, 60, 160], [20, 60, 40, 90], [20, 200, 100, 150]] {
+    for times in all {
         for (first, second) in pairs() {
             let mut rng = ChaCha8Rng::seed_from_u64(number("SEED", 1));
             let mut setup = eight(&mut rng);
