@@ -151,7 +151,8 @@ impl FenceOwner {
     /// After the setpoint has moved: a fence that gets where it stays is told at once, what is under way only when reminded.
     pub(super) fn settle(&mut self, reachable: &ReachableInterval, target_m: f32, apart: f32) {
         if let Some((x_m, last)) = self.wish(reachable, target_m, apart) {
-            self.association.due |= last && self.is_elsewhere(x_m);
+            let stays = last || reachable.is_still();
+            self.association.due |= stays && self.is_elsewhere(x_m);
         }
     }
 

@@ -3,6 +3,7 @@
 //! `COUNT` and `SEED` in the environment take other sequences of faults; a failure names the seed of its one.
 
 mod between;
+mod closer;
 mod cuts;
 mod leave;
 mod storms;
