@@ -85,7 +85,8 @@ pub enum WithoutQuorum {
     /// It stays where it was agreed to be.
     #[default]
     Hold,
-    /// It leaves the line, along y and upward from there.
+    /// It leaves the line, along y and upward from there; with a guard as far as its box goes
+    /// ([`GuardConfig::with_room_for`]).
     Leave {
         /// How far to the side, m: -1e4 to 1e4.
         y_m: f32,
@@ -98,9 +99,7 @@ impl WithoutQuorum {
     fn is_valid(self) -> bool {
         match self {
             Self::Hold => true,
-            Self::Leave { y_m, up_m } => {
-                (-1e4..=1e4).contains(&y_m) && (0.0..=1e4).contains(&up_m)
-            }
+            Self::Leave { y_m, up_m } => (-1e4..=1e4).contains(&y_m) && (0.0..=1e4).contains(&up_m),
         }
     }
 

@@ -12,6 +12,9 @@
 //! that signs takes new missions in flight (`examples/linux_ground` uploads them), and with `--upload-file` it still has them when it
 //! is switched on again.
 //!
+//! With `--positions` it is told where the drone is, and its setpoints keep drones apart on their way; without, nothing does, and it
+//! says so.
+//!
 //! Every event is one line on standard output; an f32 also as its bits. To make this program yours, hand the setpoint to
 //! your autopilot in `report.rs`. It ends with status 0 at Ctrl-C or SIGTERM, 1 when a tty fails (let systemd start it again),
 //! 2 when the options are wrong.
@@ -22,6 +25,7 @@
 //! | `mission.rs`, `command.rs` | the part of it that is the mission; what is said of a mistake |
 //! | `tty.rs` | a tty that never blocks, as a `SerialPort` |
 //! | `ports.rs` | the ttys of either wiring, and sleep until one of them or a timer needs the relay |
+//! | `positions.rs` | where the drone is, from a FIFO |
 //! | `relay.rs` | the loop |
 //! | `report.rs`, `line.rs` | the lines it prints |
 //! | `key.rs`, `epoch.rs` | what frames are signed with, from files |
@@ -50,6 +54,8 @@ mod mission;
 mod options;
 #[cfg(unix)]
 mod ports;
+#[cfg(unix)]
+mod positions;
 #[cfg(unix)]
 mod relay;
 #[cfg(unix)]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
+use uav_relay::guard::config::GuardConfig;
 use uav_relay::serial::byte_time;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
@@ -63,6 +64,13 @@ struct Options {
     /// Milliseconds of silence after which it counts as lost, above those of --probe-after-ms
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
     dead_after_ms: u64,
+    /// FIFO with a line `x_m y_m altitude_m` whenever the autopilot knows better where the drone is, twice a second or more often:
+    /// setpoints then keep drones apart on their way
+    #[arg(long, value_name = "FIFO")]
+    positions: Option<PathBuf>,
+    /// How far off its place a hovering drone may be reported, m, 0 to 1000; it may come nearer to its neighbours by as much
+    #[arg(long, value_name = "M", default_value_t = 1.0, requires = "positions", allow_negative_numbers = true, value_parser = |text: &str| command::number(text, 0.0, 1_000.0))]
+    position_error: f32,
     #[command(flatten)]
     mission: MissionOptions,
     /// How the places are found; with --field, only by `align`. What counts is what the first relay is given, with --field the
@@ -105,6 +113,7 @@ pub(crate) struct Plan {
     pub(crate) secret: Option<Secret>,
     pub(crate) ttys: Ttys,
     pub(crate) baud: u32,
+    pub(crate) positions: Option<PathBuf>,
 }
 
 /// What frames are signed with.
@@ -156,7 +165,13 @@ fn plan(options: &Options) -> Result<Plan, String> {
         Wiring::Pair => byte_time(options.baud).times(frame),
         Wiring::Shared => carried(options)?,
     };
+    let mission = mission(options)?;
+    let guard = GuardConfig {
+        hover_m: options.position_error,
+        ..GuardConfig::of(&mission, mission.config().common)
+    };
     let settings = Settings {
+        guard: options.positions.as_ref().map(|_| guard),
         method: match options.method {
             Method::Align => uav_relay::Method::Align,
             Method::Joint => uav_relay::Method::Joint,
@@ -169,7 +184,7 @@ fn plan(options: &Options) -> Result<Plan, String> {
         ..Settings::default()
     };
     Ok(Plan {
-        mission: mission(options)?,
+        mission,
         identity: Identity {
             network: options.network,
             index,
@@ -178,6 +193,7 @@ fn plan(options: &Options) -> Result<Plan, String> {
         secret: secret(options)?,
         ttys,
         baud: options.baud,
+        positions: options.positions.clone(),
     })
 }
 

@@ -91,7 +91,8 @@ impl Ports {
             .filter_map(|end| end.0.as_mut())
     }
 
-    /// Sleeps until a tty has bytes, or room after it had none, or `stop` has bytes; for `at_most`, or for ever.
+    /// Sleeps until a tty has bytes, or room after it had none, or `stop` or `positions` has bytes; for `at_most`, or for
+    /// ever.
     ///
     /// # Errors
     /// One line if it is not possible to sleep.
@@ -99,6 +100,7 @@ impl Ports {
         &mut self,
         at_most: Option<Duration>,
         stop: BorrowedFd<'_>,
+        positions: Option<BorrowedFd<'_>>,
     ) -> Result<Woken, String> {
         // Longer than a Timespec can be is for ever.
         let timeout = at_most.and_then(|span| Timespec::try_from(span).ok());
@@ -108,6 +110,7 @@ impl Ports {
             .iter()
             .map(|tty| PollFd::from_borrowed_fd(tty.as_fd(), tty.interest()));
         fds.extend(on_ttys);
+        fds.extend(positions.map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)));
         match poll(&mut fds, timeout.as_ref()) {
             Ok(_) => {}
             Err(Errno::INTR) => return Ok(Woken::Work),

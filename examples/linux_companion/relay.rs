@@ -8,9 +8,10 @@ use uav_relay::{Auth, Event, Key, Relay, Settings, Upload};
 
 use crate::options::Plan;
 use crate::ports::{Ports, Woken};
+use crate::positions::Positions;
 use crate::report::Report;
 use crate::system::{now, on_signals};
-use crate::{epoch, uploads};
+use crate::{epoch, positions, uploads};
 
 /// Runs the relay until it is told to stop.
 ///
@@ -19,6 +20,7 @@ use crate::{epoch, uploads};
 pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
     let stop = on_signals()?;
     let mut ports = Ports::open(&plan.ttys, plan.baud)?;
+    let mut positions = plan.positions.as_deref().map(Positions::open).transpose()?;
     let clock = Clock::now();
     let auth = auth(plan)?;
     let settings = Settings {
@@ -35,10 +37,16 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
     let names: Vec<String> = ports.ttys().map(|tty| tty.name().to_owned()).collect();
     report.started(&names, plan.baud)?;
     report.signs(auth.map(|auth| auth.epoch))?;
+    positions::started(positions.as_ref())?;
     if held.is_some() {
         report.resumed(&relay)?;
     }
     loop {
+        if let Some(positions) = &mut positions
+            && let Some(place) = positions.newest(now(clock))?
+        {
+            relay.handle_position(now(clock), now(clock), place);
+        }
         let wake = ports.poll(now(clock), &mut relay);
         while let Some(event) = relay.poll_event() {
             if event == Event::Uploaded {
@@ -50,7 +58,11 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
             return Err(line.to_owned());
         }
         let span = wake.map(|at| Duration::from_micros(at.since(now(clock)).as_micros()));
-        if ports.sleep(span, stop.as_fd())? == Woken::Stop {
+        let fifo = positions.as_ref().map(Positions::fd);
+        if ports.sleep(span, stop.as_fd(), fifo)? == Woken::Stop {
+            if let Some(positions) = &positions {
+                positions.stopped(now(clock))?;
+            }
             return report.stopped(now(clock), relay.stats());
         }
     }

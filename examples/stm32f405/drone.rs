@@ -2,11 +2,12 @@
 
 use embedded_hal::digital::OutputPin;
 use uav_relay::SetupError;
+use uav_relay::guard::config::GuardConfig;
 use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
 use uav_relay::wire::auth::Auth;
 #[cfg(feature = "auth")]
 use uav_relay::wire::auth::Key;
-use uav_relay::{Event, Instant, Placement, Relay, Sample, Settings, Wiring};
+use uav_relay::{Duration, Event, Instant, Placement, Relay, Sample, Settings, Wiring};
 
 use super::clock::Clock;
 #[cfg(feature = "upload")]
@@ -14,6 +15,9 @@ use super::kept;
 use super::{board, config, log};
 #[cfg(feature = "auth")]
 use super::{epoch, flash};
+
+/// How often the autopilot is asked where the drone is, at least.
+const POSITION_PERIOD: Duration = Duration::from_millis(200);
 
 /// What the links of both variants have in common.
 pub(crate) trait Links {
@@ -47,9 +51,13 @@ impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
 
 /// Flies for good.
 pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, relay: &mut Relay) -> ! {
+    let mut autopilot = Autopilot;
     loop {
         while let Some(sample) = measured() {
             relay.handle_sample(sample);
+        }
+        if let Some((at, place)) = autopilot.position() {
+            relay.handle_position(clock.now(), at, place);
         }
         let wake = links.poll(clock.now(), relay);
         while let Some(event) = relay.poll_event() {
@@ -57,7 +65,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, relay: &mut Relay) 
             if event == Event::SetpointChanged
                 && let Some(place) = relay.setpoint()
             {
-                fly_to(place);
+                autopilot.fly_to(place);
             }
             #[cfg(feature = "upload")]
             if event == Event::Uploaded {
@@ -68,7 +76,9 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, relay: &mut Relay) 
             log::counters(relay);
             links.log_counters();
         }
-        clock.sleep(wake);
+        // Ports wake it up; the autopilot may not.
+        let soon = Autopilot::KNOWS_POSITION.then(|| clock.now() + POSITION_PERIOD);
+        clock.sleep(wake.into_iter().chain(soon).min());
     }
 }
 
@@ -82,6 +92,9 @@ pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> 
         Ok(config) => {
             log::begins(&config);
             let auth = sign().ok()?;
+            if !Autopilot::KNOWS_POSITION {
+                log::unguarded();
+            }
             let relay = switch_on(&config, auth, wiring, now)?;
             #[cfg(feature = "upload")]
             if auth.is_some() {
@@ -116,6 +129,10 @@ fn switch_on(
         method: config.method,
         measure: config.measure,
         wiring,
+        guard: Autopilot::KNOWS_POSITION.then(|| GuardConfig {
+            hover_m: Autopilot::POSITION_ERROR_M,
+            ..GuardConfig::of(&config.mission, config.profile)
+        }),
         ..Settings::default()
     };
     // All else has been checked with the configuration.
@@ -182,13 +199,32 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
     Err(CannotSign)
 }
 
-/// Replace this by what your autopilot wants to hear: `place.x_m` metres from the transmitter toward the receiver,
-/// `place.y_m` to the right of that line as seen from above, at `place.altitude_m` above the ground.
-fn fly_to(place: Placement) {
-    core::hint::black_box(place);
-    // The control of the proof that no panic is reachable: with this one the image must not link.
-    #[cfg(panic_on_purpose)]
-    assert!(place.x_m < 1e6, "put there on purpose");
+/// Replace this by your autopilot: what it wants to hear, and what it knows.
+struct Autopilot;
+
+impl Autopilot {
+    /// Whether [`position`](Self::position) gives what it knows: then setpoints keep drones apart on their way.
+    const KNOWS_POSITION: bool = false;
+
+    /// How far off its place a hovering drone may be reported, m.
+    const POSITION_ERROR_M: f32 = 1.0;
+
+    /// It is to fly to `place.x_m` metres from the transmitter toward the receiver, `place.y_m` to the right of that line as seen from
+    /// above, at `place.altitude_m` above the ground.
+    #[expect(clippy::unused_self, reason = "an autopilot of yours is somewhere")]
+    fn fly_to(&mut self, place: Placement) {
+        core::hint::black_box(place);
+        // The control of the proof that no panic is reachable: with this one the image must not link.
+        #[cfg(panic_on_purpose)]
+        assert!(place.x_m < 1e6, "put there on purpose");
+    }
+
+    /// Where the drone was, and when by the relay's clock, if it has said so since it was asked last; it is asked five times a second
+    /// or more often.
+    #[expect(clippy::unused_self, reason = "an autopilot of yours is somewhere")]
+    const fn position(&mut self) -> Option<(Instant, Placement)> {
+        None
+    }
 }
 
 /// Replace this by what your receiver has measured since it was asked last, if the configuration has the relay measure.

@@ -25,6 +25,10 @@ pub(crate) fn begins(config: &Config) {
     );
 }
 
+pub(crate) fn unguarded() {
+    defmt::warn!("no position is known: nothing keeps drones apart on their way");
+}
+
 pub(crate) fn refused(error: ConfigError) {
     match error {
         ConfigError::Blank => defmt::warn!("no configuration: the block is blank"),

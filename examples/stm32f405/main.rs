@@ -16,7 +16,7 @@
 //! | --- | --- |
 //! | `main.rs` | this variant, put together |
 //! | `wires.rs` | its pins and interrupts |
-//! | `drone.rs` | what a drone does, whatever its links are; `fly_to` is where your autopilot comes in |
+//! | `drone.rs` | what a drone does, whatever its links are; `Autopilot` is where yours comes in |
 //! | `config.rs` | the configuration, byte by byte |
 //! | `epoch.rs` | with the feature `auth`, the number that rises at every start |
 //! | `uploads.rs`, `kept.rs` | with the feature `upload`, the missions that were uploaded in flight: the log of them, and its use |

@@ -12,6 +12,8 @@ pub(crate) const fn asked() -> bool {
 
 pub(crate) const fn begins(_: &Config) {}
 
+pub(crate) const fn unguarded() {}
+
 pub(crate) const fn refused(_: ConfigError) {}
 
 #[cfg(feature = "auth")]

@@ -2,12 +2,14 @@
 
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
+use crate::settings::WithoutQuorum;
 use crate::time::Duration;
 
 use super::fence::is_place;
 
-/// How long a setpoint takes to the flight controller at most, unless told otherwise.
-const LAG: Duration = Duration::from_millis(200);
+/// How long a relay may fly away from a new setpoint, unless told otherwise: it takes 0.2 s to the flight controller, and a multicopter
+/// that brakes with 3 m/s^2 stops from 11 m/s in what is left.
+const LAG: Duration = Duration::from_millis(4_000);
 
 /// Where setpoints may be.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -27,6 +29,15 @@ pub struct Geofence {
     pub most_altitude_m: f32,
 }
 
+impl Geofence {
+    /// Whether `place` is in the box.
+    pub fn contains(&self, place: Placement) -> bool {
+        (self.least_x_m..=self.most_x_m).contains(&place.x_m)
+            && (self.least_y_m..=self.most_y_m).contains(&place.y_m)
+            && (self.least_altitude_m..=self.most_altitude_m).contains(&place.altitude_m)
+    }
+}
+
 /// What a guard is told before flight.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -38,14 +49,18 @@ pub struct GuardConfig {
     /// How far off its setpoint a relay may be reported that hovers there, m: 0 to 1e3. This much is taken from the separation at
     /// each of two relays.
     pub hover_m: f32,
-    /// How long after [`Guard::steer`](super::Guard::steer) gave a setpoint the flight controller has it at the latest.
+    /// How long after [`Guard::steer`](super::Guard::steer) gave a setpoint the relay flies toward it at the latest: the way of the
+    /// setpoint to the flight controller, and the time to stop from the greatest speed along x.
     pub lag: Duration,
 }
 
 impl GuardConfig {
     /// Those of a mission: its separation, its distance, and its band of altitudes, widened to the one that this relay holds.
     ///
-    /// `hover_m` is 0 and `lag` 0.2 s.
+    /// Where relays leave the line without a quorum ([`Settings::without_quorum`](crate::Settings)), the box needs
+    /// [room](Self::with_room_for) for that: they go no farther than it.
+    ///
+    /// `hover_m` is 0 and `lag` 4 s.
     pub fn of(mission: &Mission, profile: Profile) -> Self {
         let config = mission.config();
         Self {
@@ -61,6 +76,17 @@ impl GuardConfig {
             hover_m: 0.0,
             lag: LAG,
         }
+    }
+
+    /// The same with a box that has room for relays that leave the line without a quorum.
+    pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
+        if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
+            let fence = &mut self.fence;
+            fence.least_y_m += y_m.min(0.0);
+            fence.most_y_m += y_m.max(0.0);
+            fence.most_altitude_m += up_m;
+        }
+        self
     }
 
     /// Whether every number is within its range.

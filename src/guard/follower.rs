@@ -105,6 +105,11 @@ impl FenceFollower {
         self.association.node == 0 || self.clear
     }
 
+    /// Whether nobody is there, or whoever is has found this relay beyond it: before, it announces no fence.
+    pub(super) const fn is_ordered(&self) -> bool {
+        self.association.node == 0 || self.is_agreed()
+    }
+
     /// Whether a fence was heard of.
     pub(super) const fn is_agreed(&self) -> bool {
         self.number != 0

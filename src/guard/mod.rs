@@ -28,8 +28,8 @@
 //! | 4 | The owner never raises its setpoint to less than the separation before what it counts on. | the stretches of the two are the separation apart |
 //! | 5 | The owner announces no fence nearer than the separation beyond the high end of its own stretch. | a fence it lowers is one it has cleared already |
 //! | 6 | As far as 5 allows, the fence goes halfway between the two agreed places (and half the separation on). | both can get where they are to be |
-//! | 7 | The first fence is right at the owner's own stretch; other fences, and changes of altitude, begin when the follower has cleared it. Relays in the wrong order stay where they are. | a start that is too close is opened first, and no relay sinks onto another |
-//! | 8 | A setpoint goes no farther toward a neighbour that has not been talked to yet (switched on, rebooted, newly linked) than it is. | nothing is granted unheard; what was granted is flown to the end |
+//! | 7 | The first fence is right at the owner's own stretch; other fences, and changes of altitude, begin when the follower has cleared it. | a start that is too close is opened first, and no relay sinks onto another |
+//! | 8 | A setpoint stays until both neighbours are known to be in order: the follower has told that it is beyond the owner, the owner has announced a fence. It tells one of them only once it knows that of the other one. | nothing is granted unheard (switched on, rebooted, newly linked); relays in the wrong order, and all others, stay where they are |
 //! | 9 | Nothing lapses with time: of a neighbour that is replaced or starts anew, the last limit stays until it speaks for itself, or [`Guard::forget`]; if it was never heard, this relay goes no farther toward it. | a silent relay that still hovers is not flown into |
 //!
 //! # Why everybody arrives
@@ -193,7 +193,7 @@ impl Guard {
 
     /// Moves the setpoint as far as is granted by now, and gives it; `None` before there is a place to go to and a report.
     ///
-    /// `now` is when the setpoint is handed on: the flight controller has it [`GuardConfig::lag`] later.
+    /// `now` is when the setpoint is handed on: the relay flies toward it [`GuardConfig::lag`] later.
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
         let target = self.target?;
         let Some(before) = self.setpoint else {
@@ -211,13 +211,17 @@ impl Guard {
         let x_m = target.x_m.max(least).min(most);
         // Whatever the limits ask for: toward a neighbour only as far as it has granted, back never beyond what was promised.
         let x_m = x_m.max(least.min(before.x_m)).min(most.max(before.x_m));
+        let is_ordered = self.follower.is_ordered() && self.owner.is_ordered(&self.reachable);
+        let x_m = if is_ordered { x_m } else { before.x_m };
         let clear = self.follower.is_clear() && self.owner.is_clear();
         let across = if clear { target } else { before };
         let wanted = across.cross_section().at(x_m);
         let next = self.config.cut(wanted);
         self.reachable.go(next.x_m, now);
         self.setpoint = Some(next);
-        self.owner.settle(&self.reachable, target.x_m, apart);
+        if self.follower.is_ordered() {
+            self.owner.settle(&self.reachable, target.x_m, apart);
+        }
         self.setpoint
     }
 
@@ -229,11 +233,14 @@ impl Guard {
     /// The next thing to tell a neighbour: on which side, to which node, what.
     pub fn poll(&mut self) -> Option<(Side, u16, Fence)> {
         let target = self.target.filter(|_| self.reachable.is_known())?;
-        if let Some(fence) = self.follower.tell(&self.reachable, target.x_m) {
+        if self.owner.is_ordered(&self.reachable)
+            && let Some(fence) = self.follower.tell(&self.reachable, target.x_m)
+        {
             return Some((Side::Upstream, self.follower.association.node, fence));
         }
         let apart = self.config.separation_m;
-        let fence = self.owner.tell(&self.reachable, target.x_m, apart)?;
+        let moves = self.follower.is_ordered();
+        let fence = self.owner.tell(&self.reachable, target.x_m, apart, moves)?;
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 

@@ -69,6 +69,11 @@ impl FenceOwner {
         self.association.heard != 0
     }
 
+    /// Whether nobody is there, or whoever is stands beyond this relay.
+    pub(super) fn is_ordered(&self, reachable: &ReachableInterval) -> bool {
+        self.association.node == 0 || self.is_heard() && self.is_beyond(reachable)
+    }
+
     /// Whether the neighbour is known to be beyond this relay.
     fn is_beyond(&self, reachable: &ReachableInterval) -> bool {
         self.counted_m >= reachable.high_m
@@ -146,7 +151,8 @@ impl FenceOwner {
     /// After the setpoint has moved: a fence that gets where it stays is told at once, what is under way only when reminded.
     pub(super) fn settle(&mut self, reachable: &ReachableInterval, target_m: f32, apart: f32) {
         if let Some((x_m, last)) = self.wish(reachable, target_m, apart) {
-            self.association.due |= last && self.is_elsewhere(x_m);
+            let stays = last || reachable.is_still();
+            self.association.due |= stays && self.is_elsewhere(x_m);
         }
     }
 
@@ -154,18 +160,19 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0
     }
 
-    /// What there is to tell. It is here that the fence moves: what nobody is told costs no number.
+    /// What there is to tell. It is here that the fence moves, if it may: what nobody is told costs no number.
     pub(super) fn tell(
         &mut self,
         reachable: &ReachableInterval,
         target_m: f32,
         apart: f32,
+        moves: bool,
     ) -> Option<Fence> {
         if self.association.node == 0 || !core::mem::take(&mut self.association.due) {
             return None;
         }
         let wish = self.wish(reachable, target_m, apart);
-        if let Some((x_m, _)) = wish.filter(|(x_m, _)| self.is_elsewhere(*x_m)) {
+        if let Some((x_m, _)) = wish.filter(|(x_m, _)| moves && self.is_elsewhere(*x_m)) {
             self.number = match self.number.wrapping_add(1) {
                 0 => 1,
                 number => number,

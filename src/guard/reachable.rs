@@ -1,8 +1,34 @@
 //! Where the relay may be along x: on its way between where it was reported and what it was told to fly to.
+//!
+//! A relay that is told to turn flies on for a while, but never beyond what it was told before: there it could have stopped. So it may
+//! be anywhere between where it was reported and all the setpoints of the [`lag`](GuardConfig::lag) before that report.
 
 use crate::time::Instant;
 
 use super::config::GuardConfig;
+
+/// From one x to another one, m.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Span {
+    low_m: f32,
+    high_m: f32,
+}
+
+impl Span {
+    const fn at(x_m: f32) -> Self {
+        Self {
+            low_m: x_m,
+            high_m: x_m,
+        }
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            low_m: self.low_m.min(other.low_m),
+            high_m: self.high_m.max(other.high_m),
+        }
+    }
+}
 
 /// The relay's own stretch, m along x.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -13,8 +39,15 @@ pub(super) struct ReachableInterval {
     pub(super) low_m: f32,
     /// The high end.
     pub(super) high_m: f32,
-    /// Since when the setpoint is what it is.
+    /// When the setpoint became what it is.
+    changed: Instant,
+    /// All setpoints since then, and since when.
+    late: Span,
     since: Instant,
+    /// Those before that may still have had an effect at the last report.
+    before: Span,
+    /// Of when that was.
+    reported: Instant,
     /// Whether a report has come that the first setpoint had its effect on.
     known: bool,
 }
@@ -31,8 +64,23 @@ impl ReachableInterval {
             at_m: x_m,
             low_m: x_m,
             high_m: x_m,
+            changed: now,
+            late: Span::at(x_m),
             since: now,
+            before: Span::at(x_m),
+            reported: now,
             known: false,
+        }
+    }
+
+    fn is(&mut self, span: Span) {
+        (self.low_m, self.high_m) = (span.low_m, span.high_m);
+    }
+
+    const fn span(&self) -> Span {
+        Span {
+            low_m: self.low_m,
+            high_m: self.high_m,
         }
     }
 
@@ -40,23 +88,31 @@ impl ReachableInterval {
     pub(super) fn go(&mut self, x_m: f32, now: Instant) {
         if (x_m - self.at_m).abs() > 0.0 {
             self.at_m = x_m;
-            self.low_m = self.low_m.min(x_m);
-            self.high_m = self.high_m.max(x_m);
-            self.since = now;
+            self.changed = now;
+            self.late = self.late.and(Span::at(x_m));
+            self.is(self.span().and(Span::at(x_m)));
         }
     }
 
-    /// A report of time `at`. If the flight controller had the present setpoint by then, the relay is between here and there.
+    /// A report of time `at`: the relay is between here and what it was told of late.
     pub(super) fn report(&mut self, at: Instant, x_m: f32, config: &GuardConfig) {
         let hovers = (x_m - self.at_m).abs() <= config.hover_m + config.rounding();
-        let x_m = if hovers { self.at_m } else { x_m };
+        let here = Span::at(if hovers { self.at_m } else { x_m });
         if at >= self.since + config.lag {
             self.known = true;
-            self.low_m = self.at_m;
-            self.high_m = self.at_m;
+            self.before = self.late;
+            self.late = Span::at(self.at_m);
+            self.since = self.changed;
         }
-        self.low_m = self.low_m.min(x_m);
-        self.high_m = self.high_m.max(x_m);
+        if at >= self.changed + config.lag {
+            self.before = self.late;
+        }
+        if self.known && at >= self.reported {
+            self.reported = at;
+            self.is(self.before.and(self.late).and(here));
+        } else {
+            self.is(self.span().and(here));
+        }
     }
 
     /// Whether anything can be promised.

@@ -131,7 +131,13 @@ impl Node {
         let [a, b, ..] = seed.wrapping_mul(0x9E37_79B1).to_le_bytes();
         let number = u16::from_le_bytes([a, b]);
         let member = Member::new(mission, settings, identity.index);
-        let neighbours = Neighbours::new(identity.index, member.all, seed.rotate_left(8), now, &settings);
+        let neighbours = Neighbours::new(
+            identity.index,
+            member.all,
+            seed.rotate_left(8),
+            now,
+            &settings,
+        );
         let mut node = Self {
             update: MissionUpdate::new(member.active, seed.rotate_left(4), now),
             view: ViewChange::new(member.all, mission.leader(), !seed),

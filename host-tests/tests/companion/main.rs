@@ -6,6 +6,7 @@ mod ending;
 mod idle;
 mod medium;
 mod options;
+mod positions;
 mod process;
 mod pty;
 mod signed;

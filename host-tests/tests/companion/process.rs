@@ -95,6 +95,16 @@ impl Relay {
         self.seen.iter().any(|line| line.contains(part))
     }
 
+    /// The lines with `part` in them that have come since a line was asked for last.
+    pub(crate) fn lines_with(&mut self, part: &str) -> Vec<String> {
+        let lines: Vec<String> = self.lines.try_iter().collect();
+        self.seen.extend(lines.iter().cloned());
+        lines
+            .into_iter()
+            .filter(|line| line.contains(part))
+            .collect()
+    }
+
     /// Bits of x, y, altitude and target, once the relay has them.
     pub(crate) fn settled(&mut self) -> [u32; 4] {
         let setpoint = bits(&self.line("setpoint: "));
@@ -172,7 +182,7 @@ impl Drop for Relay {
 }
 
 /// The numbers in a line that stand there as bits.
-fn bits(line: &str) -> Vec<u32> {
+pub(crate) fn bits(line: &str) -> Vec<u32> {
     let mut parts = line.split("(0x");
     parts.next();
     parts

@@ -7,13 +7,11 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::guard::Guard;
 use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Instant, Placement, Side};
+use uav_relay_sim::simulator::drones::{Body, Point};
 
 pub(crate) fn instant(at_s: f64) -> Instant {
     Instant::from_micros((at_s * 1e6).round() as u64)
 }
-
-/// A place in the air: x, y and altitude, m.
-pub(crate) type Point = [f64; 3];
 
 /// From one place to another, m.
 pub(crate) fn way(from: Point, to: Point) -> Point {
@@ -32,7 +30,7 @@ pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
 
 #[derive(Debug)]
 pub(crate) struct Drone {
-    pub(crate) at: Point,
+    pub(crate) body: Body,
     /// Where it was a step before.
     pub(crate) was: Point,
     /// What the flight controller flies to.
@@ -42,6 +40,10 @@ pub(crate) struct Drone {
     /// Positions on their way to the guard: when each was measured, when each gets there.
     reports: VecDeque<(f64, f64, Point)>,
     pub(crate) speed: f64,
+    /// How fast that changes, m/s^2.
+    pub(crate) acceleration: f64,
+    /// How long a setpoint is on its way, s: at most the guard's lag.
+    pub(crate) latency_s: f64,
     /// `None` while it is switched off.
     pub(crate) guard: Option<Guard>,
     /// Which nodes are its neighbours.
@@ -67,12 +69,14 @@ pub(crate) struct Board {
 impl Drone {
     pub(crate) fn hovering(at: Point, links: [Option<usize>; 2]) -> Self {
         Self {
-            at,
+            body: Body::hovering(at),
             was: at,
             goal: at,
             orders: VecDeque::new(),
             reports: VecDeque::new(),
             speed: 0.0,
+            acceleration: f64::INFINITY,
+            latency_s: f64::INFINITY,
             guard: None,
             links,
             flies: true,
@@ -111,14 +115,9 @@ impl Drone {
         while self.orders.front().is_some_and(|(due, _)| *due <= now_s) {
             self.goal = self.orders.pop_front().unwrap().1;
         }
-        self.was = self.at;
-        let to_go = way(self.at, self.goal);
-        let (left, step) = (length(to_go), self.speed * step_s);
-        self.at = if left <= step {
-            self.goal
-        } else {
-            along(self.at, to_go, step / left)
-        };
+        self.was = self.body.at;
+        self.body
+            .fly(self.goal, self.speed, self.acceleration, step_s);
     }
 
     /// Has the flight controller report, and hands the guard what has arrived.
@@ -127,7 +126,7 @@ impl Drone {
             self.next_report_s = now_s + rng.random_range(0.02..=1.0) * board.every_s;
             let off = hover_m * rng.random_range(-1.0..=1.0);
             let arrives_s = now_s + rng.random_range(0.0..=1.0) * board.stale_s;
-            let [x, y, h] = self.at;
+            let [x, y, h] = self.body.at;
             self.reports.push_back((now_s, arrives_s, [x + off, y, h]));
         }
         while self.reports.front().is_some_and(|report| report.1 <= now_s) {
@@ -162,7 +161,7 @@ impl Drone {
             (fence.least_altitude_m..=fence.most_altitude_m).contains(&setpoint.altitude_m),
             "{setpoint:?}"
         );
-        let lag_s = confines.lag.as_micros() as f64 / 1e6;
+        let lag_s = self.latency_s.min(confines.lag.as_micros() as f64 / 1e6);
         // In the order in which they were given.
         let before_s = self.orders.back().map_or(0.0, |order| order.0);
         let due_s = (now_s + lag_s * rng.random_range(0.0..=0.99)).max(before_s);
@@ -182,7 +181,10 @@ impl Drone {
 
     /// From the lowest to the highest x where it may be from now on if nobody tells it anything any more.
     pub(crate) fn stretch(&self) -> (f64, f64) {
-        let mut ends = (self.at[0].min(self.goal[0]), self.at[0].max(self.goal[0]));
+        let at = self.body.at[0];
+        let stop = self.body.stops_at(self.acceleration)[0];
+        let (low, high) = (at.min(stop), at.max(stop));
+        let mut ends = (low.min(self.goal[0]), high.max(self.goal[0]));
         for (_, [x, ..]) in &self.orders {
             ends = (ends.0.min(*x), ends.1.max(*x));
         }

@@ -4,7 +4,9 @@ use uav_relay::guard::HoldReason;
 use uav_relay::guard::config::{Geofence, GuardConfig};
 use uav_relay::{Duration, Side};
 
-use crate::drone::{Point, place, way};
+use uav_relay_sim::simulator::drones::Point;
+
+use crate::drone::{place, way};
 use crate::world::World;
 
 const SPEED: f64 = 10.0;
@@ -92,7 +94,7 @@ fn places_too_close_are_approached() {
     for _ in 0..3000 {
         world.step();
     }
-    let ends: Vec<Point> = world.drones.iter().map(|drone| drone.at).collect();
+    let ends: Vec<Point> = world.drones.iter().map(|drone| drone.body.at).collect();
     println!("{ends:?}");
     for k in [0, 4] {
         assert!(
@@ -125,6 +127,6 @@ fn places_too_close_are_approached() {
     for _ in 0..600 {
         world.step();
     }
-    let after: Vec<Point> = world.drones.iter().map(|drone| drone.at).collect();
+    let after: Vec<Point> = world.drones.iter().map(|drone| drone.body.at).collect();
     assert_eq!(before, after, "they stay");
 }

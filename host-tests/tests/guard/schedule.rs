@@ -9,6 +9,7 @@
 //! | start and agreed places | anywhere across the line; in order, the separation apart along x, crowded at Tx, at Rx, in the middle, or spread |
 //! | agreements | 0 to 6 in 200 s, each heard by a relay with 80 %, up to 60 s late; 20 % closer along x than the separation |
 //! | speed | changes every 20 s on average, 0 in 25 %, else 1 m/s to 40 m/s |
+//! | acceleration | without a limit in 50 %, else 4 m/s^2 to 40 m/s^2 |
 //! | medium | loses 0 to 50 %, duplicates 0 to 30 %, delays up to 0.1 s to 8 s |
 //! | reports | every 0.1 s to 10 s, up to 0 to 5 s old |
 //! | happens to some | rebooted for up to 15 s; unheard of for up to 60 s, and linked around; taken away for good |
@@ -20,7 +21,9 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::guard::config::{Geofence, GuardConfig};
 use uav_relay::{Duration, Side};
 
-use crate::drone::{Board, Point, length, place, way};
+use uav_relay_sim::simulator::drones::Point;
+
+use crate::drone::{Board, length, place, way};
 use crate::medium::Faults;
 use crate::world::{World, beside};
 
@@ -55,13 +58,29 @@ enum What {
 
 const ROUGH_S: f64 = 200.0;
 const SLOWEST: f64 = 2.0;
+const FASTEST: f64 = 40.0;
 
 pub(crate) fn fly(seed: u64) -> Report {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x00C0_FFEE);
     let confines = confines(&mut rng);
     let relays = rng.random_range(1..=12);
     let (confines, starts) = line(&mut rng, confines, relays);
+    let agile = rng.random_bool(0.5);
+    let acceleration = if agile {
+        f64::INFINITY
+    } else {
+        rng.random_range(4.0..=40.0)
+    };
+    let latency_s = confines.lag.as_micros() as f64 / 1e6;
+    let to_stop = Duration::from_micros((FASTEST / acceleration * 1e6) as u64);
+    let confines = GuardConfig {
+        lag: Duration::from_micros(confines.lag.as_micros() + to_stop.as_micros()),
+        ..confines
+    };
     let mut world = World::new(seed, confines, &starts);
+    for drone in &mut world.drones {
+        (drone.acceleration, drone.latency_s) = (acceleration, latency_s);
+    }
     let mut report = Report::default();
     rough(&mut rng, &mut world, &mut report);
     calm(&mut rng, &mut world, &mut report);
@@ -198,7 +217,7 @@ fn speeds(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
             let speed = if rng.random_bool(0.25) {
                 0.0
             } else {
-                40.0_f64.powf(rng.random_range(0.0..=1.0))
+                FASTEST.powf(rng.random_range(0.0..=1.0))
             };
             plan.push((at_s, What::Speed(k, speed)));
             at_s += rng.random_range(1.0..=40.0);
@@ -350,7 +369,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
             left.iter()
                 .map(|k| (
                     k,
-                    world.drones[*k].at[0],
+                    world.drones[*k].body.at[0],
                     targets.len(),
                     world.drones[*k].guard
                 ))
@@ -360,7 +379,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     }
     let off = f64::from(world.confines.hover_m) + world.allowed_m();
     for (k, target) in left.iter().zip(&targets) {
-        let at = world.drones[*k].at;
+        let at = world.drones[*k].body.at;
         assert!(
             way(at, *target).iter().all(|part| part.abs() <= off),
             "{at:?} {target:?}"

@@ -5,7 +5,9 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::Side;
 use uav_relay::guard::config::GuardConfig;
 
-use crate::drone::{Board, Drone, Point, along, length, node, way};
+use uav_relay_sim::simulator::drones::Point;
+
+use crate::drone::{Board, Drone, along, length, node, way};
 use crate::medium::{Faults, Medium};
 
 /// Between two looks at everything, s.
@@ -159,7 +161,7 @@ impl World {
         }
         for (k, one) in flying.iter().enumerate() {
             for other in &flying[..k] {
-                let apart = nearest((one.was, one.at), (other.was, other.at));
+                let apart = nearest((one.was, one.body.at), (other.was, other.body.at));
                 assert!(
                     apart >= floor,
                     "SEED={}: {apart} m at {:.1} s",

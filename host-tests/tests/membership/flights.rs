@@ -24,11 +24,8 @@ fn flight(rng: &mut ChaCha8Rng) -> FlightSpec {
             [x_m, 0.0, 20.0]
         })
         .collect();
-    FlightSpec {
-        start,
-        speed_mps: (0..8).map(|_| rng.random_range(0.5..15.0)).collect(),
-        step: Duration::from_millis(200),
-    }
+    let speed_mps = (0..8).map(|_| rng.random_range(0.5..15.0)).collect();
+    FlightSpec::exact(start, speed_mps, Duration::from_millis(200))
 }
 
 fn guarded(rng: &mut ChaCha8Rng) -> Setup {
@@ -52,7 +49,7 @@ fn without_losses_all_arrive_and_none_come_close() {
         setup.faults.loss = rng.random_range(0.0..0.5);
         setup.deadline = seconds(2_000);
         let outcome = run(setup.clone()).unwrap();
-        let nearest = outcome.nearest_m;
+        let nearest = outcome.nearest_m();
         println!(
             "{seed}: {:?} after {} s, nearest {nearest} m",
             outcome.ending,
@@ -91,9 +88,9 @@ fn a_drone_that_falls_silent_and_hovers_is_not_flown_into() {
         setup.deadline = seconds(241);
         let outcome = run(setup.clone()).unwrap();
         assert!(
-            outcome.nearest_m >= f64::from(SEPARATION_M) - ROUNDING_M,
+            outcome.nearest_m() >= f64::from(SEPARATION_M) - ROUNDING_M,
             "SEED={seed}: {} m, {:?} {:?}",
-            outcome.nearest_m,
+            outcome.nearest_m(),
             setup.kills,
             setup.boots
         );
@@ -110,7 +107,7 @@ fn without_a_guard_some_come_close() {
         setup.settings.guard = None;
         setup.deadline = seconds(2_000);
         let outcome = run(setup).unwrap();
-        outcome.nearest_m < f64::from(SEPARATION_M) - ROUNDING_M
+        outcome.nearest_m() < f64::from(SEPARATION_M) - ROUNDING_M
     });
     assert!(close);
 }

@@ -82,4 +82,8 @@ fn a_drone_without_the_key_takes_no_part() {
         said.text,
         "no key: frames are not signed, and anybody can send some"
     );
+    assert_eq!(
+        fleet.of_drone(4).nth(2).unwrap().text,
+        "no position is known: nothing keeps drones apart on their way"
+    );
 }

@@ -3,6 +3,7 @@
 mod pairs;
 
 use super::config::{Geofence, GuardConfig};
+use super::reachable::ReachableInterval;
 use super::{Fence, Guard, HoldReason};
 use crate::place::Placement;
 use crate::side::Side;
@@ -81,7 +82,7 @@ impl One {
 
 #[test]
 fn it_is_small() {
-    assert!(size_of::<Guard>() <= 208, "{}", size_of::<Guard>());
+    assert!(size_of::<Guard>() <= 240, "{}", size_of::<Guard>());
     assert_eq!(size_of::<Fence>(), 16);
 }
 
@@ -134,7 +135,7 @@ fn nothing_leaves_the_box_and_nonsense_is_counted() {
 #[test]
 fn a_squeezed_relay_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
-    for side in [Side::Upstream, Side::Downstream] {
+    for side in [Side::Downstream, Side::Upstream] {
         let handshake = Fence {
             association: 9,
             echo: 0,
@@ -203,4 +204,38 @@ fn one_that_was_never_heard_may_be_anywhere() {
     }
     guard.forget(Side::Downstream);
     assert_eq!(guard.steer(now), Some(at(900.0)));
+}
+
+#[test]
+fn a_relay_that_turns_flies_on_no_farther_than_it_was_told() {
+    let ms = Duration::from_millis;
+    let slow = GuardConfig {
+        lag: ms(4_000),
+        ..config()
+    };
+    let mut stretch = ReachableInterval::at(100.0, Instant::ZERO);
+    let mut after = |wait, goes: &[f32], is_at| {
+        let now = Instant::ZERO + ms(wait);
+        for x_m in goes {
+            stretch.go(*x_m, now);
+        }
+        stretch.report(now, is_at, &slow);
+        (stretch.low_m, stretch.high_m)
+    };
+    assert_eq!(after(4_000, &[], 100.0), (100.0, 100.0));
+    assert_eq!(after(5_000, &[20.0], 100.0), (20.0, 100.0));
+    assert_eq!(
+        after(7_000, &[], 70.0),
+        (20.0, 100.0),
+        "it may be off the ground"
+    );
+    assert_eq!(after(9_000, &[], 60.0), (20.0, 60.0));
+    // It flies toward Tx at full speed, and is to turn.
+    assert_eq!(after(10_000, &[80.0], 50.0), (20.0, 80.0));
+    assert_eq!(after(10_200, &[], 48.0), (20.0, 80.0));
+    assert_eq!(after(13_900, &[90.0], 36.0), (20.0, 90.0));
+    // By now it has stopped and turned, and what it is told on its way does not take that back.
+    assert_eq!(after(14_000, &[], 36.0), (36.0, 90.0));
+    assert_eq!(after(14_200, &[95.0], 38.0), (38.0, 95.0));
+    assert_eq!(after(21_000, &[], 95.0), (95.0, 95.0));
 }

@@ -1,7 +1,7 @@
 //! Two relays and the fence between them.
 
 use super::{One, at, config};
-use crate::guard::{Guard, HoldReason};
+use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
@@ -49,7 +49,7 @@ impl Pair {
 
 /// Rule 8.
 #[test]
-fn nobody_moves_toward_one_who_was_not_heard() {
+fn nobody_moves_before_the_other_one_was_heard() {
     let mut pair = Pair::new([100.0, 200.0], [300.0, 150.0]);
     assert_eq!(pair.setpoints(), Both(100.0, 300.0));
     pair.ask();
@@ -58,9 +58,11 @@ fn nobody_moves_toward_one_who_was_not_heard() {
         pair.owner.guard.hold_reason(Side::Downstream),
         Some(HoldReason::Unheard)
     );
-    // Away from it, it may.
+    // Away from where the other one should be: that may be where it is.
     pair.owner.guard.commit(at(50.0));
     pair.follower.guard.commit(at(400.0));
+    assert_eq!(pair.setpoints(), Both(100.0, 300.0));
+    pair.talk();
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
@@ -183,12 +185,11 @@ fn relays_in_the_wrong_order_stay() {
     let mut pair = Pair::new([200.0, 100.0], [150.0, 300.0]);
     pair.follower.guard.commit(at(300.0));
     pair.talk();
-    // Away from where the other one should be each could go by itself, but here that is where it is.
+    // Away from where the other one should be: that is where it is.
     pair.owner.guard.commit(at(250.0));
     pair.follower.guard.commit(at(140.0));
     pair.talk();
-    let Both(owner, follower) = pair.setpoints();
-    assert!(owner <= 200.0 && follower >= 150.0, "{owner} {follower}");
+    assert_eq!(pair.setpoints(), Both(200.0, 150.0));
     assert_eq!(
         pair.owner.guard.hold_reason(Side::Downstream),
         Some(HoldReason::Order)
@@ -234,4 +235,48 @@ fn a_new_life_is_told_from_an_old_one() {
         Both(280.0, 290.0),
         "and the two find each other again"
     );
+}
+
+/// Who is not in order with the one neighbour does not tell the other one, who would count on it.
+#[test]
+fn who_does_not_know_the_order_tells_nobody() {
+    let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
+    let heard = Fence {
+        association: 9,
+        echo: 0,
+        number: 0,
+        x_m: 50.0,
+        target_m: 50.0,
+    };
+    one.hears(Side::Upstream, 1, heard);
+    one.is_at(100.0);
+    while let Some((side, ..)) = one.guard.poll() {
+        assert_eq!(side, Side::Downstream);
+    }
+    let said = one.says(Side::Downstream);
+    let mut beyond = Fence {
+        echo: said.association,
+        x_m: 90.0,
+        ..heard
+    };
+    one.hears(Side::Downstream, 3, beyond);
+    one.is_at(100.0);
+    while let Some((side, ..)) = one.guard.poll() {
+        assert_eq!(side, Side::Downstream, "it stands before this relay");
+    }
+    beyond.x_m = 120.0;
+    one.hears(Side::Downstream, 3, beyond);
+    // Now it tells; but no fence downstream before it has heard of one upstream.
+    assert_eq!(one.says(Side::Upstream).x_m.to_bits(), 100.0_f32.to_bits());
+    assert_eq!(one.says(Side::Downstream).number, 0);
+    assert_eq!(one.setpoint().to_bits(), 100.0_f32.to_bits());
+    let upstream = Fence {
+        echo: one.says(Side::Upstream).association,
+        number: 1,
+        x_m: 60.0,
+        ..heard
+    };
+    one.hears(Side::Upstream, 1, upstream);
+    assert_ne!(one.says(Side::Downstream).number, 0);
+    assert_ne!(one.setpoint().to_bits(), 100.0_f32.to_bits());
 }

@@ -500,7 +500,10 @@ impl Neighbour {
                 }
             }
             NeighbourState::Pairing { since } => {
-                lost = self.liveness.silent(now, settings.dead_after, step, settings).lost;
+                lost = self
+                    .liveness
+                    .silent(now, settings.dead_after, step, settings)
+                    .lost;
                 self.hello_all();
                 if lost || is_over(since) {
                     self.search(now);

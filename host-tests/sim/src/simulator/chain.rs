@@ -114,7 +114,7 @@ impl Chain {
                 noticed: BTreeMap::new(),
                 struck: Struck::default(),
                 moments: Vec::new(),
-                nearest_m: f64::INFINITY,
+                nearest: None,
                 unsafe_setpoints: 0,
                 air: AirCounts::default(),
                 watched: None,
@@ -224,7 +224,7 @@ impl Chain {
             .medium
             .map_or_else(AirCounts::default, |it| it.counts());
         if self.watch.is_on {
-            let flown_m = self.flight.map(|_| self.outcome.nearest_m);
+            let flown_m = self.flight.and(self.outcome.nearest).map(|it| it.apart_m);
             let is_judged = self.setup.soak.is_some();
             let watched = self.watch.end(self.now, is_judged, flown_m);
             self.outcome.watched = Some(watched);
@@ -360,9 +360,12 @@ impl Chain {
             } else {
                 place.y_m.to_bits() == 0
             };
-            let inside = (0.0..=end).contains(&place.x_m)
+            let chosen = (0.0..=end).contains(&place.x_m)
                 && aside
                 && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
+            // With a guard it may be on its way from anywhere in the box.
+            let guard = self.setup.settings.guard;
+            let inside = guard.map_or(chosen, |guard| guard.fence.contains(place));
             self.outcome.unsafe_setpoints += u64::from(!inside);
             // With a new mission it stays where it is until the next agreement.
             member.safe = inside.then_some(place);

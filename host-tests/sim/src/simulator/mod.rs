@@ -9,7 +9,7 @@
 //! | [`attack`], [`forge`] | what an attacker does, and the frames it makes up |
 //! | [`queue`] | what happens when, in order |
 //! | [`setup`], [`outcome`] | what a chain is run with, and what came of it |
-//! | [`drones`] | drones that fly straight to where they are told |
+//! | [`drones`] | drones that fly to where they are told, and know where they are only nearly |
 //! | [`flying`] | groups of relays with an agreement of their own |
 //! | [`longest`] | which relays can be in one chain |
 //! | [`optimum`] | where exactly these relays would be if nothing had happened |

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use uav_relay::{Instant, Placement, Profile, Side, Stats};
 
 use super::attack::Struck;
+use super::drones::Nearest;
 use super::faults::Injected;
 use super::flying::Seen;
 use super::medium::AirCounts;
@@ -152,8 +153,8 @@ pub struct Outcome {
     pub noticed: BTreeMap<(u16, Side), Instant>,
     /// The story of the run.
     pub moments: Vec<Moment>,
-    /// The least distance that two drones ever had, m; infinite where their flight was not simulated.
-    pub nearest_m: f64,
+    /// When two drones were nearest to each other, where their flight was simulated.
+    pub nearest: Option<Nearest>,
     /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.
     pub unsafe_setpoints: u64,
     /// What happened on the air, where relays shared it.
@@ -163,6 +164,12 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// The least distance that two drones ever had, m; infinite where their flight was not simulated.
+    pub fn nearest_m(&self) -> f64 {
+        self.nearest
+            .map_or(f64::INFINITY, |nearest| nearest.apart_m)
+    }
+
     /// Where the relays were told to fly, to the bit: x, y and altitude; `None` for one that was told nothing.
     pub fn bits(&self) -> Vec<Option<[u32; 3]>> {
         let bits = |place: Placement| [place.x_m, place.y_m, place.altitude_m].map(f32::to_bits);

@@ -11,7 +11,7 @@ impl Chain {
     /// Has the drones take off, where there are any.
     pub(super) fn take_off(&mut self) {
         if let Some(spec) = &self.setup.flight {
-            self.flight = Some(Flight::new(spec));
+            self.flight = Some(Flight::new(spec, self.setup.seed));
             self.queue.put(Instant::ZERO, 0, Happening::Fly);
         }
     }
@@ -22,23 +22,36 @@ impl Chain {
         let Some(mut flight) = self.flight.take() else {
             return;
         };
-        #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]
-        let step_s = flight.step.as_micros() as f64 / 1e6;
-        for (index, drone) in flight.drones.iter_mut().enumerate() {
-            drone.fly(step_s);
+        let reports = flight.go_on();
+        for index in 0..flight.drones.len() {
+            let at = if reports {
+                flight.reported(index)
+            } else {
+                None
+            };
             let Some(member) = self.members.get_mut(index) else {
                 continue;
             };
             if member.killed.is_some() {
                 continue;
             }
-            member.relay.handle_position(now, now, placement(drone.at));
-            if let Some(place) = member.relay.setpoint() {
+            if let Some(at) = at {
+                member.relay.handle_position(now, now, placement(at));
+            }
+            if let Some(place) = member.relay.setpoint()
+                && let Some(drone) = flight.drones.get_mut(index)
+            {
                 drone.goal = point(place);
             }
-            self.drain(index);
+            if reports {
+                self.drain(index);
+            }
         }
-        self.outcome.nearest_m = self.outcome.nearest_m.min(flight.nearest_m());
+        let nearest = flight.nearest(now);
+        let known = self.outcome.nearest;
+        if nearest.is_some_and(|it| known.is_none_or(|known| it.apart_m < known.apart_m)) {
+            self.outcome.nearest = nearest;
+        }
         self.queue.put(now + flight.step, 0, Happening::Fly);
         self.flight = Some(flight);
     }
@@ -53,7 +66,7 @@ impl Chain {
             .filter(|(member, _)| member.killed.is_none())
             .all(|(member, drone)| {
                 let agreed = member.relay.final_setpoint();
-                agreed.is_some_and(|place| apart(point(place), drone.at) < 1e-3)
+                agreed.is_some_and(|place| apart(point(place), drone.taken()) < 1e-3)
             })
     }
 }

@@ -1,0 +1,139 @@
+//! Where the drone is, line by line from a FIFO: the autopilot's side writes `x_m y_m altitude_m` as often as it knows better.
+
+use std::fmt;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::path::Path;
+
+use rustix::fs::{FileType, Mode, OFlags, fstat, open};
+use rustix::io::{Errno, read};
+use uav_relay::{Instant, Placement};
+
+use crate::line::line;
+
+/// No line is longer.
+const LONGEST: usize = 200;
+
+/// An open FIFO.
+#[derive(Debug)]
+pub(crate) struct Positions {
+    fd: OwnedFd,
+    name: String,
+    /// What has come of a line so far; one byte more than the longest for one that is too long.
+    begun: Vec<u8>,
+    /// Lines that were none.
+    bad: u64,
+}
+
+impl Positions {
+    /// Opens it.
+    ///
+    /// # Errors
+    /// One line that says what does not work.
+    pub(crate) fn open(path: &Path) -> Result<Self, String> {
+        let name = format!("--positions {}", path.display());
+        // With an end of its own to write to it is never at its end, whoever comes and goes.
+        let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
+        let fd = open(path, flags, Mode::empty()).map_err(|error| format!("{name}: {error}"))?;
+        let kind = fstat(&fd).map(|stat| FileType::from_raw_mode(stat.st_mode));
+        if kind != Ok(FileType::Fifo) {
+            return Err(format!("{name}: is no FIFO, make one with mkfifo"));
+        }
+        Ok(Self {
+            fd,
+            name,
+            begun: Vec::new(),
+            bad: 0,
+        })
+    }
+
+    pub(crate) fn fd(&self) -> BorrowedFd<'_> {
+        self.fd.as_fd()
+    }
+
+    /// The newest of the positions that have come since; the first line that is none is said.
+    ///
+    /// # Errors
+    /// One line if it can not be read, or standard output takes no more.
+    pub(crate) fn newest(&mut self, now: Instant) -> Result<Option<Placement>, String> {
+        let mut newest = None;
+        let mut buffer = [0; 4096];
+        loop {
+            let count = match read(&self.fd, &mut buffer) {
+                Ok(0) | Err(Errno::WOULDBLOCK) => return Ok(newest),
+                Ok(count) => count,
+                Err(Errno::INTR) => continue,
+                Err(error) => return Err(format!("{}: {error}", self.name)),
+            };
+            for &byte in buffer.get(..count).unwrap_or_default() {
+                if byte != b'\n' {
+                    if self.begun.len() <= LONGEST {
+                        self.begun.push(byte);
+                    }
+                    continue;
+                }
+                match placement(&self.begun) {
+                    Some(place) => newest = Some(place),
+                    None => self.refuse(now)?,
+                }
+                self.begun.clear();
+            }
+        }
+    }
+
+    fn refuse(&mut self, now: Instant) -> Result<(), String> {
+        self.bad += 1;
+        if self.bad > 1 {
+            return Ok(());
+        }
+        let text = String::from_utf8_lossy(&self.begun);
+        line(
+            now,
+            format_args!(
+                "position: {text:?} is not x_m y_m altitude_m; more of these are only counted"
+            ),
+        )
+    }
+
+    /// How many lines were no position, if any were.
+    pub(crate) fn stopped(&self, now: Instant) -> Result<(), String> {
+        if self.bad == 0 {
+            return Ok(());
+        }
+        line(now, format_args!("position: {} lines were none", self.bad))
+    }
+}
+
+impl fmt::Display for Positions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+/// Says whether drones are kept apart.
+pub(crate) fn started(positions: Option<&Positions>) -> Result<(), String> {
+    match positions {
+        Some(positions) => line(
+            Instant::ZERO,
+            format_args!("guarded: setpoints keep drones apart on their way, by {positions}"),
+        ),
+        None => line(
+            Instant::ZERO,
+            format_args!("unguarded: no --positions, nothing keeps drones apart on their way"),
+        ),
+    }
+}
+
+/// Three numbers.
+fn placement(text: &[u8]) -> Option<Placement> {
+    let text = std::str::from_utf8(text)
+        .ok()
+        .filter(|_| text.len() <= LONGEST)?;
+    let mut numbers = text.split_whitespace().map(|word| word.parse::<f32>().ok());
+    let mut number = || numbers.next()?.filter(|number| number.is_finite());
+    let place = Placement {
+        x_m: number()?,
+        y_m: number()?,
+        altitude_m: number()?,
+    };
+    numbers.next().is_none().then_some(place)
+}

@@ -1,0 +1,134 @@
+//! Drones that are told where they are, through a FIFO.
+
+use std::fs::File;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use rustix::fs::{CWD, Mode, mkfifoat};
+use rustix::process::Signal;
+
+use crate::Chain;
+use crate::medium::QUIET;
+use crate::process::{Ended, LIMIT, Relay, bits};
+
+fn fifo(folder: &Path, name: &str) -> PathBuf {
+    let path = folder.join(name);
+    mkfifoat(CWD, &path, Mode::RUSR | Mode::WUSR).unwrap();
+    path
+}
+
+fn write(path: &Path, text: &str) {
+    let mut file = File::options().write(true).open(path).unwrap();
+    file.write_all(text.as_bytes()).unwrap();
+}
+
+/// Their first setpoints are where they are, and their last ones where they would be without a guard.
+#[test]
+fn two_that_know_where_they_are_make_room_for_each_other() {
+    let mut free = Chain::start(2, QUIET, &[]);
+    for relay in &mut free.relays {
+        relay.line("unguarded: no --positions, nothing keeps drones apart on their way");
+    }
+    let expected = free.settled();
+    drop(free);
+
+    let folder = tempfile::tempdir().unwrap();
+    let mut chain = Chain::of_wires(2, QUIET);
+    let fifos: Vec<PathBuf> = (1..=2)
+        .map(|index| fifo(folder.path(), &index.to_string()))
+        .collect();
+    for (index, fifo) in (1..).zip(&fifos) {
+        chain.options = vec!["--positions".to_owned(), fifo.display().to_string()];
+        chain.relays.push(chain.relay(index));
+    }
+    // Where the drones are: at their setpoints, once they have some.
+    let mut at = [[10.0, 0.0, 20.0], [30.0, 0.0, 20.0_f32]];
+    for relay in &mut chain.relays {
+        let line = relay.line("guarded: setpoints keep drones apart on their way, by --positions");
+        assert!(!line.contains("unguarded"), "{line}");
+        assert!(!relay.has_said("setpoint: "), "nobody knows where it is");
+    }
+    let began = Instant::now();
+    let mut setpoints = [0; 2];
+    let mut there = [false; 2];
+    while there != [true; 2] {
+        for (k, relay) in chain.relays.iter_mut().enumerate() {
+            let [x, y, h] = at[k];
+            write(&fifos[k], &format!("{x} {y} {h}\n"));
+            for line in relay.lines_with("setpoint: ") {
+                let [x, y, h] = bits(&line)[..3] else {
+                    panic!("{line}")
+                };
+                let to = [x, y, h].map(f32::from_bits);
+                assert!(
+                    setpoints[k] > 0 || to == at[k],
+                    "it is to stay first: {to:?}"
+                );
+                at[k] = to;
+                setpoints[k] += 1;
+            }
+            there[k] = at[k].map(f32::to_bits) == expected[k][..3];
+            let x_m = at.map(|at| at[0]);
+            assert!(x_m[1] - x_m[0] >= 4.0, "{at:?}");
+        }
+        assert!(began.elapsed() < 2 * LIMIT, "{at:?}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn lines_that_are_no_position_are_counted_and_said_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let fifo = fifo(folder.path(), "positions");
+    let path = fifo.to_str().unwrap();
+    let mut relay = Relay::start(&["--index", "1", "--of", "1", "--positions", path]);
+    relay.line("guarded: ");
+    let long = "1 ".repeat(10_000);
+    write(
+        &fifo,
+        &format!("x y z\n\n1 2\n1 2 3 4\n1 2 NaN\n1 2 inf\n{long}\n"),
+    );
+    relay.line("position: \"x y z\" is not x_m y_m altitude_m");
+    // The last one counts, whatever comes in pieces.
+    write(&fifo, "900 0 20\n10");
+    write(&fifo, "0 0 20\nnonsense\n");
+    let first = relay.line("setpoint: ");
+    assert!(
+        first.contains("x 900.000") || first.contains("x 100.000"),
+        "{first}"
+    );
+    write(&fifo, "100 0 20\n");
+    relay.line("setpoint: ");
+    relay.signal(Signal::TERM);
+    let Ended { status, stdout, .. } = relay.end();
+    assert_eq!(status, Some(0));
+    let said = stdout.iter().filter(|line| line.contains("is not x_m"));
+    assert_eq!(said.count(), 1, "{stdout:?}");
+    assert!(
+        stdout
+            .iter()
+            .any(|line| line.contains("position: 8 lines were none")),
+        "{stdout:?}"
+    );
+}
+
+#[test]
+fn what_is_no_fifo_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "1 2 3\n").unwrap();
+    for (path, why) in [
+        (file.as_path(), "is no FIFO, make one with mkfifo"),
+        (&folder.path().join("none"), "No such file"),
+    ] {
+        let path = path.to_str().unwrap();
+        let arguments = ["--index", "1", "--of", "1", "--positions", path];
+        let Ended { status, stderr, .. } = Relay::start(&arguments).end();
+        assert_eq!(status, Some(1));
+        assert!(
+            stderr[0].contains(path) && stderr[0].contains(why),
+            "{stderr:?}"
+        );
+    }
+}

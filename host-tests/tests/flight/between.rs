@@ -1,0 +1,66 @@
+//! Relays that come back between others, and relays that stand in another order than that of their numbers.
+
+use rand::SeedableRng;
+use uav_relay_sim::simulator::chain::run;
+
+use super::*;
+
+/// Where each relay is told to be in the end, x in m.
+fn ends(outcome: &Outcome) -> Vec<f32> {
+    let places = outcome.relays.iter().map(|relay| relay.setpoint.unwrap());
+    places.map(|place| place.x_m).collect()
+}
+
+/// Where they would be if nothing had happened.
+fn undisturbed(setup: &Setup) -> Vec<f32> {
+    let mut clean = Setup::new(setup.mission);
+    clean.seed = 1;
+    ends(&run(clean).unwrap())
+}
+
+/// Those beside it have closed up as far as its silent drone lets them; it comes back between them, and all find their places.
+#[test]
+fn one_that_comes_back_between_two_that_closed_up_gets_its_place() {
+    for silent in 1..=8 {
+        for off in [17, 60, 200] {
+            let seed = u64::from(silent) * 1_000 + off;
+            let mut setup = eight(&mut ChaCha8Rng::seed_from_u64(seed));
+            let expected = undisturbed(&setup);
+            setup.kills.push((silent, seconds(150)));
+            setup.boots.push((silent, seconds(150 + off)));
+            go_on_until(&mut setup, seconds(150 + off + 240));
+            let outcome = run(setup).unwrap();
+            let nearest = outcome.nearest;
+            assert!(
+                outcome.nearest_m() >= floor_m(2),
+                "relay {silent} for {off} s: {nearest:?}"
+            );
+            let ends = ends(&outcome);
+            for (is, expected) in ends.iter().zip(&expected) {
+                assert!(
+                    (is - expected).abs() < 1e-3,
+                    "relay {silent} for {off} s: {ends:?}, not {expected:?}"
+                );
+            }
+        }
+    }
+}
+
+/// While two neighbours stand in each other's place all stay where they are: who does not know of the two could fly into them.
+#[test]
+fn while_two_are_in_the_wrong_order_all_stay() {
+    for first in 0..7 {
+        let mut setup = eight(&mut ChaCha8Rng::seed_from_u64(first as u64));
+        let flight = setup.flight.as_mut().unwrap();
+        flight.start.swap(first, first + 1);
+        let before: Vec<f64> = flight.start.iter().map(|at| at[0]).collect();
+        go_on_until(&mut setup, seconds(400));
+        let outcome = run(setup).unwrap();
+        assert!(outcome.nearest_m() >= floor_m(1), "{:?}", outcome.nearest);
+        let ends = ends(&outcome);
+        for (is, was) in ends.iter().zip(&before) {
+            let off = (f64::from(*is) - was).abs();
+            assert!(off <= BIAS_M + NOISE_M, "{ends:?}, not {before:?}");
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Two cuts of the chain that overlap, one after the other.
+
+use rand::SeedableRng;
+use uav_relay_sim::simulator::chain::run;
+
+use super::*;
+
+/// Within this time after the last cut has healed all are in one view again.
+const SOON_S: f64 = 120.0;
+
+/// All that two cuts can be: relays 1 to `.0` cut off, then also those to `.1`; the first heals before the second.
+fn pairs() -> impl Iterator<Item = (u16, u16)> {
+    (1..8)
+        .flat_map(|first| (1..8).map(move |second| (first, second)))
+        .filter(|(first, second)| first != second)
+}
+
+#[test]
+fn all_are_in_one_view_soon_after_the_last_of_two_cuts_has_healed() {
+    judge(&[[20, 120, 60, 160], [20, 60, 40, 90], [20, 200, 100, 150]]);
+}
+
+/// With the link in the middle of a part heard again a second before the one to the others, 4 pairs of 42 take 259 s, and one has
+/// not come together after 300 s.
+#[test]
+#[ignore = "not so yet, with or without a guard"]
+fn all_are_in_one_view_soon_after_two_cuts_that_heal_a_second_apart() {
+    judge(&[[30, 200, 31, 201]]);
+}
+
+/// Has every pair of cuts fly, from, until, from and until these times, s.
+fn judge(all: &[[u64; 4]]) {
+    let mut took = Vec::new();
+    let mut failed = Vec::new();
+    let mut least_m = f64::INFINITY;
+    for times in all {
+        for (first, second) in pairs() {
+            let mut rng = ChaCha8Rng::seed_from_u64(number("SEED", 1));
+            let mut setup = eight(&mut rng);
+            let [from, until, then, healed] = times.map(seconds);
+            for (after, from, until) in [(first, from, until), (second, then, healed)] {
+                let until = Some(until);
+                setup.partitions.push(Partition { after, from, until });
+            }
+            go_on_until(&mut setup, seconds(times[3] + 300));
+            let outcome = run(setup).unwrap();
+            least_m = least_m.min(outcome.nearest_m());
+            let watched = outcome.watched.unwrap();
+            let at = together(&outcome);
+            let after = at.map(|at| at.since(healed).as_micros() as f64 / 1e6);
+            if after.is_none_or(|after| after > SOON_S)
+                || watched.most_flying > 1
+                || outcome.nearest_m() < floor_m(1)
+            {
+                let nearest = outcome.nearest;
+                failed.push((times, first, second, after, watched.most_flying, nearest));
+            }
+            took.extend(after);
+        }
+    }
+    took.sort_by(f64::total_cmp);
+    println!(
+        "{} pairs of cuts: all in one view after {:.1} s in the median, {:.1} s at most; never nearer than {least_m:.2} m",
+        took.len(),
+        took[took.len() / 2],
+        took[took.len() - 1],
+    );
+    for failed in &failed {
+        println!("{failed:?}");
+    }
+    assert!(failed.is_empty(), "{} failed", failed.len());
+}

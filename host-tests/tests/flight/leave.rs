@@ -1,0 +1,48 @@
+//! Relays that leave the line where their part of the chain is too small.
+
+use rand::SeedableRng;
+use uav_relay::WithoutQuorum;
+use uav_relay_sim::simulator::chain::run;
+
+use super::*;
+
+const LEAVES: WithoutQuorum = WithoutQuorum::Leave {
+    y_m: -30.0,
+    up_m: 25.0,
+};
+
+/// How far beside the line and how high each relay is told to be while relays 1 to 3 are cut off, with or without room for it, and
+/// when they are back.
+fn across(room: bool) -> [Vec<[f32; 2]>; 2] {
+    [seconds(110), seconds(300)].map(|end| {
+        let mut setup = eight(&mut ChaCha8Rng::seed_from_u64(1));
+        setup.settings.without_quorum = LEAVES;
+        if room {
+            let guard = setup.settings.guard;
+            setup.settings.guard = guard.map(|guard| guard.with_room_for(LEAVES));
+        }
+        setup.partitions.push(Partition {
+            after: 3,
+            from: seconds(60),
+            until: Some(seconds(120)),
+        });
+        go_on_until(&mut setup, end);
+        let outcome = run(setup).unwrap();
+        assert!(outcome.nearest_m() >= floor_m(1), "{:?}", outcome.nearest);
+        assert_eq!(outcome.unsafe_setpoints, 0);
+        let places = outcome.relays.iter().map(|relay| relay.setpoint.unwrap());
+        places.map(|place| [place.y_m, place.altitude_m]).collect()
+    })
+}
+
+#[test]
+fn a_box_has_room_for_relays_that_leave_if_it_was_asked_for() {
+    let on_line = [[0.0, 20.0]; 8];
+    let mut beside = on_line;
+    beside[..3].fill([-30.0, 45.0]);
+    assert_eq!(across(true), [beside, on_line]);
+    // They go no farther than their box: along the line it has no room beside, and a band of altitudes.
+    let [cut, back] = across(false);
+    assert_eq!((cut[0][0], &back[..]), (0.0, &on_line[..]));
+    assert_ne!(cut[..3], beside[..3]);
+}
