@@ -65,10 +65,10 @@ pub(crate) struct Lease {
     current: Option<Current>,
     /// Until when others may count on this relay.
     relied_on: Instant,
-    /// The view accepted last, and until when its places are not to be taken.
+    /// The view accepted last, and until when its places are not to be taken, once all have accepted it.
     rest: (ViewId, Instant),
-    /// Whether all are known to have accepted it: until then members of a view before may hold what was agreed on there.
-    accepted: bool,
+    /// Until when members of views before may hold what was agreed on there, as far as that is known.
+    bound: Option<Instant>,
     /// At the leader: when the next pulse begins, and how long they took lately.
     next_at: Option<Instant>,
     slowest: Duration,
@@ -88,7 +88,7 @@ impl Lease {
             current: None,
             relied_on: now + settings.dead_after,
             rest: (ViewId::LOADED, now),
-            accepted: true,
+            bound: Some(now),
             next_at: None,
             slowest: Duration::from_micros(0),
             retransmit: Retransmit::new(seed),
@@ -117,18 +117,21 @@ impl Lease {
 
     /// For how long what was agreed on may be held elsewhere.
     pub(crate) fn held(&self, now: Instant) -> Held {
-        let (view, until) = self.rest;
         Held {
             lease_left: tenths(self.relied_on.since(now)),
-            view,
-            rest: self.accepted.then(|| tenths(until.since(now))),
+            view: self.rest.0,
+            rest: self.bound.map(|until| tenths(until.since(now))),
         }
     }
 
-    /// `view` is accepted, whose places are not to be taken before `rest`.
-    pub(crate) fn renew(&mut self, view: ViewId, rest: Instant) {
+    /// `view` is accepted, which follows `base`, and whose places are not to be taken before `rest`.
+    ///
+    /// Members of `base` that have not accepted it yet may hold what was agreed on there, but not for longer than they rely on this relay,
+    /// if it was one of them: without it no more pulses go through.
+    pub(crate) fn renew(&mut self, view: ViewId, base: ViewId, rest: Instant) {
+        let known = self.bound.filter(|_| self.rest.0 == base);
+        self.bound = known.map(|until| until.max(rest).max(self.relied_on));
         self.rest = (view, rest);
-        self.accepted = false;
         self.state = LeaseState::Open;
         self.current = None;
         self.next_at = None;
@@ -138,7 +141,7 @@ impl Lease {
 
     /// All have accepted the view that this relay is in.
     pub(crate) const fn commit(&mut self) {
-        self.accepted = true;
+        self.bound = Some(self.rest.1);
     }
 
     /// The leader has heard that all agree on their places: there is something to hold from now on.

@@ -982,7 +982,7 @@ impl Node {
         self.neighbours.at_mut(onward).agree(place == relays);
         let works = self.member.settings.method == Method::Joint;
         let rest = now + Duration::from_millis(100).times(u32::from(lease_left));
-        self.lease.renew(proposed.view, rest);
+        self.lease.renew(proposed.view, proposed.base.id, rest);
         if leads {
             self.lease.commit();
         }

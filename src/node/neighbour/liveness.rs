@@ -103,6 +103,11 @@ impl Liveness {
         self.met && !self.lost
     }
 
+    /// How long a run of lost frames may be, by what the channel has shown.
+    pub(crate) fn run(&self, tick: Duration) -> Duration {
+        tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
+    }
+
     /// Whether few frames were lost on the channel lately.
     pub(crate) const fn is_clear(&self) -> bool {
         self.longest <= QUESTIONS

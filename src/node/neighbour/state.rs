@@ -7,7 +7,7 @@
 //! | `Searching` | - | - | taken, a farther one not before nearer ones could be heard; one that comes and goes after a hold-down | after a span `NoPeer` |
 //! | `NoPeer` | - | - | taken, if it takes this relay; else, or if it comes and goes, after a hold-down | the four nearest nodes are sent a hello every `dead_after`, every half of `probe_after` once one was heard |
 //!
-//! A span is `dead_after` less `probe_after`. A node that has been taken is paired with until it says that it has taken this relay, too.
+//! A span is `dead_after` less `probe_after`, or as long as a run of lost frames may be by what the channel has shown. A node that has been taken is paired with until it says that it has taken this relay, too.
 //! A node that takes another one is not taken. *Better* is a nearer node that has somebody beyond it who hears it, and a farther one by which more
 //! relays hang together: then the link that is missing is on the other side of the node taken, and it is left out.
 //!
@@ -20,6 +20,7 @@
 use super::liveness::{Liveness, patience, tick};
 use crate::jitter::Jitter;
 use crate::node::context::Proposer;
+use crate::node::timing::longest_lease;
 use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
@@ -484,7 +485,9 @@ impl Neighbour {
             .dead_after
             .as_micros()
             .saturating_sub(settings.probe_after.as_micros());
-        let is_over = |since: Instant| now.since(since).as_micros() >= span;
+        let run = self.liveness.run(self.tick).min(longest_lease(settings));
+        let span = run.max(Duration::from_micros(span));
+        let is_over = |since: Instant| now.since(since) >= span;
         let mut lost = false;
         let mut look_again = now + step;
         match self.state {

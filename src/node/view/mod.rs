@@ -79,7 +79,7 @@ pub(crate) struct Proposed {
     /// The one node that it was handed on to: were it handed to another one, too, two views could bear its name.
     handed_to: Option<u16>,
     /// The view that the decision follows, once that is known.
-    base: View,
+    pub(crate) base: View,
     /// How many have taken part in it, once that is known.
     there: u16,
     /// What was decided on, once that is known; `None` if too few are there.
