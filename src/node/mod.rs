@@ -904,7 +904,9 @@ impl Node {
         } = self;
         let neighbour = neighbours.at_mut(side);
         neighbour.notice(now, &member.settings);
-        let taken = hello.neighbour != own && hello.neighbour != 0;
+        // It would rather have this relay than one that is farther away.
+        let farther = hello.neighbour.abs_diff(from) > own.abs_diff(from);
+        let taken = hello.neighbour != own && hello.neighbour != 0 && !farther;
         if taken || !hears(own, from, hello.hears) {
             return;
         }
