@@ -17,7 +17,7 @@ use uav_relay::{
 
 use super::codec::{Greeting, Proposed, Said, Seats, SizedView, Swept, plain, wire};
 use super::config;
-use super::forming::{ASKS, FRESH, a_hello, granted, hearing, id, mark, proposed};
+use super::forming::{ASKS, FRESH, a_hello, granted, hearing, id, mark, proposed, unnumbered};
 use super::lies::renamed;
 use super::offer::{Offer, offer};
 use super::receive::{FIELD, counted, drain, relay_of};
@@ -82,7 +82,7 @@ pub(crate) fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
     wire(&plain(header, &said.body()))
 }
 
-/// What `relay` sends at `now`: ports, and bodies as the rules read them.
+/// What `relay` sends at `now`: ports, and bodies as the rules read them, but for the numbers of hellos.
 pub(crate) fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
     let mut out = Vec::new();
     let mut buffer = [0; MAX_FRAME];
@@ -90,7 +90,7 @@ pub(crate) fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
         let plain = unstuffed(&buffer[..transmit.len - 1]).unwrap();
         assert!(frame::decode(&plain).is_ok());
         let said = Said::read(&plain[10..plain.len() - 4]).unwrap();
-        out.push((transmit.port, said));
+        out.push((transmit.port, unnumbered(said)));
     }
     out
 }
@@ -178,8 +178,10 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         Said::Hello(Greeting {
             mission,
             neighbour: 4,
+            behind: 1,
             newest: view,
             holds: (mission, 0),
+            nonce: 0,
             hears: 1,
             flags: 16,
         }),

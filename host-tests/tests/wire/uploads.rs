@@ -11,7 +11,7 @@ use super::codec::{Greeting, Said};
 use super::forming::{
     ASKS, FLIES, FORMS, FRESH, READY, events, granted, hearing, id, mark, proposed,
 };
-use super::offer::{BYTES, Offer, offer};
+use super::offer::{KEPT, Offer, offer};
 use super::receive::{FIELD, counted, relay};
 use super::sequence::{FIRST, framed, one_of_each, sent};
 use super::signed::{Peer, said, set, with_key};
@@ -43,8 +43,10 @@ pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) 
     Said::Hello(Greeting {
         mission,
         neighbour,
+        behind: 1,
         newest: 0,
         holds,
+        nonce: 0,
         hears: 0,
         flags,
     })
@@ -337,8 +339,10 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
             let call = Greeting {
                 mission: base,
                 neighbour: 3,
+                behind: 5,
                 newest: id(2, 1),
                 holds: (next.digest(), 3),
+                nonce: 0,
                 hears: 1,
                 flags: ASKS | FORMS | READY,
             };
@@ -370,9 +374,9 @@ fn in_a_field_nothing_is_held() {
 #[test]
 fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
     let (relay, _, base, newer) = adopted();
-    let mut kept = [0; BYTES];
+    let mut kept = [0; KEPT];
     relay.upload().unwrap().encode(&mut kept).unwrap();
-    assert_eq!(kept[..], newer.body());
+    assert_eq!(kept[..], newer.kept());
     let upload = Upload::decode(&kept).unwrap();
     let loaded = Mission::try_new(paper(8)).unwrap();
     for remembers in [false, true] {
