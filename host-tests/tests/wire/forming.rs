@@ -109,7 +109,7 @@ pub(crate) fn long(behind: u16, said: Said) -> Said {
     }
 }
 
-/// What is said, but for the number of a hello, which is never 0.
+/// What a relay with a key says, but for the number of a hello, which is never 0 there.
 pub(crate) fn unnumbered(mut said: Said) -> Said {
     if let Said::Hello(greeting) = &mut said {
         assert_ne!(greeting.nonce, 0);
@@ -452,7 +452,8 @@ fn a_part_that_is_cut_off_stops_calling() {
     // It calls: it has missed a beginning.
     let sweep = &one_of_each(FIRST + 1, mission)[0];
     relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, sweep));
-    let calls = hearing(1, a_hello(0, mission, 3, ASKS | FORMS | FRESH));
+    let calls = a_hello(0, mission, 3, ASKS | FORMS | FRESH);
+    let calls = long(5, hearing(1, calls));
     assert_eq!(soon(&mut relay, now), [(Port::Upstream, calls)]);
     now = now + Duration::from_millis(1);
     let (view, of) = (id(1, 1), (mission, 0));
@@ -533,7 +534,7 @@ fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
         let hello = a_hello(newest, mission, 4, flags);
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &hello));
         let out = soon(&mut relay, now);
-        let answer = hearing(1, a_hello(newest, mission, 3, FRESH));
+        let answer = long(5, hearing(1, a_hello(newest, mission, 3, FRESH)));
         let expected = asks.then_some((Port::Upstream, answer));
         assert_eq!(out, expected.into_iter().collect::<Vec<_>>());
         assert_eq!(counted(relay.stats()), ["received"]);
@@ -551,7 +552,7 @@ fn a_view_too_far_ahead_is_not_heard_of() {
         let hello = a_hello(newest, mission, 4, ASKS);
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &hello));
         let known = if believed { newest } else { 0 };
-        let answer = hearing(1, a_hello(known, mission, 3, FRESH));
+        let answer = long(5, hearing(1, a_hello(known, mission, 3, FRESH)));
         assert_eq!(
             soon(&mut relay, now),
             [(Port::Upstream, answer)],

@@ -17,7 +17,7 @@ use uav_relay::{
 
 use super::codec::{Greeting, Proposed, Said, Seats, SizedView, Swept, plain, wire};
 use super::config;
-use super::forming::{ASKS, FRESH, a_hello, granted, hearing, id, mark, proposed, unnumbered};
+use super::forming::{ASKS, FRESH, a_hello, granted, hearing, id, long, mark, proposed};
 use super::lies::renamed;
 use super::offer::{Offer, offer};
 use super::receive::{FIELD, counted, drain, relay_of};
@@ -82,7 +82,7 @@ pub(crate) fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
     wire(&plain(header, &said.body()))
 }
 
-/// What `relay` sends at `now`: ports, and bodies as the rules read them, but for the numbers of hellos.
+/// What `relay` sends at `now`: ports, and bodies as the rules read them.
 pub(crate) fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
     let mut out = Vec::new();
     let mut buffer = [0; MAX_FRAME];
@@ -90,7 +90,7 @@ pub(crate) fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
         let plain = unstuffed(&buffer[..transmit.len - 1]).unwrap();
         assert!(frame::decode(&plain).is_ok());
         let said = Said::read(&plain[10..plain.len() - 4]).unwrap();
-        out.push((transmit.port, unnumbered(said)));
+        out.push((transmit.port, said));
     }
     out
 }
@@ -268,8 +268,8 @@ fn a_message_of_another_mission_leads_to_a_hello_at_most() {
         let own = digest(relay.mission());
         let other = own ^ 0x4000;
         let hello = |port| {
-            let neighbour = if port == Port::Upstream { 3 } else { 5 };
-            hearing(1, a_hello(0, own, neighbour, ASKS | FRESH))
+            let (neighbour, behind) = if port == Port::Upstream { (3, 5) } else { (5, 4) };
+            long(behind, hearing(1, a_hello(0, own, neighbour, ASKS | FRESH)))
         };
         for said in one_of_each(FIRST, other) {
             if matches!(said, Said::Busy { .. }) {

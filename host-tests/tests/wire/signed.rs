@@ -53,6 +53,8 @@ pub(crate) struct Peer {
     /// Its nonce toward the relay, and the relay's toward it.
     nonces: [u64; 2],
     counter: u32,
+    /// Digest of the mission that the relay was loaded with.
+    base: u16,
 }
 
 impl Peer {
@@ -64,6 +66,7 @@ impl Peer {
             port,
             nonces: [5 << 32 | 1, 0],
             counter: 0,
+            base: digest(relay.mission()),
         };
         // It asks, it is answered, it shows that it has heard that.
         peer.handshake(relay, true);
@@ -121,13 +124,13 @@ impl Peer {
 
     /// The number of the hello that `relay` says when it is asked for one.
     pub(crate) fn number(&mut self, mut relay: Relay, now: Instant) -> u16 {
-        let mission = Mission::try_new(paper(8)).unwrap();
+        let mission = self.base;
         let asks = Said::Hello(Greeting {
-            mission: digest(&mission),
+            mission,
             neighbour: 0,
             behind: 1,
             newest: 0,
-            holds: (digest(&mission), 0),
+            holds: (mission, 0),
             nonce: 0,
             hears: 0,
             flags: ASKS,
