@@ -19,6 +19,7 @@ impl Body<'_, '_> {
         } else {
             self.wild();
         }
+        self.question();
     }
 
     /// The version that the relay holds, one of the next, or any.
