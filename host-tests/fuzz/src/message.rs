@@ -27,6 +27,8 @@ pub struct Known {
     pub number: u16,
     /// Number of the talk that its last fence was of, 0 for none.
     pub association: u16,
+    /// Number of the last hello that it said, 0 for none.
+    pub asked: u16,
     /// D, m.
     pub distance_m: f32,
 }
