@@ -332,10 +332,12 @@ impl Watched {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
         assert!(told || setpoint == self.setpoint, "moved in silence");
-        self.setpoint = setpoint.or(self.setpoint);
+        // One that stands down flies nothing.
+        let silent = self.relay.stands_down();
+        self.setpoint = setpoint.or(self.setpoint.filter(|_| !silent));
         assert_eq!(setpoint, self.setpoint, "a place that was taken away");
         let Some(place) = setpoint else {
-            assert!(!told, "told to fly nowhere");
+            assert!(!told || silent, "told to fly nowhere");
             return;
         };
         if let Some(GuardConfig { fence, .. }) = self.settings.guard {

@@ -80,7 +80,7 @@ pub(crate) struct Candidate {
 
 impl Candidate {
     /// Whether it is to take the place of another one.
-    const fn is_better(&self) -> bool {
+    const fn is_better(self) -> bool {
         if self.nearer { self.ready } else { self.longer }
     }
 }
