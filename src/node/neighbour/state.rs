@@ -65,6 +65,10 @@ const FORGIVEN: u8 = 3;
 const MEMORY: u32 = 32;
 
 /// A node that is not taken, and hears this relay.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "four things that its hello says"
+)]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) node: u16,
