@@ -10,7 +10,8 @@
 //!
 //! With `--key-file` and `--epoch-file` its frames are signed; without, anybody in range can move the drones, and it says so. One
 //! that signs takes new missions in flight (`examples/linux_ground` uploads them), and with `--upload-file` it still has them when it
-//! is switched on again.
+//! is switched on again. With `--view-file` it stands by what it has said in votes on who is in the chain when it is switched on again
+//! in flight; before another flight that file is removed.
 //!
 //! With `--positions` it is told where the drone is, and its setpoints keep drones apart on their way; without, nothing does, and it
 //! says so.
@@ -30,6 +31,7 @@
 //! | `report.rs`, `line.rs` | the lines it prints |
 //! | `key.rs`, `epoch.rs` | what frames are signed with, from files |
 //! | `uploads.rs` | the newest mission that was uploaded, in a file |
+//! | `views.rs` | what it has said in the votes on views, in a file |
 //! | `keep.rs` | a file that is written whole or not at all |
 //! | `system.rs` | time and signals |
 //!
@@ -66,6 +68,8 @@ mod system;
 mod tty;
 #[cfg(unix)]
 mod uploads;
+#[cfg(unix)]
+mod views;
 
 #[cfg(unix)]
 fn main() -> std::process::ExitCode {

@@ -58,6 +58,10 @@ struct Options {
     /// it is switched on again
     #[arg(long, value_name = "FILE", requires = "key_file")]
     upload_file: Option<PathBuf>,
+    /// File that keeps what this relay has said in votes on who is in the chain, made if it is missing: with it a relay that is
+    /// switched on again in flight stands by that. Remove it before another flight
+    #[arg(long, value_name = "FILE")]
+    view_file: Option<PathBuf>,
     /// Milliseconds of silence after which a neighbour is asked for a sign of life
     #[arg(long, value_name = "MS", default_value_t = 5_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
     probe_after_ms: u64,
@@ -111,6 +115,7 @@ pub(crate) struct Plan {
     pub(crate) identity: Identity,
     pub(crate) settings: Settings,
     pub(crate) secret: Option<Secret>,
+    pub(crate) view_file: Option<PathBuf>,
     pub(crate) ttys: Ttys,
     pub(crate) baud: u32,
     pub(crate) positions: Option<PathBuf>,
@@ -191,6 +196,7 @@ fn plan(options: &Options) -> Result<Plan, String> {
         },
         settings,
         secret: secret(options)?,
+        view_file: options.view_file.clone(),
         ttys,
         baud: options.baud,
         positions: options.positions.clone(),

@@ -72,11 +72,16 @@ impl Ports {
         })
     }
 
-    /// Moves what can be moved, and says when to come back at the latest.
-    pub(crate) fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
+    /// Moves what can be moved, with a call of `keep` before anything is sent, and says when to come back at the latest.
+    pub(crate) fn poll(
+        &mut self,
+        now: Instant,
+        relay: &mut Relay,
+        keep: &mut dyn FnMut(&Relay),
+    ) -> Option<Instant> {
         match self {
-            Self::Pair(pair) => pair.poll(now, relay),
-            Self::Shared(shared) => shared.poll(now, relay),
+            Self::Pair(pair) => pair.poll_keeping(now, relay, keep),
+            Self::Shared(shared) => shared.poll_keeping(now, relay, keep),
         }
     }
 

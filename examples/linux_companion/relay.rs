@@ -11,6 +11,7 @@ use crate::ports::{Ports, Woken};
 use crate::positions::Positions;
 use crate::report::Report;
 use crate::system::{now, on_signals};
+use crate::views::Views;
 use crate::{epoch, positions, uploads};
 
 /// Runs the relay until it is told to stop.
@@ -28,10 +29,16 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
         ..plan.settings
     };
     let held = held(plan);
+    let mut views = Views::load(plan.view_file.as_deref())?;
     let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), now(clock))
         .map_err(|error| error.to_string())?;
     if let Some(held) = &held {
         relay.resume(held).map_err(|error| error.to_string())?;
+    }
+    if let Some(record) = views.stored() {
+        relay
+            .resume_view(now(clock), record)
+            .map_err(|error| views.refused(&error.to_string()))?;
     }
     let report = Report::new(plan.identity, &plan.mission);
     let names: Vec<String> = ports.ttys().map(|tty| tty.name().to_owned()).collect();
@@ -47,7 +54,7 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
         {
             relay.handle_position(now(clock), now(clock), place);
         }
-        let wake = ports.poll(now(clock), &mut relay);
+        let wake = ports.poll(now(clock), &mut relay, &mut |relay| views.keep(relay));
         while let Some(event) = relay.poll_event() {
             if event == Event::Uploaded {
                 store(plan, &relay);

@@ -792,10 +792,14 @@ impl Node {
         }
     }
 
-    /// The number of a hello that is said now, for the offer that answers it.
+    /// The number of a hello that is said now, for the offer that answers it; 0 where none is taken.
     #[cfg(feature = "upload")]
     fn ask_number(&mut self, now: Instant) -> u16 {
-        self.update.ask(now, &self.member.settings)
+        if takes_uploads(&self.member) {
+            self.update.ask(now, &self.member.settings)
+        } else {
+            0
+        }
     }
 
     #[cfg(not(feature = "upload"))]

@@ -130,6 +130,17 @@ where
     /// Work: at most [`READ_LIMIT`] bytes a port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the
     /// frames the relay then has.
     pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
+        self.poll_keeping(now, relay, &mut |_| {})
+    }
+
+    /// The same, with a call of `keep` between what comes in and what is sent: what has to be stored before others are told it, see
+    /// [`Relay::view_record`].
+    pub fn poll_keeping(
+        &mut self,
+        now: Instant,
+        relay: &mut Relay,
+        keep: &mut dyn FnMut(&Relay),
+    ) -> Option<Instant> {
         poll(
             now,
             relay,
@@ -137,6 +148,7 @@ where
                 (Port::Upstream, &mut self.upstream),
                 (Port::Downstream, &mut self.downstream),
             ],
+            keep,
         )
     }
 }
@@ -161,7 +173,18 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
     /// Work: at most [`READ_LIMIT`] bytes through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the frames
     /// that fit.
     pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
-        poll(now, relay, &mut [(Port::Shared, &mut self.channel)])
+        self.poll_keeping(now, relay, &mut |_| {})
+    }
+
+    /// The same, with a call of `keep` between what comes in and what is sent: what has to be stored before others are told it, see
+    /// [`Relay::view_record`].
+    pub fn poll_keeping(
+        &mut self,
+        now: Instant,
+        relay: &mut Relay,
+        keep: &mut dyn FnMut(&Relay),
+    ) -> Option<Instant> {
+        poll(now, relay, &mut [(Port::Shared, &mut self.channel)], keep)
     }
 }
 
@@ -170,6 +193,7 @@ fn poll(
     now: Instant,
     relay: &mut Relay,
     links: &mut [(Port, &mut dyn FrameLink)],
+    keep: &mut dyn FnMut(&Relay),
 ) -> Option<Instant> {
     for (port, link) in &mut *links {
         link.receive(now, *port, relay);
@@ -177,6 +201,7 @@ fn poll(
     if relay.poll_timeout().is_some_and(|at| at <= now) {
         relay.handle_timeout(now);
     }
+    keep(relay);
     let mut frame = [0; MAX_FRAME];
     // A link without room must not hold up the other one, so what is for it is counted and gone.
     while links.iter().any(|(_, link)| link.has_room())

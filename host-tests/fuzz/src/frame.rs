@@ -271,6 +271,9 @@ fn look_at(message: &Message) {
         }
         Message::Decision(decision) => {
             assert!(is_count(decision.place) && is_proposed(decision.proposal));
+            let base = decision.base;
+            assert!(is_count(decision.there) && is_count(base.relays));
+            assert!(base.id == ViewId::LOADED || is_proposed(base.id));
             let view = decision.view;
             assert!(view.is_none_or(|view| is_proposed(view.id) && is_count(view.relays)));
         }
@@ -280,7 +283,7 @@ fn look_at(message: &Message) {
                 fence.association != 0 && fence.x_m.abs() <= 1e7 && fence.target_m.abs() <= 1e7
             );
         }
-        Message::Offer(upload) => {
+        Message::Offer { upload, .. } => {
             let same = Mission::try_new(*upload.config()).is_ok();
             assert!(same && upload.version() > 0, "{upload:?}");
         }

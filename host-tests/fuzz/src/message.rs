@@ -27,6 +27,8 @@ pub struct Known {
     pub number: u16,
     /// Number of the talk that its last fence was of, 0 for none.
     pub association: u16,
+    /// Number of the last hello that it said, 0 for none.
+    pub asked: u16,
     /// D, m.
     pub distance_m: f32,
 }
@@ -357,10 +359,12 @@ impl Body<'_, '_> {
     fn hello(&mut self) {
         self.digest();
         self.relay();
+        self.relay();
         self.view();
         let MissionId { digest, version } = self.mission_id();
         self.word(digest);
         self.word(version);
+        self.question();
         self.small(0, 15);
         self.small(0, 31);
     }
@@ -379,6 +383,7 @@ impl Body<'_, '_> {
         self.sized();
         self.relay();
         self.lease();
+        self.lease();
         self.small(0, 1);
         if self.small(0, 1) == 1 {
             self.view();
@@ -388,9 +393,11 @@ impl Body<'_, '_> {
 
     fn decision(&mut self) {
         self.call();
+        self.sized();
         if self.small(0, 1) == 1 {
             self.sized();
         }
+        self.relay();
         self.lease();
     }
 

@@ -264,6 +264,7 @@ impl Bench {
             view: self.watched.relay().view(),
             number: self.watched.number(),
             association: self.watched.association(),
+            asked: self.watched.asked(),
             distance_m: self.mission.config().distance_m,
         };
         let body = body(input, &known);

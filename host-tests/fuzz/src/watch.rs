@@ -67,6 +67,7 @@ pub struct Watched {
     number: u16,
     /// Number of the talk that its last fence was of.
     association: u16,
+    asked: u16,
     /// View and number of the pass that its place is from, as far as that is known.
     held: Option<(ViewId, u16)>,
     /// What it flew when it was looked at last.
@@ -100,6 +101,7 @@ impl Watched {
             begun: [0; 3],
             number: 0,
             association: 0,
+            asked: 0,
             held: None,
             flown: *mission.config(),
         })
@@ -123,6 +125,11 @@ impl Watched {
     /// Number of the talk that its last fence was of, 0 for none.
     pub const fn association(&self) -> u16 {
         self.association
+    }
+
+    /// The number of the last hello that it said, 0 for none.
+    pub const fn asked(&self) -> u16 {
+        self.asked
     }
 
     /// View and number of the pass that the place it has agreed to is from; `None` where a guard leads it there, too.
@@ -251,7 +258,9 @@ impl Watched {
             let off = self.node.abs_diff(header.destination) <= far;
             let upstream = off && header.destination < self.node;
             let downstream = off && header.destination > self.node;
-            let right = match (self.settings.wiring, port) {
+            // One that stands down says so to the other node of its number.
+            let own = header.destination == self.node && self.relay.stands_down();
+            let right = own || match (self.settings.wiring, port) {
                 (Wiring::Pair, Port::Upstream) => upstream,
                 (Wiring::Pair, Port::Downstream) => downstream,
                 (Wiring::Shared, Port::Shared) => upstream || downstream,
@@ -278,6 +287,9 @@ impl Watched {
                 assert!(sweep.reaches.iter().all(inside), "{sweep:?}");
             }
             self.number = number_of(&message).unwrap_or(self.number);
+            if let Message::Hello(hello) = &message {
+                self.asked = hello.nonce;
+            }
             if let Message::Fence { fence, .. } = &message {
                 self.association = fence.association;
             }
@@ -320,10 +332,12 @@ impl Watched {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
         assert!(told || setpoint == self.setpoint, "moved in silence");
-        self.setpoint = setpoint.or(self.setpoint);
+        // One that stands down flies nothing.
+        let silent = self.relay.stands_down();
+        self.setpoint = setpoint.or(self.setpoint.filter(|_| !silent));
         assert_eq!(setpoint, self.setpoint, "a place that was taken away");
         let Some(place) = setpoint else {
-            assert!(!told, "told to fly nowhere");
+            assert!(!told || silent, "told to fly nowhere");
             return;
         };
         if let Some(GuardConfig { fence, .. }) = self.settings.guard {

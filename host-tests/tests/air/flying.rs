@@ -4,11 +4,12 @@ use uav_relay::{Phase, ViewId};
 use uav_relay_sim::simulator::flying::{Seen, groups, has_agreed};
 
 /// Relay `index` of `relays` in view `view`.
-fn seen(view: u16, relays: u16, index: u16) -> Seen {
+fn seen(view: u32, relays: u16, index: u16) -> Seen {
     Seen {
         is_on: true,
         phase: Phase::Holding,
-        view,
+        view: ViewId::from_bits(view),
+        leased: true,
         relays,
         index,
         version: 0,

@@ -1,7 +1,7 @@
 //! A chain on a clock of its own, and the ground at both ends, every frame of which can be listened to and added to: what an
 //! attacker has.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use host_tests::fixtures::mission;
 use uav_relay::wire::frame::MAX_FRAME;
@@ -75,6 +75,8 @@ pub(crate) struct Net {
     pub(crate) proven: BTreeMap<(u16, u16), (u32, u32)>,
     /// For each of them, the sender's life that the receiver has heard of last, and its own at that time.
     learned: BTreeMap<(u16, u16), (u32, u32)>,
+    /// Frames that were signed before their sender knew of the receiver's last start.
+    outdated: BTreeSet<usize>,
     /// When frames arrive, and which; in order.
     under_way: VecDeque<(Instant, usize)>,
     pub(crate) deeds: VecDeque<(Instant, Deed)>,
@@ -102,6 +104,7 @@ impl Net {
             genuine: vec![0; relays.into()],
             proven: BTreeMap::new(),
             learned: BTreeMap::new(),
+            outdated: BTreeSet::new(),
             under_way: VecDeque::new(),
             deeds: deeds
                 .iter()
@@ -167,7 +170,9 @@ impl Net {
         let Heard {
             from, to, lives, ..
         } = heard;
-        lives.1 == self.life(*to) && self.learned.get(&(*from, *to)) == Some(lives)
+        lives.1 == self.life(*to)
+            && self.learned.get(&(*from, *to)) == Some(lives)
+            && !self.outdated.contains(&heard.number)
     }
 
     /// Does what is next, unless that is later than `until`; whether something was.
@@ -259,6 +264,7 @@ impl Net {
             to,
             lives,
             wire,
+            number,
             ..
         } = self.heard[heard].clone();
         if !self.is_relay(to) {
@@ -267,9 +273,13 @@ impl Net {
             return self.drain_ground(end);
         }
         self.learned.insert((from, to), (lives.0, self.life(to)));
-        let before = self.stats(to).received;
+        let before = self.stats(to);
         self.give(to, self.port(from, to), &wire);
-        let messages = self.stats(to).received - before;
+        let after = self.stats(to);
+        if after.forged > before.forged {
+            self.outdated.insert(number);
+        }
+        let messages = after.received - before.received;
         self.genuine[usize::from(to) - 1] += messages;
         if messages > 0 {
             self.proven.insert((from, to), (lives.0, self.life(to)));

@@ -23,7 +23,8 @@ fn offered(relays: u16, version: u16) -> Vec<u8> {
     let mut body = [0; LENGTH];
     let len = newer(&mission(relays), version).encode(&mut body).unwrap();
     assert_eq!((len, body[0]), (LENGTH, OFFER));
-    body.to_vec()
+    // Which hello it answers is not kept with an upload.
+    [&body[..], &version.to_le_bytes()].concat()
 }
 
 impl Attacker {

@@ -163,20 +163,23 @@ fn relay() -> Vec<Vec<u8>> {
 fn offer(side: u8) -> Vec<u8> {
     let head = [9, side, 14, 1, 0, 0, 1];
     let interferer = [0, 0, 128, 0, 0, 192, 0, 0, 64];
-    [&head[..], &interferer, &[255, 1, 1, 0]].concat()
+    [&head[..], &interferer, &[255, 1, 1, 0, 0]].concat()
 }
 
-/// The second of four relays with a key, on links or on one channel: it is offered a mission, its other neighbour comes to hold
+/// The second of four relays with a key, on links or on one channel: it is asked for a hello and offered a mission, its other neighbour comes to hold
 /// it, too, and they are counted in a view that flies it.
 fn uploaded(how: u8) -> Vec<u8> {
     let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
-    let hello = [9, 1, 10, 0, 2, 0, 0, 1, 0, 0];
+    let asks = [9, 0, 10, 0, 2, 1, 0, 0, 0, 1, 1, 0];
+    let hello = [9, 1, 10, 0, 2, 1, 0, 0, 0, 1, 0, 0];
     // The next view, of the mission held: from the first place, after view 0 of four with a voice, its leader's; back from the third.
-    let proposal = [9, 0, 11, 0, 33, 1, 240, 4, 1, 0, 1, 0, 0];
-    let decision = [9, 1, 12, 0, 33, 3, 1, 33, 4, 0, 0];
+    let proposal = [9, 0, 11, 0, 33, 1, 240, 4, 1, 0, 0, 1, 0, 0];
+    let decision = [9, 1, 12, 0, 33, 3, 240, 4, 1, 33, 4, 4, 0, 0];
     let wake = [3, 3];
     let parts = [
         &head[..],
+        &asks,
+        &wake,
         &offer(0),
         &wake,
         &hello,
@@ -191,7 +194,7 @@ fn uploaded(how: u8) -> Vec<u8> {
 fn by_the_ground(index: u8) -> Vec<u8> {
     let head = [0, 3, 0, index, 8, 0, 0, 0, 0, 1, 0];
     let side = u8::from(index > 0);
-    let asks = [9, side, 10, 0, 0, 0, 0, 0, 1, 0];
+    let asks = [9, side, 10, 0, 0, 1, 0, 0, 0, 0, 1, 0];
     let offer = offer(side);
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }

@@ -167,9 +167,11 @@ impl Swept {
 pub(crate) struct Greeting {
     pub(crate) mission: u16,
     pub(crate) neighbour: u16,
+    pub(crate) behind: u16,
     pub(crate) newest: u32,
     /// Digest and version of the mission held.
     pub(crate) holds: (u16, u16),
+    pub(crate) nonce: u16,
     pub(crate) hears: u8,
     pub(crate) flags: u8,
 }
@@ -177,8 +179,9 @@ pub(crate) struct Greeting {
 impl Greeting {
     fn body(self) -> Vec<u8> {
         let mut out = pass(10, [self.mission, self.neighbour]);
+        words(&mut out, &[self.behind]);
         out.extend(self.newest.to_le_bytes());
-        words(&mut out, &[self.holds.0, self.holds.1]);
+        words(&mut out, &[self.holds.0, self.holds.1, self.nonce]);
         out.extend([self.hears, self.flags]);
         out
     }
@@ -210,6 +213,11 @@ impl SizedView {
 
     fn is_proposed(self) -> bool {
         is_proposed(self.id) && is_count(self.relays)
+    }
+
+    /// Whether it is a proposed one, or the chain as it was loaded.
+    fn is_view(self) -> bool {
+        (self.id == 0 || is_proposed(self.id)) && is_count(self.relays)
     }
 }
 
@@ -246,6 +254,7 @@ pub(crate) struct Proposed {
     pub(crate) agreed: SizedView,
     pub(crate) votes: u16,
     pub(crate) lease_left: u16,
+    pub(crate) rest: u16,
     pub(crate) proposer: bool,
     /// The proposal that was decided on, and the view that was decided for.
     pub(crate) successor: Option<(u32, SizedView)>,
@@ -255,7 +264,7 @@ impl Proposed {
     fn body(self) -> Vec<u8> {
         let mut out = self.call.body(11);
         self.agreed.write(&mut out);
-        words(&mut out, &[self.votes, self.lease_left]);
+        words(&mut out, &[self.votes, self.lease_left, self.rest]);
         out.push(u8::from(self.proposer));
         out.push(u8::from(self.successor.is_some()));
         if let Some((proposal, view)) = self.successor {
@@ -275,6 +284,7 @@ impl Proposed {
                 votes: self.votes,
                 proposer: self.proposer,
                 lease_left: self.lease_left,
+                rest: self.rest,
                 successor: self.successor.map(|(proposal, view)| Successor {
                     proposal: ViewId::from_bits(proposal),
                     view: view.view(),
@@ -286,8 +296,7 @@ impl Proposed {
     fn in_range(self) -> bool {
         let agreed = self.agreed;
         self.call.in_range()
-            && (agreed.id == 0 || is_proposed(agreed.id))
-            && is_count(agreed.relays)
+            && agreed.is_view()
             && self.votes <= agreed.relays
             && self
                 .successor
@@ -304,23 +313,30 @@ impl Proposed {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(crate) struct Decided {
     pub(crate) call: Call,
+    /// What the decision follows.
+    pub(crate) base: SizedView,
     pub(crate) view: Option<SizedView>,
+    pub(crate) there: u16,
     pub(crate) lease_left: u16,
 }
 
 impl Decided {
     fn body(self) -> Vec<u8> {
         let mut out = self.call.body(12);
+        self.base.write(&mut out);
         out.push(u8::from(self.view.is_some()));
         if let Some(view) = self.view {
             view.write(&mut out);
         }
-        words(&mut out, &[self.lease_left]);
+        words(&mut out, &[self.there, self.lease_left]);
         out
     }
 
     fn in_range(self) -> bool {
-        self.call.in_range() && self.view.is_none_or(SizedView::is_proposed)
+        self.call.in_range()
+            && self.base.is_view()
+            && is_count(self.there)
+            && self.view.is_none_or(SizedView::is_proposed)
     }
 }
 
@@ -532,8 +548,10 @@ impl Said {
                 form: greeting.flag(1),
                 fresh: greeting.flag(2),
                 ready: greeting.flag(3),
+                behind: greeting.behind,
                 hears: greeting.hears,
                 holds: mission_id(greeting.holds),
+                nonce: greeting.nonce,
                 flies: greeting.flag(4),
             }),
             Self::Proposal(proposed) => proposed.message(),
@@ -541,6 +559,8 @@ impl Said {
                 mission_id: decided.call.mission_id(),
                 proposal: ViewId::from_bits(decided.call.view),
                 place: decided.call.place,
+                there: decided.there,
+                base: decided.base.view(),
                 view: decided.view.map(SizedView::view),
                 lease_left: decided.lease_left,
             }),
@@ -647,7 +667,10 @@ impl Said {
                 ..
             } => is_place(*x_m) && is_altitude(*altitude_m) && is_sir(*worst),
             Self::Hello(greeting) => {
-                greeting.neighbour <= 1000 && greeting.hears <= 15 && greeting.flags <= 31
+                greeting.neighbour <= 1000
+                    && is_count(greeting.behind)
+                    && greeting.hears <= 15
+                    && greeting.flags <= 31
             }
             Self::Proposal(proposed) => proposed.in_range(),
             Self::Decision(decided) => decided.in_range(),
@@ -933,8 +956,10 @@ impl Reader<'_> {
         Some(Greeting {
             mission: self.word()?,
             neighbour: self.word()?,
+            behind: self.word()?,
             newest: self.long()?,
             holds: (self.word()?, self.word()?),
+            nonce: self.word()?,
             hears: self.byte()?,
             flags: self.byte()?,
         })
@@ -961,6 +986,7 @@ impl Reader<'_> {
             agreed: self.sized()?,
             votes: self.word()?,
             lease_left: self.word()?,
+            rest: self.word()?,
             proposer: self.bool()?,
             successor: self.option(|rest| Some((rest.long()?, rest.sized()?)))?,
         })
@@ -969,7 +995,9 @@ impl Reader<'_> {
     fn decided(&mut self) -> Option<Decided> {
         Some(Decided {
             call: self.call()?,
+            base: self.sized()?,
             view: self.option(Self::sized)?,
+            there: self.word()?,
             lease_left: self.word()?,
         })
     }

@@ -51,6 +51,7 @@ pub(crate) fn proposed(view: u32, of: (u16, u16), place: u16, relays: u16) -> Pr
         agreed: SizedView { id: 0, relays },
         votes: place,
         lease_left: RELIED,
+        rest: 0,
         proposer: true,
         successor: None,
     }
@@ -60,16 +61,20 @@ pub(crate) fn proposed(view: u32, of: (u16, u16), place: u16, relays: u16) -> Pr
 pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Said {
     Said::Decision(Decided {
         call: Call { of, view, place },
+        base: SizedView { id: 0, relays },
         view: Some(SizedView { id: view, relays }),
+        there: relays,
         lease_left: 0,
     })
 }
 
-/// The decision that too few are there.
-pub(crate) fn refused(view: u32, of: (u16, u16), place: u16) -> Said {
+/// The decision that `there` of eight relays are too few.
+pub(crate) fn refused(view: u32, of: (u16, u16), place: u16, there: u16) -> Said {
     Said::Decision(Decided {
         call: Call { of, view, place },
+        base: SizedView { id: 0, relays: 8 },
         view: None,
+        there,
         lease_left: 0,
     })
 }
@@ -79,8 +84,10 @@ pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> S
     Said::Hello(Greeting {
         mission,
         neighbour,
+        behind: 1,
         newest,
         holds: (mission, 0),
+        nonce: 0,
         hears: 0,
         flags: flags | FLIES,
     })
@@ -92,6 +99,23 @@ pub(crate) fn hearing(hears: u8, said: Said) -> Said {
         Said::Hello(greeting) => Said::Hello(Greeting { hears, ..greeting }),
         other => other,
     }
+}
+
+/// The same hello of a node from which so many relays hang together on, itself included.
+pub(crate) fn long(behind: u16, said: Said) -> Said {
+    match said {
+        Said::Hello(greeting) => Said::Hello(Greeting { behind, ..greeting }),
+        other => other,
+    }
+}
+
+/// What a relay with a key says, but for the number of a hello, which is never 0 there.
+pub(crate) fn unnumbered(mut said: Said) -> Said {
+    if let Said::Hello(greeting) = &mut said {
+        assert_ne!(greeting.nonce, 0);
+        greeting.nonce = 0;
+    }
+    said
 }
 
 /// What `relay` sends at `now` or a millisecond later.
@@ -263,10 +287,12 @@ fn more_than_half_is_a_chain_and_half_of_it_with_its_proposer() {
                             place: 12,
                             ..proposal.call
                         },
+                        base: proposal.agreed,
                         view: enough.then_some(SizedView {
                             id: id(9, 1),
                             relays: 12,
                         }),
+                        there: 12,
                         // Somebody who is not here may hold the view before for as long.
                         lease_left: if all { 0 } else { 77 },
                     };
@@ -388,7 +414,9 @@ fn what_may_have_been_agreed_on_is_decided_on_again() {
             view: id(1, 1),
             place: 2,
         },
+        base: SizedView { id: 0, relays: 8 },
         view: Some(before),
+        there: 8,
         lease_left: 40,
     });
     head.handle_bytes(
@@ -404,6 +432,7 @@ fn what_may_have_been_agreed_on_is_decided_on_again() {
         agreed: before,
         votes: 0,
         lease_left: u16::MAX,
+        rest: u16::MAX,
         proposer: false,
         ..proposed(id(2, 1), (mission, 0), 1, 8)
     };
@@ -423,14 +452,15 @@ fn a_part_that_is_cut_off_stops_calling() {
     // It calls: it has missed a beginning.
     let sweep = &one_of_each(FIRST + 1, mission)[0];
     relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, sweep));
-    let calls = hearing(1, a_hello(0, mission, 3, ASKS | FORMS | FRESH));
+    let calls = a_hello(0, mission, 3, ASKS | FORMS | FRESH);
+    let calls = long(5, hearing(1, calls));
     assert_eq!(soon(&mut relay, now), [(Port::Upstream, calls)]);
     now = now + Duration::from_millis(1);
     let (view, of) = (id(1, 1), (mission, 0));
     let proposal = Said::Proposal(proposed(view, of, 1, 8));
     relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
     sent(&mut relay, now);
-    let too_few = |place| refused(view, of, place);
+    let too_few = |place| refused(view, of, place, 3);
     relay.handle_bytes(
         now,
         Port::Downstream,
@@ -460,7 +490,7 @@ fn a_leader_whose_part_is_cut_off_holds_and_proposes_again_and_again() {
     soon(&mut head, now);
     for number in 1..=5 {
         let since = now;
-        let too_few = refused(id(number, 1), (mission, 0), 2);
+        let too_few = refused(id(number, 1), (mission, 0), 2, 2);
         head.handle_bytes(
             now,
             Port::Downstream,
@@ -504,7 +534,7 @@ fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
         let hello = a_hello(newest, mission, 4, flags);
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &hello));
         let out = soon(&mut relay, now);
-        let answer = hearing(1, a_hello(newest, mission, 3, FRESH));
+        let answer = long(5, hearing(1, a_hello(newest, mission, 3, FRESH)));
         let expected = asks.then_some((Port::Upstream, answer));
         assert_eq!(out, expected.into_iter().collect::<Vec<_>>());
         assert_eq!(counted(relay.stats()), ["received"]);
@@ -522,7 +552,7 @@ fn a_view_too_far_ahead_is_not_heard_of() {
         let hello = a_hello(newest, mission, 4, ASKS);
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &hello));
         let known = if believed { newest } else { 0 };
-        let answer = hearing(1, a_hello(known, mission, 3, FRESH));
+        let answer = long(5, hearing(1, a_hello(known, mission, 3, FRESH)));
         assert_eq!(
             soon(&mut relay, now),
             [(Port::Upstream, answer)],

@@ -289,8 +289,10 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
         matches!(said, Said::Hello(hello) if *hello == Greeting {
             mission: u16::MAX,
             neighbour: 1000,
+            behind: 1000,
             newest: u32::MAX,
             holds: (u16::MAX, u16::MAX),
+            nonce: u16::MAX,
             hears: 15,
             flags: 31,
         })
@@ -312,11 +314,15 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
             agreed: BEFORE,
             votes: 1000,
             lease_left: u16::MAX,
+            rest: u16::MAX,
             proposer: true,
             successor: Some((BEFORE.id, BEFORE)),
         })
     });
+    some(|said| matches!(said, Said::Hello(hello) if hello.behind == 1 && hello.nonce == 0));
+    some(|said| matches!(said, Said::Proposal(proposal) if proposal.rest == 0));
     some(|said| matches!(said, Said::Decision(decision) if decision.view.is_none()));
+    some(|said| matches!(said, Said::Decision(decision) if decision.base.id == 0));
     some(|said| {
         matches!(
             said,
@@ -330,7 +336,9 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
                 view: MOST.id,
                 place: 1000,
             },
+            base: BEFORE,
             view: Some(MOST),
+            there: 1000,
             lease_left: u16::MAX,
         })
     });
@@ -357,6 +365,8 @@ fn the_vectors_hold_offers_of_every_extreme() {
     some(|offer| offer.left_m == -1e5 && offer.right_m == 1e5);
     some(|offer| offer.left_m == 0.0 && offer.right_m == 0.0);
     some(|offer| offer.left_m < 0.0 && offer.right_m == 0.0);
+    some(|offer| offer.answer == 0);
+    some(|offer| offer.answer == u16::MAX);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Event, Port, Relay, Wiring};
 
 use super::codec::Said;
-use super::forming::{ASKS, FLIES, FORMS, FRESH, READY, between, events};
+use super::forming::{ASKS, FLIES, FORMS, FRESH, READY, between, events, long};
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, one_of_each};
 use super::signed::{Peer, said, with_key};
@@ -37,7 +37,9 @@ fn tx_and_rx_offer_and_ask_and_are_told() {
         // On its other side all are silent yet; and a leader awaits no pass.
         let flags = if own == 1 { 0 } else { FRESH };
         assert_eq!(told(&mut relay, ground), [], "it has only become known");
-        let first = hello(base, 0, (base, 0), flags | FLIES);
+        // As many as hang together from it on away from the ground.
+        let behind = if ground == 0 { 9 - own } else { own };
+        let first = long(behind, hello(base, 0, (base, 0), flags | FLIES));
         ground_peer.says(&mut relay, NOW, &hello(base, 0, (1, 1), READY));
         assert_eq!(told(&mut relay, ground), [], "it has not asked");
         ground_peer.says(&mut relay, NOW, &hello(base, 0, (1, 1), ASKS | FORMS));
@@ -47,7 +49,7 @@ fn tx_and_rx_offer_and_ask_and_are_told() {
         ground_peer.says(&mut relay, NOW, &Said::Offer(newer));
         assert_eq!(held(&relay), Some(mission_id(&newer)));
         assert_eq!(events(&mut relay), [Event::Uploaded]);
-        let holds = hello(base, 0, mission_id(&newer), flags);
+        let holds = long(behind, hello(base, 0, mission_id(&newer), flags));
         let taken = told(&mut relay, ground);
         assert_eq!(taken, std::slice::from_ref(&holds), "{own}");
         ground_peer.says(&mut relay, NOW, &Said::Offer(newer));

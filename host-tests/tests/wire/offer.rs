@@ -31,6 +31,8 @@ pub(crate) struct Offer {
     /// How far to the left, at most 0, and to the right, at least 0.
     pub(crate) left_m: f32,
     pub(crate) right_m: f32,
+    /// The number of the hello that it answers; 0 for none.
+    pub(crate) answer: u16,
 }
 
 /// Where each number begins in the body.
@@ -51,9 +53,11 @@ pub(crate) const LEAST: usize = 67;
 pub(crate) const MOST: usize = 71;
 pub(crate) const LEFT: usize = 75;
 pub(crate) const RIGHT: usize = 79;
+pub(crate) const ANSWER: usize = 83;
 
-/// Bytes of the body.
-pub(crate) const BYTES: usize = 83;
+/// Bytes of the body, and how many of them are kept across a reboot.
+pub(crate) const BYTES: usize = 85;
+pub(crate) const KEPT: usize = 83;
 
 impl Offer {
     /// The bytes of the body.
@@ -81,7 +85,15 @@ impl Offer {
         for number in [self.least_m, self.most_m, self.left_m, self.right_m] {
             out.extend(number.to_le_bytes());
         }
+        out.extend(self.answer.to_le_bytes());
         out
+    }
+
+    /// What is kept of it: what it answers says nothing of the mission.
+    pub(crate) fn kept(&self) -> Vec<u8> {
+        let mut body = self.body();
+        body.truncate(KEPT);
+        body
     }
 
     /// What the bytes after the tag say, if there are enough of them, and those that are left.
@@ -110,6 +122,7 @@ impl Offer {
             most_m: real(MOST),
             left_m: real(LEFT),
             right_m: real(RIGHT),
+            answer: word(ANSWER),
         };
         Some((offer, rest))
     }
@@ -142,9 +155,9 @@ impl Offer {
         narrow(f64::from(self.relays - 1) * wide(step)) <= self.distance_m
     }
 
-    /// The digest of the mission that it is of: CRC-32C of all but version and base.
+    /// The digest of the mission that it is of: CRC-32C of all but version, base and answer.
     pub(crate) fn digest(&self) -> u16 {
-        let body = self.body();
+        let body = self.kept();
         let bytes = &body[RELAYS..];
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes);
         u16::try_from(crc & 0xFFFF).unwrap()
@@ -152,7 +165,7 @@ impl Offer {
 
     /// The message that says this. Only the crate can make it of any numbers: each of them must be found again in it.
     pub(crate) fn message(&self) -> Message {
-        let upload = Upload::decode(&self.body()).unwrap();
+        let upload = Upload::decode(&self.kept()).unwrap();
         let config = upload.config();
         assert_eq!((upload.version(), upload.base()), (self.version, self.base));
         let common = Profile {
@@ -187,7 +200,10 @@ impl Offer {
             (mission_id.version, mission_id.digest),
             (self.version, self.digest())
         );
-        Message::Offer(upload)
+        Message::Offer {
+            upload,
+            answer: self.answer,
+        }
     }
 }
 
@@ -213,5 +229,6 @@ pub(crate) fn offer() -> Offer {
         most_m: 300.0,
         left_m: -60.0,
         right_m: 40.5,
+        answer: 0,
     }
 }

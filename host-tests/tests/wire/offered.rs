@@ -102,7 +102,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
     let versions = prop_oneof![4 => 1..9_u16, 1 => 1..=u16::MAX];
     let powers = (scaled(1e-6, 1e6), scaled(1e-6, 1e6), scaled(1e-6, 1e9));
     (
-        (versions, any::<u16>()),
+        (versions, any::<u16>(), any::<u16>()),
         rooms(),
         powers,
         (beside(), beside()),
@@ -113,7 +113,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
     )
         .prop_map(
             |(
-                (version, base),
+                (version, base, answer),
                 (relays, distance_m, min_separation_m),
                 (tx_power_w, power_w, interferer_w),
                 (x_m, y_m),
@@ -142,6 +142,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
                     most_m,
                     left_m: -left_m,
                     right_m,
+                    answer,
                 })
             },
         )

@@ -7,7 +7,7 @@ use uav_relay::wire::message::{Message, MessageError};
 use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile, Upload};
 
 use super::offer::{
-    ALTITUDE, BYTES, DISTANCE, ETA, INTERFERER, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, Offer, POWER,
+    ALTITUDE, BYTES, DISTANCE, ETA, INTERFERER, KEPT, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, Offer, POWER,
     RELAYS, RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y, offer,
 };
 
@@ -15,7 +15,7 @@ use super::offer::{
 fn taken(body: &[u8]) -> bool {
     match Message::decode(body) {
         Ok(message) => {
-            assert!(matches!(message, Message::Offer(_)));
+            assert!(matches!(message, Message::Offer { .. }));
             assert_eq!(body.len(), BYTES);
             true
         }
@@ -239,12 +239,14 @@ fn an_upload_is_written_as_its_mission_has_it_and_read_back() {
             most_m: 250.0,
             left_m: -35.0,
             right_m: 45.0,
+            answer: 77,
         };
-        let mut bytes = [0; BYTES];
-        assert_eq!(upload.encode(&mut bytes), Some(BYTES));
-        assert_eq!(bytes[..], offer.body());
+        let mut bytes = [0; KEPT];
+        assert_eq!(upload.encode(&mut bytes), Some(KEPT));
+        assert_eq!(bytes[..], offer.kept());
         assert_eq!(Upload::decode(&bytes), Some(upload));
-        assert_eq!(offer.message(), Message::Offer(upload));
+        let answer = 77;
+        assert_eq!(offer.message(), Message::Offer { upload, answer });
         let mission = Mission::try_new(config).unwrap();
         assert_eq!(digest(&mission), offer.digest());
     }
@@ -252,13 +254,14 @@ fn an_upload_is_written_as_its_mission_has_it_and_read_back() {
 
 #[test]
 fn what_is_kept_of_an_upload_is_an_offer_and_nothing_else() {
-    let body = offer().body();
+    let body = offer().kept();
     assert!(Upload::decode(&body).is_some());
-    for len in 0..BYTES {
+    assert_eq!(Upload::decode(&offer().body()), None, "as it is sent");
+    for len in 0..KEPT {
         assert_eq!(Upload::decode(&body[..len]), None, "{len}");
     }
     assert_eq!(Upload::decode(&[&body[..], &[0]].concat()), None);
     assert_eq!(Upload::decode(&[3, 0, 0, 1]), None, "another message");
     let upload = Upload::decode(&body).unwrap();
-    assert_eq!(upload.encode(&mut [0; BYTES - 1]), None);
+    assert_eq!(upload.encode(&mut [0; KEPT - 1]), None);
 }

@@ -196,17 +196,23 @@ fn fed_with_anything(
             let wired = |port| (wiring == Wiring::Shared) == (port == Port::Shared);
             let mut now = Instant::ZERO;
             for (port, piece, wait_ms) in steps {
-                let neighbours = relay.neighbours();
-                relay.handle_bytes(now, port, &piece);
                 let stream = streams.entry(format!("{port:?}")).or_default();
-                stream.extend(piece);
-                for chunk in chunks(stream).into_iter().filter(|_| wired(port)) {
-                    let name = by_the_rules(chunk, index, neighbours, port);
-                    let counter = wanted.iter_mut().find(|(other, _)| *other == name);
-                    counter.unwrap().1 += 1;
+                for frame in piece.split_inclusive(|byte| *byte == 0) {
+                    let silent = relay.stands_down();
+                    let neighbours = relay.neighbours();
+                    relay.handle_bytes(now, port, frame);
+                    stream.extend(frame);
+                    for chunk in chunks(stream).into_iter().filter(|_| wired(port)) {
+                        let name = match by_the_rules(chunk, index, neighbours, port) {
+                            "received" if silent => "misaddressed",
+                            name => name,
+                        };
+                        let counter = wanted.iter_mut().find(|(other, _)| *other == name);
+                        counter.unwrap().1 += 1;
+                    }
+                    let rest = stream.iter().rposition(|&byte| byte == 0);
+                    stream.drain(..rest.map_or(0, |end| end + 1));
                 }
-                let rest = stream.iter().rposition(|&byte| byte == 0);
-                stream.drain(..rest.map_or(0, |end| end + 1));
                 drain(&mut relay, now);
                 now = now + Duration::from_millis(wait_ms);
                 relay.handle_timeout(now);

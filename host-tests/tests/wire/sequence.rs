@@ -17,7 +17,7 @@ use uav_relay::{
 
 use super::codec::{Greeting, Proposed, Said, Seats, SizedView, Swept, plain, wire};
 use super::config;
-use super::forming::{ASKS, FRESH, a_hello, granted, hearing, id, mark, proposed};
+use super::forming::{ASKS, FRESH, a_hello, granted, hearing, id, long, mark, proposed};
 use super::lies::renamed;
 use super::offer::{Offer, offer};
 use super::receive::{FIELD, counted, drain, relay_of};
@@ -178,8 +178,10 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         Said::Hello(Greeting {
             mission,
             neighbour: 4,
+            behind: 1,
             newest: view,
             holds: (mission, 0),
+            nonce: 0,
             hears: 1,
             flags: 16,
         }),
@@ -266,8 +268,8 @@ fn a_message_of_another_mission_leads_to_a_hello_at_most() {
         let own = digest(relay.mission());
         let other = own ^ 0x4000;
         let hello = |port| {
-            let neighbour = if port == Port::Upstream { 3 } else { 5 };
-            hearing(1, a_hello(0, own, neighbour, ASKS | FRESH))
+            let (neighbour, behind) = if port == Port::Upstream { (3, 5) } else { (5, 4) };
+            long(behind, hearing(1, a_hello(0, own, neighbour, ASKS | FRESH)))
         };
         for said in one_of_each(FIRST, other) {
             if matches!(said, Said::Busy { .. }) {

@@ -4,7 +4,7 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Instant, Port, Relay, Wiring};
 
 use super::codec::Said;
-use super::forming::{ASKS, FORMS, FRESH, READY, a_hello, between, hearing, id, soon};
+use super::forming::{ASKS, FORMS, FRESH, READY, a_hello, between, hearing, id, long, soon};
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, one_of_each, sent};
 
@@ -19,14 +19,17 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
         let hello = a_hello(0, mission, 0, ASKS);
         near.handle_bytes(now, Port::Shared, &between(sender, 6, &hello));
         let heard = (1..=12).contains(&sender) && (1..=4).contains(&sender.abs_diff(6));
-        let neighbour = if sender < 6 { 5 } else { 7 };
+        // It has just been switched on, and stands down for one of its number that takes part: it says so to that one.
+        let answered = heard || sender == 6;
+        let neighbour = if sender <= 6 { 5 } else { 7 };
         // It hears whoever has just said something, but for nodes that are too far away.
         let mask = if heard {
             1 << (sender.abs_diff(6) - 1)
         } else {
             0
         };
-        let answer = |from| hearing(mask, a_hello(0, mission, from, FRESH));
+        let behind = if neighbour == 5 { 7 } else { 6 };
+        let answer = |from| long(behind, hearing(mask, a_hello(0, mission, from, FRESH)));
         if heard {
             assert_eq!(counted(near.stats()), ["received"], "{sender}");
         } else {
@@ -40,14 +43,14 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
         } else {
             answer(neighbour)
         };
-        let expected = heard.then_some((Port::Shared, own));
+        let expected = answered.then_some((Port::Shared, own));
         assert_eq!(out, expected.into_iter().collect::<Vec<_>>(), "{sender}");
 
         let mut near = relay_of_12(6);
         let sweep = &one_of_each(FIRST, mission)[0];
         near.handle_bytes(now, Port::Shared, &between(sender, 6, sweep));
         assert_eq!(counted(near.stats()), ["misaddressed"], "{sender}");
-        let expected = heard.then_some((Port::Shared, answer(neighbour)));
+        let expected = answered.then_some((Port::Shared, answer(neighbour)));
         assert_eq!(
             sent(&mut near, now),
             expected.into_iter().collect::<Vec<_>>(),
@@ -76,7 +79,7 @@ fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
         relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(6)));
         // Somebody is on its other side now.
         let flags = ASKS | FORMS | FRESH | READY;
-        let call = a_hello(newest, mission, 5, flags);
+        let call = long(7, a_hello(newest, mission, 5, flags));
         let expected = calls.then_some((Port::Shared, call));
         assert_eq!(
             soon(&mut relay, now),

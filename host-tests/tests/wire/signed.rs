@@ -5,11 +5,12 @@ use blake2::digest::consts::U8;
 use blake2::digest::{FixedOutput, Mac};
 use host_tests::fixtures::{NETWORK, paper};
 use uav_relay::wire::auth::{Auth, Key, TAG};
+use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Identity, Instant, Mission, Port, Relay, Settings, Wiring};
+use uav_relay::{Duration, Identity, Instant, Mission, Port, Relay, Settings, Wiring};
 
-use super::codec::{Said, header, sealed, wire};
-
+use super::codec::{Greeting, Said, header, sealed, wire};
+use super::forming::{ASKS, unnumbered};
 use super::stream::unstuffed;
 use uav_relay::wire::frame::Header;
 
@@ -52,6 +53,8 @@ pub(crate) struct Peer {
     /// Its nonce toward the relay, and the relay's toward it.
     nonces: [u64; 2],
     counter: u32,
+    /// Digest of the mission that the relay was loaded with.
+    base: u16,
 }
 
 impl Peer {
@@ -63,6 +66,7 @@ impl Peer {
             port,
             nonces: [5 << 32 | 1, 0],
             counter: 0,
+            base: digest(relay.mission()),
         };
         // It asks, it is answered, it shows that it has heard that.
         peer.handshake(relay, true);
@@ -109,8 +113,45 @@ impl Peer {
         wire(&sealed(bytes))
     }
 
-    /// Says something to the relay.
+    /// Says something to the relay; an offer answers the hello that it would say now.
     pub(crate) fn says(&mut self, relay: &mut Relay, now: Instant, said: &Said) {
+        let mut said = said.clone();
+        if let Said::Offer(offer) = &mut said {
+            offer.answer = self.clone().number(relay.clone(), now);
+        }
+        self.says_as_it_is(relay, now, &said);
+    }
+
+    /// The number of the hello that `relay` says when it is asked for one.
+    pub(crate) fn number(&mut self, mut relay: Relay, now: Instant) -> u16 {
+        let mission = self.base;
+        let asks = Said::Hello(Greeting {
+            mission,
+            neighbour: 0,
+            behind: 1,
+            newest: 0,
+            holds: (mission, 0),
+            nonce: 0,
+            hears: 0,
+            flags: ASKS,
+        });
+        self.says_as_it_is(&mut relay, now, &asks);
+        let later = now + Duration::from_millis(1);
+        let out = [now, later].map(|at| {
+            relay.handle_timeout(at);
+            frames(&mut relay, at)
+        });
+        let hello = out.into_iter().flatten().find_map(|(to, flags, body)| {
+            match Said::read(&body) {
+                Ok(Said::Hello(hello)) if (to, flags) == (self.node, SIGNED) => Some(hello),
+                _ => None,
+            }
+        });
+        hello.unwrap().nonce
+    }
+
+    /// Says just that.
+    pub(crate) fn says_as_it_is(&mut self, relay: &mut Relay, now: Instant, said: &Said) {
         let frame = self.frame(SIGNED, &said.body());
         relay.handle_bytes(now, self.port, &frame);
     }
@@ -129,11 +170,11 @@ fn frames(relay: &mut Relay, now: Instant) -> Vec<(u16, u8, Vec<u8>)> {
     out
 }
 
-/// What `relay` says at `now`, and to whom; handshakes left out.
+/// What `relay` says at `now`, and to whom; handshakes left out, and the numbers of hellos.
 pub(crate) fn said(relay: &mut Relay, now: Instant) -> Vec<(u16, Said)> {
     frames(relay, now)
         .into_iter()
         .filter(|(_, flags, _)| *flags == SIGNED)
-        .map(|(to, _, body)| (to, Said::read(&body).unwrap()))
+        .map(|(to, _, body)| (to, unnumbered(Said::read(&body).unwrap())))
         .collect()
 }

@@ -278,13 +278,17 @@ fn formings() -> BoxedStrategy<Said> {
     let stamps = || (any::<u16>(), versions());
     let newest = prop_oneof![4 => proposals(), 1 => Just(0), 1 => any::<u32>()];
     let sight = (0..16_u8, 0..32_u8);
-    let hello = (newest, any::<u16>(), counts(0), stamps(), sight).prop_map(
-        |(newest, mission, neighbour, holds, (hears, flags))| {
+    let near = (counts(0), counts(1));
+    let numbers = (any::<u16>(), any::<u16>());
+    let hello = (newest, numbers, near, stamps(), sight).prop_map(
+        |(newest, (mission, nonce), (neighbour, behind), holds, (hears, flags))| {
             Said::Hello(Greeting {
                 mission,
                 neighbour,
+                behind,
                 newest,
                 holds,
+                nonce,
                 hears,
                 flags,
             })
@@ -304,9 +308,9 @@ fn formings() -> BoxedStrategy<Said> {
     ];
     let votes = any::<proptest::sample::Index>();
     let sizes = (counts(1), votes, proptest::option::of(counts(1)));
-    let proposal = (calls(), order, sizes, spans(), any::<bool>()).prop_filter_map(
+    let proposal = (calls(), order, sizes, (spans(), spans()), any::<bool>()).prop_filter_map(
         "proposed before what has come of it",
-        |(call, order, (relays, votes, successor), lease_left, proposer)| {
+        |(call, order, (relays, votes, successor), (lease_left, rest), proposer)| {
             let [agreed, id, decided_by, view] = order;
             let votes = votes.index(usize::from(relays) + 1);
             (decided_by < view).then_some(Said::Proposal(Proposed {
@@ -314,16 +318,24 @@ fn formings() -> BoxedStrategy<Said> {
                 agreed: SizedView { id: agreed, relays },
                 votes: u16::try_from(votes).unwrap(),
                 lease_left,
+                rest,
                 proposer,
                 successor: successor.map(|relays| (decided_by, SizedView { id, relays })),
             }))
         },
     );
     let granted = proptest::option::of(views());
-    let decision = (calls(), granted, spans()).prop_map(|(call, view, lease_left)| {
+    let bases = prop_oneof![
+        3 => views(),
+        1 => counts(1).prop_map(|relays| SizedView { id: 0, relays }),
+    ];
+    let decision = (calls(), bases, granted, counts(1), spans());
+    let decision = decision.prop_map(|(call, base, view, there, lease_left)| {
         Said::Decision(Decided {
             call,
+            base,
             view,
+            there,
             lease_left,
         })
     });

@@ -9,9 +9,9 @@ use uav_relay::{
 
 use super::codec::{Greeting, Said};
 use super::forming::{
-    ASKS, FLIES, FORMS, FRESH, READY, events, granted, hearing, id, mark, proposed,
+    ASKS, FLIES, FORMS, FRESH, events, granted, hearing, id, long, mark, proposed,
 };
-use super::offer::{BYTES, Offer, offer};
+use super::offer::{KEPT, Offer, offer};
 use super::receive::{FIELD, counted, relay};
 use super::sequence::{FIRST, framed, one_of_each, sent};
 use super::signed::{Peer, said, set, with_key};
@@ -43,8 +43,10 @@ pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) 
     Said::Hello(Greeting {
         mission,
         neighbour,
+        behind: 1,
         newest: 0,
         holds,
+        nonce: 0,
         hears: 0,
         flags,
     })
@@ -97,15 +99,14 @@ fn a_newer_mission_is_held_told_and_offered_on_and_a_view_called_for() {
         let form = if side == 0 { FORMS } else { 0 };
         // No message has come from the other side yet.
         let answer = hello(base, from, mission_id(&newer), FRESH | form);
-        let answer = hearing(1, answer);
+        let answer = long([5, 4][side], hearing(1, answer));
         let mut now = vec![(from, answer)];
         if side == 1 {
             // The one before has not said that it holds it.
             now.push((3, Said::Offer(newer)));
         }
-        let (hears, ready) = [(1, 0), (0, READY)][side];
-        let call = hello(base, 3, mission_id(&newer), ASKS | FORMS | FRESH | ready);
-        let call = hearing(hears, call);
+        let call = hello(base, 3, mission_id(&newer), ASKS | FORMS | FRESH);
+        let call = long(5, hearing([1, 0][side], call));
         assert_eq!(both(&mut relay), [now, vec![(3, call)]]);
         assert_eq!(relay.stats().rejected(), 0);
     }
@@ -131,7 +132,7 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
         ..upload(3, base)
     };
     // What cannot be held is not answered: it would only be offered again.
-    let answer = hello(base, 5, mission_id(&newer), FRESH);
+    let answer = long(4, hello(base, 5, mission_id(&newer), FRESH));
     let answer = || vec![(5, hearing(1, answer.clone()))];
     for (other, answer) in [
         (newer, answer()),
@@ -179,7 +180,7 @@ fn a_hello_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_h
     peers[0].says(&mut relay, NOW, &Said::Offer(own));
     both(&mut relay);
     let (digest, version) = mission_id(&own);
-    let answer = hearing(1, hello(base, 5, mission_id(&own), FRESH | READY));
+    let answer = long(4, hearing(1, hello(base, 5, mission_id(&own), FRESH)));
     for (holds, expected) in [
         ((base, 0), Some(Said::Offer(own))),
         ((digest - 1, version), Some(Said::Offer(own))),
@@ -224,7 +225,7 @@ fn a_proposal_of_another_mission_than_the_one_held_leads_to_a_hello() {
         let (was, is) = (before, after.stats());
         let raised = (is.view - was.view, is.mission - was.mission);
         assert_eq!(raised, (1, 0), "{proposal:?}");
-        let answer = hello(base, 3, (base, 0), ASKS | FRESH | FLIES);
+        let answer = long(5, hello(base, 3, (base, 0), ASKS | FRESH | FLIES));
         assert_eq!(said(&mut after, NOW), [(3, hearing(1, answer))]);
         assert_eq!(after.stats().received, before.received + 1);
     }
@@ -337,10 +338,12 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
             let call = Greeting {
                 mission: base,
                 neighbour: 3,
+                behind: 5,
                 newest: id(2, 1),
                 holds: (next.digest(), 3),
+                nonce: 0,
                 hears: 1,
-                flags: ASKS | FORMS | READY,
+                flags: ASKS | FORMS,
             };
             assert_eq!(later, [(3, Said::Hello(call))]);
         }
@@ -359,8 +362,12 @@ fn in_a_field_nothing_is_held() {
     let mut peer = Peer::meets(&mut relay, 4, 3, Port::Upstream);
     said(&mut relay, NOW);
     // By chance the base has the same digest.
-    let offer = upload(1, digest(&mission));
-    peer.says(&mut relay, NOW, &Said::Offer(offer));
+    let number = peer.clone().number(relay.clone(), NOW);
+    let offer = Offer {
+        answer: number,
+        ..upload(1, digest(&mission))
+    };
+    peer.says_as_it_is(&mut relay, NOW, &Said::Offer(offer));
     assert_eq!(
         (held(&relay), counted(relay.stats())),
         (None, vec!["received"])
@@ -370,9 +377,9 @@ fn in_a_field_nothing_is_held() {
 #[test]
 fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
     let (relay, _, base, newer) = adopted();
-    let mut kept = [0; BYTES];
+    let mut kept = [0; KEPT];
     relay.upload().unwrap().encode(&mut kept).unwrap();
-    assert_eq!(kept[..], newer.body());
+    assert_eq!(kept[..], newer.kept());
     let upload = Upload::decode(&kept).unwrap();
     let loaded = Mission::try_new(paper(8)).unwrap();
     for remembers in [false, true] {
@@ -389,11 +396,75 @@ fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
         } else {
             (base, 0)
         };
-        let answer = hearing(1, hello(base, 3, holds, FRESH | FLIES));
+        let answer = long(5, hearing(1, hello(base, 3, holds, FRESH | FLIES)));
         assert_eq!(said(&mut relay, NOW), [(3, answer)]);
         assert_eq!((relay.version(), relay.view()), (holds.1, ViewId::LOADED));
         let sweep = &one_of_each(FIRST, newer.digest())[0];
         peer.says(&mut relay, NOW, sweep);
         assert_eq!(relay.stats().view, u32::from(!remembers));
     }
+}
+
+/// Every hello bears a number, another one `dead_after` after the first with the one before. An offer counts while its number is one of
+/// the last two, and was said not more than twice `dead_after` ago; and a relay's own offer bears the number that it was told.
+#[test]
+fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
+    let (relay, peers, base) = relay_4();
+    let newer = upload(2, base);
+    let after = |ms| NOW + Duration::from_millis(ms);
+    let number = |relay: &Relay, ms| peers[0].clone().number(relay.clone(), after(ms));
+    let first = number(&relay, 0);
+    assert_ne!(first, 0);
+    assert_eq!(number(&relay, 14_999), first);
+    let next = if first == u16::MAX { 1 } else { first + 1 };
+    assert_eq!(number(&relay, 15_000), next);
+    // Of the second number the relay has said no hello yet.
+    for (answer, ms, counts) in [
+        (first, 0, true),
+        (first, 30_000, true),
+        (first, 30_001, false),
+        (0, 0, false),
+        (next, 0, false),
+        (first ^ 0x4000, 0, false),
+    ] {
+        let mut after_it = relay.clone();
+        let offer = Said::Offer(Offer { answer, ..newer });
+        peers[0].clone().says_as_it_is(&mut after_it, after(ms), &offer);
+        let expected = counts.then_some(mission_id(&newer));
+        assert_eq!(held(&after_it), expected, "{answer} at {ms}");
+        assert_eq!(after_it.stats().stale, u32::from(!counts));
+        // It is told by a hello in either case, whose number the next offer bears.
+        let hellos = said(&mut after_it, after(ms));
+        let told = |(to, said): &(u16, Said)| *to == 3 && matches!(said, Said::Hello(_));
+        assert!(hellos.iter().any(told), "{answer} at {ms}: {hellos:?}");
+    }
+    // A hello with the next number has been said, and another one with the one after that.
+    let mut later = relay.clone();
+    let mut peer = peers[0].clone();
+    for (ms, first_counts) in [(15_000, true), (30_000, false)] {
+        let asks = hello(base, 4, (base, 0), ASKS);
+        peer.says_as_it_is(&mut later, after(ms), &asks);
+        said(&mut later, after(ms));
+        let mut after_it = later.clone();
+        let offer = Said::Offer(Offer {
+            answer: first,
+            ..newer
+        });
+        peers[1].clone().says_as_it_is(&mut after_it, after(ms), &offer);
+        assert_eq!(held(&after_it).is_some(), first_counts, "at {ms}");
+    }
+    let mut told = relay.clone();
+    peers[0].clone().says(&mut told, NOW, &Said::Offer(newer));
+    both(&mut told);
+    let Said::Hello(greeting) = hello(base, 4, (base, 0), 0) else {
+        panic!("a hello");
+    };
+    let nonce = 0xABCD;
+    let asks = Said::Hello(Greeting { nonce, ..greeting });
+    peers[1].clone().says(&mut told, NOW, &asks);
+    let answers = Offer {
+        answer: nonce,
+        ..newer
+    };
+    assert_eq!(said(&mut told, NOW), [(5, Said::Offer(answers))]);
 }

@@ -5,7 +5,7 @@ use uav_relay::{Event, Instant, Port, Relay, Wiring};
 
 use super::codec::{Proposed, Said, SizedView};
 use super::forming::{
-    ASKS, FORMS, FRESH, READY, a_hello, events, granted, hearing, id, mark, proposed, soon,
+    ASKS, FORMS, FRESH, a_hello, events, granted, hearing, id, long, mark, proposed, soon,
 };
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, framed, one_of_each, sent};
@@ -32,7 +32,10 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
     for view in [id(1, 1), id(300, 7), id(4_194_303, 1000)] {
         let (relay, mission) = in_view(4, view);
         let own = mission.wrapping_add(mark(view));
-        let hello = |neighbour| hearing(1, a_hello(view, mission, neighbour, ASKS | READY));
+        let hello = |neighbour: u16| {
+            let behind = if neighbour == 3 { 5 } else { 4 };
+            long(behind, hearing(1, a_hello(view, mission, neighbour, ASKS)))
+        };
         for off in [0, 1, 64, 0xFFC0, 65, 0xFFBF, 0x4000] {
             let known = off == 0;
             let expected = if known {
@@ -133,7 +136,7 @@ fn a_late_proposal_of_an_old_view_changes_nothing_and_a_leader_that_insists_hear
     }
     let proposal = Said::Proposal(proposed(id(4, 1), of, 3, 8));
     relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
-    let hello = hearing(1, a_hello(id(6, 4), mission, 3, ASKS | FORMS | READY));
+    let hello = long(5, hearing(1, a_hello(id(6, 4), mission, 3, ASKS | FORMS)));
     assert_eq!(soon(&mut relay, now), [(Port::Upstream, hello)]);
     assert_eq!((relay.stats().stale, relay.view().bits()), (4, id(5, 2)));
 }
@@ -157,7 +160,7 @@ fn a_hello_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() 
         let hello = a_hello(newest, mission, 4, flags);
         after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &hello));
         let known = newest.max(view);
-        let on = hearing(1, a_hello(known, mission, 3, ASKS | FORMS | READY));
+        let on = long(5, hearing(1, a_hello(known, mission, 3, ASKS | FORMS)));
         let expected = calls.then_some((Port::Upstream, on));
         assert_eq!(
             soon(&mut after, now),

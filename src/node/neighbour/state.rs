@@ -66,6 +66,10 @@ const FORGIVEN: u8 = 3;
 const MEMORY: u32 = 32;
 
 /// A node that is not taken, and hears this relay.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "four things that its hello says"
+)]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) node: u16,
@@ -88,7 +92,7 @@ impl Candidate {
     }
 
     /// Whether it is to take the place of another one.
-    const fn is_better(&self) -> bool {
+    const fn is_better(self) -> bool {
         if self.nearer { self.ready } else { self.longer }
     }
 }

@@ -73,7 +73,7 @@ impl Held {
         rest: Some(0),
     };
 
-    fn rest_of(&self, view: ViewId) -> u16 {
+    fn rest_of(self, view: ViewId) -> u16 {
         if view == ViewId::LOADED {
             0
         } else {

@@ -19,6 +19,16 @@ impl Body<'_, '_> {
         } else {
             self.wild();
         }
+        self.answer();
+    }
+
+    /// The number of the last hello that the relay said, mostly.
+    fn answer(&mut self) {
+        let answer = match self.input.byte() {
+            0..240 => self.known.asked,
+            _ => self.input.word(),
+        };
+        self.word(answer);
     }
 
     /// The version that the relay holds, one of the next, or any.
