@@ -280,7 +280,7 @@ fn look_at(message: &Message) {
                 fence.association != 0 && fence.x_m.abs() <= 1e7 && fence.target_m.abs() <= 1e7
             );
         }
-        Message::Offer(upload) => {
+        Message::Offer { upload, answer: _ } => {
             let same = Mission::try_new(*upload.config()).is_ok();
             assert!(same && upload.version() > 0, "{upload:?}");
         }

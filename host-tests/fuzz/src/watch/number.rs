@@ -18,6 +18,6 @@ pub(super) const fn number_of(message: &Message) -> Option<u16> {
         | Message::Proposal(_)
         | Message::Decision(_)
         | Message::Fence { .. }
-        | Message::Offer(_) => return None,
+        | Message::Offer { .. } => return None,
     })
 }
