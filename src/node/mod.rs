@@ -682,6 +682,8 @@ impl Node {
             let effects = self.view.handle_timeout(&context, leads, fresh);
             self.apply(now, effects);
         }
+        #[cfg(feature = "upload")]
+        self.offer_again(now);
         self.steering.handle_timeout(now);
         self.steer(now);
     }
@@ -834,6 +836,7 @@ impl Node {
             #[cfg(feature = "upload")]
             {
                 self.neighbours.at_mut(side).asked = hello.nonce;
+                self.update.may_answer(side, now);
                 self.compare(side, from, hello.holds);
             }
             self.neighbours.at_mut(side).holds = Some(hello.holds);
@@ -871,6 +874,8 @@ impl Node {
             member,
             neighbours,
             steering,
+            #[cfg(feature = "upload")]
+            update,
             ..
         } = self;
         let neighbour = neighbours.at_mut(side);
@@ -892,6 +897,8 @@ impl Node {
             #[cfg(feature = "upload")]
             {
                 neighbour.asked = hello.nonce;
+                update.may_answer(side, now);
+                update.begin_offers(side);
             }
             steering.link(side, Some(from));
             self.raise_about(About::Back, side, from);
@@ -1053,8 +1060,8 @@ impl Node {
         }
         #[cfg(feature = "upload")]
         for side in [Side::Upstream, Side::Downstream] {
-            if let Some((to, message)) = self.next_offer(side) {
-                return Some((side, to, message));
+            if let Some(offer) = self.next_offer(now, side) {
+                return Some(offer);
             }
             if let Some((to, hello)) = self.next_report(now, side) {
                 return Some((side, to, Message::Hello(hello)));
@@ -1087,9 +1094,13 @@ impl Node {
             && let Some(message) = self.view.take_onward(&context, to)
         {
             #[cfg(feature = "upload")]
-            if let Some(upload) = self.update.offer_to(self.neighbours.at(onward).holds) {
-                let answer = self.neighbours.at(onward).asked;
-                return Some((onward, to, Message::Offer { upload, answer }));
+            {
+                let holds = self.neighbours.at(onward).holds;
+                if self.update.offer_to(holds).is_some() {
+                    self.neighbours.at_mut(onward).offer = true;
+                    self.update.begin_offers(onward);
+                    return self.next_offer(now, onward);
+                }
             }
             return Some((onward, to, message));
         }
@@ -1137,6 +1148,8 @@ impl Node {
             self.lease.next_timeout(),
             self.round.next_timeout(),
             self.steering.next_timeout(),
+            #[cfg(feature = "upload")]
+            self.update.next_timeout(),
         ]
         .into_iter()
         .flatten()
@@ -1283,6 +1296,7 @@ impl Node {
         // The leader has to hold it first; the others are offered it before the proposal comes to them.
         let back = self.back();
         self.neighbours.at_mut(back).offer = true;
+        self.update.begin_offers(back);
         self.view.ask(now);
     }
 
@@ -1320,6 +1334,9 @@ impl Node {
             return;
         }
         let latest = self.update.latest();
+        if holds >= latest {
+            self.update.stop_offers(side);
+        }
         if holds > latest {
             self.owe_hello(side, from, false);
         } else if holds < latest {
@@ -1336,13 +1353,33 @@ impl Node {
         }
     }
 
-    /// The offer that is owed to the neighbour at `side`.
-    fn next_offer(&mut self, side: Side) -> Option<(u16, Message)> {
+    /// The offer that is owed to the neighbour at `side`, or the hello that asks for one that it can answer: to which node.
+    fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.neighbours.at_mut(side);
         let due = core::mem::take(&mut neighbour.offer);
         let (to, holds, answer) = (neighbour.node(), neighbour.holds, neighbour.asked);
         let upload = self.update.offer_to(holds)?;
-        (due && to != 0).then_some((to, Message::Offer { upload, answer }))
+        if !due || to == 0 {
+            return None;
+        }
+        let settings = self.member.settings;
+        self.update.offered(side, now, &settings);
+        let message = if self.update.has_asked(side, now, &settings) {
+            Message::Offer { upload, answer }
+        } else {
+            let nonce = self.ask_number(now);
+            Message::Hello(self.hello(now, side, true, nonce))
+        };
+        Some((side, to, message))
+    }
+
+    /// Whoever has not said since that it holds the mission is offered it again.
+    fn offer_again(&mut self, now: Instant) {
+        for side in [Side::Upstream, Side::Downstream] {
+            if self.update.offers_again(side, now) {
+                self.neighbours.at_mut(side).offer = true;
+            }
+        }
     }
 }
 
