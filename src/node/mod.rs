@@ -847,7 +847,9 @@ impl Node {
                 self.told(now, side, mutual);
             }
             let waits = self.view.awaited().is_some();
-            if hello.form && (hello.newest >= known || hello.fresh && !waits) {
+            // One that holds a newer mission takes part in no view without it: it is asked for once this relay holds it, too.
+            let newer = takes_uploads(&self.member) && hello.holds > self.update.latest();
+            if hello.form && !newer && (hello.newest >= known || hello.fresh && !waits) {
                 self.view.ask(now);
             }
         } else if self.searches() {
