@@ -808,7 +808,10 @@ impl Node {
             ask,
             form: self.view.asks() && side == self.back(),
             fresh: self.round.is_fresh(),
-            ready: self.neighbours.at(side.other()).is_ready(),
+            ready: self
+                .neighbours
+                .at(side.other())
+                .is_ready(now, &self.member.settings),
             behind: self.beyond(side.other()).saturating_add(1),
             hears: self.neighbours.at(side).hears(now, &self.member.settings),
             holds: latest,
@@ -883,7 +886,11 @@ impl Node {
         let neighbour = neighbours.at_mut(side);
         neighbour.notice(now, &member.settings);
         let taken = hello.neighbour != own && hello.neighbour != 0;
-        if taken || !hears(own, from, hello.hears) {
+        let hears = hears(own, from, hello.hears);
+        if taken && hears && (from < own) == (own < hello.neighbour) {
+            neighbour.takes_across(now);
+        }
+        if taken || !hears {
             return;
         }
         let pairs = hello.neighbour == own;

@@ -8,7 +8,8 @@
 //! | `NoPeer` | - | - | taken, if it takes this relay; else, or if it comes and goes, after a hold-down | the four nearest nodes are sent a hello every `dead_after`, every half of `probe_after` once one was heard |
 //!
 //! A span is `dead_after` less `probe_after`. A node that has been taken is paired with until it says that it has taken this relay, too.
-//! A node that takes another one is not taken. *Better* is a nearer node that has somebody beyond it who hears it, and a farther one by which more
+//! A node that takes another one is not taken. Where one such hears this relay, and takes a node on the other side of it, there is somebody:
+//! then this relay is between the two, and both may take it. *Better* is a nearer node that has somebody beyond it who hears it, and a farther one by which more
 //! relays hang together: then the link that is missing is on the other side of the node taken, and it is left out.
 //!
 //! While it searches, it sends hellos to the four nearest nodes there: as many as three relays in a row may be lost at once. In a hold-down
@@ -161,6 +162,8 @@ pub(crate) struct Neighbour {
     lost_at: Instant,
     /// When a node that is not taken was heard last.
     near: Option<Instant>,
+    /// When one that hears this relay was that takes a node on the other side of it.
+    across: Option<Instant>,
     /// The nodes heard since `since`, and in the span before: bit 0 is the nearest one.
     hearing: Hearing,
     /// How often each of them said that it does not hear this relay.
@@ -223,6 +226,7 @@ impl Neighbour {
             lost: 0,
             lost_at: now,
             near: None,
+            across: None,
             hearing: Hearing {
                 since: now,
                 now: 0,
@@ -261,13 +265,20 @@ impl Neighbour {
     }
 
     /// Whether somebody is there that hears this relay, and is heard.
-    pub(crate) fn is_ready(&self) -> bool {
+    pub(crate) fn is_ready(&self, now: Instant, settings: &Settings) -> bool {
         match self.state {
             NeighbourState::Linked | NeighbourState::Pairing { .. } => {
                 self.two_way && self.liveness.is_there()
             }
-            NeighbourState::NoPeer | NeighbourState::Searching { .. } => false,
+            NeighbourState::NoPeer | NeighbourState::Searching { .. } => self
+                .across
+                .is_some_and(|across| now.since(across) <= settings.dead_after),
         }
+    }
+
+    /// A node that is not taken hears this relay, and takes a node on the other side of it.
+    pub(crate) const fn takes_across(&mut self, now: Instant) {
+        self.across = Some(now);
     }
 
     /// Whether it is certain who is there, and somebody else than when a proposal was decided last.
