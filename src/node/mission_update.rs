@@ -16,7 +16,7 @@
 //! | --- | --- |
 //! | a hello of a node that holds an older mission | it is offered the newer one |
 //! | a hello of a node that holds a newer mission | a hello, so that it is offered here |
-//! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hello; an offer to the relay before, toward the leader; a request for a view |
+//! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hello; an offer to the neighbour on the other side; a request for a view |
 //! | an offer of one that is not newer | a hello |
 //! | an offer that answers no hello of late | it is counted as stale; a hello, which the next one can answer |
 //! | a proposal is due, and the node after holds an older mission or has not said which | it is offered the newer one first |

@@ -1302,10 +1302,11 @@ impl Node {
     /// A newer mission is held.
     fn held(&mut self, now: Instant) {
         self.raise(Event::Uploaded);
-        // The leader has to hold it first; the others are offered it before the proposal comes to them.
-        let back = self.back();
-        self.neighbours.at_mut(back).offer = true;
-        self.update.begin_offers(back);
+        // The leader has to hold it first; the others hold it best before the proposal comes to them.
+        for side in [Side::Upstream, Side::Downstream] {
+            self.neighbours.at_mut(side).offer = true;
+            self.update.begin_offers(side);
+        }
         self.view.ask(now);
     }
 
