@@ -853,7 +853,11 @@ impl Node {
             // One that holds a newer mission takes part in no view without it: it is asked for once this relay holds it, too.
             let newer = takes_uploads(&self.member) && hello.holds > self.update.latest();
             if hello.form && !newer && (hello.newest >= known || hello.fresh && !waits) {
-                self.view.ask(now);
+                if self.view.newest() > known {
+                    self.view.ask_anew(now);
+                } else {
+                    self.view.ask(now);
+                }
             }
         } else if self.searches() {
             self.consider(now, side, from, hello);
