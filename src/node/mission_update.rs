@@ -9,23 +9,31 @@
 //! the one before it is good until then as well, neither for longer than twice `dead_after` after it was last said. So an offer that was
 //! recorded or withheld is worth nothing later, though its tag is right.
 //!
+//! Whoever has an offer to make, and no hello of late that it could answer, says a hello that asks for one. Until the neighbour says that it
+//! holds the mission it is offered it again, first after four hops' time, and less and less often: sixteen times.
+//!
 //! | between neighbours | what follows |
 //! | --- | --- |
 //! | a hello of a node that holds an older mission | it is offered the newer one |
 //! | a hello of a node that holds a newer mission | a hello, so that it is offered here |
-//! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hello; an offer to the relay before, toward the leader; a request for a view |
+//! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hello; an offer to the neighbour on the other side; a request for a view |
 //! | an offer of one that is not newer | a hello |
 //! | an offer that answers no hello of late | it is counted as stale; a hello, which the next one can answer |
 //! | a proposal is due, and the node after holds an older mission or has not said which | it is offered the newer one first |
+//! | an offer is owed, and the neighbour has said no hello of late | a hello that asks, and the offer answers what comes back |
 //! | a proposal that does not name the mission held | a hello, and no part in it |
 //! | a decision on a view that was granted | its mission is flown: `Event::Adopted` |
 
 use super::context::Member;
 #[cfg(feature = "upload")]
+use super::timing::earliest;
+#[cfg(feature = "upload")]
 use crate::jitter::Jitter;
 use crate::mission::Mission;
 #[cfg(feature = "upload")]
 use crate::settings::Settings;
+#[cfg(feature = "upload")]
+use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::digest::MissionId;
 #[cfg(feature = "upload")]
@@ -53,6 +61,34 @@ impl Asked {
     }
 }
 
+/// Offers to the neighbour on one side.
+#[cfg(feature = "upload")]
+#[derive(Clone, Copy, Debug)]
+struct Offering {
+    /// When it said a hello last, which an offer answers.
+    heard: Option<Instant>,
+    /// When it is to be offered the mission again, and how often it has been.
+    at: Option<Instant>,
+    tries: u8,
+}
+
+#[cfg(feature = "upload")]
+impl Offering {
+    const NONE: Self = Self {
+        heard: None,
+        at: None,
+        tries: 0,
+    };
+}
+
+/// Hop times until an offer is made again, and how often it is until they are twice as many; so often in all.
+#[cfg(feature = "upload")]
+const OFFER_HOPS: u32 = 4;
+#[cfg(feature = "upload")]
+const OFFERS_AT_A_PACE: u8 = 4;
+#[cfg(feature = "upload")]
+const OFFERS: u8 = 16;
+
 /// What one relay holds.
 #[derive(Clone, Debug)]
 pub(crate) struct MissionUpdate {
@@ -64,6 +100,11 @@ pub(crate) struct MissionUpdate {
     /// The number that hellos bear now, and the one before.
     #[cfg(feature = "upload")]
     asked: [Asked; 2],
+    /// Toward Tx and toward Rx.
+    #[cfg(feature = "upload")]
+    offering: [Offering; 2],
+    #[cfg(feature = "upload")]
+    jitter: Jitter,
 }
 
 /// Whether newer missions are taken in flight: only where frames are signed.
@@ -88,6 +129,10 @@ impl MissionUpdate {
             upload: None,
             #[cfg(feature = "upload")]
             asked: [asked, Asked { number: 0, ..asked }],
+            #[cfg(feature = "upload")]
+            offering: [Offering::NONE; 2],
+            #[cfg(feature = "upload")]
+            jitter: Jitter::new(seed),
         }
     }
 
@@ -135,6 +180,64 @@ impl MissionUpdate {
         self.asked
             .iter()
             .any(|asked| asked.is(answer, now, settings))
+    }
+
+    const fn offering(&mut self, side: Side) -> &mut Offering {
+        let [upstream, downstream] = &mut self.offering;
+        match side {
+            Side::Upstream => upstream,
+            Side::Downstream => downstream,
+        }
+    }
+
+    /// The neighbour at `side` has said a hello, which an offer may answer.
+    pub(crate) const fn may_answer(&mut self, side: Side, now: Instant) {
+        self.offering(side).heard = Some(now);
+    }
+
+    /// Whether it has of late: the number is good for `dead_after` after it was said, and more.
+    pub(crate) fn has_asked(&mut self, side: Side, now: Instant, settings: &Settings) -> bool {
+        let heard = self.offering(side).heard;
+        heard.is_some_and(|heard| now.since(heard).times(2) <= settings.dead_after)
+    }
+
+    /// There is something new to offer the neighbour at `side`, or another neighbour.
+    pub(crate) const fn begin_offers(&mut self, side: Side) {
+        self.offering(side).tries = 0;
+    }
+
+    /// It is offered the mission now, or asked for a hello first.
+    pub(crate) fn offered(&mut self, side: Side, now: Instant, settings: &Settings) {
+        let tries = self.offering(side).tries;
+        let hops = OFFER_HOPS << (tries / OFFERS_AT_A_PACE).min(OFFERS);
+        let wait = settings.hop_time.times(hops).min(settings.probe_after);
+        let at = now + self.jitter.spread(wait);
+        *self.offering(side) = Offering {
+            at: (tries < OFFERS).then_some(at),
+            tries: tries.saturating_add(1),
+            ..*self.offering(side)
+        };
+    }
+
+    /// The neighbour at `side` has nothing to be offered any more.
+    pub(crate) const fn stop_offers(&mut self, side: Side) {
+        self.offering(side).at = None;
+    }
+
+    /// Whether the neighbour at `side` is to be offered the mission again now.
+    pub(crate) fn offers_again(&mut self, side: Side, now: Instant) -> bool {
+        let offering = self.offering(side);
+        let due = offering.at.is_some_and(|at| at <= now);
+        if due {
+            offering.at = None;
+        }
+        due
+    }
+
+    /// When it is.
+    pub(crate) fn next_timeout(&self) -> Option<Instant> {
+        let [upstream, downstream] = self.offering;
+        earliest(upstream.at, downstream.at)
     }
 
     /// Holds `upload` from now on, if it is for this relay and newer than what it holds; whether it is.

@@ -687,6 +687,8 @@ impl Node {
             let effects = self.view.handle_timeout(&context, leads, fresh);
             self.apply(now, effects);
         }
+        #[cfg(feature = "upload")]
+        self.offer_again(now);
         self.steering.handle_timeout(now);
         self.steer(now);
     }
@@ -866,6 +868,7 @@ impl Node {
             #[cfg(feature = "upload")]
             {
                 self.neighbours.at_mut(side).asked = hello.nonce;
+                self.update.may_answer(side, now);
                 self.compare(side, from, hello.holds);
             }
             self.neighbours.at_mut(side).holds = Some(hello.holds);
@@ -877,8 +880,14 @@ impl Node {
                 self.told(now, side, mutual);
             }
             let waits = self.view.awaited().is_some();
-            if hello.form && (hello.newest >= known || hello.fresh && !waits) {
-                self.view.ask(now);
+            // One that holds a newer mission takes part in no view without it: it is asked for once this relay holds it, too.
+            let newer = takes_uploads(&self.member) && hello.holds > self.update.latest();
+            if hello.form && !newer && (hello.newest >= known || hello.fresh && !waits) {
+                if self.view.newest() > known {
+                    self.view.ask_anew(now);
+                } else {
+                    self.view.ask(now);
+                }
             }
         } else if self.searches() {
             self.consider(now, side, from, hello);
@@ -904,6 +913,8 @@ impl Node {
             member,
             neighbours,
             steering,
+            #[cfg(feature = "upload")]
+            update,
             ..
         } = self;
         let neighbour = neighbours.at_mut(side);
@@ -928,6 +939,8 @@ impl Node {
             #[cfg(feature = "upload")]
             {
                 neighbour.asked = hello.nonce;
+                update.may_answer(side, now);
+                update.begin_offers(side);
             }
             steering.link(side, Some(from));
             self.raise_about(About::Back, side, from);
@@ -1089,8 +1102,8 @@ impl Node {
         }
         #[cfg(feature = "upload")]
         for side in [Side::Upstream, Side::Downstream] {
-            if let Some((to, message)) = self.next_offer(side) {
-                return Some((side, to, message));
+            if let Some(offer) = self.next_offer(now, side) {
+                return Some(offer);
             }
             if let Some((to, hello)) = self.next_report(now, side) {
                 return Some((side, to, Message::Hello(hello)));
@@ -1123,9 +1136,13 @@ impl Node {
             && let Some(message) = self.view.take_onward(&context, to)
         {
             #[cfg(feature = "upload")]
-            if let Some(upload) = self.update.offer_to(self.neighbours.at(onward).holds) {
-                let answer = self.neighbours.at(onward).asked;
-                return Some((onward, to, Message::Offer { upload, answer }));
+            {
+                let holds = self.neighbours.at(onward).holds;
+                if self.update.offer_to(holds).is_some() {
+                    self.neighbours.at_mut(onward).offer = true;
+                    self.update.begin_offers(onward);
+                    return self.next_offer(now, onward);
+                }
             }
             return Some((onward, to, message));
         }
@@ -1173,6 +1190,8 @@ impl Node {
             self.lease.next_timeout(),
             self.round.next_timeout(),
             self.steering.next_timeout(),
+            #[cfg(feature = "upload")]
+            self.update.next_timeout(),
         ]
         .into_iter()
         .flatten()
@@ -1316,9 +1335,11 @@ impl Node {
     /// A newer mission is held.
     fn held(&mut self, now: Instant) {
         self.raise(Event::Uploaded);
-        // The leader has to hold it first; the others are offered it before the proposal comes to them.
-        let back = self.back();
-        self.neighbours.at_mut(back).offer = true;
+        // The leader has to hold it first; the others hold it best before the proposal comes to them.
+        for side in [Side::Upstream, Side::Downstream] {
+            self.neighbours.at_mut(side).offer = true;
+            self.update.begin_offers(side);
+        }
         self.view.ask(now);
     }
 
@@ -1356,6 +1377,9 @@ impl Node {
             return;
         }
         let latest = self.update.latest();
+        if holds >= latest {
+            self.update.stop_offers(side);
+        }
         if holds > latest {
             self.owe_hello(side, from, false);
         } else if holds < latest {
@@ -1372,13 +1396,33 @@ impl Node {
         }
     }
 
-    /// The offer that is owed to the neighbour at `side`.
-    fn next_offer(&mut self, side: Side) -> Option<(u16, Message)> {
+    /// The offer that is owed to the neighbour at `side`, or the hello that asks for one that it can answer: to which node.
+    fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.neighbours.at_mut(side);
         let due = core::mem::take(&mut neighbour.offer);
         let (to, holds, answer) = (neighbour.node(), neighbour.holds, neighbour.asked);
         let upload = self.update.offer_to(holds)?;
-        (due && to != 0).then_some((to, Message::Offer { upload, answer }))
+        if !due || to == 0 {
+            return None;
+        }
+        let settings = self.member.settings;
+        self.update.offered(side, now, &settings);
+        let message = if self.update.has_asked(side, now, &settings) {
+            Message::Offer { upload, answer }
+        } else {
+            let nonce = self.ask_number(now);
+            Message::Hello(self.hello(now, side, true, nonce))
+        };
+        Some((side, to, message))
+    }
+
+    /// Whoever has not said since that it holds the mission is offered it again.
+    fn offer_again(&mut self, now: Instant) {
+        for side in [Side::Upstream, Side::Downstream] {
+            if self.update.offers_again(side, now) {
+                self.neighbours.at_mut(side).offer = true;
+            }
+        }
     }
 }
 

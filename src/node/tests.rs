@@ -145,18 +145,29 @@ fn who_does_not_hold_the_mission_hands_no_proposal_on_and_says_what_it_holds() {
 #[test]
 fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
     let mut node = relay(true);
-    let new = upload(1);
+    let (old, new) = (node.update.latest(), upload(1));
     let said_now = offer(&mut node, new);
     node.handle_message(NOW, Side::Upstream, 1, &said_now);
     assert_eq!(node.update.latest(), new.id());
     assert_ne!(node.member.active, new.id());
+    // An offer answers a hello: it asks for one.
     let told = said(&mut node);
     assert!(
-        matches!(told[..], [(1, Message::Hello(Hello { holds, flies: false, .. }))] if holds == new.id()),
+        matches!(
+            told[..],
+            [
+                (1, Message::Hello(Hello { holds, flies: false, .. })),
+                (3, Message::Hello(Hello { ask: true, .. })),
+            ] if holds == new.id()
+        ),
         "{told:?}"
     );
+    let behind = hello(&node, old);
+    node.handle_message(NOW, Side::Downstream, 3, &behind);
+    assert_eq!(said(&mut node), [(3, offered(new, 9))]);
+    // A proposal waits for it, too.
     node.handle_message(NOW, Side::Upstream, 1, &proposal(new.id()));
-    assert_eq!(said(&mut node), [(3, offered(new, 0))]);
+    assert_eq!(said(&mut node), [(3, offered(new, 9))]);
     // It says that it holds it.
     let holds = hello(&node, new.id());
     node.handle_message(NOW, Side::Downstream, 3, &holds);
@@ -180,8 +191,26 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
     );
     let new = upload(1);
     node.handle_upload(NOW, &new).unwrap();
-    // The neighbour that the leader is beyond is offered it at once.
-    assert_eq!(said(&mut node), [(1, offered(new, 0))]);
+    // Whoever it may be newer for is asked at once for a hello that an offer can answer.
+    let told = said(&mut node);
+    assert!(
+        matches!(told[..], [(1, Message::Hello(Hello { ask: true, .. }))]),
+        "{told:?}"
+    );
+    // Again and again, as nobody answers, and less and less often.
+    let mut at: heapless::Vec<u64, 40> = heapless::Vec::new();
+    for ms in 1..4_000 {
+        let now = NOW + Duration::from_millis(ms);
+        for side in [Side::Upstream, Side::Downstream] {
+            if node.update.offers_again(side, now) {
+                node.neighbours.at_mut(side).offer = true;
+                assert!(node.next_offer(now, side).is_some());
+                at.push(ms).unwrap();
+            }
+        }
+    }
+    assert!((120..=136).contains(&at[0]) && at.len() > 8, "{at:?}");
+    assert!((240..=271).contains(&(at[4] - at[3])), "{at:?}");
     let behind = hello(&node, older);
     node.handle_message(NOW, Side::Downstream, 3, &behind);
     assert_eq!(said(&mut node), [(3, offered(new, 9))]);

@@ -80,6 +80,24 @@ fn a_relay_that_comes_back_takes_its_place_again() {
     }
 }
 
+/// The two beside the gap have taken each other by then, and neither has anything to hear of the other one that is off.
+#[test]
+fn one_of_two_in_a_row_that_comes_back_is_taken_between_those_who_have_closed_up() {
+    for (index, off) in [(2, 3), (3, 2), (4, 5), (5, 4), (6, 7), (7, 6)] {
+        for seconds_off in [15, 17, 20, 30, 60] {
+            let mut setup = paper(8);
+            setup.kills = vec![(index, seconds(20)), (off, seconds(20))];
+            setup.boots = vec![(index, seconds(20 + seconds_off))];
+            setup.deadline = seconds(300);
+            let outcome = run(setup.clone()).unwrap();
+            assert_eq!(outcome.ending, Ending::Settled, "{index} off for {seconds_off} s");
+            let left: Vec<u16> = (1..=8).filter(|node| *node != off).collect();
+            judge(&setup, &outcome, &left)
+                .unwrap_or_else(|what| panic!("{index} off for {seconds_off} s: {what}"));
+        }
+    }
+}
+
 #[test]
 fn all_of_them_are_switched_on_again_one_after_the_other() {
     let mut setup = paper(8);

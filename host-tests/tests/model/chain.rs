@@ -59,6 +59,8 @@ impl<'a> World<'a> {
         let mut frame = [0; MAX_FRAME];
         let mut sent = 0;
         self.ledgers[at].look_up(relay)?;
+        // As a firmware stores it: before what it says to others leaves.
+        self.ledgers[at].record = Some(relay.view_record());
         let most = MOST_FRAMES + if self.scenario.signs() { 2 } else { 0 };
         while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
             sent += 1;
@@ -191,8 +193,8 @@ impl<'a> World<'a> {
         self.relays[to].handle_bytes(self.now, port, bytes);
         let after = self.relays[to].stats();
         let is_taken = taken(after) > taken(&before);
-        let settings = &self.scenario.settings[to];
-        self.ledgers[to].heard(from, ended, is_taken.then_some(frame), settings, self.now)?;
+        let known = (&self.scenario.settings[to], self.scenario.relays());
+        self.ledgers[to].heard(from, ended, is_taken.then_some(frame), known, self.now)?;
         if let Some(pass) = pass(&frame.bytes).filter(|_| is_taken) {
             let met =
                 self.ledgers[to].meets(self.scenario, pass, stands, suspended, &before, after)?;

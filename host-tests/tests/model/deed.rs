@@ -1,5 +1,6 @@
 //! What each operation does to a chain.
 
+use proptest::prop_assert;
 use uav_relay::{Duration, Sample};
 
 use super::Checked;
@@ -124,6 +125,10 @@ impl World<'_> {
         });
         self.epochs += 1;
         self.relays[at] = self.scenario.relay(at, seed, self.epochs, self.now);
+        if let Some(record) = &self.ledgers[at].record {
+            let resumed = self.relays[at].resume_view(self.now, record);
+            prop_assert!(resumed.is_ok(), "{resumed:?}");
+        }
         self.wires.forget(at);
         self.ledgers[at].reboot(self.now, self.epochs);
         self.turn(at)

@@ -4,7 +4,7 @@ use proptest::{prop_assert, prop_assert_eq};
 use uav_relay::wire::message::Message;
 use uav_relay::{
     Duration, Event, Instant, Method, Phase, Placement, Profile, Relay, Settings, Side, Stats,
-    ViewId,
+    ViewId, ViewRecord,
 };
 use uav_relay_oracle::reference::joint::Place;
 
@@ -17,9 +17,13 @@ use super::wires::{Ended, Flying, message};
 /// and to each side a heartbeat and a hello.
 pub(crate) const MOST_FRAMES: u32 = 9;
 
-/// Questions between `probe_after` and `dead_after`, and how many of them may still be answered.
-const QUESTIONS: u64 = 16;
+/// Questions that a neighbour leaves open at least until it is missed, and how many of them may still be answered.
+const QUESTIONS: usize = 16;
 const OPEN: u32 = 4;
+
+/// How many times as many questions as were open before an answer, and how many times `dead_after`, are enough in any case.
+const MARGIN: usize = 3;
+const LONGEST: u32 = 8;
 
 /// One relay, by what it has said since it was switched on.
 #[derive(Debug)]
@@ -45,6 +49,8 @@ pub(crate) struct Ledger {
     pub(crate) measured_per_w: Option<f64>,
     /// Of this life: 1 and up, larger in each, and no two relays' are the same.
     pub(crate) epoch: u32,
+    /// What it had said in the votes on views when it said something last, as its flash keeps it.
+    pub(crate) record: Option<ViewRecord>,
     /// The frames that it has taken.
     taken: Taken,
 }
@@ -59,6 +65,10 @@ struct Signs {
     perhaps: Instant,
     /// When something came that may have been a sign of it.
     last: Instant,
+    /// Questions since a certain sign, since one that may have been, and the most since a certain one.
+    open: usize,
+    perhaps_open: usize,
+    most_open: usize,
     /// Whether the relay has said that it is lost.
     missed: bool,
 }
@@ -70,6 +80,9 @@ impl Signs {
             surely: now,
             perhaps: now,
             last: now,
+            open: 0,
+            perhaps_open: 0,
+            most_open: QUESTIONS,
             missed: false,
         }
     }
@@ -77,6 +90,9 @@ impl Signs {
     fn ask(&mut self, message: &Message, now: Instant) {
         if let Message::Heartbeat { ask, .. } = message {
             self.asked.push((*ask, now));
+            self.open += 1;
+            self.perhaps_open += 1;
+            self.most_open = self.most_open.max(self.open);
         }
     }
 
@@ -89,22 +105,45 @@ impl Signs {
                     return;
                 };
                 self.last = now;
+                self.perhaps_open = 0;
                 self.perhaps = self.perhaps.max(*asked);
                 // So few questions can have followed it that it is open yet.
                 if now.since(*asked) < tick.times(OPEN) {
                     self.surely = self.surely.max(*asked);
+                    self.open = 0;
                 }
             }
-            Message::Pulse(_) | Message::Pulsed(_) => (self.last, self.perhaps) = (now, now),
+            Message::Pulse(_) | Message::Pulsed(_) => {
+                (self.last, self.perhaps) = (now, now);
+                self.perhaps_open = 0;
+            }
             _ => {}
         }
     }
+
+    /// Whether it was to be missed when it was asked last, as nothing had come for `most`: that often it had been asked before, or that
+    /// long it may be silent at most.
+    fn is_to_be_missed(&self, most: Duration, longest: Duration) -> bool {
+        let Some((_, asked)) = self.asked.last() else {
+            return false;
+        };
+        let silent = asked.since(self.perhaps);
+        let enough = self.perhaps_open > MARGIN * self.most_open;
+        silent >= most && (enough || silent >= longest)
+    }
 }
 
-/// How long after one question the next one is asked, at the soonest.
-fn tick(settings: &Settings) -> Duration {
+/// How long after one question the next one is asked, at the soonest: as often as all of a chain can do on one channel, sixteen times within
+/// the span between `probe_after` and `dead_after` at least, and 64 times at most.
+fn tick(settings: &Settings, relays: usize) -> Duration {
     let span = settings.dead_after.as_micros() - settings.probe_after.as_micros();
-    Duration::from_micros(span / QUESTIONS)
+    let round = 2 * relays as u64 * settings.hop_time.as_micros();
+    Duration::from_micros(round.clamp(span / 64 + 1, span / QUESTIONS as u64))
+}
+
+/// And at the latest.
+fn spread(tick: Duration) -> Duration {
+    Duration::from_micros(tick.as_micros() + tick.as_micros() / 8 + 1)
 }
 
 /// What one turn of a relay's main loop gave.
@@ -143,17 +182,19 @@ impl Ledger {
             passes_before: Vec::new(),
             measured_per_w: None,
             epoch,
+            record: None,
             taken: Taken::default(),
         }
     }
 
-    /// The relay has been switched off and on again: it has forgotten everything.
+    /// The relay has been switched off and on again: it has forgotten everything but what its flash keeps.
     pub(crate) fn reboot(&mut self, now: Instant, epoch: u32) {
         let mut passes_before = core::mem::take(&mut self.passes_before);
         passes_before.extend(self.pass);
         *self = Self {
             passes_before,
             measured_per_w: self.measured_per_w,
+            record: self.record,
             ..Self::new(now, epoch)
         };
     }
@@ -164,7 +205,7 @@ impl Ledger {
         from: Side,
         ended: Ended,
         taken: Option<&Flying>,
-        settings: &Settings,
+        (settings, relays): (&Settings, usize),
         now: Instant,
     ) -> Checked {
         self.ended.intact += ended.intact;
@@ -174,7 +215,7 @@ impl Ledger {
         };
         let Flying { bytes, seal, .. } = frame;
         prop_assert!(ended.intact > 0, "a broken frame is taken");
-        let tick = tick(settings);
+        let tick = tick(settings, relays);
         if settings.auth.is_some() {
             self.taken.take(side(from), bytes, *seal, self.epoch)?;
         }
@@ -377,7 +418,8 @@ impl Ledger {
         Ok(())
     }
 
-    /// A neighbour is missed once it has answered nothing for `dead_after`, or for as long as a lease may be, and until it does.
+    /// A neighbour is asked again and again once nothing has come for `probe_after`. It is missed once it has answered nothing for
+    /// `dead_after`, or for as long as a lease may be, and enough questions, and until it answers.
     fn miss(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let there = [at > 0, at + 1 < scenario.relays()];
         for event in turn.events {
@@ -398,14 +440,25 @@ impl Ledger {
             }
         }
         let settings = &scenario.settings[at];
-        let tick = tick(settings);
+        let tick = spread(tick(settings, scenario.relays()));
+        let longest = settings.dead_after.times(LONGEST);
         let most = self.longest.max(settings.dead_after);
         for (signs, there) in self.signs.iter().zip(there) {
             // While it solves the chain, silence is excused.
             let looks = there && settings.method != Method::Joint;
-            let due = (signs.perhaps + most).max(signs.last + tick) + tick;
+            let idle = !looks || signs.missed;
+            let asked = signs.asked.last().map_or(signs.last, |(_, asked)| *asked);
+            let due = (signs.perhaps + settings.probe_after).max(signs.last + tick);
+            // Signed questions wait for the handshake.
             prop_assert!(
-                !looks || signs.missed || turn.now < due,
+                idle || scenario.signs() || turn.now <= due.max(asked + tick),
+                "not asked by relay {}: {signs:?}",
+                at + 1
+            );
+            let last = (signs.perhaps + longest.max(most)).max(signs.last + tick) + tick;
+            let misses = turn.now >= last || signs.is_to_be_missed(most, longest);
+            prop_assert!(
+                idle || !misses,
                 "not missed by relay {}: {signs:?}",
                 at + 1
             );

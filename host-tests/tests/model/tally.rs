@@ -32,7 +32,7 @@ const EXPECTED: [(&str, u64); 18] = [
     ("restarts", 1),
     ("measurements taken", 10),
     ("hops held", 1),
-    ("neighbours missed", 2),
+    ("neighbours missed", 10),
     ("stragglers", 20),
     ("foreign passes", 2),
     ("views agreed on", 1),

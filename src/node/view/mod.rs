@@ -218,6 +218,12 @@ impl ViewChange {
         }
     }
 
+    /// The same at once, however often it has asked in vain: something new has come to be known.
+    pub(crate) fn ask_anew(&mut self, now: Instant) {
+        self.asks = false;
+        self.ask(now);
+    }
+
     /// Whether it is time to ask.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.ask_at.is_some_and(|at| at <= now)
@@ -256,7 +262,7 @@ impl ViewChange {
         {
             self.heard_of(later);
         }
-        self.ask(context.now);
+        self.ask_anew(context.now);
     }
 
     /// A proposal or a decision from the neighbour before or after, of a mission that this relay holds.

@@ -404,10 +404,13 @@ fn on_wires_a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
     );
     let silences = report["silences"].as_array().unwrap();
     assert_eq!(silences.len(), 2);
+    // By the first question after 15 s: they are at most 10 s / 16 apart, and an eighth more.
+    let latest_s = 15.0 + 10.0 / 16.0 * 1.125;
     assert!(
         silences
             .iter()
-            .all(|silence| silence["silent"] == 2 && silence["at_s"].as_f64().unwrap() <= 15.01)
+            .all(|silence| silence["silent"] == 2 && silence["at_s"].as_f64().unwrap() <= latest_s),
+        "{silences:?}"
     );
 }
 
