@@ -19,7 +19,8 @@
 //! before r lets go.
 //!
 //! The span is `dead_after`, or four times as long as a pulse took lately and two periods, at most eight times `dead_after`: where many
-//! frames are lost a silence says less. The period is half of `probe_after`, or as long as a pulse takes.
+//! frames are lost a silence says less. The period from one to the next is half of `probe_after`, or twice as
+//! long as a pulse takes.
 
 use super::context::{Context, Effects};
 use super::retransmit::{Retransmit, Trip};
@@ -230,17 +231,14 @@ impl Lease {
         let part = self.slowest.as_micros() / 64;
         let lately = self.slowest.as_micros().saturating_sub(part);
         self.slowest = took.max(Duration::from_micros(lately));
-        let wait = if first {
-            PAUSE
-        } else {
-            period
-        };
-        self.next_at = Some(context.now + wait);
+        let soon = context.now + PAUSE;
+        let paced = current.handed_on + period;
+        self.next_at = Some(if first { soon } else { paced.max(soon) });
     }
 
     fn period(&self, settings: &Settings) -> Duration {
         let half = Duration::from_micros(settings.probe_after.as_micros() / 2);
-        half.max(self.slowest).max(PAUSE)
+        half.max(self.slowest.times(2)).max(PAUSE)
     }
 
     /// What the leader gives the others, in tenths of a second.

@@ -721,10 +721,15 @@ impl Node {
             return;
         }
         let node = neighbour.node();
+        let ended = neighbour.has_no_peer();
         let lost = neighbour.handle_timeout(now, settings, lease.span(settings), searches);
+        let ends = neighbour.has_no_peer() && !ended;
         steering.link(side, Some(neighbour.node()).filter(|node| *node != 0));
         if lost {
             self.raise_about(About::Lost, side, node);
+        }
+        if ends {
+            self.view.hasten(now);
         }
         self.review(now);
     }
@@ -834,7 +839,12 @@ impl Node {
             form: self.view.asks() && side == self.back(),
             fresh: self.round.is_fresh(),
             ready: false,
-            behind: self.beyond(side.other()).saturating_add(1),
+            // Who has just been switched on is in no part yet.
+            behind: if self.round.is_fresh() {
+                1
+            } else {
+                self.beyond(side.other()).saturating_add(1)
+            },
             hears: self.neighbours.at(side).hears(now, &self.member.settings),
             holds: latest,
             flies: self.member.active == latest,

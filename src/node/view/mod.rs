@@ -224,6 +224,14 @@ impl ViewChange {
         self.ask(now);
     }
 
+    /// Something has come to be certain: if it asks, it asks anew at once.
+    pub(crate) fn hasten(&mut self, now: Instant) {
+        if self.asks {
+            self.tries = 0;
+            self.ask_at = Some(now + PAUSE);
+        }
+    }
+
     /// Whether it is time to ask.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.ask_at.is_some_and(|at| at <= now)
