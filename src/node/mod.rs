@@ -815,8 +815,8 @@ impl Node {
         0
     }
 
-    /// Whether this relay could come between node `other` at `side` and the one that it takes there: whether that one is heard, and
-    /// hears this relay.
+    /// Whether this relay could come between node `other` at `side` and the one that it takes there: whether that one and this relay hear
+    /// each other, or there is a neighbour that comes along with it.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self.neighbours.at(side).taken_by(other.abs_diff(own));
@@ -826,7 +826,8 @@ impl Node {
         };
         let settings = &self.member.settings;
         let far = self.neighbours.at(side.other());
-        there && far.is_two_way(beyond.abs_diff(own), now, settings)
+        let distance = beyond.abs_diff(own);
+        there && (far.is_two_way(distance, now, settings) || far.comes_along(distance))
     }
 
     fn hello(&self, now: Instant, side: Side, ask: bool, nonce: u16) -> Hello {

@@ -311,6 +311,11 @@ impl Neighbour {
         known || self.is_mutual() && self.distance == distance && self.liveness.is_there()
     }
 
+    /// Whether the neighbour here is linked, and less than `distance` places away.
+    pub(crate) fn comes_along(&self, distance: u16) -> bool {
+        self.is_mutual() && self.liveness.is_there() && self.distance < distance
+    }
+
     /// Node `distance` places away has said which one it takes on this side, and whether it hears this relay.
     pub(crate) fn says(
         &mut self,
