@@ -42,7 +42,9 @@ pub use optimiser::local::Local;
 pub use optimiser::search::Schedule;
 pub use place::Placement;
 pub use relay::{Port, Relay, Transmit};
-pub use settings::{Adjust, Identity, Measure, Method, Settings, SetupError, Wiring, WithoutQuorum};
+pub use settings::{
+    Adjust, Identity, Measure, Method, Settings, SetupError, Wiring, WithoutQuorum,
+};
 pub use side::Side;
 pub use stats::Stats;
 pub use time::{Duration, Instant};

@@ -98,9 +98,7 @@ impl WithoutQuorum {
     fn is_valid(self) -> bool {
         match self {
             Self::Hold => true,
-            Self::Leave { y_m, up_m } => {
-                (-1e4..=1e4).contains(&y_m) && (0.0..=1e4).contains(&up_m)
-            }
+            Self::Leave { y_m, up_m } => (-1e4..=1e4).contains(&y_m) && (0.0..=1e4).contains(&up_m),
         }
     }
 

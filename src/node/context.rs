@@ -1,9 +1,9 @@
 //! What a relay is and flies, as every layer is handed it, and what a layer asks of the others.
 
-use crate::mission::{Band, Heading, Mission};
-use crate::place::Placement;
 use super::timing::{longest_lease, tenths};
 use super::view::electorate::Held;
+use crate::mission::{Band, Heading, Mission};
+use crate::place::Placement;
 use crate::settings::{Method, Settings};
 use crate::time::Instant;
 use crate::view::ViewId;

@@ -217,11 +217,7 @@ impl Lease {
         let eighth = self.slowest.as_micros() / 8;
         let lately = self.slowest.as_micros().saturating_sub(eighth);
         self.slowest = took.max(Duration::from_micros(lately));
-        let wait = if first {
-            PAUSE
-        } else {
-            period
-        };
+        let wait = if first { PAUSE } else { period };
         self.next_at = Some(context.now + wait);
     }
 

@@ -131,7 +131,13 @@ impl Node {
         let [a, b, ..] = seed.wrapping_mul(0x9E37_79B1).to_le_bytes();
         let number = u16::from_le_bytes([a, b]);
         let member = Member::new(mission, settings, identity.index);
-        let neighbours = Neighbours::new(identity.index, member.all, seed.rotate_left(8), now, &settings);
+        let neighbours = Neighbours::new(
+            identity.index,
+            member.all,
+            seed.rotate_left(8),
+            now,
+            &settings,
+        );
         let mut node = Self {
             update: MissionUpdate::new(member.active, seed.rotate_left(4), now),
             view: ViewChange::new(member.all, mission.leader(), !seed),
@@ -496,13 +502,7 @@ impl Node {
 
     /// Whether `message` from the neighbour `from` is of the mission and, if it is of one, of the view that this relay is in.
     /// What is not is counted and answered by a hello, and a pass of another view has the relay ask for one.
-    fn is_of_this_view(
-        &mut self,
-        now: Instant,
-        side: Side,
-        from: u16,
-        message: &Message,
-    ) -> bool {
+    fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
         let Some(digest) = message.mission() else {
             return true;
         };
@@ -1028,7 +1028,11 @@ impl Node {
     }
 
     /// A relay that has just been switched on has said what is in `record`.
-    pub(crate) fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
+    pub(crate) fn resume_view(
+        &mut self,
+        now: Instant,
+        record: &ViewRecord,
+    ) -> Result<(), RecordError> {
         let untouched = self.round.is_untouched();
         self.view.resume(now, &self.member, record, untouched)?;
         self.lease.resume(&self.member.settings);

@@ -34,7 +34,11 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
         .saturating_sub(settings.probe_after.as_micros());
     let round = settings.hop_time.times(2 * u32::from(all));
     let most = (span / u64::from(QUESTIONS)).max(1);
-    Duration::from_micros(round.as_micros().clamp(span / 64 + 1, most.max(span / 64 + 1)))
+    Duration::from_micros(
+        round
+            .as_micros()
+            .clamp(span / 64 + 1, most.max(span / 64 + 1)),
+    )
 }
 
 /// Questions that may still be answered.

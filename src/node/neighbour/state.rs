@@ -398,9 +398,7 @@ impl Neighbour {
             (NeighbourState::Pairing { .. }, true) => {
                 (NeighbourState::Linked, settings.probe_after)
             }
-            (NeighbourState::Linked, false) => {
-                (NeighbourState::Pairing { since: now }, self.tick)
-            }
+            (NeighbourState::Linked, false) => (NeighbourState::Pairing { since: now }, self.tick),
             _ => return false,
         };
         self.state = next;
@@ -457,7 +455,10 @@ impl Neighbour {
                 }
             }
             NeighbourState::Pairing { since } => {
-                lost = self.liveness.silent(now, settings.dead_after, step, settings).lost;
+                lost = self
+                    .liveness
+                    .silent(now, settings.dead_after, step, settings)
+                    .lost;
                 self.hello_all();
                 if lost || is_over(since) {
                     self.search(now);
@@ -527,9 +528,7 @@ impl Neighbour {
         let flaps = node == self.lost && self.losses > FORGIVEN;
         let takes = match self.state {
             NeighbourState::Searching { .. } => !flaps || self.passes(node, now, settings),
-            NeighbourState::NoPeer => {
-                candidate.pairs && !flaps || self.passes(node, now, settings)
-            }
+            NeighbourState::NoPeer => candidate.pairs && !flaps || self.passes(node, now, settings),
             NeighbourState::Linked | NeighbourState::Pairing { .. } => {
                 candidate.is_better() && self.passes(node, now, settings)
             }

@@ -133,11 +133,7 @@ impl Message {
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,
-            Self::Sweep(_)
-                | Self::Gather(_)
-                | Self::Token(_)
-                | Self::Proposal(_)
-                | Self::Pulse(_)
+            Self::Sweep(_) | Self::Gather(_) | Self::Token(_) | Self::Proposal(_) | Self::Pulse(_)
         )
     }
 }

@@ -9,11 +9,11 @@ use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::digest::{MissionId, digest};
 use uav_relay::wire::frame::{self, HEADER, Header, MAX_FRAME};
 use uav_relay::wire::message::{Decision, Hello, Message, Poll, Proposal};
-use uav_relay::{View, ViewId};
 use uav_relay::{
     Auth, Identity, Instant, Interference, Interferer, Key, Mission, MissionConfig, Relay,
     Settings, Upload, Wiring,
 };
+use uav_relay::{View, ViewId};
 
 /// The network that every simulated relay belongs to.
 pub(super) const NETWORK: u16 = 1;
@@ -121,7 +121,8 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
 fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let digest = digest(mission);
     let mission_id = MissionId { version: 0, digest };
-    let view = ViewId::from_bits(rng.random_range(1..=40) << 10 | u32::from(way.from.clamp(1, 1000)));
+    let view =
+        ViewId::from_bits(rng.random_range(1..=40) << 10 | u32::from(way.from.clamp(1, 1000)));
     let loaded = View {
         id: ViewId::LOADED,
         relays: mission.relays(),
