@@ -22,9 +22,9 @@ use crate::time::Instant;
 use crate::view::ViewId;
 use crate::wire::deframe::{DeframeError, Deframer};
 use crate::wire::frame::{self, FrameBuf, Header};
-use incoming::Addressed;
 #[cfg(feature = "auth")]
 use crate::wire::session::Session;
+use incoming::Addressed;
 
 /// Where bytes come from and go to.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -160,13 +160,8 @@ impl Relay {
                     bump(counter);
                 }
                 Some(Ok(plain)) => {
-                    let addressed = incoming::addressed(
-                        &mut self.node,
-                        now,
-                        self.network,
-                        port,
-                        plain,
-                    );
+                    let addressed =
+                        incoming::addressed(&mut self.node, now, self.network, port, plain);
                     let (side, frame) = match addressed {
                         Some(Addressed::By(side, frame)) => (side, frame),
                         Some(Addressed::ByNamesake(frame)) => {

@@ -152,7 +152,9 @@ impl Report {
             ),
             Event::LeaseLapsed => line(
                 now,
-                format_args!("lapsed: not all relays can be reached; holds its place and asks for a new view"),
+                format_args!(
+                    "lapsed: not all relays can be reached; holds its place and asks for a new view"
+                ),
             ),
             Event::NoQuorum => line(
                 now,

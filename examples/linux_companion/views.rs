@@ -27,7 +27,10 @@ impl Views {
             None => None,
             Some(file) => match std::fs::read(file) {
                 Ok(bytes) => Some(parse(&bytes).ok_or_else(|| {
-                    named(file, "is damaged, or no record; remove it before another flight")
+                    named(
+                        file,
+                        "is damaged, or no record; remove it before another flight",
+                    )
                 })?),
                 Err(error) if error.kind() == ErrorKind::NotFound => None,
                 Err(error) => return Err(named(file, &format!("cannot be read: {error}"))),

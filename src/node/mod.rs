@@ -502,13 +502,7 @@ impl Node {
 
     /// Whether `message` from the neighbour `from` is of the mission and, if it is of one, of the view that this relay is in.
     /// What is not is counted and answered by a hello, and a pass of another view has the relay ask for one.
-    fn is_of_this_view(
-        &mut self,
-        now: Instant,
-        side: Side,
-        from: u16,
-        message: &Message,
-    ) -> bool {
+    fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
         let Some(digest) = message.mission() else {
             return true;
         };
@@ -1084,7 +1078,11 @@ impl Node {
     }
 
     /// A relay that has just been switched on has said what is in `record`.
-    pub(crate) fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
+    pub(crate) fn resume_view(
+        &mut self,
+        now: Instant,
+        record: &ViewRecord,
+    ) -> Result<(), RecordError> {
         let untouched = self.round.is_untouched();
         self.view.resume(now, &self.member, record, untouched)?;
         self.lease.resume(&self.member.settings);

@@ -280,7 +280,9 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
 /// Hours later, or just too late, an offer is nothing but a reason to say a hello; one that answers that is taken.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_counted() {
-    let late = |seconds: u64| NOW + Settings::default().dead_after.times(2) + Duration::from_millis(1_000 * seconds);
+    let late = |seconds: u64| {
+        NOW + Settings::default().dead_after.times(2) + Duration::from_millis(1_000 * seconds)
+    };
     for ground in [false, true] {
         for (now, hellos) in [(late(1), false), (late(1), true), (late(7_200), true)] {
             let mut node = relay(true);
@@ -307,7 +309,10 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
             let fresh = offered(upload(1), answer.unwrap());
             assert_ne!(fresh, withheld);
             assert!(node.handle_message(now, Side::Upstream, from, &fresh));
-            assert_eq!((node.stats().stale, node.update.latest()), (1, upload(1).id()));
+            assert_eq!(
+                (node.stats().stale, node.update.latest()),
+                (1, upload(1).id())
+            );
         }
     }
 }
@@ -320,7 +325,10 @@ fn what_is_stored_of_an_upload_does_not_depend_on_what_it_answers() {
     }
     let mut stored = [0; LENGTH];
     assert_eq!(upload(3).encode(&mut stored), Some(LENGTH));
-    assert_eq!((&bodies[0][..LENGTH], &bodies[1][..LENGTH]), (&stored[..], &stored[..]));
+    assert_eq!(
+        (&bodies[0][..LENGTH], &bodies[1][..LENGTH]),
+        (&stored[..], &stored[..])
+    );
     assert_eq!(Upload::decode(&stored), Some(upload(3)));
     assert_eq!(Upload::decode(&bodies[0][..LENGTH + 2]), None);
 }
@@ -369,15 +377,26 @@ fn a_loss_and_a_mission_that_differs_are_told_with_the_node() {
         ..hello
     });
     node.handle_message(NOW, Side::Upstream, 1, &other);
-    assert_eq!(events(&mut node)[..], [Event::MissionMismatch { node: 1 }], "{lost:?}");
+    assert_eq!(
+        events(&mut node)[..],
+        [Event::MissionMismatch { node: 1 }],
+        "{lost:?}"
+    );
     let mut told = heapless::Vec::<Event, 16>::new();
     for seconds in 10..200 {
         node.handle_timeout(Instant::from_millis(1_000 * seconds));
-        while node.poll_message(Instant::from_millis(1_000 * seconds)).is_some() {}
+        while node
+            .poll_message(Instant::from_millis(1_000 * seconds))
+            .is_some()
+        {}
         told.extend(events(&mut node));
     }
     for (side, other) in [(Side::Upstream, 1), (Side::Downstream, 3)] {
         let lost = Event::NeighbourLost { side, node: other };
-        assert_eq!(told.iter().filter(|event| **event == lost).count(), 1, "{told:?}");
+        assert_eq!(
+            told.iter().filter(|event| **event == lost).count(),
+            1,
+            "{told:?}"
+        );
     }
 }

@@ -248,7 +248,11 @@ impl Session {
             let [.., a, b, c, d] = nonces.sender.to_le_bytes();
             let epoch = u32::from_le_bytes([a, b, c, d]);
             let back = peer.older.count(epoch, frame.header.counter);
-            return Some(if back { Checked::WentBack } else { Checked::Replayed });
+            return Some(if back {
+                Checked::WentBack
+            } else {
+                Checked::Replayed
+            });
         }
         if !peer.taken.take(frame.header.counter) {
             return Some(Checked::Replayed);

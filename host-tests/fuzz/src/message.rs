@@ -173,7 +173,7 @@ impl Body<'_, '_> {
             0..32 => own.bits(),
             up @ 32..224 => {
                 let number = own.number().wrapping_add(u32::from(up % 4));
-                number << 10 | u32::from(up / 4 % 4) + 1
+                (number << 10) | (u32::from(up / 4 % 4) + 1)
             }
             down @ 224..240 => {
                 let number = own.number().wrapping_sub(u32::from(down - 223));

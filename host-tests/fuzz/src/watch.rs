@@ -260,12 +260,13 @@ impl Watched {
             let downstream = off && header.destination > self.node;
             // One that stands down says so to the other node of its number.
             let own = header.destination == self.node && self.relay.stands_down();
-            let right = own || match (self.settings.wiring, port) {
-                (Wiring::Pair, Port::Upstream) => upstream,
-                (Wiring::Pair, Port::Downstream) => downstream,
-                (Wiring::Shared, Port::Shared) => upstream || downstream,
-                _ => false,
-            };
+            let right = own
+                || match (self.settings.wiring, port) {
+                    (Wiring::Pair, Port::Upstream) => upstream,
+                    (Wiring::Pair, Port::Downstream) => downstream,
+                    (Wiring::Shared, Port::Shared) => upstream || downstream,
+                    _ => false,
+                };
             assert!(right, "{header:?} through {port:?}");
             let config = self.relay.mission().config();
             // Tx and Rx are told which mission is held, where there is a key.

@@ -171,7 +171,13 @@ fn lost_after(recorded: &mut dyn Iterator<Item = Vec<u8>>) -> (u64, u32) {
         lonely.handle_timeout(now);
         while lonely.poll_transmit(now, &mut frame).is_some() {}
         while let Some(event) = lonely.poll_event() {
-            if matches!(event, Event::NeighbourLost { side: Side::Downstream, .. }) {
+            if matches!(
+                event,
+                Event::NeighbourLost {
+                    side: Side::Downstream,
+                    ..
+                }
+            ) {
                 lost_after.get_or_insert(ms);
             }
             assert!(!matches!(event, Event::NeighbourBack { .. }));

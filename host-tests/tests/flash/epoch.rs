@@ -128,14 +128,27 @@ fn a_write_that_fails_never_puts_the_epoch_back() {
             let sound = tried.len() > worn;
             // A worn place takes half of what is written.
             let [epoch, complement] = entry(step.epoch);
-            flash.program(step, if sound { [epoch, complement] } else { [epoch, u32::MAX] });
+            flash.program(
+                step,
+                if sound {
+                    [epoch, complement]
+                } else {
+                    [epoch, u32::MAX]
+                },
+            );
             sound
         });
         let (epoch, kept) = begun.unwrap();
-        assert_eq!((epoch, kept, tried.len()), (13, worn < 4, (worn + 1).min(4)));
+        assert_eq!(
+            (epoch, kept, tried.len()),
+            (13, worn < 4, (worn + 1).min(4))
+        );
         let again = flash.next(3).unwrap();
         assert_eq!(again.epoch, if kept { 14 } else { 13 });
-        assert!(again.entry > *tried.last().unwrap(), "a worn place is left alone");
+        assert!(
+            again.entry > *tried.last().unwrap(),
+            "a worn place is left alone"
+        );
     }
     // The last place of a sector, and none that can be written.
     let full = vec![entry(7); 8];
@@ -147,5 +160,9 @@ fn a_write_that_fails_never_puts_the_epoch_back() {
     });
     assert_eq!(begun, Some((8, false)));
     assert_eq!(steps[0], (1, 0, false));
-    assert_eq!(begin([&[], &[]], 9, |_| true), Some((9, false)), "an emulator");
+    assert_eq!(
+        begin([&[], &[]], 9, |_| true),
+        Some((9, false)),
+        "an emulator"
+    );
 }

@@ -224,10 +224,7 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
     assert!(hello.ask && !hello.form, "{hello:?}");
     head.handle_bytes(now, Port::Downstream, bytes);
     assert_eq!((head.stats().mission, head.stats().rejected()), (1, 1));
-    assert_eq!(
-        events(&mut head),
-        [Event::MissionMismatch { node: 2 }]
-    );
+    assert_eq!(events(&mut head), [Event::MissionMismatch { node: 2 }]);
     assert!(drain(&mut head, now).is_empty(), "it is not answered");
     // And so a heartbeat tells.
     let beat = Message::Heartbeat {
@@ -343,12 +340,20 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
         after.handle_bytes(late, Port::Upstream, &beat(0, last - before));
         assert_eq!(
             events(&mut after),
-            [Event::NeighbourBack { side: Side::Upstream, node: 1 }],
+            [Event::NeighbourBack {
+                side: Side::Upstream,
+                node: 1
+            }],
             "{before}"
         );
         let heard = asked[count - 1 - usize::from(before)];
         let mut lost = late;
-        while events(&mut after) != [Event::NeighbourLost { side: Side::Upstream, node: 1 }] {
+        while events(&mut after)
+            != [Event::NeighbourLost {
+                side: Side::Upstream,
+                node: 1,
+            }]
+        {
             lost = after.poll_timeout().unwrap();
             after.handle_timeout(lost);
             drain(&mut after, lost);

@@ -32,8 +32,16 @@ fn both_neighbours_notice_a_drone_that_is_switched_off() {
     let until_killed = question.elapsed().mul_f64(SPEED).as_micros();
     let slack = SLACK + u64::try_from(until_killed).unwrap();
     let sides = [
-        (2, "event NeighbourLost { side: Downstream, node: 3 }", asked[0]),
-        (4, "event NeighbourLost { side: Upstream, node: 3 }", asked[1]),
+        (
+            2,
+            "event NeighbourLost { side: Downstream, node: 3 }",
+            asked[0],
+        ),
+        (
+            4,
+            "event NeighbourLost { side: Upstream, node: 3 }",
+            asked[1],
+        ),
     ];
     let noticed = |lines: &[Line], (drone, text, _): &(u16, &str, u64)| {
         let mut new = lines[before..].iter();

@@ -181,5 +181,7 @@ pub(crate) fn direct(relays: u16) -> Vec<Option<Placement>> {
 
 /// Whether a neighbour has been lost so far.
 pub(crate) fn has_lost(node: &Node, side: Side) -> bool {
-    node.events.iter().any(|event| matches!(event, Event::NeighbourLost { side: at, .. } if *at == side))
+    node.events
+        .iter()
+        .any(|event| matches!(event, Event::NeighbourLost { side: at, .. } if *at == side))
 }

@@ -94,6 +94,7 @@ pub(crate) enum Said {
 }
 
 /// What a gathering says, and its answer.
+#[expect(clippy::struct_field_names, reason = "the vectors name it so")]
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub(crate) struct Seats {
     pub(crate) number: u16,

@@ -143,6 +143,7 @@ fn the_crate_reads_the_vectors() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a line or more for each message")]
 fn the_vectors_hold_every_kind_and_every_extreme() {
     let frames = vectors().frames;
     let some = |what: fn(&Said) -> bool| {

@@ -7,8 +7,8 @@ use uav_relay::wire::message::{Message, MessageError};
 use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile, Upload};
 
 use super::offer::{
-    ALTITUDE, BYTES, DISTANCE, ETA, INTERFERER, KEPT, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, Offer, POWER,
-    RELAYS, RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y, offer,
+    ALTITUDE, BYTES, DISTANCE, ETA, INTERFERER, KEPT, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, Offer,
+    POWER, RELAYS, RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y, offer,
 };
 
 /// Whether a body is taken; out of range is the only other thing that it may be.

@@ -268,7 +268,11 @@ fn a_message_of_another_mission_leads_to_a_hello_at_most() {
         let own = digest(relay.mission());
         let other = own ^ 0x4000;
         let hello = |port| {
-            let (neighbour, behind) = if port == Port::Upstream { (3, 5) } else { (5, 4) };
+            let (neighbour, behind) = if port == Port::Upstream {
+                (3, 5)
+            } else {
+                (5, 4)
+            };
             long(behind, hearing(1, a_hello(0, own, neighbour, ASKS | FRESH)))
         };
         for said in one_of_each(FIRST, other) {
@@ -605,6 +609,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 /// Leads a relay of 8 by any messages, from a place or from none: it must be drained at any time, asleep until later, its
 /// setpoint between Tx and Rx and within the band, its place in the chain one of those that there are. `expected` names what
 /// must have happened at times: what moved the setpoint, and new views.
+#[expect(clippy::too_many_lines, reason = "all that is looked at in one flight")]
 fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
     let seen: Cell<BTreeMap<&str, u32>> = Cell::new(BTreeMap::new());
     let (from, to) = match mission.interference {

@@ -141,12 +141,13 @@ impl Peer {
             relay.handle_timeout(at);
             frames(&mut relay, at)
         });
-        let hello = out.into_iter().flatten().find_map(|(to, flags, body)| {
-            match Said::read(&body) {
-                Ok(Said::Hello(hello)) if (to, flags) == (self.node, SIGNED) => Some(hello),
-                _ => None,
-            }
-        });
+        let hello =
+            out.into_iter()
+                .flatten()
+                .find_map(|(to, flags, body)| match Said::read(&body) {
+                    Ok(Said::Hello(hello)) if (to, flags) == (self.node, SIGNED) => Some(hello),
+                    _ => None,
+                });
         hello.unwrap().nonce
     }
 

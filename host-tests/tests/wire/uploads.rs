@@ -429,7 +429,9 @@ fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
     ] {
         let mut after_it = relay.clone();
         let offer = Said::Offer(Offer { answer, ..newer });
-        peers[0].clone().says_as_it_is(&mut after_it, after(ms), &offer);
+        peers[0]
+            .clone()
+            .says_as_it_is(&mut after_it, after(ms), &offer);
         let expected = counts.then_some(mission_id(&newer));
         assert_eq!(held(&after_it), expected, "{answer} at {ms}");
         assert_eq!(after_it.stats().stale, u32::from(!counts));
@@ -450,7 +452,9 @@ fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
             answer: first,
             ..newer
         });
-        peers[1].clone().says_as_it_is(&mut after_it, after(ms), &offer);
+        peers[1]
+            .clone()
+            .says_as_it_is(&mut after_it, after(ms), &offer);
         assert_eq!(held(&after_it).is_some(), first_counts, "at {ms}");
     }
     let mut told = relay.clone();

@@ -529,7 +529,7 @@ impl Neighbour {
             }
             NeighbourState::NoPeer => {
                 self.hello_all();
-                let often = Duration::from_micros(settings.probe_after.as_micros() / 2);
+                let often = Duration::from_micros((settings.probe_after.as_micros() / 2).max(1));
                 let wait = if self.is_near(now, settings) {
                     often
                 } else {

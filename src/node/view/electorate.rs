@@ -313,10 +313,19 @@ mod tests {
         /// What is decided on a proposal to `nodes`; the last `accept` of them hear of it.
         fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Outcome {
             let poll = self.poll(nodes, proposal);
-            let outcome = decide(&poll, proposal, count(nodes), u16::try_from(self.0.len()).unwrap());
+            let outcome = decide(
+                &poll,
+                proposal,
+                count(nodes),
+                u16::try_from(self.0.len()).unwrap(),
+            );
             if let Outcome::View(view) = outcome {
                 for &node in nodes.iter().rev().take(accept) {
-                    assert!(self.0[usize::from(node) - 1].accept(proposal, poll.agreed, Some(view)));
+                    assert!(self.0[usize::from(node) - 1].accept(
+                        proposal,
+                        poll.agreed,
+                        Some(view)
+                    ));
                 }
                 if accept == nodes.len() {
                     self.0[usize::from(nodes[0]) - 1].commit();

@@ -351,9 +351,7 @@ impl ViewChange {
         told: Option<Poll>,
     ) -> Option<Effects> {
         let node = context.member.node;
-        let poll = self
-            .electorate
-            .vote(node, view, told, context.held)?;
+        let poll = self.electorate.vote(node, view, told, context.held)?;
         // However far ahead it is, this relay has had part in it.
         self.newest = self.newest.max(view);
         self.state = ViewState::Proposed;

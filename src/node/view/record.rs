@@ -197,9 +197,9 @@ fn is_sound(kept: &Electorate) -> bool {
 #[cfg(test)]
 mod tests {
     use super::{Electorate, RecordError, ViewRecord};
-    use crate::node::view::electorate::Held;
     use crate::mission::Mission;
     use crate::mission::tests::paper;
+    use crate::node::view::electorate::Held;
     use crate::relay::Relay;
     use crate::settings::{Identity, Settings};
     use crate::time::Instant;
@@ -300,14 +300,23 @@ mod tests {
     fn a_record_is_for_a_relay_of_its_mission_that_has_not_begun() {
         let record = relay(3).view_record();
         let mut other = relay(4);
-        assert_eq!(other.resume_view(Instant::ZERO, &record), Err(RecordError::Base));
+        assert_eq!(
+            other.resume_view(Instant::ZERO, &record),
+            Err(RecordError::Base)
+        );
         let digest = crate::wire::digest::digest(relay(3).mission());
         let stray = ViewRecord::new(digest.wrapping_add(1), busy());
-        assert_eq!(relay(3).resume_view(Instant::ZERO, &stray), Err(RecordError::Base));
+        assert_eq!(
+            relay(3).resume_view(Instant::ZERO, &stray),
+            Err(RecordError::Base)
+        );
         let mut twice = relay(3);
         let busy = ViewRecord::new(digest, busy());
         assert_eq!(twice.resume_view(Instant::ZERO, &busy), Ok(()));
-        assert_eq!(twice.resume_view(Instant::ZERO, &busy), Err(RecordError::Begun));
+        assert_eq!(
+            twice.resume_view(Instant::ZERO, &busy),
+            Err(RecordError::Begun)
+        );
         // The leader of a chain begins by itself.
         let mission = *relay(3).mission();
         let identity = Identity {
@@ -322,6 +331,9 @@ mod tests {
         {
             leader.handle_timeout(leader.poll_timeout().unwrap_or(now));
         }
-        assert_eq!(leader.resume_view(Instant::ZERO, &record), Err(RecordError::Begun));
+        assert_eq!(
+            leader.resume_view(Instant::ZERO, &record),
+            Err(RecordError::Begun)
+        );
     }
 }

@@ -496,9 +496,13 @@ fn who_has_lost_the_mission_has_no_part_in_its_view() {
 fn a_successor_that_was_accepted_is_told_of_and_decided_on_again() {
     let mut relay = Relay::new(4);
     let first = all(id(1, 1));
-    relay.view.electorate.vote(4, first.id, None, Held::NONE).unwrap();
+    relay
+        .view
+        .electorate
+        .vote(4, first.id, None, Held::NONE)
+        .unwrap();
     let base = relay.view.electorate.agreed();
-        assert!(relay.view.electorate.accept(first.id, base, Some(first)));
+    assert!(relay.view.electorate.accept(first.id, base, Some(first)));
     let Message::Proposal(mut proposal) = relay.proposal(id(2, 1)) else {
         return;
     };

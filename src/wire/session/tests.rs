@@ -337,6 +337,10 @@ fn only_a_handshake_with_the_key_and_a_larger_epoch_is_ahead() {
         let mut other = Session::new(Auth { key, epoch });
         other.greet(2);
         let plain = frame(&mut other, (1, 2), handshake, 0);
-        assert_eq!(own.is_ahead(&frame::open(&plain).unwrap()), ahead, "{epoch} {handshake}");
+        assert_eq!(
+            own.is_ahead(&frame::open(&plain).unwrap()),
+            ahead,
+            "{epoch} {handshake}"
+        );
     }
 }

@@ -63,7 +63,9 @@ fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same(
         };
         let before = stale(&air);
         for _ in 0..5 {
-            offers.iter().for_each(|offer| air.play(offer));
+            for offer in &offers {
+                air.play(offer);
+            }
             air.run(1);
         }
         assert!(
