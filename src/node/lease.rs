@@ -20,7 +20,7 @@
 //!
 //! The span is `dead_after`, or four times as long as a pulse took lately and two periods, at most eight times `dead_after`: where many
 //! frames are lost a silence says less. The period from one to the next is half of `probe_after`, or twice as
-//! long as a pulse takes.
+//! long as a pulse takes, up to a quarter of `dead_after`.
 
 use super::context::{Context, Effects};
 use super::retransmit::{Retransmit, Trip};
@@ -238,7 +238,9 @@ impl Lease {
 
     fn period(&self, settings: &Settings) -> Duration {
         let half = Duration::from_micros(settings.probe_after.as_micros() / 2);
-        half.max(self.slowest.times(2)).max(PAUSE)
+        // The span that was told last may be the shortest one: several have to fit into it.
+        let most = Duration::from_micros(settings.dead_after.as_micros() / 4);
+        half.max(self.slowest.times(2).min(most)).max(PAUSE)
     }
 
     /// What the leader gives the others, in tenths of a second.
