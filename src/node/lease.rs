@@ -129,7 +129,19 @@ impl Lease {
     ///
     /// Members of `base` that have not accepted it yet may hold what was agreed on there, but not for longer than they rely on this relay,
     /// if it was one of them: without it no more pulses go through.
-    pub(crate) fn renew(&mut self, view: ViewId, base: ViewId, rest: Instant) {
+    ///
+    /// Where nobody was `lost` by it, the pulse that was under way was only slow.
+    pub(crate) fn renew(
+        &mut self,
+        now: Instant,
+        (view, base): (ViewId, ViewId),
+        rest: Instant,
+        lost: bool,
+    ) {
+        let under_way = self.current.filter(|current| current.done.is_none());
+        if let Some(slow) = under_way.filter(|_| !lost) {
+            self.slowest = self.slowest.max(now.since(slow.handed_on));
+        }
         let known = self.bound.filter(|_| self.rest.0 == base);
         self.bound = known.map(|until| until.max(rest).max(self.relied_on));
         self.rest = (view, rest);

@@ -994,6 +994,7 @@ impl Node {
         let Some(mission) = mission else {
             return self.view.ask(now);
         };
+        let before = self.member.mission.relays();
         self.member.index = match mission.heading() {
             Heading::TowardRx => place,
             Heading::TowardTx => relays.saturating_sub(place).saturating_add(1),
@@ -1006,7 +1007,8 @@ impl Node {
         self.neighbours.at_mut(onward).agree(place == relays);
         let works = self.member.settings.method == Method::Joint;
         let rest = now + Duration::from_millis(100).times(u32::from(lease_left));
-        self.lease.renew(proposed.view, proposed.base.id, rest);
+        let views = (proposed.view, proposed.base.id);
+        self.lease.renew(now, views, rest, relays < before);
         if leads {
             self.lease.commit();
         }

@@ -90,7 +90,11 @@ fn one_of_two_in_a_row_that_comes_back_is_taken_between_those_who_have_closed_up
             setup.boots = vec![(index, seconds(20 + seconds_off))];
             setup.deadline = seconds(300);
             let outcome = run(setup.clone()).unwrap();
-            assert_eq!(outcome.ending, Ending::Settled, "{index} off for {seconds_off} s");
+            assert_eq!(
+                outcome.ending,
+                Ending::Settled,
+                "{index} off for {seconds_off} s"
+            );
             let left: Vec<u16> = (1..=8).filter(|node| *node != off).collect();
             judge(&setup, &outcome, &left)
                 .unwrap_or_else(|what| panic!("{index} off for {seconds_off} s: {what}"));

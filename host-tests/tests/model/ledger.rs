@@ -457,11 +457,7 @@ impl Ledger {
             );
             let last = (signs.perhaps + longest.max(most)).max(signs.last + tick) + tick;
             let misses = turn.now >= last || signs.is_to_be_missed(most, longest);
-            prop_assert!(
-                idle || !misses,
-                "not missed by relay {}: {signs:?}",
-                at + 1
-            );
+            prop_assert!(idle || !misses, "not missed by relay {}: {signs:?}", at + 1);
         }
         Ok(())
     }

@@ -318,11 +318,23 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
                 .map(|event| (now.since(Instant::ZERO).as_micros() / 1_000, event)),
         );
     }
-    let [(lost_ms, Event::NeighbourLost { side: Side::Upstream, node: 1 })] = seen[..] else {
+    let [
+        (
+            lost_ms,
+            Event::NeighbourLost {
+                side: Side::Upstream,
+                node: 1,
+            },
+        ),
+    ] = seen[..]
+    else {
         panic!("{seen:?}");
     };
     // Not before `dead_after`, and no later than it is asked next: questions are 10 s / 64 apart, and up to an eighth more.
-    assert!((15_000..=15_000 + 157 * 9 / 8).contains(&lost_ms), "{lost_ms}");
+    assert!(
+        (15_000..=15_000 + 157 * 9 / 8).contains(&lost_ms),
+        "{lost_ms}"
+    );
     let count = asked.len();
     // Up to 64 in the ten seconds until it is lost, and one in five seconds from then on.
     assert!((60..=75).contains(&count), "{count} heartbeats in a minute");
@@ -362,7 +374,11 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
         let due = heard + Duration::from_millis(15_000);
         let longest = heard + Duration::from_millis(8 * 15_000);
         let latest = longest + Duration::from_millis(157 * 9 / 8);
-        assert!(due <= lost && lost <= latest, "{before}: {:?}", (heard, lost));
+        assert!(
+            due <= lost && lost <= latest,
+            "{before}: {:?}",
+            (heard, lost)
+        );
     }
 }
 

@@ -113,8 +113,12 @@ fn every_schedule_ends_with_the_newest_mission_flown_by_all_that_are_left() {
                 "SEED={seed}: {what}; {uploads:?} kills {:?} boots {:?} {:?}",
                 setup.kills, setup.boots, setup.settings.wiring
             );
-            for m in outcome.moments.iter().rev().take(60).rev() { println!("DBG {m:?}"); }
-            for r in &outcome.relays { println!("DBG {r:?}"); }
+            for m in outcome.moments.iter().rev().take(60).rev() {
+                println!("DBG {m:?}");
+            }
+            for r in &outcome.relays {
+                println!("DBG {r:?}");
+            }
             failed.push(seed);
         }
         let left = setup.deadline.since(outcome.ended).as_micros();

@@ -451,9 +451,7 @@ impl Neighbour {
     pub(crate) fn told(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
             (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
-            (NeighbourState::Linked, false) => {
-                (NeighbourState::Pairing { since: now }, self.tick)
-            }
+            (NeighbourState::Linked, false) => (NeighbourState::Pairing { since: now }, self.tick),
             _ => return false,
         };
         self.state = next;
@@ -591,9 +589,7 @@ impl Neighbour {
                 let wait = self.tick.times(u32::from(candidate.beyond()) * 2);
                 now.since(since) >= wait && (!flaps || self.passes(node, now, settings))
             }
-            NeighbourState::NoPeer => {
-                candidate.pairs && !flaps || self.passes(node, now, settings)
-            }
+            NeighbourState::NoPeer => candidate.pairs && !flaps || self.passes(node, now, settings),
             NeighbourState::Linked | NeighbourState::Pairing { .. } => {
                 candidate.is_better() && self.passes(node, now, settings)
             }
