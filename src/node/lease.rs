@@ -119,9 +119,9 @@ impl Lease {
     /// For how long what was agreed on may be held elsewhere.
     pub(crate) fn held(&self, now: Instant) -> Held {
         Held {
-            lease_left: tenths(self.relied_on.since(now)),
+            lease_left: self.relied_on.since(now),
             view: self.rest.0,
-            rest: self.bound.map(|until| tenths(until.since(now))),
+            rest: self.bound.map(|until| until.since(now)),
         }
     }
 

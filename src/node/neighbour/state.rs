@@ -87,7 +87,7 @@ pub(crate) struct Candidate {
 
 impl Candidate {
     /// How many nodes there may be between it and the one that was lost.
-    const fn beyond(&self) -> u16 {
+    const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
 

@@ -34,6 +34,8 @@
 //! that were left behind: they decide beside the two of three that remember. One that forgets in the midst of a proposal may also hand the
 //! same one on another way.
 
+use crate::node::timing::tenths;
+use crate::time::Duration;
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
@@ -55,22 +57,22 @@ pub(crate) struct Electorate {
     pub(super) elder: u16,
 }
 
-/// For how long what was agreed on may be held elsewhere, in tenths of a second.
+/// For how long what was agreed on may be held elsewhere.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Held {
     /// By members of its view that rely on this relay.
-    pub(crate) lease_left: u16,
+    pub(crate) lease_left: Duration,
     /// By members of views before `view`; `None` as long as they may not have accepted that.
     pub(crate) view: ViewId,
-    pub(crate) rest: Option<u16>,
+    pub(crate) rest: Option<Duration>,
 }
 
 impl Held {
     #[cfg(test)]
     pub(super) const NONE: Self = Self {
-        lease_left: 0,
+        lease_left: Duration::from_micros(0),
         view: ViewId::LOADED,
-        rest: Some(0),
+        rest: Some(Duration::from_micros(0)),
     };
 
     fn rest_of(self, view: ViewId) -> u16 {
@@ -78,7 +80,7 @@ impl Held {
             0
         } else {
             let known = self.rest.filter(|_| view == self.view);
-            known.unwrap_or(u16::MAX)
+            known.map_or(u16::MAX, tenths)
         }
     }
 }
@@ -163,7 +165,7 @@ impl Electorate {
             // No more than there are, whatever was told: nobody would read that.
             poll.votes = poll.votes.saturating_add(1).min(poll.agreed.relays);
             poll.proposer |= proposer == node;
-            poll.lease_left = poll.lease_left.min(held.lease_left);
+            poll.lease_left = poll.lease_left.min(tenths(held.lease_left));
             poll.rest = poll.rest.min(held.rest_of(self.agreed.id));
         }
         Some(poll)
@@ -266,14 +268,14 @@ mod tests {
     use std::vec::Vec;
 
     use super::{Electorate, Held, Outcome, VOTES, decide};
+    use crate::time::Duration;
     use crate::view::{View, ViewId};
     use crate::wire::message::{Poll, Successor};
 
     const fn left(lease_left: u16) -> Held {
         Held {
-            lease_left,
-            view: ViewId::LOADED,
-            rest: Some(0),
+            lease_left: Duration::from_millis(100 * lease_left as u64),
+            ..Held::NONE
         }
     }
 
