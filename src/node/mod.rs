@@ -934,6 +934,7 @@ impl Node {
         let candidate = Candidate {
             node: from,
             distance: from.abs_diff(own),
+            downstream: from > own,
             pairs,
             nearer: from.abs_diff(own) < neighbour.node().abs_diff(own),
             ready: hello.ready,

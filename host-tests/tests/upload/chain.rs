@@ -21,7 +21,8 @@ fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
         let relays = outcome.relays.iter();
         relays.map(|relay| relay.stats.rejected()).sum()
     };
-    assert_eq!(refused(&outcome), refused(&before));
+    // A pulse that is under way when the proposal comes is stale to one relay at most.
+    assert!(refused(&outcome) <= refused(&before) + 1);
     let settled = |moment: &&Moment| moment.what == Turning::Converged;
     let last = outcome.moments.iter().rfind(settled).unwrap();
     let took = last.at.since(AT).as_micros() / 1_000;

@@ -73,8 +73,9 @@ const MEMORY: u32 = 32;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) node: u16,
-    /// How many places away it is.
+    /// How many places away it is, and whether toward Rx.
     pub(crate) distance: u16,
+    pub(crate) downstream: bool,
     /// Whether it takes this relay for its neighbour.
     pub(crate) pairs: bool,
     /// Whether it is nearer than the one taken.
@@ -582,16 +583,26 @@ impl Neighbour {
     ) -> bool {
         let node = candidate.node;
         // A link that comes and goes has to stay for a while first.
+        let none = Duration::from_micros(0);
         let flaps = node == self.lost && self.losses > FORGIVEN;
         let takes = match self.state {
             NeighbourState::Searching { since } => {
                 // One that is nearer may be about to be heard.
                 let wait = self.tick.times(u32::from(candidate.beyond()) * 2);
-                now.since(since) >= wait && (!flaps || self.passes(node, now, settings))
+                now.since(since) >= wait && (!flaps || self.passes(node, none, now, settings))
             }
-            NeighbourState::NoPeer => candidate.pairs && !flaps || self.passes(node, now, settings),
+            NeighbourState::NoPeer => {
+                candidate.pairs && !flaps || self.passes(node, none, now, settings)
+            }
             NeighbourState::Linked | NeighbourState::Pairing { .. } => {
-                candidate.is_better() && self.passes(node, now, settings)
+                // Of two that could leave somebody out the one nearer to Rx does, unless it takes long.
+                let waits = !candidate.nearer && candidate.downstream;
+                let more = if waits {
+                    settings.dead_after.times(2)
+                } else {
+                    none
+                };
+                candidate.is_better() && self.passes(node, more, now, settings)
             }
         };
         if !takes {
@@ -611,7 +622,7 @@ impl Neighbour {
     }
 
     /// Whether a node that is heard now has been for the whole of its hold-down.
-    fn passes(&mut self, node: u16, now: Instant, settings: &Settings) -> bool {
+    fn passes(&mut self, node: u16, more: Duration, now: Instant, settings: &Settings) -> bool {
         let since = match self.hold_down {
             Some(known) if known.node == node && now.since(known.heard) <= settings.dead_after => {
                 known.since
@@ -627,7 +638,7 @@ impl Neighbour {
             None => settings.probe_after,
             Some(more) => settings.dead_after.times(1 << more.min(DOUBLINGS)),
         };
-        now.since(since) >= hold_down
+        now.since(since) >= hold_down.max(more)
     }
 
     /// A heartbeat that is owed: to which node, the number of its question and that of the one it answers.
