@@ -253,7 +253,8 @@ pub(crate) fn check(
     let able = match settings.method {
         Method::Align => true,
         Method::Joint => {
-            usize::from(mission.relays()) <= MOST_SOLVED && mission.interferer().is_some()
+            MOST_SOLVED.checked_sub(mission.relays().into()).is_some()
+                && mission.interferer().is_some()
         }
         Method::Adjust(_) => cfg!(feature = "adjust") && mission.interferer().is_some(),
     };
