@@ -4,7 +4,7 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Instant, Port, Relay, Wiring};
 
 use super::codec::Said;
-use super::forming::{ASKS, FORMS, FRESH, READY, a_hello, between, hearing, id, long, soon};
+use super::forming::{ASKS, FORMS, FRESH, a_hello, between, hearing, id, long, soon};
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, one_of_each, sent};
 
@@ -28,8 +28,8 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
         } else {
             0
         };
-        let behind = if neighbour == 5 { 7 } else { 6 };
-        let answer = |from| long(behind, hearing(mask, a_hello(0, mission, from, FRESH)));
+        // Fresh: it is alone.
+        let answer = |from| long(1, hearing(mask, a_hello(0, mission, from, FRESH)));
         if heard {
             assert_eq!(counted(near.stats()), ["received"], "{sender}");
         } else {
@@ -77,9 +77,9 @@ fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
         relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(0)));
         assert!(soon(&mut relay, now).is_empty(), "{newest}");
         relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(6)));
-        // Somebody is on its other side now.
-        let flags = ASKS | FORMS | FRESH | READY;
-        let call = long(7, a_hello(newest, mission, 5, flags));
+        // Somebody is on its other side now; but node 5 takes nobody, as far as it has said, so this relay comes between it and nobody.
+        let flags = ASKS | FORMS | FRESH;
+        let call = long(1, a_hello(newest, mission, 5, flags));
         let expected = calls.then_some((Port::Shared, call));
         assert_eq!(
             soon(&mut relay, now),

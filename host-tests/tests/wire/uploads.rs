@@ -132,7 +132,7 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
         ..upload(3, base)
     };
     // What cannot be held is not answered: it would only be offered again.
-    let answer = long(4, hello(base, 5, mission_id(&newer), FRESH));
+    let answer = long(1, hello(base, 5, mission_id(&newer), FRESH));
     let answer = || vec![(5, hearing(1, answer.clone()))];
     for (other, answer) in [
         (newer, answer()),
@@ -180,7 +180,7 @@ fn a_hello_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_h
     peers[0].says(&mut relay, NOW, &Said::Offer(own));
     both(&mut relay);
     let (digest, version) = mission_id(&own);
-    let answer = long(4, hearing(1, hello(base, 5, mission_id(&own), FRESH)));
+    let answer = long(1, hearing(1, hello(base, 5, mission_id(&own), FRESH)));
     for (holds, expected) in [
         ((base, 0), Some(Said::Offer(own))),
         ((digest - 1, version), Some(Said::Offer(own))),
@@ -225,7 +225,7 @@ fn a_proposal_of_another_mission_than_the_one_held_leads_to_a_hello() {
         let (was, is) = (before, after.stats());
         let raised = (is.view - was.view, is.mission - was.mission);
         assert_eq!(raised, (1, 0), "{proposal:?}");
-        let answer = long(5, hello(base, 3, (base, 0), ASKS | FRESH | FLIES));
+        let answer = long(1, hello(base, 3, (base, 0), ASKS | FRESH | FLIES));
         assert_eq!(said(&mut after, NOW), [(3, hearing(1, answer))]);
         assert_eq!(after.stats().received, before.received + 1);
     }
@@ -396,7 +396,7 @@ fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
         } else {
             (base, 0)
         };
-        let answer = long(5, hearing(1, hello(base, 3, holds, FRESH | FLIES)));
+        let answer = long(1, hearing(1, hello(base, 3, holds, FRESH | FLIES)));
         assert_eq!(said(&mut relay, NOW), [(3, answer)]);
         assert_eq!((relay.version(), relay.view()), (holds.1, ViewId::LOADED));
         let sweep = &one_of_each(FIRST, newer.digest())[0];
