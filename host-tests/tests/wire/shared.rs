@@ -111,20 +111,36 @@ fn a_pass_waits_for_a_neighbour_that_takes_another() {
     );
 }
 
-/// A link that bears frames one way alone is none: whoever does not hear this relay has not taken it, whatever it says.
+/// A link that bears frames one way alone is none: whoever does not hear this relay has not taken it, whatever it says. But one that
+/// was linked stays so: a run of lost frames does not undo what was heard before.
 #[test]
-fn a_neighbour_that_does_not_hear_the_relay_is_as_one_that_takes_another() {
+fn a_neighbour_that_does_not_hear_the_relay_is_not_linked_but_stays_so() {
     let now = Instant::ZERO;
-    for (hears, waits) in [(0, true), (0b1110, true), (1, false), (0b1111, false)] {
+    for (linked, hears, waits) in [
+        (false, 0, true),
+        (false, 0b1110, true),
+        (false, 1, false),
+        (false, 0b1111, false),
+        (true, 0, false),
+        (true, 0b1110, false),
+        (true, 1, false),
+        (true, 0b1111, false),
+    ] {
         let mut relay = relay_of_12(6);
         let mission = digest(relay.mission());
-        let hello = hearing(hears, a_hello(0, mission, 6, 0));
-        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello));
+        let says = |neighbour, hears| {
+            let hello = hearing(hears, a_hello(0, mission, neighbour, 0));
+            between(7, 6, &hello)
+        };
+        if !linked {
+            relay.handle_bytes(now, Port::Shared, &says(5, 1));
+        }
+        relay.handle_bytes(now, Port::Shared, &says(6, hears));
         let sweep = &one_of_each(FIRST, mission)[0];
         relay.handle_bytes(now, Port::Shared, &between(5, 6, sweep));
         assert_eq!(counted(relay.stats()), ["received"]);
         let out = sent(&mut relay, now);
         let waiting = !out.iter().any(|(_, said)| matches!(said, Said::Sweep(_)));
-        assert_eq!(waiting, waits, "{hears:b}: {out:?}");
+        assert_eq!(waiting, waits, "{linked}, {hears:b}: {out:?}");
     }
 }
