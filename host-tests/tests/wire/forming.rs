@@ -452,8 +452,9 @@ fn a_part_that_is_cut_off_stops_calling() {
     // It calls: it has missed a beginning.
     let sweep = &one_of_each(FIRST + 1, mission)[0];
     relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, sweep));
+    // Fresh: nothing hangs together from it on yet.
     let calls = a_hello(0, mission, 3, ASKS | FORMS | FRESH);
-    let calls = long(5, hearing(1, calls));
+    let calls = long(1, hearing(1, calls));
     assert_eq!(soon(&mut relay, now), [(Port::Upstream, calls)]);
     now = now + Duration::from_millis(1);
     let (view, of) = (id(1, 1), (mission, 0));
@@ -534,7 +535,7 @@ fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
         let hello = a_hello(newest, mission, 4, flags);
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &hello));
         let out = soon(&mut relay, now);
-        let answer = long(5, hearing(1, a_hello(newest, mission, 3, FRESH)));
+        let answer = long(1, hearing(1, a_hello(newest, mission, 3, FRESH)));
         let expected = asks.then_some((Port::Upstream, answer));
         assert_eq!(out, expected.into_iter().collect::<Vec<_>>());
         assert_eq!(counted(relay.stats()), ["received"]);
@@ -552,7 +553,7 @@ fn a_view_too_far_ahead_is_not_heard_of() {
         let hello = a_hello(newest, mission, 4, ASKS);
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &hello));
         let known = if believed { newest } else { 0 };
-        let answer = long(5, hearing(1, a_hello(known, mission, 3, FRESH)));
+        let answer = long(1, hearing(1, a_hello(known, mission, 3, FRESH)));
         assert_eq!(
             soon(&mut relay, now),
             [(Port::Upstream, answer)],

@@ -37,8 +37,8 @@ fn tx_and_rx_offer_and_ask_and_are_told() {
         // On its other side all are silent yet; and a leader awaits no pass.
         let flags = if own == 1 { 0 } else { FRESH };
         assert_eq!(told(&mut relay, ground), [], "it has only become known");
-        // As many as hang together from it on away from the ground.
-        let behind = if ground == 0 { 9 - own } else { own };
+        // As many as hang together from it on away from the ground; itself alone while it is fresh.
+        let behind = if own == 1 { 8 } else { 1 };
         let first = long(behind, hello(base, 0, (base, 0), flags | FLIES));
         ground_peer.says(&mut relay, NOW, &hello(base, 0, (1, 1), READY));
         assert_eq!(told(&mut relay, ground), [], "it has not asked");

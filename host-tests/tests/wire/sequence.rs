@@ -268,12 +268,9 @@ fn a_message_of_another_mission_leads_to_a_hello_at_most() {
         let own = digest(relay.mission());
         let other = own ^ 0x4000;
         let hello = |port| {
-            let (neighbour, behind) = if port == Port::Upstream {
-                (3, 5)
-            } else {
-                (5, 4)
-            };
-            long(behind, hearing(1, a_hello(0, own, neighbour, ASKS | FRESH)))
+            let neighbour = if port == Port::Upstream { 3 } else { 5 };
+            // Fresh: it is alone.
+            long(1, hearing(1, a_hello(0, own, neighbour, ASKS | FRESH)))
         };
         for said in one_of_each(FIRST, other) {
             if matches!(said, Said::Busy { .. }) {

@@ -4,7 +4,7 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Instant, Port, Relay, Wiring};
 
 use super::codec::Said;
-use super::forming::{ASKS, FORMS, FRESH, READY, a_hello, between, hearing, id, long, soon};
+use super::forming::{ASKS, FORMS, FRESH, a_hello, between, hearing, id, long, soon};
 use super::receive::{counted, relay};
 use super::sequence::{FIRST, one_of_each, sent};
 
@@ -28,8 +28,8 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
         } else {
             0
         };
-        let behind = if neighbour == 5 { 7 } else { 6 };
-        let answer = |from| long(behind, hearing(mask, a_hello(0, mission, from, FRESH)));
+        // Fresh: it is alone.
+        let answer = |from| long(1, hearing(mask, a_hello(0, mission, from, FRESH)));
         if heard {
             assert_eq!(counted(near.stats()), ["received"], "{sender}");
         } else {
@@ -77,9 +77,9 @@ fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
         relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(0)));
         assert!(soon(&mut relay, now).is_empty(), "{newest}");
         relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(6)));
-        // Somebody is on its other side now.
-        let flags = ASKS | FORMS | FRESH | READY;
-        let call = long(7, a_hello(newest, mission, 5, flags));
+        // Somebody is on its other side now; but node 5 takes nobody, as far as it has said, so this relay comes between it and nobody.
+        let flags = ASKS | FORMS | FRESH;
+        let call = long(1, a_hello(newest, mission, 5, flags));
         let expected = calls.then_some((Port::Shared, call));
         assert_eq!(
             soon(&mut relay, now),
@@ -111,20 +111,36 @@ fn a_pass_waits_for_a_neighbour_that_takes_another() {
     );
 }
 
-/// A link that bears frames one way alone is none: whoever does not hear this relay has not taken it, whatever it says.
+/// A link that bears frames one way alone is none: whoever does not hear this relay has not taken it, whatever it says. But one that
+/// was linked stays so: a run of lost frames does not undo what was heard before.
 #[test]
-fn a_neighbour_that_does_not_hear_the_relay_is_as_one_that_takes_another() {
+fn a_neighbour_that_does_not_hear_the_relay_is_not_linked_but_stays_so() {
     let now = Instant::ZERO;
-    for (hears, waits) in [(0, true), (0b1110, true), (1, false), (0b1111, false)] {
+    for (linked, hears, waits) in [
+        (false, 0, true),
+        (false, 0b1110, true),
+        (false, 1, false),
+        (false, 0b1111, false),
+        (true, 0, false),
+        (true, 0b1110, false),
+        (true, 1, false),
+        (true, 0b1111, false),
+    ] {
         let mut relay = relay_of_12(6);
         let mission = digest(relay.mission());
-        let hello = hearing(hears, a_hello(0, mission, 6, 0));
-        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello));
+        let says = |neighbour, hears| {
+            let hello = hearing(hears, a_hello(0, mission, neighbour, 0));
+            between(7, 6, &hello)
+        };
+        if !linked {
+            relay.handle_bytes(now, Port::Shared, &says(5, 1));
+        }
+        relay.handle_bytes(now, Port::Shared, &says(6, hears));
         let sweep = &one_of_each(FIRST, mission)[0];
         relay.handle_bytes(now, Port::Shared, &between(5, 6, sweep));
         assert_eq!(counted(relay.stats()), ["received"]);
         let out = sent(&mut relay, now);
         let waiting = !out.iter().any(|(_, said)| matches!(said, Said::Sweep(_)));
-        assert_eq!(waiting, waits, "{hears:b}: {out:?}");
+        assert_eq!(waiting, waits, "{linked}, {hears:b}: {out:?}");
     }
 }

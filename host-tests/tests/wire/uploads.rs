@@ -40,7 +40,11 @@ pub(crate) fn upload(version: u16, base: u16) -> Offer {
 
 /// A hello of a node that has heard of view 0 alone, and holds the mission of these: digest and version.
 pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
-    Said::Hello(Greeting {
+    Said::Hello(greeting(mission, neighbour, holds, flags))
+}
+
+fn greeting(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Greeting {
+    Greeting {
         mission,
         neighbour,
         behind: 1,
@@ -49,7 +53,7 @@ pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) 
         nonce: 0,
         hears: 0,
         flags,
-    })
+    }
 }
 
 pub(crate) fn mission_id(offer: &Offer) -> (u16, u16) {
@@ -99,15 +103,19 @@ fn a_newer_mission_is_held_told_and_offered_on_and_a_view_called_for() {
         let form = if side == 0 { FORMS } else { 0 };
         // No message has come from the other side yet.
         let answer = hello(base, from, mission_id(&newer), FRESH | form);
-        let answer = long([5, 4][side], hearing(1, answer));
-        let mut now = vec![(from, answer)];
-        if side == 1 {
-            // The one before has not said that it holds it.
-            now.push((3, Said::Offer(newer)));
-        }
+        let answer = long(1, hearing(1, answer));
+        // The other one has said no hello that an offer could answer: it is asked for one.
+        let other = [5, 3][side];
+        let form = if side == 1 { FORMS } else { 0 };
+        let asks = hello(base, other, mission_id(&newer), ASKS | FRESH | form);
+        let now = vec![(from, answer), (other, long(1, asks))];
         let call = hello(base, 3, mission_id(&newer), ASKS | FORMS | FRESH);
-        let call = long(5, hearing([1, 0][side], call));
+        let call = long(1, hearing([1, 0][side], call));
         assert_eq!(both(&mut relay), [now, vec![(3, call)]]);
+        // It has not said that it holds it.
+        let older = hello(base, 4, (base, 0), 0);
+        peers[1 - side].says(&mut relay, NOW, &older);
+        assert_eq!(said(&mut relay, NOW), [(other, Said::Offer(newer))]);
         assert_eq!(relay.stats().rejected(), 0);
     }
 }
@@ -132,7 +140,7 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
         ..upload(3, base)
     };
     // What cannot be held is not answered: it would only be offered again.
-    let answer = long(4, hello(base, 5, mission_id(&newer), FRESH));
+    let answer = long(1, hello(base, 5, mission_id(&newer), FRESH));
     let answer = || vec![(5, hearing(1, answer.clone()))];
     for (other, answer) in [
         (newer, answer()),
@@ -180,7 +188,7 @@ fn a_hello_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_h
     peers[0].says(&mut relay, NOW, &Said::Offer(own));
     both(&mut relay);
     let (digest, version) = mission_id(&own);
-    let answer = long(4, hearing(1, hello(base, 5, mission_id(&own), FRESH)));
+    let answer = long(1, hearing(1, hello(base, 5, mission_id(&own), FRESH)));
     for (holds, expected) in [
         ((base, 0), Some(Said::Offer(own))),
         ((digest - 1, version), Some(Said::Offer(own))),
@@ -225,7 +233,7 @@ fn a_proposal_of_another_mission_than_the_one_held_leads_to_a_hello() {
         let (was, is) = (before, after.stats());
         let raised = (is.view - was.view, is.mission - was.mission);
         assert_eq!(raised, (1, 0), "{proposal:?}");
-        let answer = long(5, hello(base, 3, (base, 0), ASKS | FRESH | FLIES));
+        let answer = long(1, hello(base, 3, (base, 0), ASKS | FRESH | FLIES));
         assert_eq!(said(&mut after, NOW), [(3, hearing(1, answer))]);
         assert_eq!(after.stats().received, before.received + 1);
     }
@@ -242,6 +250,14 @@ fn the_node_after_is_offered_the_mission_before_the_proposal() {
     both(&mut relay);
     let proposal = |place| forming(11, 1, mission_id(&newer), place);
     peers[0].says(&mut relay, NOW, &proposal(3));
+    // It has said no hello that an offer could answer: it is asked for one. The relay is fresh no more, since it takes part in a proposal.
+    let asks = Greeting {
+        newest: id(1, 1),
+        behind: 4,
+        ..greeting(base, 5, mission_id(&newer), ASKS)
+    };
+    assert_eq!(said(&mut relay, NOW), [(5, Said::Hello(asks))]);
+    peers[1].says(&mut relay, NOW, &hello(base, 4, (base, 0), 0));
     assert_eq!(said(&mut relay, NOW), [(5, Said::Offer(newer))]);
     // It is not repeated at once: a hello shows whether it has arrived.
     peers[1].says(&mut relay, NOW, &hello(base, 4, mission_id(&newer), 0));
@@ -396,7 +412,7 @@ fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
         } else {
             (base, 0)
         };
-        let answer = long(5, hearing(1, hello(base, 3, holds, FRESH | FLIES)));
+        let answer = long(1, hearing(1, hello(base, 3, holds, FRESH | FLIES)));
         assert_eq!(said(&mut relay, NOW), [(3, answer)]);
         assert_eq!((relay.version(), relay.view()), (holds.1, ViewId::LOADED));
         let sweep = &one_of_each(FIRST, newer.digest())[0];
