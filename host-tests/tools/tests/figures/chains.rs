@@ -219,10 +219,10 @@ fn settling_costs_what_the_schedules_take() {
             9857.0
         };
         assert_eq!(row.number("step_sweeps"), tried);
-        // A message and an answer for each sweep between two relays; the heartbeats of the minutes that takes are few.
+        // A message and an answer for each sweep between two relays; in the hours that takes heartbeats are asked for all the while.
         let hops = relays - 1.0;
         let passes = 2.0 * hops * tried;
-        assert!((passes..=1.02 * passes).contains(&row.number("step_messages")));
+        assert!((passes..=1.5 * passes).contains(&row.number("step_messages")));
         assert_eq!(row.number("predicted_sweeps"), 1.0);
         assert_eq!(row.number("predicted_messages"), 2.0 * hops);
         assert!((2.0..=6.0).contains(&row.number("bracketed_sweeps")));
