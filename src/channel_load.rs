@@ -146,7 +146,11 @@ mod tests {
             load.hop_time(108_000, latency).as_micros()
         });
         // 120 bytes of ten bits each; without `auth` a sweep is shorter by its tag.
-        let frame = if cfg!(feature = "auth") { 10_000 } else { 9_260 };
+        let frame = if cfg!(feature = "auth") {
+            10_000
+        } else {
+            9_260
+        };
         let expected = [1, 1, 2, 3, 4].map(|times| 3_000 + times * frame);
         assert_eq!(times, expected);
     }
