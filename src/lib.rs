@@ -8,6 +8,8 @@ mod channel_load;
 pub mod docs;
 mod event;
 pub mod field;
+#[cfg(feature = "flight")]
+pub mod flight;
 #[cfg(feature = "upload")]
 pub mod ground;
 pub mod guard;

@@ -1,0 +1,224 @@
+//! Places along a line on earth, held against geodesics.
+
+use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Deserialize;
+use uav_relay::flight::axis::Axis;
+use uav_relay::flight::geodetic::Geodetic;
+
+/// How far x or y may be off, by the length of the line, m.
+const ALLOWED: [(f64, f64); 3] = [(1e3, 1e-3), (1e4, 1e-3), (1e5, 5e-3)];
+
+/// Lines of each length.
+const LINES: usize = 10_000;
+
+/// A point beside a line, and where it is along it.
+#[derive(Deserialize)]
+struct Beside {
+    tx_lat: i32,
+    tx_lon: i32,
+    rx_lat: i32,
+    rx_lon: i32,
+    lat: i32,
+    lon: i32,
+    distance_m: f64,
+    x_m: f64,
+    y_m: f64,
+}
+
+const fn ground(lat_e7: i32, lon_e7: i32) -> Geodetic {
+    Geodetic {
+        lat_e7,
+        lon_e7,
+        amsl_mm: 0,
+    }
+}
+
+impl Beside {
+    fn axis(&self) -> Axis {
+        let (tx, rx) = (
+            ground(self.tx_lat, self.tx_lon),
+            ground(self.rx_lat, self.rx_lon),
+        );
+        Axis::try_new(tx, rx).unwrap()
+    }
+
+    /// How far off D, x and y are, m, less what f32 rounds of a place.
+    fn off(&self) -> [f64; 3] {
+        let axis = self.axis();
+        let place = axis.place(ground(self.lat, self.lon)).unwrap();
+        let rounded = |value: f32| f64::from(value).abs() * f64::from(f32::EPSILON) / 2.0;
+        let off = |value: f32, is: f64| (f64::from(value) - is).abs() - rounded(value);
+        [
+            (axis.distance_m() - self.distance_m).abs(),
+            off(place.x_m, self.x_m),
+            off(place.y_m, self.y_m),
+        ]
+    }
+}
+
+/// The library that the points are from, and a port of it that is quick enough for all the lines.
+struct Line {
+    earth: Geodesic,
+    tx: [f64; 2],
+    azimuth: f64,
+}
+
+impl Line {
+    /// The point that far along it, and the direction of the line there.
+    fn at(&self, x: f64) -> [f64; 3] {
+        let (lat, lon, azimuth): (f64, f64, f64) =
+            self.earth.direct(self.tx[0], self.tx[1], self.azimuth, x);
+        [lat, lon, azimuth]
+    }
+
+    /// How far along the line its foot is, and how far beside it the point is.
+    fn foot(&self, lat: f64, lon: f64, mut x: f64) -> [f64; 2] {
+        let mut y = 0.0;
+        for _ in 0..20 {
+            let [at_lat, at_lon, azimuth] = self.at(x);
+            let (s, azi, _, _): (f64, f64, f64, f64) = self.earth.inverse(at_lat, at_lon, lat, lon);
+            let (sin, cos) = (azi - azimuth).to_radians().sin_cos();
+            y = s * sin;
+            x += s * cos;
+            if (s * cos).abs() < 1e-9 {
+                break;
+            }
+        }
+        [x, y]
+    }
+}
+
+fn unit(degrees: f64) -> i32 {
+    (degrees * 1e7).round() as i32
+}
+
+fn around(degrees: f64) -> f64 {
+    (degrees + 180.0).rem_euclid(360.0) - 180.0
+}
+
+/// A line of that length anywhere on earth, and a point up to 500 m beside it.
+fn beside(rng: &mut ChaCha8Rng, length: f64) -> Beside {
+    let earth = Geodesic::wgs84();
+    let degrees = |unit: i32| f64::from(unit) / 1e7;
+    let tx = [
+        unit(rng.random_range(-89.9..89.9)),
+        unit(rng.random_range(-180.0..180.0)),
+    ];
+    let heading = rng.random_range(0.0..360.0);
+    let (lat, lon): (f64, f64) = earth.direct(degrees(tx[0]), degrees(tx[1]), heading, length);
+    let rx = [unit(lat), unit(around(lon))];
+    let [tx_lat, tx_lon, rx_lat, rx_lon] = [tx[0], tx[1], rx[0], rx[1]].map(degrees);
+    let (distance_m, azimuth, _, _): (f64, f64, f64, f64) =
+        earth.inverse(tx_lat, tx_lon, rx_lat, rx_lon);
+    let line = Line {
+        earth,
+        tx: [tx_lat, tx_lon],
+        azimuth,
+    };
+    let (x, y) = (
+        rng.random_range(0.0..length),
+        rng.random_range(-500.0..500.0),
+    );
+    let [lat, lon, along] = line.at(x);
+    let (lat, lon): (f64, f64) = line.earth.direct(lat, lon, along + 90.0, y);
+    let point = [unit(lat), unit(around(lon))];
+    let [x_m, y_m] = line.foot(degrees(point[0]), degrees(point[1]), x);
+    Beside {
+        tx_lat: tx[0],
+        tx_lon: tx[1],
+        rx_lat: rx[0],
+        rx_lon: rx[1],
+        lat: point[0],
+        lon: point[1],
+        distance_m,
+        x_m,
+        y_m,
+    }
+}
+
+/// Every point of `points.csv` is where GeographicLib says; as far as the port of it says the same, it may judge the rest.
+#[test]
+fn the_points_that_geographiclib_made() {
+    let mut reader = csv::Reader::from_reader(&include_bytes!("points.csv")[..]);
+    let points: Vec<Beside> = reader.deserialize().map(Result::unwrap).collect();
+    assert_eq!(points.len(), 300);
+    let degrees = |unit: i32| f64::from(unit) / 1e7;
+    for point in points {
+        let earth = Geodesic::wgs84();
+        let [tx_lat, tx_lon, rx_lat, rx_lon] =
+            [point.tx_lat, point.tx_lon, point.rx_lat, point.rx_lon].map(degrees);
+        let (distance_m, azimuth, _, _): (f64, f64, f64, f64) =
+            earth.inverse(tx_lat, tx_lon, rx_lat, rx_lon);
+        let line = Line {
+            earth,
+            tx: [tx_lat, tx_lon],
+            azimuth,
+        };
+        let [x, y] = line.foot(degrees(point.lat), degrees(point.lon), point.x_m);
+        for (is, said) in [
+            (distance_m, point.distance_m),
+            (x, point.x_m),
+            (y, point.y_m),
+        ] {
+            assert!((is - said).abs() < 2e-6, "{is} m, said are {said}");
+        }
+        let allowed = if distance_m < 5e4 { 1e-3 } else { 5e-3 };
+        let off = point.off();
+        assert!(off.iter().all(|off| *off <= allowed), "{off:?}");
+    }
+}
+
+#[test]
+fn places_agree_with_geodesics() {
+    for (length, allowed) in ALLOWED {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut worst = [0.0_f64; 3];
+        for _ in 0..LINES {
+            for (worst, off) in worst.iter_mut().zip(beside(&mut rng, length).off()) {
+                *worst = worst.max(off);
+            }
+        }
+        let [d, x, y] = worst.map(|off| off * 1e3);
+        println!(
+            "{:>3} km: D within {d:.3} mm, x {x:.3} mm, y {y:.3} mm",
+            length / 1e3
+        );
+        assert!(
+            worst.iter().all(|off| *off <= allowed),
+            "{length} m: {worst:?}"
+        );
+    }
+}
+
+#[test]
+fn there_and_back_is_within_one_unit() {
+    for (length, _) in ALLOWED {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        for _ in 0..LINES {
+            let point = beside(&mut rng, length);
+            let from = Geodetic {
+                amsl_mm: rng.random_range(-100_000..3_000_000),
+                ..ground(point.lat, point.lon)
+            };
+            let axis = point.axis();
+            let place = axis.place(from).unwrap();
+            let back = axis.point(place).unwrap();
+            // A place is f32: what it rounds of x is that many units.
+            let rounded = f64::from(place.x_m.abs()) * f64::from(f32::EPSILON) / 2.0 / 0.0111;
+            let shrunk = f64::from(from.lat_e7).mul_add(1e-7, 0.0).to_radians().cos();
+            let lon = (i64::from(back.lon_e7) - i64::from(from.lon_e7)).rem_euclid(3_600_000_000);
+            let lon = lon.min(3_600_000_000 - lon) as f64 * shrunk;
+            let lat = f64::from(back.lat_e7.abs_diff(from.lat_e7));
+            assert!(
+                lat <= 1.0 + rounded && lon <= 1.0 + rounded,
+                "{from:?} became {back:?}, over {length} m"
+            );
+            assert!(
+                back.amsl_mm.abs_diff(from.amsl_mm) <= 1,
+                "{from:?} became {back:?}"
+            );
+        }
+    }
+}

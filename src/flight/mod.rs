@@ -1,0 +1,9 @@
+//! From the agreed place to a flying drone: sites on earth, and the autopilot.
+//!
+//! | module | one idea |
+//! | --- | --- |
+//! | [`geodetic`] | a point on earth, in the integers that autopilots speak |
+//! | [`axis`] | the line from transmitter to receiver on earth, and places along it |
+
+pub mod axis;
+pub mod geodetic;
