@@ -2,3 +2,5 @@
 
 pub mod firmware;
 pub mod fixtures;
+#[cfg(target_os = "linux")]
+pub mod python;

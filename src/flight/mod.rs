@@ -4,6 +4,8 @@
 //! | --- | --- |
 //! | [`geodetic`] | a point on earth, in the integers that autopilots speak |
 //! | [`axis`] | the line from transmitter to receiver on earth, and places along it |
+//! | [`mavlink`] | the bytes that autopilots speak |
 
 pub mod axis;
 pub mod geodetic;
+pub mod mavlink;

@@ -1,0 +1,244 @@
+//! What a companion says, read by others.
+
+use host_tests::python;
+use mavlink::dialects::common::MavMessage;
+use mavlink::{MavlinkReader, MavlinkVersion};
+use serde_json::Value;
+use uav_relay::flight::geodetic::Geodetic;
+use uav_relay::flight::mavlink::outgoing::{Outgoing, severity};
+
+use super::*;
+
+/// So many messages of every kind.
+const EACH: usize = 200;
+
+fn messages() -> Vec<Outgoing<'static>> {
+    let mut rng = rng(1);
+    let mut all = vec![Outgoing::Heartbeat];
+    for _ in 0..EACH {
+        all.push(Outgoing::SetMessageInterval {
+            id: rng.random_range(0..1000),
+            interval_us: rng.random_range(0..10_000_000),
+        });
+        all.push(Outgoing::SetPosition {
+            boot_ms: rng.random(),
+            at: Geodetic {
+                lat_e7: rng.random_range(-900_000_000..=900_000_000),
+                lon_e7: rng.random_range(-1_800_000_000..=1_800_000_000),
+                amsl_mm: rng.random_range(-500_000..9_000_000),
+            },
+            velocity_m_s: rng
+                .random_bool(0.5)
+                .then(|| [0; 3].map(|_| rng.random_range(-20.0..20.0))),
+            yaw_rad: rng.random_bool(0.5).then(|| rng.random_range(-3.2..3.2)),
+        });
+        all.push(Outgoing::NamedValue {
+            boot_ms: rng.random(),
+            name: ["sir", "x", "exactlyten", "more than ten"][rng.random_range(0..4)],
+            value: rng.random_range(-1e6..1e6),
+        });
+        all.push(Outgoing::StatusText {
+            severity: [severity::WARNING, severity::INFO][rng.random_range(0..2)],
+            text: [
+                "relay: in its place",
+                "",
+                "fifty bytes are as many as fit, and this is longer than that",
+            ][rng.random_range(0..3)],
+        });
+    }
+    all
+}
+
+fn framed() -> Vec<(Outgoing<'static>, u8, Vec<u8>)> {
+    let numbered = messages().into_iter().zip((0..=u8::MAX).cycle());
+    numbered
+        .map(|(message, number)| {
+            let bytes = message.encode(COMPANION, AUTOPILOT, number);
+            (message, number, bytes.to_vec())
+        })
+        .collect()
+}
+
+/// What fits of a text.
+fn cut(text: &str, most: usize) -> &str {
+    &text[..text.len().min(most)]
+}
+
+fn mask(velocity: bool, yaw: bool) -> u16 {
+    match (velocity, yaw) {
+        (false, false) => 0x0DF8,
+        (false, true) => 0x09F8,
+        (true, false) => 0x0DC0,
+        (true, true) => 0x09C0,
+    }
+}
+
+#[test]
+fn pymavlink_reads_every_field_of_what_is_said() {
+    let framed = framed();
+    let input: String = framed
+        .iter()
+        .map(|(_, _, bytes)| hex(bytes) + "\n")
+        .collect();
+    let said = python::output(peer(), &["read"], &input);
+    assert_eq!(said.lines().count(), framed.len());
+    for ((message, number, _), line) in framed.iter().zip(said.lines()) {
+        let fields: Value = serde_json::from_str(line).unwrap();
+        let integer = |name: &str| {
+            fields[name]
+                .as_i64()
+                .unwrap_or_else(|| panic!("{name}: {line}"))
+        };
+        let float = |name: &str| fields[name].as_f64().unwrap() as f32;
+        assert_eq!(integer("system"), 7);
+        assert_eq!(integer("component"), 191);
+        assert_eq!(integer("sequence"), i64::from(*number));
+        let kind = fields["mavpackettype"].as_str().unwrap();
+        match *message {
+            Outgoing::Heartbeat => {
+                assert_eq!(kind, "HEARTBEAT");
+                let said = [
+                    "type",
+                    "autopilot",
+                    "base_mode",
+                    "custom_mode",
+                    "system_status",
+                    "mavlink_version",
+                ]
+                .map(integer);
+                assert_eq!(said, [18, 8, 0, 0, 4, 3]);
+            }
+            Outgoing::SetMessageInterval { id, interval_us } => {
+                assert_eq!(kind, "COMMAND_LONG");
+                let said = [
+                    "command",
+                    "target_system",
+                    "target_component",
+                    "confirmation",
+                ]
+                .map(integer);
+                assert_eq!(said, [511, 7, 1, 0]);
+                let said = [1, 2, 3, 4, 5, 6, 7].map(|i| float(&format!("param{i}")));
+                assert_eq!(
+                    said,
+                    [id as f32, interval_us as f32, 0.0, 0.0, 0.0, 0.0, 0.0]
+                );
+            }
+            Outgoing::SetPosition {
+                boot_ms,
+                at,
+                velocity_m_s,
+                yaw_rad,
+            } => {
+                assert_eq!(kind, "SET_POSITION_TARGET_GLOBAL_INT");
+                let said = [
+                    "time_boot_ms",
+                    "lat_int",
+                    "lon_int",
+                    "coordinate_frame",
+                    "target_system",
+                    "target_component",
+                ]
+                .map(integer);
+                let is = [
+                    i64::from(boot_ms),
+                    at.lat_e7.into(),
+                    at.lon_e7.into(),
+                    5,
+                    7,
+                    1,
+                ];
+                assert_eq!(said, is);
+                let mask = mask(velocity_m_s.is_some(), yaw_rad.is_some());
+                assert_eq!(integer("type_mask"), i64::from(mask));
+                assert!((float("alt") - at.amsl_mm as f32 / 1e3).abs() < 1e-6);
+                assert_eq!(
+                    ["vx", "vy", "vz"].map(float),
+                    velocity_m_s.unwrap_or_default()
+                );
+                assert_eq!(["afx", "afy", "afz", "yaw_rate"].map(float), [0.0; 4]);
+                assert_eq!(float("yaw"), yaw_rad.unwrap_or_default());
+            }
+            Outgoing::StatusText { severity, text } => {
+                assert_eq!(kind, "STATUSTEXT");
+                assert_eq!(integer("severity"), i64::from(severity));
+                assert_eq!(fields["text"].as_str().unwrap(), cut(text, 50));
+            }
+            Outgoing::NamedValue {
+                boot_ms,
+                name,
+                value,
+            } => {
+                assert_eq!(kind, "NAMED_VALUE_FLOAT");
+                assert_eq!(integer("time_boot_ms"), i64::from(boot_ms));
+                assert_eq!(fields["name"].as_str().unwrap(), cut(name, 10));
+                assert_eq!(float("value"), value);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_mavlink_crate_reads_every_field_of_what_is_said() {
+    for (message, number, bytes) in framed() {
+        let mut reader = MavlinkReader::new(&bytes[..]);
+        let (header, read) = reader
+            .read_message::<MavMessage>(MavlinkVersion::V2)
+            .unwrap();
+        assert_eq!(
+            (header.system_id, header.component_id, header.sequence),
+            (7, 191, number)
+        );
+        match (message, read) {
+            (Outgoing::Heartbeat, MavMessage::HEARTBEAT(said)) => {
+                assert_eq!((said.mavtype as u32, said.autopilot as u32), (18, 8));
+                assert_eq!((said.custom_mode, said.mavlink_version), (0, 3));
+            }
+            (Outgoing::SetMessageInterval { id, interval_us }, MavMessage::COMMAND_LONG(said)) => {
+                assert_eq!(said.command as u32, 511);
+                assert_eq!((said.target_system, said.target_component), (7, 1));
+                assert_eq!((said.param1, said.param2), (id as f32, interval_us as f32));
+            }
+            (
+                Outgoing::SetPosition {
+                    boot_ms,
+                    at,
+                    velocity_m_s,
+                    yaw_rad,
+                },
+                MavMessage::SET_POSITION_TARGET_GLOBAL_INT(said),
+            ) => {
+                assert_eq!(
+                    (said.time_boot_ms, said.lat_int, said.lon_int),
+                    (boot_ms, at.lat_e7, at.lon_e7)
+                );
+                assert_eq!(said.alt, at.amsl_mm as f32 / 1e3);
+                assert_eq!(
+                    [said.vx, said.vy, said.vz],
+                    velocity_m_s.unwrap_or_default()
+                );
+                assert_eq!(said.yaw, yaw_rad.unwrap_or_default());
+                let mask = mask(velocity_m_s.is_some(), yaw_rad.is_some());
+                assert_eq!(said.type_mask.bits(), mask);
+                assert_eq!(said.coordinate_frame as u32, 5);
+                assert_eq!((said.target_system, said.target_component), (7, 1));
+            }
+            (Outgoing::StatusText { severity, text }, MavMessage::STATUSTEXT(said)) => {
+                assert_eq!(said.severity as u32, u32::from(severity));
+                assert_eq!(said.text.to_str().unwrap(), cut(text, 50));
+            }
+            (
+                Outgoing::NamedValue {
+                    boot_ms,
+                    name,
+                    value,
+                },
+                MavMessage::NAMED_VALUE_FLOAT(said),
+            ) => {
+                assert_eq!((said.time_boot_ms, said.value), (boot_ms, value));
+                assert_eq!(said.name.to_str().unwrap(), cut(name, 10));
+            }
+            (message, read) => panic!("{message:?} was read as {read:?}"),
+        }
+    }
+}

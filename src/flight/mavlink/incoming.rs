@@ -1,0 +1,154 @@
+//! What an autopilot says, of that what a companion needs.
+
+use super::frame::MAX_PAYLOAD;
+use super::table::id;
+
+/// The payload of a message, with the zeros at its end that are not sent.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Payload<'a>(pub(super) &'a [u8]);
+
+impl Payload<'_> {
+    fn bytes<const N: usize>(self, at: usize) -> [u8; N] {
+        core::array::from_fn(|i| self.0.get(at + i).copied().unwrap_or(0))
+    }
+
+    fn u8(self, at: usize) -> u8 {
+        self.bytes::<1>(at)[0]
+    }
+
+    fn i16(self, at: usize) -> i16 {
+        i16::from_le_bytes(self.bytes(at))
+    }
+
+    fn u16(self, at: usize) -> u16 {
+        u16::from_le_bytes(self.bytes(at))
+    }
+
+    fn i32(self, at: usize) -> i32 {
+        i32::from_le_bytes(self.bytes(at))
+    }
+
+    fn u32(self, at: usize) -> u32 {
+        u32::from_le_bytes(self.bytes(at))
+    }
+
+    fn f32(self, at: usize) -> f32 {
+        f32::from_le_bytes(self.bytes(at))
+    }
+}
+
+const _: () = assert!(MAX_PAYLOAD <= u8::MAX as usize, "what a length says");
+
+/// A message, in the units and frames of the wire. Numbers of enums are as they came.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Incoming {
+    /// HEARTBEAT.
+    Heartbeat {
+        /// `MAV_TYPE`.
+        kind: u8,
+        /// `MAV_AUTOPILOT`: 3 is ArduPilot, 12 PX4.
+        autopilot: u8,
+        /// `MAV_MODE_FLAG`: bit 7 is armed.
+        base_mode: u8,
+        /// The mode, as the autopilot numbers it.
+        custom_mode: u32,
+        /// `MAV_STATE`.
+        status: u8,
+    },
+    /// GLOBAL_POSITION_INT.
+    GlobalPosition {
+        /// When it was there, ms since the autopilot began.
+        boot_ms: u32,
+        /// 10⁻⁷ degrees.
+        lat_e7: i32,
+        /// 10⁻⁷ degrees.
+        lon_e7: i32,
+        /// Above the mean sea level, mm.
+        amsl_mm: i32,
+        /// Toward north, east and down, cm/s.
+        velocity_cm_s: [i16; 3],
+    },
+    /// EXTENDED_SYS_STATE.
+    ExtendedSysState {
+        /// `MAV_LANDED_STATE`: 1 on the ground, 2 in the air, 3 taking off, 4 landing.
+        landed_state: u8,
+    },
+    /// POSITION_TARGET_LOCAL_NED: of it, what kind of target is flown to.
+    PositionTargetLocal {
+        /// Bits of what is left out.
+        type_mask: u16,
+    },
+    /// POSITION_TARGET_GLOBAL_INT.
+    PositionTargetGlobal {
+        /// 10⁻⁷ degrees.
+        lat_e7: i32,
+        /// 10⁻⁷ degrees.
+        lon_e7: i32,
+        /// m, in that frame.
+        altitude_m: f32,
+        /// Bits of what is left out.
+        type_mask: u16,
+        /// `MAV_FRAME`: 5 is above the mean sea level.
+        frame: u8,
+    },
+    /// COMMAND_ACK.
+    CommandAck {
+        /// Which command.
+        command: u16,
+        /// `MAV_RESULT`: 0 accepted.
+        result: u8,
+    },
+    /// RADIO_STATUS, of a SiK radio: dBm are v / 1.9 - 127, 255 is unknown.
+    RadioStatus {
+        /// What was heard at the last frame.
+        rssi: u8,
+        /// What is heard between frames.
+        noise: u8,
+    },
+}
+
+impl Incoming {
+    /// The message of that number; `None` for one that says a companion nothing.
+    pub(super) fn read(id: u32, payload: Payload<'_>) -> Option<Self> {
+        Some(match id {
+            id::HEARTBEAT => Self::Heartbeat {
+                custom_mode: payload.u32(0),
+                kind: payload.u8(4),
+                autopilot: payload.u8(5),
+                base_mode: payload.u8(6),
+                status: payload.u8(7),
+            },
+            id::GLOBAL_POSITION_INT => Self::GlobalPosition {
+                boot_ms: payload.u32(0),
+                lat_e7: payload.i32(4),
+                lon_e7: payload.i32(8),
+                amsl_mm: payload.i32(12),
+                velocity_cm_s: [20, 22, 24].map(|at| payload.i16(at)),
+            },
+            id::EXTENDED_SYS_STATE => Self::ExtendedSysState {
+                landed_state: payload.u8(1),
+            },
+            id::POSITION_TARGET_LOCAL_NED => Self::PositionTargetLocal {
+                type_mask: payload.u16(48),
+            },
+            id::POSITION_TARGET_GLOBAL_INT => Self::PositionTargetGlobal {
+                lat_e7: payload.i32(4),
+                lon_e7: payload.i32(8),
+                altitude_m: payload.f32(12),
+                type_mask: payload.u16(48),
+                frame: payload.u8(50),
+            },
+            id::COMMAND_ACK => Self::CommandAck {
+                command: payload.u16(0),
+                result: payload.u8(2),
+            },
+            id::RADIO_STATUS => Self::RadioStatus {
+                rssi: payload.u8(4),
+                noise: payload.u8(7),
+            },
+            _ => return None,
+        })
+    }
+}

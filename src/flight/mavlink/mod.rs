@@ -1,0 +1,18 @@
+//! MAVLink 2, as far as a companion needs it: by a table of messages, numbers instead of enums, nothing that can panic.
+//!
+//! | module | one idea |
+//! | --- | --- |
+//! | [`table`] | the messages that are known: number, CRC seed, length |
+//! | [`frame`] | what stands around a payload, and the checksum |
+//! | [`parser`] | frames out of a stream of bytes |
+//! | [`incoming`] | what an autopilot says |
+//! | [`outgoing`] | what a companion says |
+//!
+//! A number that no enum has, and a message that the table has not, cost nothing but their bytes. MAVLink 1 is not read; an autopilot
+//! that begins with it changes to MAVLink 2 as soon as it has heard a frame of that.
+
+pub mod frame;
+pub mod incoming;
+pub mod outgoing;
+pub mod parser;
+pub mod table;

@@ -1,0 +1,205 @@
+//! What a companion says.
+
+use heapless::Vec;
+
+use super::frame::{Address, CHECKSUM, HEADER, MAGIC, checksum};
+use super::table::{self, id};
+use crate::flight::geodetic::Geodetic;
+
+/// The longest payload of what is said.
+const LONGEST: usize = 54;
+
+/// A frame to send.
+pub type FrameBytes = Vec<u8, { HEADER + LONGEST + CHECKSUM }>;
+
+/// Severities of [`Outgoing::StatusText`], `MAV_SEVERITY`.
+pub mod severity {
+    /// Something is wrong that the flight goes on with.
+    pub const WARNING: u8 = 4;
+    /// Something an operator wants to know.
+    pub const INFO: u8 = 6;
+}
+
+/// A message, in the units and frames of the wire.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Outgoing<'a> {
+    /// HEARTBEAT of an onboard computer that is active.
+    Heartbeat,
+    /// COMMAND_LONG 511, SET_MESSAGE_INTERVAL: have a message sent that often.
+    SetMessageInterval {
+        /// Which message.
+        id: u32,
+        /// µs from one to the next.
+        interval_us: u32,
+    },
+    /// SET_POSITION_TARGET_GLOBAL_INT, above the mean sea level (frame 5).
+    SetPosition {
+        /// Since the companion began, ms.
+        boot_ms: u32,
+        /// Where to.
+        at: Geodetic,
+        /// Toward north, east and down, m/s: with it the autopilot follows a target that moves, without it it stops there.
+        velocity_m_s: Option<[f32; 3]>,
+        /// Which way to look, radians clockwise from north.
+        yaw_rad: Option<f32>,
+    },
+    /// STATUSTEXT of at most 50 bytes; what is longer is cut.
+    StatusText {
+        /// See [`severity`].
+        severity: u8,
+        /// The line.
+        text: &'a str,
+    },
+    /// NAMED_VALUE_FLOAT.
+    NamedValue {
+        /// Since the companion began, ms.
+        boot_ms: u32,
+        /// At most ten bytes; what is longer is cut.
+        name: &'a str,
+        /// The number.
+        value: f32,
+    },
+}
+
+/// `type_mask` of a target: what is left out of position (0 to 2), velocity (3 to 5), acceleration (6 to 8), yaw (10), its rate (11).
+mod mask {
+    pub(super) const VELOCITY: u16 = 0b11_1000;
+    pub(super) const ACCELERATION: u16 = 0b1_1100_0000;
+    pub(super) const YAW: u16 = 1 << 10;
+    pub(super) const YAW_RATE: u16 = 1 << 11;
+}
+
+/// `MAV_FRAME_GLOBAL_INT`: latitude, longitude, and altitude above the mean sea level.
+const FRAME_AMSL: u8 = 5;
+
+/// MAV_CMD_SET_MESSAGE_INTERVAL.
+const SET_MESSAGE_INTERVAL: u16 = 511;
+
+impl Outgoing<'_> {
+    const fn id(&self) -> u32 {
+        match self {
+            Self::Heartbeat => id::HEARTBEAT,
+            Self::SetMessageInterval { .. } => id::COMMAND_LONG,
+            Self::SetPosition { .. } => id::SET_POSITION_TARGET_GLOBAL_INT,
+            Self::StatusText { .. } => id::STATUSTEXT,
+            Self::NamedValue { .. } => id::NAMED_VALUE_FLOAT,
+        }
+    }
+
+    /// The frame that says it, the `sequence`-th of that sender, to the autopilot `to` where the message names one. Constant work.
+    pub fn encode(&self, from: Address, to: Address, sequence: u8) -> FrameBytes {
+        let mut writer = Writer(FrameBytes::new());
+        let [a, b, c, _] = self.id().to_le_bytes();
+        let Address { system, component } = from;
+        writer.bytes(&[MAGIC, 0, 0, 0, sequence, system, component, a, b, c]);
+        self.write(&mut writer, to);
+        let mut frame = writer.0;
+        while frame.len() > HEADER + 1 && frame.last() == Some(&0) {
+            frame.pop();
+        }
+        let length = frame.len() - HEADER;
+        if let (Some(byte), Ok(length)) = (frame.get_mut(1), u8::try_from(length)) {
+            *byte = length;
+        }
+        if let (Some(known), Some(covered)) = (table::find(self.id()), frame.get(1..)) {
+            let checksum = checksum(covered, known);
+            let mut writer = Writer(frame);
+            writer.bytes(&checksum.to_le_bytes());
+            frame = writer.0;
+        }
+        frame
+    }
+
+    fn write(&self, to_frame: &mut Writer, to: Address) {
+        match *self {
+            Self::Heartbeat => {
+                // An onboard controller (18), no autopilot (8), no flags, active (4), of MAVLink's third version.
+                to_frame.bytes(&[0, 0, 0, 0, 18, 8, 0, 4, 3]);
+            }
+            Self::SetMessageInterval { id, interval_us } => {
+                #[expect(
+                    clippy::cast_precision_loss,
+                    reason = "numbers and intervals are small"
+                )]
+                let parameters = [id as f32, interval_us as f32];
+                for parameter in parameters {
+                    to_frame.bytes(&parameter.to_le_bytes());
+                }
+                to_frame.bytes(&[0; 20]);
+                to_frame.bytes(&SET_MESSAGE_INTERVAL.to_le_bytes());
+                to_frame.bytes(&[to.system, to.component, 0]);
+            }
+            Self::SetPosition {
+                boot_ms,
+                at,
+                velocity_m_s,
+                yaw_rad,
+            } => {
+                to_frame.bytes(&boot_ms.to_le_bytes());
+                to_frame.bytes(&at.lat_e7.to_le_bytes());
+                to_frame.bytes(&at.lon_e7.to_le_bytes());
+                #[expect(
+                    clippy::cast_precision_loss,
+                    reason = "the wire has an f32, a millimetre up to 16 km"
+                )]
+                let amsl_m = at.amsl_mm as f32 / 1e3;
+                to_frame.bytes(&amsl_m.to_le_bytes());
+                for part in velocity_m_s.unwrap_or_default() {
+                    to_frame.bytes(&part.to_le_bytes());
+                }
+                to_frame.bytes(&[0; 12]);
+                to_frame.bytes(&yaw_rad.unwrap_or_default().to_le_bytes());
+                to_frame.bytes(&[0; 4]);
+                let mut left_out = mask::ACCELERATION | mask::YAW_RATE;
+                if velocity_m_s.is_none() {
+                    left_out |= mask::VELOCITY;
+                }
+                if yaw_rad.is_none() {
+                    left_out |= mask::YAW;
+                }
+                to_frame.bytes(&left_out.to_le_bytes());
+                to_frame.bytes(&[to.system, to.component, FRAME_AMSL]);
+            }
+            Self::StatusText { severity, text } => {
+                to_frame.bytes(&[severity]);
+                to_frame.text::<50>(text);
+                to_frame.bytes(&[0; 3]);
+            }
+            Self::NamedValue {
+                boot_ms,
+                name,
+                value,
+            } => {
+                to_frame.bytes(&boot_ms.to_le_bytes());
+                to_frame.bytes(&value.to_le_bytes());
+                to_frame.text::<10>(name);
+            }
+        }
+    }
+}
+
+/// Never more than a frame holds: each message's fields are `LONGEST` bytes or fewer.
+struct Writer(FrameBytes);
+
+impl Writer {
+    fn bytes(&mut self, bytes: &[u8]) {
+        debug_assert!(self.0.len() + bytes.len() <= self.0.capacity());
+        for byte in bytes {
+            // Cannot fail.
+            let _ = self.0.push(*byte);
+        }
+    }
+
+    /// `N` bytes: what fits of `text`, and zeros. No character is cut in two.
+    fn text<const N: usize>(&mut self, text: &str) {
+        let mut end = text.len().min(N);
+        while !text.is_char_boundary(end) {
+            end = end.saturating_sub(1);
+        }
+        let text = text.as_bytes().get(..end).unwrap_or_default();
+        self.bytes(text);
+        for _ in text.len()..N {
+            self.bytes(&[0]);
+        }
+    }
+}
