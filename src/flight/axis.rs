@@ -202,6 +202,39 @@ impl Axis {
         })
     }
 
+    /// The azimuth of the line where it passes `x_m`, radians clockwise from north; of no meaning at a pole. Constant work.
+    pub fn azimuth_rad(&self, x_m: f32) -> f32 {
+        let [north, east] = self.direction(x_m);
+        narrow(libm::atan2(east, north))
+    }
+
+    /// A velocity along x, y and h at `x_m` as one toward north, east and down; all in m/s. Constant work.
+    pub fn to_ned(&self, x_m: f32, velocity_m_s: [f32; 3]) -> [f32; 3] {
+        let [x, y, h] = velocity_m_s.map(f64::from);
+        let [north, east] = self.direction(x_m);
+        let [tx, rx] = self.ends_amsl_m;
+        let climb = h + x * (rx - tx) / self.distance_m;
+        [x * north - y * east, x * east + y * north, -climb].map(narrow)
+    }
+
+    /// How much of the line's direction where it passes `x_m` is north, and how much east.
+    fn direction(&self, x_m: f32) -> [f64; 2] {
+        // The tangent turns with the earth: c / r is how far.
+        let c = chord(f64::from(x_m) - self.distance_m / 2.0, self.radius_m);
+        let turn = c / self.radius_m;
+        let tangent = self.along.minus(self.up.times(turn));
+        let normal = self.up.plus(self.along.times(turn)).unit();
+        // North is what is left of the earth's axis in the ground plane; both are as long as the cosine of the latitude.
+        let north = tangent.dot(Vector::POLE.minus(normal.times(normal.z)));
+        let east = tangent.dot(Vector::POLE.cross(normal));
+        let length = libm::sqrt(north * north + east * east);
+        if length > 0.0 {
+            [north / length, east / length]
+        } else {
+            [1.0, 0.0]
+        }
+    }
+
     /// Whether a place is finite and near the line. NaN is not.
     fn is_around(&self, place: Placement) -> bool {
         let Placement {
@@ -262,6 +295,12 @@ struct Vector {
 }
 
 impl Vector {
+    const POLE: Self = Self {
+        x: 0.0,
+        y: 0.0,
+        z: 1.0,
+    };
+
     /// The point of that latitude and longitude at height 0.
     fn on_ellipsoid(point: Geodetic) -> Self {
         let (sin_lat, cos_lat) = libm::sincos(f64::from(point.lat_e7) * UNIT);
@@ -380,7 +419,7 @@ mod tests {
     fn height_is_above_the_line_from_ground_to_ground() {
         let axis =
             Axis::try_new(site(0.0, 179.99, 100.0), site(0.0, -179.99, 300.0)).expect("a line");
-        let middle = Placement::on_line(1113.194_9, 20.0);
+        let middle = Placement::on_line(1_113.195, 20.0);
         let point = axis.point(middle).expect("near");
         assert_eq!(point.lat_e7, 0);
         assert_eq!(
@@ -449,6 +488,32 @@ mod tests {
             None,
             "behind the earth"
         );
+    }
+
+    #[test]
+    fn the_azimuth_turns_along_the_line() {
+        let axis = Axis::try_new(site(60.0, 10.0, 0.0), site(60.0, 11.0, 0.0)).expect("a line");
+        #[expect(clippy::cast_possible_truncation, reason = "missions are f32")]
+        let d = axis.distance_m() as f32;
+        // Eastward in the middle; meridians converge by 0.866 degrees from one end to the other.
+        for (x, degrees) in [(0.0, 89.567), (d / 2.0, 90.0), (d, 90.433)] {
+            let azimuth = axis.azimuth_rad(x).to_degrees();
+            near(azimuth, degrees, 2e-3);
+        }
+    }
+
+    #[test]
+    fn velocities_turn_with_the_line() {
+        // Toward the south-east, 100 m up in all.
+        let axis = Axis::try_new(site(0.01, 10.0, 0.0), site(0.0, 10.01, 100.0)).expect("a line");
+        let [north, east, down] = axis.to_ned(800.0, [10.0, 0.0, 1.0]);
+        near(north, -7.05, 0.05);
+        near(east, 7.09, 0.05);
+        near(down, -1.0 - 10.0 * 100.0 / axis.distance_m(), 1e-3);
+        let [north, east, down] = axis.to_ned(800.0, [0.0, 10.0, 0.0]);
+        near(north, -7.09, 0.05);
+        near(east, -7.05, 0.05);
+        near(down, 0.0, 1e-6);
     }
 
     #[test]

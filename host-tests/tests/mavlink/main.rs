@@ -6,6 +6,7 @@ mod noise;
 mod ours;
 mod theirs;
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use rand::{RngExt, SeedableRng};
@@ -35,7 +36,10 @@ fn rng(seed: u64) -> ChaCha8Rng {
 }
 
 fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    bytes.iter().fold(String::new(), |mut line, byte| {
+        let _ = write!(line, "{byte:02x}");
+        line
+    })
 }
 
 fn unhex(line: &str) -> Vec<u8> {

@@ -1,0 +1,74 @@
+//! An ArduCopter: a target holds for good, and one too many makes it wobble.
+
+use super::vehicle::Mode;
+use super::*;
+
+fn flying() -> Vehicle {
+    let mut vehicle = Vehicle::new(Kind::ArduCopter);
+    vehicle.fly_off();
+    vehicle
+}
+
+#[test]
+fn nothing_is_streamed_while_the_pilot_flies() {
+    let mut vehicle = flying();
+    vehicle.setpoint = Some(place(500.0));
+    vehicle.run(5_000);
+    assert!(vehicle.targets().is_empty());
+    assert_eq!(vehicle.link.state(), State::Standby);
+}
+
+#[test]
+fn it_is_led_to_its_place_and_then_left_alone() {
+    let mut vehicle = flying();
+    vehicle.setpoint = Some(place(180.0));
+    vehicle.engage();
+    vehicle.run(30_000);
+    assert!((vehicle.place.x_m - 180.0).abs() < 0.05);
+    let last = vehicle.targets().last().unwrap().1;
+    assert_eq!(last.type_mask, 0x0DF8);
+    let from = vehicle.now;
+    vehicle.run(30_000);
+    assert_eq!(
+        vehicle.targets_since(from),
+        [],
+        "it has said where it flies to"
+    );
+    assert!(!vehicle.events.contains(&AutopilotEvent::Refused));
+}
+
+#[test]
+fn a_target_that_is_not_taken_is_told_again_and_then_an_event() {
+    let mut vehicle = flying();
+    vehicle.takes_targets = false;
+    vehicle.setpoint = Some(place(100.0));
+    vehicle.engage();
+    let from = vehicle.now;
+    vehicle.run(4_000);
+    assert!(
+        (3..=5).contains(&vehicle.targets_since(from).len()),
+        "once a second"
+    );
+    assert!(!vehicle.events.contains(&AutopilotEvent::Refused));
+    vehicle.run(4_000);
+    assert!(vehicle.events.contains(&AutopilotEvent::Refused));
+}
+
+#[test]
+fn back_in_its_mode_the_target_is_told_anew() {
+    let mut vehicle = flying();
+    vehicle.setpoint = Some(place(120.0));
+    vehicle.engage();
+    vehicle.run(20_000);
+    vehicle.mode = Mode::Position;
+    vehicle.run(3_000);
+    vehicle.place = place(110.0);
+    let from = vehicle.now;
+    vehicle.engage();
+    vehicle.run(20_000);
+    assert!(
+        !vehicle.targets_since(from).is_empty(),
+        "it does not resume the one of before"
+    );
+    assert!((vehicle.place.x_m - 120.0).abs() < 0.05);
+}

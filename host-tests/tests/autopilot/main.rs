@@ -1,0 +1,244 @@
+//! The link to an autopilot, against one that says what it is told to say, in frames of another codec.
+
+mod any;
+mod arducopter;
+mod px4;
+mod vehicle;
+
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::flight::autopilot::{AutopilotEvent, Kind};
+use uav_relay::{Instant, Placement};
+use vehicle::{Said, Vehicle, place};
+
+#[test]
+fn an_autopilot_is_found_and_asked_for_its_messages() {
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        let mut vehicle = Vehicle::new(kind);
+        vehicle.run(2_000);
+        assert_eq!(vehicle.events[0], AutopilotEvent::Found(kind));
+        assert_eq!(vehicle.link.state(), State::Grounded);
+        for id in [33, 245, 87] {
+            let asked = vehicle
+                .said
+                .iter()
+                .filter(|(_, said)| matches!(said, Said::Interval { id: of, .. } if *of == id));
+            assert_eq!(asked.count(), 1, "{id}");
+        }
+        assert!(
+            vehicle
+                .said
+                .iter()
+                .any(|(_, said)| matches!(said, Said::Heartbeat))
+        );
+        assert!(
+            vehicle
+                .systems
+                .iter()
+                .skip(1)
+                .all(|system| *system == vehicle::SYSTEM),
+            "as a part of the vehicle"
+        );
+    }
+}
+
+#[test]
+fn messages_that_come_too_seldom_are_asked_for_again() {
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.run(6_000);
+    let before = vehicle.intervals(33);
+    vehicle.position_every_ms = 1_000;
+    vehicle.run(12_000);
+    let after = vehicle.intervals(33);
+    assert!(
+        (2..=3).contains(&(after - before)),
+        "once in four seconds: {before}, {after}"
+    );
+    assert_eq!(vehicle.intervals(245), 1, "what comes is not asked for");
+}
+
+#[test]
+fn heartbeats_of_others_are_not_the_mode() {
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.fly_off();
+    vehicle.engage();
+    vehicle.run(3_000);
+    assert_eq!(vehicle.link.state(), State::Engaged);
+    // A gimbal of the same vehicle, a ground station, and another vehicle.
+    for (system, component, kind, autopilot) in [
+        (vehicle::SYSTEM, 154, 26, 8),
+        (255, 190, 6, 8),
+        (9, 1, 2, 12),
+    ] {
+        vehicle.heartbeat_of(system, component, kind, autopilot, 0);
+    }
+    assert_eq!(vehicle.link.state(), State::Engaged);
+}
+
+#[test]
+fn a_plane_is_no_copter() {
+    // Mode 4 of a plane flown by ArduPilot is ACRO.
+    let mut vehicle = Vehicle::new(Kind::ArduCopter);
+    vehicle.mute = true;
+    for _ in 0..5 {
+        vehicle.heartbeat_of(vehicle::SYSTEM, 1, 1, 3, 4);
+        vehicle.run(1_000);
+    }
+    assert_eq!(vehicle.link.state(), State::Silent);
+    assert!(vehicle.targets().is_empty());
+}
+
+#[test]
+fn positions_are_as_old_as_the_autopilot_says() {
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.run(3_000);
+    vehicle.late_ms = 130;
+    vehicle.positions.clear();
+    vehicle.run(2_000);
+    assert!(vehicle.positions.len() >= 9);
+    for (came, position) in &vehicle.positions {
+        let age = came.since(position.at).as_micros() / 1_000;
+        assert!((120..=140).contains(&age), "{age} ms");
+        let off = position.place.x_m - vehicle.place.x_m;
+        assert!(off.abs() < 0.02, "{off} m");
+    }
+}
+
+#[test]
+fn nothing_is_flown_without_a_position_and_the_last_target_is_kept() {
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        let mut vehicle = Vehicle::new(kind);
+        vehicle.fly_off();
+        vehicle.setpoint = Some(place(500.0));
+        vehicle.engage();
+        vehicle.run(4_000);
+        vehicle.position_every_ms = u64::MAX;
+        vehicle.run(2_000);
+        assert_eq!(vehicle.link.state(), State::Blind);
+        assert!(!vehicle.link.is_flown());
+        let frozen = vehicle.targets();
+        let last = frozen.last().unwrap().1;
+        vehicle.run(3_000);
+        for (_, target) in vehicle.targets().iter().skip(frozen.len()) {
+            assert_eq!((target.lat_e7, target.lon_e7), (last.lat_e7, last.lon_e7));
+            assert!(!target.has_velocity());
+        }
+        assert!(vehicle.heard("relay: no position, keeps its last target"));
+        vehicle.position_every_ms = 200;
+        vehicle.run(500);
+        assert_eq!(vehicle.link.state(), State::Engaged);
+    }
+}
+
+#[test]
+fn an_autopilot_that_is_switched_off_and_on_is_asked_anew() {
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        let mut vehicle = Vehicle::new(kind);
+        vehicle.fly_off();
+        vehicle.engage();
+        vehicle.run(3_000);
+        let before = vehicle.intervals(33);
+        vehicle.reboot();
+        vehicle.run(1_500);
+        assert!(
+            vehicle.events.contains(&AutopilotEvent::Restarted),
+            "{:?}",
+            vehicle.events
+        );
+        assert!(vehicle.intervals(33) > before);
+        assert!(!vehicle.link.is_flown());
+        let told = vehicle.targets().len();
+        vehicle.run(5_000);
+        assert_eq!(vehicle.targets().len(), told, "nothing on the ground");
+    }
+}
+
+#[test]
+fn a_silent_autopilot_is_gone_after_three_seconds() {
+    let mut vehicle = Vehicle::new(Kind::ArduCopter);
+    vehicle.fly_off();
+    vehicle.engage();
+    vehicle.run(2_000);
+    vehicle.mute = true;
+    vehicle.run(4_500);
+    assert_eq!(vehicle.link.state(), State::Silent);
+    let told = vehicle.targets().len();
+    vehicle.run(5_000);
+    assert_eq!(vehicle.targets().len(), told);
+    assert!(
+        vehicle
+            .said
+            .iter()
+            .rev()
+            .take(6)
+            .all(|(_, said)| matches!(said, Said::Heartbeat))
+    );
+}
+
+#[test]
+fn numbers_for_the_operator_come_once_a_second() {
+    let mut vehicle = Vehicle::new(Kind::ArduCopter);
+    vehicle.run(2_000);
+    vehicle
+        .link
+        .handle_values(vehicle.now, Some(1.5), Some(place(300.0)));
+    vehicle.run(10_000);
+    for (name, expected) in [
+        ("sir_db", 1.5),
+        ("relay_x", 300.0),
+        ("relay_y", 0.0),
+        ("relay_h", 20.0),
+    ] {
+        let values: Vec<f32> = vehicle
+            .said
+            .iter()
+            .filter_map(|(_, said)| match said {
+                Said::Value { name: of, value } if of == name => Some(*value),
+                _ => None,
+            })
+            .collect();
+        assert!(
+            (10..=11).contains(&values.len()),
+            "{name}: {}",
+            values.len()
+        );
+        assert!(values.iter().all(|value| *value == expected));
+    }
+    assert!(vehicle.link.say("a line of a relay"));
+    vehicle.run(100);
+    assert!(vehicle.heard("a line of a relay"));
+}
+
+#[test]
+fn it_sleeps_between_what_is_due() {
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.fly_off();
+    vehicle.engage();
+    vehicle.setpoint = Some(place(500.0));
+    for _ in 0..20_000 {
+        vehicle.step();
+        while vehicle.link.poll_transmit(vehicle.now).is_some() {}
+        assert!(
+            vehicle.link.poll_timeout(vehicle.now) > vehicle.now,
+            "it would spin"
+        );
+    }
+}
+
+#[test]
+fn the_setpoint_of_before_is_forgotten_on_none() {
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.fly_off();
+    vehicle.setpoint = Some(Placement::on_line(900.0, 20.0));
+    vehicle.engage();
+    vehicle.run(6_000);
+    vehicle.setpoint = None;
+    vehicle.run(1_000);
+    let stopped = *vehicle.targets().last().unwrap();
+    vehicle.run(5_000);
+    let last = *vehicle.targets().last().unwrap();
+    assert_eq!(
+        (stopped.1.lat_e7, stopped.1.lon_e7),
+        (last.1.lat_e7, last.1.lon_e7)
+    );
+    assert!(last.0 > stopped.0);
+}

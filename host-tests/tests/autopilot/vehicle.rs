@@ -1,0 +1,379 @@
+//! A vehicle with an autopilot of one of the two kinds: it hovers, or flies to the last target in its mode.
+
+use mavlink::dialects::common::{
+    EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, MavLandedState, MavMessage,
+    POSITION_TARGET_GLOBAL_INT_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA,
+};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkReader, MavlinkVersion};
+use uav_relay::flight::autopilot::carrot::Pace;
+use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind, Position};
+use uav_relay::flight::axis::Axis;
+use uav_relay::flight::geodetic::Geodetic;
+use uav_relay::flight::mavlink::table;
+use uav_relay::{Instant, Placement};
+
+pub(crate) const SYSTEM: u8 = 7;
+
+/// From one step to the next, ms.
+const STEP_MS: u64 = 20;
+
+/// How fast it flies, m/s.
+const SPEED: f32 = 8.0;
+
+pub(crate) const fn place(x_m: f32) -> Placement {
+    Placement::on_line(x_m, 20.0)
+}
+
+pub(crate) fn axis() -> Axis {
+    let tx = Geodetic::from_degrees(47.40, 8.54, 420.0).unwrap();
+    let rx = Geodetic::from_degrees(47.41, 8.55, 431.0).unwrap();
+    Axis::try_new(tx, rx).unwrap()
+}
+
+/// What the link says.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) enum Said {
+    Heartbeat,
+    Interval { id: u32 },
+    Target(Target),
+    Text(String),
+    Value { name: String, value: f32 },
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Target {
+    pub(crate) lat_e7: i32,
+    pub(crate) lon_e7: i32,
+    pub(crate) alt_m: f32,
+    pub(crate) velocity_m_s: [f32; 3],
+    pub(crate) type_mask: u16,
+}
+
+impl Target {
+    pub(crate) const fn has_velocity(&self) -> bool {
+        self.type_mask & 0b11_1000 == 0
+    }
+
+    pub(crate) fn place(&self) -> Placement {
+        let point = Geodetic {
+            lat_e7: self.lat_e7,
+            lon_e7: self.lon_e7,
+            amsl_mm: (self.alt_m * 1e3) as i32,
+        };
+        axis().place(point).unwrap()
+    }
+}
+
+/// Modes, as both number them.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Mode {
+    /// The pilot has the sticks.
+    Position,
+    /// Hold, a mission, a return: the autopilot flies by itself.
+    Hold,
+    /// OFFBOARD or GUIDED.
+    Companion,
+}
+
+pub(crate) struct Vehicle {
+    kind: Kind,
+    pub(crate) link: Autopilot,
+    pub(crate) now: Instant,
+    began: Instant,
+    pub(crate) armed: bool,
+    pub(crate) landed: MavLandedState,
+    pub(crate) mode: Mode,
+    pub(crate) place: Placement,
+    pub(crate) setpoint: Option<Placement>,
+    /// Where it was told to fly.
+    goal: Option<Target>,
+    pub(crate) mute: bool,
+    pub(crate) takes_targets: bool,
+    pub(crate) position_every_ms: u64,
+    pub(crate) late_ms: u64,
+    number: u8,
+    pub(crate) said: Vec<(Instant, Said)>,
+    pub(crate) systems: Vec<u8>,
+    pub(crate) events: Vec<AutopilotEvent>,
+    pub(crate) positions: Vec<(Instant, Position)>,
+}
+
+impl Vehicle {
+    pub(crate) fn new(kind: Kind) -> Self {
+        let now = Instant::from_millis(1_000_000);
+        Self {
+            kind,
+            link: Autopilot::new(axis(), Pace::default(), now),
+            now,
+            began: now,
+            armed: false,
+            landed: MavLandedState::MAV_LANDED_STATE_ON_GROUND,
+            mode: Mode::Position,
+            place: place(100.0),
+            setpoint: None,
+            goal: None,
+            mute: false,
+            takes_targets: true,
+            position_every_ms: 200,
+            late_ms: 0,
+            number: 0,
+            said: Vec::new(),
+            systems: Vec::new(),
+            events: Vec::new(),
+            positions: Vec::new(),
+        }
+    }
+
+    /// In the air, in the pilot's hands.
+    pub(crate) fn fly_off(&mut self) {
+        self.run(2_000);
+        self.armed = true;
+        self.landed = MavLandedState::MAV_LANDED_STATE_TAKEOFF;
+        self.run(2_000);
+        self.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+        self.run(2_000);
+    }
+
+    /// The pilot chooses the mode.
+    pub(crate) fn engage(&mut self) {
+        self.mode = Mode::Companion;
+        self.run(1_100);
+    }
+
+    /// It is switched off and on, on the ground.
+    pub(crate) fn reboot(&mut self) {
+        self.began = self.now;
+        self.armed = false;
+        self.landed = MavLandedState::MAV_LANDED_STATE_ON_GROUND;
+        self.goal = None;
+    }
+
+    pub(crate) fn run(&mut self, ms: u64) {
+        for _ in 0..ms / STEP_MS {
+            self.step();
+        }
+    }
+
+    pub(crate) fn step(&mut self) {
+        self.now = Instant::from_micros(self.now.as_micros() + STEP_MS * 1_000);
+        let ms = self.now.as_micros() / 1_000;
+        self.fly();
+        if !self.mute {
+            if ms.is_multiple_of(1_000) {
+                self.heartbeat();
+            }
+            if ms.is_multiple_of(500) {
+                self.say(&MavMessage::EXTENDED_SYS_STATE(EXTENDED_SYS_STATE_DATA {
+                    landed_state: self.landed,
+                    ..EXTENDED_SYS_STATE_DATA::DEFAULT
+                }));
+                self.say_target();
+            }
+            if self.position_every_ms != u64::MAX && ms.is_multiple_of(self.position_every_ms) {
+                self.say_position();
+            }
+        }
+        self.drive();
+    }
+
+    /// What a firmware's loop does.
+    pub(crate) fn drive(&mut self) {
+        self.link.handle_setpoint(self.now, self.setpoint);
+        if self.link.poll_timeout(self.now) <= self.now {
+            self.link.handle_timeout(self.now);
+        }
+        while let Some(frame) = self.link.poll_transmit(self.now) {
+            self.hear(&frame);
+        }
+        while let Some(position) = self.link.poll_position() {
+            self.positions.push((self.now, position));
+        }
+        while let Some(event) = self.link.poll_event() {
+            self.events.push(event);
+        }
+    }
+
+    fn fly(&mut self) {
+        let Some(goal) = self.goal.filter(|_| self.mode == Mode::Companion) else {
+            return;
+        };
+        let to = goal.place();
+        let step = SPEED * STEP_MS as f32 / 1e3;
+        for (own, to) in [
+            (&mut self.place.x_m, to.x_m),
+            (&mut self.place.y_m, to.y_m),
+            (&mut self.place.altitude_m, to.altitude_m),
+        ] {
+            *own += (to - *own).clamp(-step, step);
+        }
+    }
+
+    fn boot_ms(&self) -> u32 {
+        let ms = self.now.since(self.began).as_micros() / 1_000;
+        ms.saturating_sub(self.late_ms) as u32
+    }
+
+    fn custom_mode(&self) -> u32 {
+        match (self.kind, self.mode) {
+            (Kind::Px4, Mode::Position) => 3 << 16,
+            (Kind::Px4, Mode::Hold) => 4 << 16 | 3 << 24,
+            (Kind::Px4, Mode::Companion) => 6 << 16,
+            (Kind::ArduCopter, Mode::Position) => 16,
+            (Kind::ArduCopter, Mode::Hold) => 5,
+            (Kind::ArduCopter, Mode::Companion) => 4,
+        }
+    }
+
+    pub(crate) fn heartbeat(&mut self) {
+        let autopilot = match self.kind {
+            Kind::Px4 => 12,
+            Kind::ArduCopter => 3,
+        };
+        self.heartbeat_of(SYSTEM, 1, 2, autopilot, self.custom_mode());
+    }
+
+    /// A heartbeat by numbers, since not every one of them is of an enum.
+    pub(crate) fn heartbeat_of(
+        &mut self,
+        system: u8,
+        component: u8,
+        kind: u8,
+        autopilot: u8,
+        mode: u32,
+    ) {
+        let base_mode = 1 | if self.armed { 128 } else { 0 };
+        let mut payload = mode.to_le_bytes().to_vec();
+        payload.extend([kind, autopilot, base_mode, 4, 3]);
+        let mut covered = vec![
+            payload.len() as u8,
+            0,
+            0,
+            self.number,
+            system,
+            component,
+            0,
+            0,
+            0,
+        ];
+        covered.extend(payload);
+        self.number = self.number.wrapping_add(1);
+        let known = table::find(0).unwrap();
+        let checksum = uav_relay::flight::mavlink::frame::checksum(&covered, known);
+        let mut frame = vec![0xFD];
+        frame.extend(covered);
+        frame.extend(checksum.to_le_bytes());
+        self.link.handle_bytes(self.now, &frame);
+    }
+
+    fn say_position(&mut self) {
+        let point = axis().point(self.place).unwrap();
+        self.say(&MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+            time_boot_ms: self.boot_ms(),
+            lat: point.lat_e7,
+            lon: point.lon_e7,
+            alt: point.amsl_mm,
+            ..GLOBAL_POSITION_INT_DATA::DEFAULT
+        }));
+    }
+
+    /// An ArduCopter says in its mode what it flies to; a PX4 does not.
+    fn say_target(&mut self) {
+        if self.kind == Kind::Px4 || self.mode != Mode::Companion {
+            return;
+        }
+        if let Some(goal) = self.goal {
+            self.say(&MavMessage::POSITION_TARGET_GLOBAL_INT(
+                POSITION_TARGET_GLOBAL_INT_DATA {
+                    lat_int: goal.lat_e7,
+                    lon_int: goal.lon_e7,
+                    alt: goal.alt_m,
+                    ..POSITION_TARGET_GLOBAL_INT_DATA::DEFAULT
+                },
+            ));
+        }
+    }
+
+    fn say(&mut self, message: &MavMessage) {
+        let header = MavHeader {
+            system_id: SYSTEM.into(),
+            component_id: 1,
+            sequence: self.number,
+        };
+        self.number = self.number.wrapping_add(1);
+        let mut raw = MAVLinkV2MessageRaw::new();
+        raw.serialize_message(header, message);
+        self.link.handle_bytes(self.now, raw.raw_bytes());
+    }
+
+    fn hear(&mut self, frame: &[u8]) {
+        let mut reader = MavlinkReader::new(frame);
+        let (header, message) = reader
+            .read_message::<MavMessage>(MavlinkVersion::V2)
+            .unwrap();
+        self.systems.push(header.system_id as u8);
+        let said = match message {
+            MavMessage::HEARTBEAT(_) => Said::Heartbeat,
+            MavMessage::COMMAND_LONG(command) => {
+                assert_eq!(command.command as u32, 511);
+                Said::Interval {
+                    id: command.param1 as u32,
+                }
+            }
+            MavMessage::SET_POSITION_TARGET_GLOBAL_INT(target) => Said::Target(self.told(&target)),
+            MavMessage::STATUSTEXT(text) => Said::Text(text.text.to_str().unwrap().to_owned()),
+            MavMessage::NAMED_VALUE_FLOAT(value) => Said::Value {
+                name: value.name.to_str().unwrap().to_owned(),
+                value: value.value,
+            },
+            other => panic!("it does not say {other:?}"),
+        };
+        self.said.push((self.now, said));
+    }
+
+    fn told(&mut self, target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Target {
+        assert_eq!((target.target_system, target.target_component), (SYSTEM, 1));
+        assert_eq!(target.coordinate_frame as u32, 5);
+        let target = Target {
+            lat_e7: target.lat_int,
+            lon_e7: target.lon_int,
+            alt_m: target.alt,
+            velocity_m_s: [target.vx, target.vy, target.vz],
+            type_mask: target.type_mask.bits(),
+        };
+        if self.mode == Mode::Companion && self.takes_targets {
+            self.goal = Some(target);
+        }
+        target
+    }
+
+    /// All targets so far.
+    pub(crate) fn targets(&self) -> Vec<(Instant, Target)> {
+        let all = self.said.iter();
+        all.filter_map(|(at, said)| match said {
+            Said::Target(target) => Some((*at, *target)),
+            _ => None,
+        })
+        .collect()
+    }
+
+    /// Targets since `from`.
+    pub(crate) fn targets_since(&self, from: Instant) -> Vec<(Instant, Target)> {
+        let mut all = self.targets();
+        all.retain(|(at, _)| *at > from);
+        all
+    }
+
+    /// How often a message was asked for.
+    pub(crate) fn intervals(&self, id: u32) -> usize {
+        let asked = self.said.iter();
+        asked
+            .filter(|(_, said)| *said == Said::Interval { id })
+            .count()
+    }
+
+    pub(crate) fn heard(&self, text: &str) -> bool {
+        self.said
+            .iter()
+            .any(|(_, said)| *said == Said::Text(text.to_owned()))
+    }
+}
