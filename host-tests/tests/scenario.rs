@@ -301,7 +301,7 @@ fn every_required_key_is_missed() {
     refused(
         &format!("{POWER}{INTERFERER}"),
         Problem::Missing,
-        &["geometry.distance_m is missing", "1 to 1e6 m"],
+        &["geometry.altitude_m is missing", "0.1 to 1e5 m"],
     );
     refused(
         &format!("{GEOMETRY}{INTERFERER}"),
@@ -709,6 +709,7 @@ fn a_file_with_every_key_means_what_it_says() {
         power_w = 4
     ";
     let expected = Scenario {
+        axis: None,
         distance_m: 1500.0,
         altitude_m: 25.0,
         altitude_min_m: 20.0,

@@ -58,6 +58,8 @@ pub enum Problem {
     DuplicateRelay,
     /// A relay is described, but nothing about it differs.
     NothingDiffers,
+    /// The distance is not that of the sites.
+    OtherDistance,
     /// The places are not in order.
     Unsorted,
 }
@@ -81,6 +83,7 @@ impl fmt::Display for Problem {
             Self::NoInterference => "is missing, and so is field",
             Self::DuplicateRelay => "is taken",
             Self::NothingDiffers => "changes nothing",
+            Self::OtherDistance => "contradicts [site]",
             Self::Unsorted => "is not in increasing order",
         })
     }

@@ -8,6 +8,7 @@ use toml::Table;
 use super::check::{mistake, wrong_type};
 use super::error::{Problem, ScenarioError};
 use super::keys::number;
+use super::site::{self, RawSites};
 use super::spec::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
 };
@@ -24,6 +25,7 @@ pub(super) struct RawFile {
     #[serde(default)]
     relay: Vec<RawRelay>,
     field: Option<RawField>,
+    site: Option<RawSites>,
 }
 
 #[derive(Deserialize)]
@@ -33,7 +35,7 @@ pub(super) struct RawFile {
     reason = "the fields are the keys of the file"
 )]
 struct RawGeometry {
-    distance_m: f64,
+    distance_m: Option<f64>,
     altitude_m: f64,
     altitude_min_m: Option<f64>,
     altitude_max_m: Option<f64>,
@@ -136,8 +138,10 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
     if altitude_max_m < altitude_m {
         return band("geometry.altitude_max_m", altitude_max_m, "least");
     }
+    let (axis, distance_m) = site::line(file, raw.site, geometry.distance_m)?;
     Ok(Scenario {
-        distance_m: geometry.distance_m,
+        axis,
+        distance_m,
         altitude_m,
         altitude_min_m,
         altitude_max_m,

@@ -81,16 +81,28 @@ pub(super) const FILE: Keys = &[
     optional("interferer", Rule::Tables(INTERFERER, 1)),
     optional("relay", Rule::Tables(RELAY, 0)),
     optional("field", Rule::Table(FIELD)),
+    optional("site", Rule::Table(SITES)),
 ];
 
 const GEOMETRY: Keys = &[
-    required("distance_m", Number(range(1.0, 1e6, "m"))),
+    optional("distance_m", Number(range(1.0, 1e6, "m"))),
     required("altitude_m", Number(ALTITUDE)),
     optional("altitude_min_m", Number(ALTITUDE)),
     optional("altitude_max_m", Number(ALTITUDE)),
     optional("lateral_min_m", Number(range(-1e5, 0.0, "m"))),
     optional("lateral_max_m", Number(range(0.0, 1e5, "m"))),
     optional("min_separation_m", Number(range(0.0, 1e5, "m"))),
+];
+
+const SITES: Keys = &[
+    required("tx", Rule::Table(SITE)),
+    required("rx", Rule::Table(SITE)),
+];
+
+const SITE: Keys = &[
+    required("lat_deg", Number(range(-90.0, 90.0, "degrees"))),
+    required("lon_deg", Number(range(-180.0, 180.0, "degrees"))),
+    required("amsl_m", Number(range(-1e3, 1e4, "m"))),
 ];
 
 const POWERS: Keys = &[

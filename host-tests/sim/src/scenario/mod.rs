@@ -10,6 +10,7 @@ mod error;
 mod file;
 mod keys;
 mod read;
+mod site;
 mod spec;
 
 use std::path::Path;

@@ -2,12 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use uav_relay::flight::axis::Axis;
+
 /// Everything a host tool has to know about a flight, in SI units, with x along the line from Tx (x = 0) to Rx and y to the
 /// right of it as seen from above.
 ///
 /// A value that came from [`Scenario::load`] or [`Scenario::parse`] lies within the ranges given here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
+    /// The line from Tx to Rx on earth, where the scenario says where the two are.
+    pub axis: Option<Axis>,
     /// Distance D from Tx to Rx, in metres, 1 to 1e6.
     pub distance_m: f64,
     /// Common altitude of the relays, in metres, 0.1 to 1e5.
@@ -123,6 +127,7 @@ impl Default for Scenario {
     /// The paper's multi-hop scenario: 1 km, relays at 20 m and 4 m apart at least, one 80 W interferer halfway.
     fn default() -> Self {
         Self {
+            axis: None,
             distance_m: 1000.0,
             altitude_m: 20.0,
             altitude_min_m: 20.0,
