@@ -1,6 +1,7 @@
 //! The facade a firmware uses: bytes in, bytes and setpoints out, and no input or output of its own.
 
 mod incoming;
+mod port;
 #[cfg(feature = "auth")]
 pub(crate) mod signed;
 #[cfg(feature = "upload")]
@@ -24,29 +25,9 @@ use crate::wire::deframe::{DeframeError, Deframer};
 use crate::wire::frame::{self, FrameBuf, Header};
 #[cfg(feature = "auth")]
 use crate::wire::session::Session;
+pub use port::{Port, Transmit};
+
 use incoming::Addressed;
-
-/// Where bytes come from and go to.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Port {
-    /// The link toward the transmitter, with [`Wiring::Pair`].
-    Upstream,
-    /// The link toward the receiver, with [`Wiring::Pair`].
-    Downstream,
-    /// The one channel, with [`Wiring::Shared`].
-    Shared,
-}
-
-/// A frame to be sent: the first `len` bytes of the buffer, through `port`.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Transmit {
-    /// Where to.
-    pub port: Port,
-    /// Bytes, the delimiter included; at most [`frame::MAX_FRAME`].
-    pub len: usize,
-}
 
 /// One relay's share of the placement, sans-IO.
 ///
@@ -378,12 +359,12 @@ impl Relay {
 
     /// What the measurements at this place say so far, and `None` before they say anything.
     pub fn estimate(&self) -> Option<Estimate> {
-        self.node.meter().estimate()
+        self.node.round().meter().estimate()
     }
 
     /// Upsilon that this relay uses instead of the agreed field's, 1/W, once it has measured enough.
     pub fn measured_per_w(&self) -> Option<f32> {
-        self.node.meter().published()
+        self.node.round().meter().published()
     }
 
     /// While Algorithm 2 goes on, at the leader: rounds that are over, and the SIR (linear) of the chain after the last.

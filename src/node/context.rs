@@ -70,8 +70,6 @@ pub(crate) struct Context<'a> {
     pub(crate) end: bool,
     /// For how long what was agreed on may be held elsewhere.
     pub(crate) held: Held,
-    /// Upsilon as it measures it where it stands, 1/W.
-    pub(crate) measured_per_w: Option<f32>,
 }
 
 impl<'a> Context<'a> {
@@ -144,8 +142,6 @@ pub(crate) struct Effects {
     pub(crate) resent: bool,
     /// A pass, or a proposal, begins here.
     pub(crate) began: bool,
-    /// The chain has agreed on a place for this relay.
-    pub(crate) moved: bool,
     /// The chain has agreed on a target.
     pub(crate) converged: bool,
     /// No target can be met.
@@ -191,7 +187,6 @@ impl Effects {
         repeated: false,
         resent: false,
         began: false,
-        moved: false,
         converged: false,
         infeasible: false,
         view_needed: false,

@@ -1,6 +1,6 @@
 //! What a relay does with a frame that has come in: checked, addressed and only then read.
 
-use super::Port;
+use super::port::Port;
 use crate::node::Node;
 use crate::node::namesake::Claim;
 use crate::side::Side;

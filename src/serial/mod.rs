@@ -110,13 +110,7 @@ pub struct Pair<U, D, UPin = NoPin, DPin = NoPin> {
     pub downstream: SerialLink<D, DPin>,
 }
 
-impl<U, D, UPin, DPin> Pair<U, D, UPin, DPin>
-where
-    U: SerialPort,
-    D: SerialPort,
-    UPin: OutputPin,
-    DPin: OutputPin,
-{
+impl<U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin> Pair<U, D, UPin, DPin> {
     /// Two links for a relay whose settings say [`Wiring::Pair`](crate::Wiring::Pair).
     pub const fn new(upstream: SerialLink<U, UPin>, downstream: SerialLink<D, DPin>) -> Self {
         Self {
@@ -125,31 +119,11 @@ where
         }
     }
 
-    /// Moves what can be moved now, and says when to be called again at the latest, always later than `now`.
-    ///
-    /// Work: at most [`READ_LIMIT`] bytes a port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the
-    /// frames the relay then has.
-    pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
-        self.poll_keeping(now, relay, &mut |_| {})
-    }
-
-    /// The same, with a call of `keep` between what comes in and what is sent: what has to be stored before others are told it, see
-    /// [`Relay::view_record`].
-    pub fn poll_keeping(
-        &mut self,
-        now: Instant,
-        relay: &mut Relay,
-        keep: &mut dyn FnMut(&Relay),
-    ) -> Option<Instant> {
-        poll(
-            now,
-            relay,
-            &mut [
-                (Port::Upstream, &mut self.upstream),
-                (Port::Downstream, &mut self.downstream),
-            ],
-            keep,
-        )
+    const fn links(&mut self) -> [(Port, &mut dyn FrameLink); 2] {
+        [
+            (Port::Upstream, &mut self.upstream),
+            (Port::Downstream, &mut self.downstream),
+        ]
     }
 }
 
@@ -168,25 +142,39 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
         Self { channel }
     }
 
-    /// Moves what can be moved now, and says when to be called again at the latest, always later than `now`.
-    ///
-    /// Work: at most [`READ_LIMIT`] bytes through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the frames
-    /// that fit.
-    pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
-        self.poll_keeping(now, relay, &mut |_| {})
-    }
-
-    /// The same, with a call of `keep` between what comes in and what is sent: what has to be stored before others are told it, see
-    /// [`Relay::view_record`].
-    pub fn poll_keeping(
-        &mut self,
-        now: Instant,
-        relay: &mut Relay,
-        keep: &mut dyn FnMut(&Relay),
-    ) -> Option<Instant> {
-        poll(now, relay, &mut [(Port::Shared, &mut self.channel)], keep)
+    const fn links(&mut self) -> [(Port, &mut dyn FrameLink); 1] {
+        [(Port::Shared, &mut self.channel)]
     }
 }
+
+/// The call that a firmware makes, with either wiring. As methods of a trait it would have to be imported beside the ports.
+macro_rules! polled {
+    ([$($of:tt)*] $ports:ty) => {
+        impl<$($of)*> $ports {
+            /// Moves what can be moved now, and says when to be called again at the latest, always later than `now`.
+            ///
+            /// Work: at most [`READ_LIMIT`] bytes a port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the
+            /// frames that the relay then has; of those for a shared port, as many as fit.
+            pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
+                self.poll_keeping(now, relay, &mut |_| {})
+            }
+
+            /// The same, with a call of `keep` between what comes in and what is sent: what has to be stored before others are told
+            /// it, see [`Relay::view_record`].
+            pub fn poll_keeping(
+                &mut self,
+                now: Instant,
+                relay: &mut Relay,
+                keep: &mut dyn FnMut(&Relay),
+            ) -> Option<Instant> {
+                poll(now, relay, &mut self.links(), keep)
+            }
+        }
+    };
+}
+
+polled!([U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin] Pair<U, D, UPin, DPin>);
+polled!([P: SerialPort, Pin: OutputPin] Shared<P, Pin>);
 
 /// One round over all links.
 fn poll(

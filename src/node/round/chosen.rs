@@ -35,7 +35,7 @@ impl Computation {
             behind: None,
             index: context.index(),
             own: self.station_for(chosen),
-            measured_per_w: context.measured_per_w,
+            measured_per_w: self.meter.published(),
             plain: chosen && there.is_none_or(|there| there.plain),
             end_m: there.map(|there| there.end_m),
         }

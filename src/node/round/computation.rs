@@ -1,15 +1,17 @@
 //! What a relay holds while it does its share of an algorithm: the pass that is under way, its place, its targets.
 
-use super::gathering::Seats;
+use super::seats::Seats;
 use super::state::{Action, Phase, RoundState};
 use super::sweeping::Sweeping;
 use super::task::LeaderTask;
 use super::turning::Turning;
 use crate::mission::Profile;
 use crate::node::context::Context;
+use crate::node::sample::Meter;
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement, Station};
+use crate::settings::Measure;
 use crate::wire::message::{Answer, Message, Moved, Roster, Sweep, Token};
 
 /// Places weighed in one call of `work` in Algorithm 2, and a row of 24 more at most.
@@ -56,6 +58,8 @@ pub(crate) struct Computation {
     /// Where the neighbour toward Rx stands, as far as it has said.
     pub(super) after: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
+    /// What it measures there.
+    pub(super) meter: Meter,
     pub(super) target: Option<f32>,
     /// At the leader, what no chain can have.
     pub(super) bound: Option<f32>,
@@ -63,7 +67,12 @@ pub(crate) struct Computation {
 
 impl Computation {
     /// A relay that has just been switched on. The leader numbers its passes from `number` on, and has work to do.
-    pub(crate) const fn new(leader: bool, number: u16, profile: Profile) -> Self {
+    pub(crate) const fn new(
+        leader: bool,
+        number: u16,
+        profile: Profile,
+        measure: Option<Measure>,
+    ) -> Self {
         Self {
             state: RoundState::new(if leader { Phase::Planning } else { Phase::Idle }, number),
             pass: PassKind::Sweep(Sweeping::new(Ladder::single(1.0))),
@@ -75,6 +84,7 @@ impl Computation {
             at: profile.on_line().at,
             after: None,
             setpoint: None,
+            meter: Meter::new(measure),
             target: None,
             bound: None,
         }
@@ -120,6 +130,15 @@ impl Computation {
         self.state.renew(leads);
     }
 
+    /// It is to be at `place` from now on, and keeps to `at` across the line.
+    #[inline(never)]
+    pub(super) fn stand_at(&mut self, place: Placement, at: CrossSection) {
+        self.setpoint = Some(place);
+        self.at = at;
+        // What is measured from now on is measured elsewhere.
+        self.meter.restart();
+    }
+
     pub(super) fn give_up(&mut self) -> Action {
         self.state.give_up();
         Action::Infeasible
@@ -135,7 +154,7 @@ impl Computation {
                 PassKind::Sweep(sweeping) if !sweeping.is_done() => {
                     let unknown = ALTITUDE && sweeping.chosen && self.chosen.is_none();
                     if unknown && self.solve(context).is_none() {
-                        return Action::Work { moved: false };
+                        return Action::Work;
                     }
                     return self.go_on_with_sweep(context);
                 }
@@ -148,7 +167,7 @@ impl Computation {
         }
         match self.plan(context) {
             Ok(true) => self.begin_pass(context),
-            Ok(false) => Action::Work { moved: false },
+            Ok(false) => Action::Work,
             Err(Infeasible) => self.give_up(),
         }
     }
@@ -167,7 +186,7 @@ impl Computation {
                 ladder: sweeping.ladder,
                 relay: self.station_for(sweeping.chosen),
                 chosen: sweeping.chosen,
-                measured_per_w: context.measured_per_w,
+                measured_per_w: self.meter.published(),
                 reaches: sweeping.reaches.clone(),
             })),
             PassKind::Gather(roster) if ALTITUDE => Some(Message::Gather(roster.clone())),

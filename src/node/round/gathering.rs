@@ -4,62 +4,11 @@
 //! a roster is full, the next pass goes on after the last relay in it.
 
 use super::computation::{Computation, PassKind};
+use super::seats::Seats;
 use super::state::Action;
-use crate::mission::{Mission, Profile};
 use crate::node::context::Context;
-use crate::optimiser::joint::{MOST_SOLVED, Seat};
+use crate::optimiser::joint::Seat;
 use crate::wire::message::{OwnSeat, OwnSeats, Roster};
-
-/// What the relays of the view bring along, as far as it is known.
-#[derive(Clone, Debug)]
-pub(super) struct Seats {
-    /// Relays that are known, from Tx on; `None` before anybody has asked.
-    known: Option<u16>,
-    /// The altitude that a relay keeps to, m, or 0; its power, W, or 0 where the mission says all.
-    own: [[f32; 2]; MOST_SOLVED],
-}
-
-impl Seats {
-    /// Nobody has asked.
-    pub(super) const UNKNOWN: Self = Self {
-        known: None,
-        own: [[0.0; 2]; MOST_SOLVED],
-    };
-
-    /// What relay `index` brings along: what the mission says where nobody has asked.
-    #[inline(never)] // the solver asks in many places
-    pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
-        let at = usize::from(index).wrapping_sub(1);
-        match self.own.get(at) {
-            Some(&[altitude_m, power_w]) if power_w > 0.0 => {
-                let own = Profile {
-                    altitude_m,
-                    power_w,
-                };
-                Seat::of(mission, own, altitude_m > 0.0)
-            }
-            _ => Seat::common(mission),
-        }
-    }
-
-    /// Whether it is known of some of `relays` alone.
-    pub(super) fn is_partial(&self, relays: u16) -> bool {
-        self.known.is_some_and(|known| known < relays)
-    }
-
-    /// Takes what came of a pass along `relays`; whether that is all.
-    fn take(&mut self, roster: &Roster, relays: u16) -> bool {
-        for seat in &roster.seats {
-            let at = usize::from(seat.index).wrapping_sub(1);
-            if let Some(own) = self.own.get_mut(at) {
-                *own = [seat.held_m, seat.power_w];
-            }
-        }
-        let last = roster.seats.last().filter(|_| roster.seats.is_full());
-        self.known = Some(last.map_or(relays, |last| last.index));
-        !self.is_partial(relays)
-    }
-}
 
 impl Computation {
     /// What this relay brings along.
@@ -138,7 +87,7 @@ impl Computation {
         if context.is_last() {
             return self.conclude_gathering(context);
         }
-        Action::Forward { moved: false }
+        Action::Forward
     }
 
     /// What came of it, from the relay after.
@@ -167,11 +116,8 @@ impl Computation {
             self.chosen = None;
         }
         if context.index() == context.mission().leader() {
-            return Action::Work { moved: false };
+            return Action::Work;
         }
-        Action::Answer {
-            moved: false,
-            agreed: false,
-        }
+        Action::Answer { agreed: false }
     }
 }

@@ -141,7 +141,7 @@ impl Computation {
                 };
                 self.take_turn(context, Turning::new(turn, sir, tx, mission.tx_gain()))
             }
-            _ => Action::Work { moved: false },
+            _ => Action::Work,
         }
     }
 

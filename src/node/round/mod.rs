@@ -5,7 +5,8 @@
 //! | [`state`] | the state table of a pass, and its number |
 //! | `computation` | what a relay holds while it does its share |
 //! | `sweep`, `sweeping` | a sweep of targets (Algorithms 1 and 4) and its verdict |
-//! | `chosen`, `gathering` | a relay's own solution of the chain by the joint method, and what it has to know of the others |
+//! | `chosen` | a relay's own solution of the chain by the joint method |
+//! | `seats`, `gathering` | what it has to know of the others for that, and the pass that gathers it |
 //! | `turn`, `turning` | a turn of Algorithm 2 |
 //! | `leader`, `task` | what comes before a pass begins: which one, and what for |
 
@@ -13,6 +14,7 @@ mod chosen;
 mod computation;
 mod gathering;
 mod leader;
+mod seats;
 pub(crate) mod state;
 mod sweep;
 mod sweeping;
@@ -20,11 +22,13 @@ mod task;
 mod turn;
 mod turning;
 
-use super::context::{Context, Effects};
+use super::context::{Context, Effects, Member};
 use super::retransmit::{Retransmit, Trip};
+use super::sample::{Meter, Sample};
 use super::timing::{PAUSE, earliest};
 use crate::mission::{Heading, Profile};
 use crate::place::Placement;
+use crate::settings::Measure;
 use crate::time::Instant;
 use crate::wire::message::Message;
 
@@ -42,17 +46,23 @@ struct RoundDue {
 /// The rounds of one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Round {
-    computation: Computation,
     retransmit: Retransmit,
     work_at: Option<Instant>,
     due: RoundDue,
+    computation: Computation,
 }
 
 impl Round {
     /// A relay that has just been switched on. The leader numbers its passes from `number` on, and has work to do.
-    pub(crate) const fn new(leads: bool, number: u16, profile: Profile, seed: u32) -> Self {
+    pub(crate) const fn new(
+        leads: bool,
+        number: u16,
+        profile: Profile,
+        measure: Option<Measure>,
+        seed: u32,
+    ) -> Self {
         Self {
-            computation: Computation::new(leads, number, profile),
+            computation: Computation::new(leads, number, profile, measure),
             retransmit: Retransmit::new(seed),
             work_at: None,
             due: RoundDue {
@@ -111,26 +121,22 @@ impl Round {
 
     /// Does what the relay's share asks for.
     fn proceed(&mut self, context: &Context<'_>, next: Action) -> Effects {
-        let moved = |moved| Effects {
-            moved,
-            ..Effects::NONE
-        };
         match next {
             Action::Nothing => Effects::NONE,
             Action::Foreign => Effects::FOREIGN,
             Action::Stale => Effects::STALE,
-            Action::Work { moved: to } => {
+            Action::Work => {
                 // What there was to say of the pass before would be stale.
                 self.due = RoundDue::default();
                 self.retransmit.stop();
                 self.work_soon(context.now);
-                moved(to)
+                Effects::NONE
             }
             Action::Think => {
                 self.work_soon(context.now);
                 Effects::NONE
             }
-            Action::Forward { moved: to } => {
+            Action::Forward => {
                 // An answer to the pass before would be stale.
                 self.due = RoundDue {
                     onward: true,
@@ -139,7 +145,7 @@ impl Round {
                 self.retransmit.heard();
                 self.retransmit.stop();
                 self.work_at = None;
-                moved(to)
+                Effects::NONE
             }
             Action::Busy => {
                 self.due.busy = true;
@@ -149,7 +155,7 @@ impl Round {
                 self.due.back = true;
                 Effects::REPEATED
             }
-            Action::Answer { moved: to, agreed } => {
+            Action::Answer { agreed } => {
                 self.due = RoundDue {
                     back: true,
                     ..RoundDue::default()
@@ -162,7 +168,7 @@ impl Round {
                 }
                 Effects {
                     converged: agreed,
-                    ..moved(to)
+                    ..Effects::NONE
                 }
             }
             Action::Infeasible => {
@@ -175,6 +181,12 @@ impl Round {
         }
     }
 
+    /// One measurement, by a relay that measures; whether it was of use.
+    pub(crate) fn handle_sample(&mut self, member: &Member, sample: Sample) -> bool {
+        let at = self.computation.setpoint.filter(|_| member.index == 1);
+        self.computation.meter.take(&member.mission, at, sample)
+    }
+
     /// Goes on with a computation after a pause, so that a caller's loop gets its turn.
     pub(crate) fn work_soon(&mut self, now: Instant) {
         self.work_at = Some(now + PAUSE);
@@ -183,7 +195,7 @@ impl Round {
     /// The leader begins again from the start.
     pub(crate) fn restart(&mut self, context: &Context<'_>) -> Effects {
         self.computation.restart();
-        self.proceed(context, Action::Work { moved: false })
+        self.proceed(context, Action::Work)
     }
 
     /// A view is proposed: what was under way is over.
@@ -280,6 +292,11 @@ impl Round {
     /// Where to be in the end.
     pub(crate) const fn setpoint(&self) -> Option<Placement> {
         self.computation.setpoint
+    }
+
+    /// What it has measured.
+    pub(crate) const fn meter(&self) -> &Meter {
+        &self.computation.meter
     }
 
     pub(crate) const fn target(&self) -> Option<f32> {

@@ -49,25 +49,17 @@ pub(crate) enum Action {
     /// Count a message of a pass that is over.
     Stale,
     /// Call `work` after a pause.
-    Work {
-        /// Whether the setpoint has moved.
-        moved: bool,
-    },
+    Work,
     /// Call `work` after a pause; what there is to say stays.
     Think,
     /// Hand the pass onward, and again until something comes back.
-    Forward {
-        /// Whether the setpoint has moved.
-        moved: bool,
-    },
+    Forward,
     /// Say back that the pass has arrived.
     Busy,
     /// Hand back again what came of it.
     Repeat,
     /// What came of the pass is known: hand it back.
     Answer {
-        /// Whether the setpoint has moved.
-        moved: bool,
         /// Whether the chain has agreed with it.
         agreed: bool,
     },

@@ -71,19 +71,19 @@ impl Computation {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.chosen);
         if ALTITUDE && is_chosen && self.chosen.is_none() {
             // First it has to find out where it is to be.
-            return Action::Work { moved: false };
+            return Action::Work;
         }
         let link = self.link(context, is_chosen);
         let PassKind::Sweep(sweeping) = &mut self.pass else {
             return Action::Stale;
         };
         if !sweeping.go_on(link) {
-            return Action::Work { moved: false };
+            return Action::Work;
         }
         if context.is_last() {
             self.conclude_sweep(context)
         } else {
-            Action::Forward { moved: false }
+            Action::Forward
         }
     }
 
@@ -112,26 +112,23 @@ impl Computation {
                 let most = search.most(&sweeping.verdict.slacks);
                 self.bound = most.filter(|_| !chosen && !given);
             }
-            self.at = self.station_for(chosen).at;
-            self.setpoint = Some(self.at.at(x_m));
+            let at = self.station_for(chosen).at;
+            self.stand_at(at.at(x_m), at);
             self.target = Some(target);
             if let LeaderTask::Searching { search, .. } = &mut self.task
                 && !search.accept(target)
             {
                 self.state.answer();
-                return Action::Work { moved: true };
+                return Action::Work;
             }
             return self.agree(context);
         }
         self.state.answer();
         if self.gathers(context) {
-            return Action::Work { moved: false };
+            return Action::Work;
         }
         let LeaderTask::Searching { search, .. } = &mut self.task else {
-            return Action::Answer {
-                moved: false,
-                agreed: false,
-            };
+            return Action::Answer { agreed: false };
         };
         let verdict = &sweeping.verdict;
         let next = match search.refused(context.mission(), verdict) {
@@ -147,7 +144,7 @@ impl Computation {
                 return self.give_up();
             }
         }
-        Action::Work { moved: false }
+        Action::Work
     }
 
     /// The chain has agreed on a target. The leader may have more in mind.
@@ -158,19 +155,16 @@ impl Computation {
                 Method::Adjust(adjust) if ADJUST => {
                     self.task.adjust(adjust);
                     self.state.answer();
-                    return Action::Work { moved: true };
+                    return Action::Work;
                 }
                 Method::Joint if self.gathers(context) => {
                     self.state.answer();
-                    return Action::Work { moved: true };
+                    return Action::Work;
                 }
                 _ => {}
             }
         }
         self.task.rest();
-        Action::Answer {
-            moved: true,
-            agreed: true,
-        }
+        Action::Answer { agreed: true }
     }
 }

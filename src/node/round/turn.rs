@@ -54,9 +54,9 @@ impl Computation {
         }
         self.pass = PassKind::Turn(turning);
         if searching {
-            Action::Work { moved: false }
+            Action::Work
         } else {
-            self.pass_on_turn(context, false)
+            self.pass_on_turn(context)
         }
     }
 
@@ -66,21 +66,20 @@ impl Computation {
             return Action::Stale;
         };
         match turning.step(PLACES_AT_ONCE) {
-            Poll::Pending => Action::Work { moved: false },
-            Poll::Ready(None) => self.pass_on_turn(context, false),
+            Poll::Pending => Action::Work,
+            Poll::Ready(None) => self.pass_on_turn(context),
             Poll::Ready(Some(place)) => {
-                self.setpoint = Some(place);
-                self.at = place.cross_section();
-                self.pass_on_turn(context, true)
+                self.stand_at(place, place.cross_section());
+                self.pass_on_turn(context)
             }
         }
     }
 
-    pub(super) fn pass_on_turn(&mut self, context: &Context<'_>, moved: bool) -> Action {
+    pub(super) fn pass_on_turn(&mut self, context: &Context<'_>) -> Action {
         if !context.is_last() {
-            return Action::Forward { moved };
+            return Action::Forward;
         }
-        self.conclude_turn(context, moved, f32::MAX)
+        self.conclude_turn(context, f32::MAX)
     }
 
     /// What a turn came to, from the relay after.
@@ -92,18 +91,13 @@ impl Computation {
         {
             turning.any |= moved.any;
             self.after = Some(moved.place);
-            return self.conclude_turn(context, false, moved.worst);
+            return self.conclude_turn(context, moved.worst);
         }
         Action::Stale
     }
 
     /// What the current turn came to is known; `worst` is the worst SIR beyond the next hop.
-    pub(super) fn conclude_turn(
-        &mut self,
-        context: &Context<'_>,
-        moved: bool,
-        worst: f32,
-    ) -> Action {
+    pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
         let (PassKind::Turn(turning), Some(at), Some(interferer)) = (
             &mut self.pass,
             self.setpoint,
@@ -130,13 +124,10 @@ impl Computation {
         }
         if let LeaderTask::Adjusting(rounds) = &mut self.task {
             if !rounds.advance(turning.any, turning.worst.min(incoming)) {
-                return Action::Work { moved };
+                return Action::Work;
             }
             self.task.rest();
         }
-        Action::Answer {
-            moved,
-            agreed: stop,
-        }
+        Action::Answer { agreed: stop }
     }
 }

@@ -235,7 +235,6 @@ impl Check {
             latest: member.active,
             end: Self::after(chain, at).is_none(),
             held: Held::NONE,
-            measured_per_w: None,
         }
     }
 

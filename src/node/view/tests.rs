@@ -117,7 +117,6 @@ fn context(member: &Member, latest: MissionId, end: bool, now: Instant) -> Conte
         latest,
         end,
         held: Held::NONE,
-        measured_per_w: None,
     }
 }
 

@@ -1,103 +1,19 @@
-//! What one relay does with an offer and a proposal, and says of them.
+//! What a relay does with an offer and a proposal, and says of them.
 
-use super::{Event, Hello, Message, MissionId, Node, Side, Upload};
+use super::fixture::{NOW, base, hello, relay, relay_of, said, upload, upload_to};
 use crate::mission::tests::paper;
-use crate::mission::{Interference, Interferer, Mission, MissionConfig};
-use crate::settings::{Identity, Settings, Wiring};
-use crate::time::{Duration, Instant};
+use crate::mission::{Mission, MissionConfig};
+use crate::node::Node;
+use crate::settings::Settings;
+use crate::side::Side;
+use crate::time::Duration;
 use crate::view::{View, ViewId};
-use crate::wire::auth::{Auth, Key};
-use crate::wire::message::{Poll, Proposal};
-use crate::wire::upload::LENGTH;
-
-const NOW: Instant = Instant::from_millis(10_000);
+use crate::wire::digest::MissionId;
+use crate::wire::message::{Hello, Message, Poll, Proposal};
+use crate::wire::upload::{LENGTH, Upload};
 
 /// The first view that relay 1 proposes.
 const FIRST: ViewId = ViewId::from_bits(1 << 10 | 1);
-
-fn base() -> Mission {
-    Mission::try_new(paper(3)).unwrap()
-}
-
-fn upload(version: u16) -> Upload {
-    upload_to(&base(), version)
-}
-
-fn upload_to(base: &Mission, version: u16) -> Upload {
-    let interference = Interference::Source(Interferer {
-        power_w: 80.0,
-        x_m: 700.0,
-        y_m: 100.0,
-    });
-    let config = MissionConfig {
-        interference,
-        ..*base.config()
-    };
-    Upload::new(base, version, config).unwrap()
-}
-
-/// Relay 2 of 3, with or without a key.
-fn relay(signs: bool) -> Node {
-    relay_of(base(), 2, signs)
-}
-
-fn relay_of(mission: Mission, index: u16, signs: bool) -> Node {
-    let settings = Settings {
-        wiring: Wiring::Shared,
-        auth: signs.then_some(Auth {
-            key: Key::new([1; 32]),
-            epoch: 1,
-        }),
-        ..Settings::default()
-    };
-    let identity = Identity { network: 1, index };
-    let mut node = Node::new(mission, identity, settings, 1, Instant::ZERO);
-    // What it says by itself after so long.
-    node.handle_timeout(NOW);
-    said(&mut node);
-    node
-}
-
-fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
-    let mut said = heapless::Vec::new();
-    while let Some((_, to, message)) = node.poll_message(NOW) {
-        let message = match message {
-            Message::Hello(hello) => Message::Hello(hello),
-            Message::Proposal(proposal) => Message::Proposal(proposal),
-            Message::Offer { upload, answer } => Message::Offer { upload, answer },
-            Message::Heartbeat {
-                mission,
-                ask,
-                answer,
-            } => Message::Heartbeat {
-                mission,
-                ask,
-                answer,
-            },
-            _ => panic!("{message:?}"),
-        };
-        said.push((to, message)).unwrap();
-    }
-    said
-}
-
-/// A hello of a neighbour that has taken relay 2.
-fn hello(node: &Node, holds: MissionId) -> Message {
-    Message::Hello(Hello {
-        mission: node.member.digest,
-        newest: ViewId::LOADED,
-        neighbour: 2,
-        ask: false,
-        form: false,
-        fresh: false,
-        ready: true,
-        behind: 1,
-        hears: 0x0F,
-        holds,
-        flies: true,
-        nonce: 9,
-    })
-}
 
 fn proposal(mission_id: MissionId) -> Message {
     Message::Proposal(Proposal {
@@ -129,7 +45,7 @@ fn offered(upload: Upload, answer: u16) -> Message {
 #[test]
 fn who_does_not_hold_the_mission_hands_no_proposal_on_and_says_what_it_holds() {
     let mut node = relay(true);
-    let held = node.update.latest();
+    let held = node.layers.update.latest();
     let known = hello(&node, held);
     node.handle_message(NOW, Side::Upstream, 1, &known);
     assert_eq!(said(&mut node), []);
@@ -145,10 +61,10 @@ fn who_does_not_hold_the_mission_hands_no_proposal_on_and_says_what_it_holds() {
 #[test]
 fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
     let mut node = relay(true);
-    let (old, new) = (node.update.latest(), upload(1));
+    let (old, new) = (node.layers.update.latest(), upload(1));
     let said_now = offer(&mut node, new);
     node.handle_message(NOW, Side::Upstream, 1, &said_now);
-    assert_eq!(node.update.latest(), new.id());
+    assert_eq!(node.layers.update.latest(), new.id());
     assert_ne!(node.member.active, new.id());
     // An offer answers a hello: it asks for one.
     let told = said(&mut node);
@@ -181,7 +97,7 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
 #[test]
 fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one_is_told() {
     let mut node = relay(true);
-    let (older, newer) = (node.update.latest(), upload(2).id());
+    let (older, newer) = (node.layers.update.latest(), upload(2).id());
     let ahead = hello(&node, newer);
     node.handle_message(NOW, Side::Downstream, 3, &ahead);
     let told = said(&mut node);
@@ -202,8 +118,8 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
     for ms in 1..4_000 {
         let now = NOW + Duration::from_millis(ms);
         for side in [Side::Upstream, Side::Downstream] {
-            if node.update.offers_again(side, now) {
-                node.neighbours.at_mut(side).offer = true;
+            if node.layers.update.offers_again(side, now) {
+                node.layers.neighbours.at_mut(side).offer = true;
                 assert!(node.next_offer(now, side).is_some());
                 at.push(ms).unwrap();
             }
@@ -219,10 +135,13 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
 #[test]
 fn without_a_key_nothing_is_taken() {
     let mut node = relay(false);
-    let held = node.update.latest();
+    let held = node.layers.update.latest();
     let said_now = offer(&mut node, upload(1));
     node.handle_message(NOW, Side::Upstream, 1, &said_now);
-    assert_eq!((node.stats().unsigned, node.update.latest()), (1, held));
+    assert_eq!(
+        (node.stats().unsigned, node.layers.update.latest()),
+        (1, held)
+    );
     assert_eq!(node.upload(), None);
     assert_eq!(said(&mut node), []);
     // Nor is the ground anybody to listen to.
@@ -235,7 +154,7 @@ fn without_a_key_nothing_is_taken() {
 #[test]
 fn an_offer_for_other_relays_is_refused() {
     let mut node = relay(true);
-    let held = node.update.latest();
+    let held = node.layers.update.latest();
     let other = Mission::try_new(MissionConfig {
         tx_power_w: 1.0,
         ..paper(3)
@@ -243,10 +162,16 @@ fn an_offer_for_other_relays_is_refused() {
     let stray = Upload::new(&other.unwrap(), 1, paper(3)).unwrap();
     let said_now = offer(&mut node, stray);
     node.handle_message(NOW, Side::Upstream, 1, &said_now);
-    assert_eq!((node.stats().mission, node.update.latest()), (1, held));
+    assert_eq!(
+        (node.stats().mission, node.layers.update.latest()),
+        (1, held)
+    );
     let said_now = offer(&mut node, stray);
     node.on_ground(NOW, Side::Upstream, 0, &said_now);
-    assert_eq!((node.stats().mission, node.update.latest()), (2, held));
+    assert_eq!(
+        (node.stats().mission, node.layers.update.latest()),
+        (2, held)
+    );
 }
 
 /// Two that do not take each other for neighbours, but one of them the other: offers and hellos must come to an end.
@@ -259,8 +184,8 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     assert!(node.handle_message(NOW, Side::Upstream, 1, &first));
     assert_eq!(
         (
-            node.update.latest(),
-            node.neighbours.at(Side::Upstream).node()
+            node.layers.update.latest(),
+            node.layers.neighbours.at(Side::Upstream).node()
         ),
         (new.id(), 2)
     );
@@ -274,7 +199,10 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     let stray = upload_to(&base(), 2);
     let said_now = offer(&mut node, stray);
     node.handle_message(NOW, Side::Upstream, 1, &said_now);
-    assert_eq!((node.stats().mission, node.update.latest()), (1, new.id()));
+    assert_eq!(
+        (node.stats().mission, node.layers.update.latest()),
+        (1, new.id())
+    );
 }
 
 /// Hours later, or just too late, an offer is nothing but a reason to say a hello; one that answers that is taken.
@@ -286,7 +214,7 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
     for ground in [false, true] {
         for (now, hellos) in [(late(1), false), (late(1), true), (late(7_200), true)] {
             let mut node = relay(true);
-            let held = node.update.latest();
+            let held = node.layers.update.latest();
             let withheld = offer(&mut node, upload(1));
             if hellos {
                 // It goes on saying hellos; their number is another one by then.
@@ -297,7 +225,7 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
             }
             let from = u16::from(!ground);
             assert!(node.handle_message(now, Side::Upstream, from, &withheld));
-            assert_eq!((node.stats().stale, node.update.latest()), (1, held));
+            assert_eq!((node.stats().stale, node.layers.update.latest()), (1, held));
             let mut answer = None;
             while let Some((_, to, message)) = node.poll_message(now) {
                 if let Message::Hello(hello) = message
@@ -310,7 +238,7 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
             assert_ne!(fresh, withheld);
             assert!(node.handle_message(now, Side::Upstream, from, &fresh));
             assert_eq!(
-                (node.stats().stale, node.update.latest()),
+                (node.stats().stale, node.layers.update.latest()),
                 (1, upload(1).id())
             );
         }
@@ -331,72 +259,4 @@ fn what_is_stored_of_an_upload_does_not_depend_on_what_it_answers() {
     );
     assert_eq!(Upload::decode(&stored), Some(upload(3)));
     assert_eq!(Upload::decode(&bodies[0][..LENGTH + 2]), None);
-}
-
-/// The hello of node 1, which hears relay 2 or not.
-fn hello_of(node: &Node, hears: u8) -> Message {
-    let Message::Hello(hello) = hello(node, node.update.latest()) else {
-        unreachable!();
-    };
-    Message::Hello(Hello {
-        ask: true,
-        hears,
-        ..hello
-    })
-}
-
-fn events(node: &mut Node) -> heapless::Vec<Event, 16> {
-    core::iter::from_fn(|| node.poll_event()).collect()
-}
-
-#[test]
-fn a_node_that_does_not_hear_this_relay_is_told_of_once_until_it_does() {
-    let mut node = relay(false);
-    events(&mut node);
-    let deaf = hello_of(&node, 0);
-    for round in 1..=2 {
-        for times in 1..=30 {
-            node.handle_message(NOW, Side::Upstream, 1, &deaf);
-            let told = events(&mut node).contains(&Event::NotHeard { node: 1 });
-            assert_eq!(told, times == 8, "{round} {times}");
-        }
-        let hears = hello_of(&node, 1);
-        node.handle_message(NOW, Side::Upstream, 1, &hears);
-    }
-}
-
-#[test]
-fn a_loss_and_a_mission_that_differs_are_told_with_the_node() {
-    let mut node = relay(false);
-    let lost = events(&mut node);
-    let Message::Hello(hello) = hello_of(&node, 1) else {
-        unreachable!();
-    };
-    let other = Message::Hello(Hello {
-        mission: hello.mission ^ 1,
-        ..hello
-    });
-    node.handle_message(NOW, Side::Upstream, 1, &other);
-    assert_eq!(
-        events(&mut node)[..],
-        [Event::MissionMismatch { node: 1 }],
-        "{lost:?}"
-    );
-    let mut told = heapless::Vec::<Event, 16>::new();
-    for seconds in 10..200 {
-        node.handle_timeout(Instant::from_millis(1_000 * seconds));
-        while node
-            .poll_message(Instant::from_millis(1_000 * seconds))
-            .is_some()
-        {}
-        told.extend(events(&mut node));
-    }
-    for (side, other) in [(Side::Upstream, 1), (Side::Downstream, 3)] {
-        let lost = Event::NeighbourLost { side, node: other };
-        assert_eq!(
-            told.iter().filter(|event| **event == lost).count(),
-            1,
-            "{told:?}"
-        );
-    }
 }

@@ -1,0 +1,189 @@
+//! Newer missions, in flight: what is offered, to whom, and what the ground is told.
+
+use super::state::Node;
+use crate::event::Event;
+use crate::node::mission_update::takes_uploads;
+use crate::side::Side;
+use crate::stats::bump;
+use crate::time::Instant;
+use crate::wire::digest::MissionId;
+use crate::wire::message::{Hello, Message};
+use crate::wire::upload::{Upload, UploadError};
+
+impl Node {
+    /// A message from the ground at `side`; whether it is one for the ground to say.
+    pub(super) fn on_ground(
+        &mut self,
+        now: Instant,
+        side: Side,
+        from: u16,
+        message: &Message,
+    ) -> bool {
+        let base = self.member.digest;
+        match message {
+            Message::Offer { .. } | Message::Hello(_) if message.mission() != Some(base) => {
+                self.refuse_mission(side, from);
+            }
+            Message::Offer { upload, answer } => {
+                if self.is_asked(now, *answer) {
+                    self.hold(now, *upload);
+                }
+                self.layers.neighbours.at_mut(side).ground = true;
+            }
+            Message::Hello(hello) => self.layers.neighbours.at_mut(side).ground |= hello.ask,
+            _ => return false,
+        }
+        true
+    }
+
+    /// What the ground at `side` is told, once it is owed: to which node.
+    pub(super) fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Hello)> {
+        if !core::mem::take(&mut self.layers.neighbours.at_mut(side).ground) {
+            return None;
+        }
+        let to = match side {
+            Side::Upstream => 0,
+            Side::Downstream => self.member.all.saturating_add(1),
+        };
+        let nonce = self.ask_number(now);
+        let hello = Hello {
+            neighbour: 0,
+            form: false,
+            ..self.hello(now, side, false, nonce)
+        };
+        Some((to, hello))
+    }
+
+    /// Whether an offer of that number answers a hello of late; one that does not is counted.
+    fn is_asked(&mut self, now: Instant, answer: u16) -> bool {
+        let asked = self.layers.update.asked(answer, now, &self.member.settings);
+        if !asked {
+            bump(&mut self.telemetry.stats.stale);
+        }
+        asked
+    }
+
+    /// An offer from node `from` at `side`, for relays that were loaded with the same mission. One that answers a hello of late is
+    /// answered only by who holds as new a mission then: any other answer would be answered by the same offer.
+    pub(super) fn on_offer(
+        &mut self,
+        now: Instant,
+        side: Side,
+        from: u16,
+        upload: &Upload,
+        answer: u16,
+    ) {
+        if !takes_uploads(&self.member) {
+            return bump(&mut self.telemetry.stats.unsigned);
+        }
+        if !self.is_asked(now, answer) {
+            return self.owe_hello(side, from, false);
+        }
+        let id = upload.id();
+        let neighbour = self.layers.neighbours.at_mut(side);
+        if neighbour.node() == from {
+            neighbour.holds = neighbour.holds.max(Some(id));
+        }
+        self.hold(now, *upload);
+        if self.layers.update.latest() >= id {
+            self.owe_hello(side, from, false);
+        }
+    }
+
+    /// Holds `upload` from now on, if it is newer than what is held.
+    fn hold(&mut self, now: Instant, upload: Upload) {
+        if self.layers.update.hold(&self.member, upload) {
+            self.held(now);
+        }
+    }
+
+    /// A newer mission is held.
+    fn held(&mut self, now: Instant) {
+        self.raise(Event::Uploaded);
+        // The leader has to hold it first; the others hold it best before the proposal comes to them.
+        for side in [Side::Upstream, Side::Downstream] {
+            self.layers.neighbours.at_mut(side).offer = true;
+            self.layers.update.begin_offers(side);
+        }
+        self.layers.view.ask(now);
+    }
+
+    /// The same by the relay's own firmware.
+    pub(crate) fn handle_upload(
+        &mut self,
+        now: Instant,
+        upload: &Upload,
+    ) -> Result<(), UploadError> {
+        self.layers.update.hand_in(&self.member, upload)?;
+        self.held(now);
+        Ok(())
+    }
+
+    /// A relay that has just been switched on flies `upload`, which it held before.
+    pub(crate) fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
+        let untouched = self.layers.view.is_untouched() && self.layers.round.is_untouched();
+        let mission = self.layers.update.resume(&self.member, upload, untouched)?;
+        self.adopt(mission, upload.id());
+        Ok(())
+    }
+
+    /// The newest mission held, if it was uploaded.
+    pub(crate) const fn upload(&self) -> Option<&Upload> {
+        self.layers.update.upload()
+    }
+
+    /// The neighbour `from` at `side` says that it holds the mission of that number.
+    pub(super) fn compare(&mut self, side: Side, from: u16, holds: MissionId) {
+        if !takes_uploads(&self.member) {
+            return;
+        }
+        let latest = self.layers.update.latest();
+        if holds >= latest {
+            self.layers.update.stop_offers(side);
+        }
+        if holds > latest {
+            self.owe_hello(side, from, false);
+        } else if holds < latest {
+            self.layers.neighbours.at_mut(side).offer = true;
+        } else if self.layers.neighbours.at(side).holds != Some(latest)
+            && side == self.onward()
+            && self
+                .layers
+                .view
+                .awaited()
+                .is_some_and(|proposed| proposed.mission_id == latest)
+        {
+            // The proposal had to wait for that.
+            self.layers.view.resend();
+        }
+    }
+
+    /// The offer that is owed to the neighbour at `side`, or the hello that asks for one that it can answer: to which node.
+    pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
+        let neighbour = self.layers.neighbours.at_mut(side);
+        let due = core::mem::take(&mut neighbour.offer);
+        let (to, holds, answer) = (neighbour.node(), neighbour.holds, neighbour.asked);
+        let upload = self.layers.update.offer_to(holds)?;
+        if !due || to == 0 {
+            return None;
+        }
+        let settings = self.member.settings;
+        self.layers.update.offered(side, now, &settings);
+        let message = if self.layers.update.has_asked(side, now, &settings) {
+            Message::Offer { upload, answer }
+        } else {
+            let nonce = self.ask_number(now);
+            Message::Hello(self.hello(now, side, true, nonce))
+        };
+        Some((side, to, message))
+    }
+
+    /// Whoever has not said since that it holds the mission is offered it again.
+    pub(super) fn offer_again(&mut self, now: Instant) {
+        for side in [Side::Upstream, Side::Downstream] {
+            if self.layers.update.offers_again(side, now) {
+                self.layers.neighbours.at_mut(side).offer = true;
+            }
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! What a relay holds, and how its layers come to know of each other.
+
+use super::layers::Layers;
+use super::telemetry::Telemetry;
+use crate::event::{About, Event};
+use crate::mission::Mission;
+use crate::node::context::{Effects, Member};
+use crate::node::lease::Lease;
+use crate::node::mission_update::MissionUpdate;
+use crate::node::namesake::Namesake;
+use crate::node::neighbour::Neighbours;
+use crate::node::round::Round;
+use crate::node::round::state::Phase;
+use crate::node::sample::Sample;
+use crate::node::steering::Steering;
+use crate::node::view::ViewChange;
+use crate::node::view::record::{RecordError, ViewRecord};
+use crate::settings::{Identity, Method, Settings};
+use crate::side::Side;
+use crate::stats::{Stats, bump};
+use crate::time::Instant;
+
+/// A relay's share of the protocol.
+#[derive(Clone, Debug)]
+pub(crate) struct Node {
+    pub(super) member: Member,
+    pub(super) layers: Layers,
+    pub(super) steering: Steering,
+    pub(super) namesake: Namesake,
+    pub(super) telemetry: Telemetry,
+}
+
+impl Node {
+    /// A relay that has just been switched on. `identity` and `settings` have been checked.
+    pub(crate) fn new(
+        mission: Mission,
+        identity: Identity,
+        settings: Settings,
+        seed: u32,
+        now: Instant,
+    ) -> Self {
+        let leads = identity.index == mission.leader();
+        let profile = settings.profile.unwrap_or(mission.config().common);
+        let seed = seed.wrapping_add(u32::from(identity.index));
+        let [a, b, ..] = seed.wrapping_mul(0x9E37_79B1).to_le_bytes();
+        let number = u16::from_le_bytes([a, b]);
+        let member = Member::new(mission, settings, identity.index);
+        let neighbours = Neighbours::new(
+            identity.index,
+            member.all,
+            seed.rotate_left(8),
+            now,
+            &settings,
+        );
+        let mut node = Self {
+            steering: Steering::new(&settings, neighbours.nodes(), seed, now),
+            layers: Layers {
+                neighbours,
+                view: ViewChange::new(member.all, mission.leader(), !seed),
+                lease: Lease::new(!seed.rotate_left(16), now, &settings),
+                update: MissionUpdate::new(member.active, seed.rotate_left(4), now),
+                round: Round::new(leads, number, profile, settings.measure, seed),
+            },
+            namesake: Namesake::new(seed.rotate_left(24)),
+            telemetry: Telemetry::default(),
+            member,
+        };
+        if leads || settings.method == Method::Joint {
+            node.layers.round.work_soon(now);
+        }
+        if !leads {
+            node.await_first(now);
+        }
+        node
+    }
+
+    pub(super) fn raise(&mut self, event: Event) {
+        self.telemetry.events.raise(event);
+    }
+
+    pub(super) fn raise_about(&mut self, about: About, side: Side, node: u16) {
+        self.telemetry.events.raise_about(about, side, node);
+    }
+
+    /// Has the other layers know what one of them came to.
+    pub(super) fn apply(&mut self, now: Instant, effects: Effects) {
+        let stats = &mut self.telemetry.stats;
+        for (happened, counter) in [
+            (effects.stale, &mut stats.stale),
+            (effects.repeated, &mut stats.repeated),
+            (effects.resent, &mut stats.repeats),
+            (effects.began, &mut stats.sweeps),
+        ] {
+            if happened {
+                bump(counter);
+            }
+        }
+        if let Some(proposer) = effects.proposed_by {
+            let back = self.back();
+            self.layers.neighbours.at_mut(back).proposed_by(proposer);
+        }
+        let (back, onward) = (self.back(), self.onward());
+        for (side, at) in [(onward, effects.heard_onward), (back, effects.heard_back)] {
+            if let Some(at) = at {
+                self.confirm(now, side, at);
+            }
+        }
+        if effects.lapsed && !core::mem::replace(&mut self.telemetry.told_lapsed, true) {
+            self.raise(Event::LeaseLapsed);
+        }
+        if effects.view_proposed {
+            self.layers.round.suspend();
+        }
+        if effects.view_needed {
+            self.layers.view.ask(now);
+        }
+        if effects.ask {
+            let back = self.back();
+            let to = self.layers.neighbours.at(back).node();
+            self.owe_hello(back, to, true);
+        }
+        if let Some(decided) = effects.decided {
+            self.decided(now, decided);
+        }
+        if effects.converged {
+            self.raise(Event::Converged);
+            if self.layers.context(now, &self.member).leads() {
+                self.layers.lease.begin(now);
+            }
+        }
+        if effects.infeasible {
+            self.raise(Event::Infeasible);
+        }
+    }
+
+    pub(crate) fn poll_event(&mut self) -> Option<Event> {
+        self.telemetry.events.take()
+    }
+
+    /// Until when it may hold what was agreed on.
+    pub(crate) const fn lease(&self) -> Option<Instant> {
+        self.layers.lease.until()
+    }
+
+    pub(crate) fn phase(&self) -> Phase {
+        if self.layers.view.has_no_quorum() {
+            Phase::NoQuorum
+        } else if self.layers.view.awaited().is_some() {
+            Phase::ViewChange
+        } else {
+            self.layers.round.phase()
+        }
+    }
+
+    pub(crate) const fn member(&self) -> &Member {
+        &self.member
+    }
+
+    /// The neighbours toward Tx and toward Rx.
+    pub(crate) fn neighbours(&self) -> [Option<u16>; 2] {
+        self.layers.neighbours.nodes()
+    }
+
+    pub(crate) const fn round(&self) -> &Round {
+        &self.layers.round
+    }
+
+    pub(crate) const fn stats(&self) -> &Stats {
+        &self.telemetry.stats
+    }
+
+    pub(crate) const fn stats_mut(&mut self) -> &mut Stats {
+        &mut self.telemetry.stats
+    }
+
+    /// What it has said in the votes on views.
+    pub(crate) const fn view_record(&self) -> ViewRecord {
+        self.layers.view.record(self.member.digest)
+    }
+
+    /// A relay that has just been switched on has said what is in `record`.
+    pub(crate) fn resume_view(
+        &mut self,
+        now: Instant,
+        record: &ViewRecord,
+    ) -> Result<(), RecordError> {
+        let untouched = self.layers.round.is_untouched();
+        self.layers
+            .view
+            .resume(now, &self.member, record, untouched)?;
+        self.layers.lease.resume(&self.member.settings);
+        Ok(())
+    }
+
+    /// One measurement, by a relay that measures.
+    pub(crate) fn handle_sample(&mut self, sample: Sample) {
+        if !self.layers.round.handle_sample(&self.member, sample) {
+            bump(&mut self.telemetry.stats.samples_refused);
+        }
+    }
+
+    /// The leader begins again, at `now`; nobody else has anything to begin.
+    pub(crate) fn restart(&mut self, now: Instant) {
+        let leads = self.member.index == self.member.mission.leader();
+        let may = leads && !self.layers.view.has_no_quorum() && !self.stands_down();
+        if may && self.layers.view.awaited().is_none() {
+            let context = self.layers.context(now, &self.member);
+            let effects = self.layers.round.restart(&context);
+            self.apply(now, effects);
+        }
+    }
+}
