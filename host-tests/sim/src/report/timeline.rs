@@ -21,7 +21,8 @@ pub struct MomentReport {
     /// transmitter, and the receiver comes after the last relay.
     pub relay: u16,
     /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted`, `healed`, `deaf`, `hears`, `offered`,
-    /// `held`, `adopted`, `lapsed`, `unheard`, `stranger`, `other key`, `old epoch` or `namesake`.
+    /// `held`, `adopted`, `lapsed`, `unheard`, `stranger`, `other key`, `old epoch`, `namesake`,
+    /// `engaged`, `released`, `blind` or `restarted`: the last four of its autopilot.
     pub what: &'static str,
     /// The neighbour that was lost or found, the relay that is not heard, or the one that is told of.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -64,6 +65,10 @@ impl MomentReport {
             Turning::Offered(_) => "offered",
             Turning::Uploaded(_) => "held",
             Turning::Adopted(_) => "adopted",
+            Turning::Engaged => "engaged",
+            Turning::Released => "released",
+            Turning::Blind => "blind",
+            Turning::Restarted => "restarted",
         };
         let (view, relays) = match moment.what {
             Turning::Reformed { view, relays, .. } => (Some(view), Some(relays)),
@@ -160,7 +165,7 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         "converged" => one.sir.map(f64::to_bits) == moment.sir.map(f64::to_bits),
         "silent" | "on" => one.at_s.to_bits() == moment.at_s.to_bits(),
         "held" | "adopted" => one.version == moment.version,
-        "cut" | "lapsed" => true,
+        "cut" | "lapsed" | "engaged" | "released" => true,
         _ => false,
     }
 }
@@ -193,6 +198,8 @@ impl Group {
             "other key" => format!("{}: another key", one.other.unwrap_or_default()),
             "old epoch" => format!("{}: an old epoch", one.other.unwrap_or_default()),
             "namesake" => format!("{} used twice", one.other.unwrap_or_default()),
+            "engaged" | "released" | "blind" => format!("{who} {}", one.what),
+            "restarted" => format!("{who}: autopilot restarted"),
             "offered" | "held" | "adopted" => {
                 format!("mission {} {}", one.version.unwrap_or_default(), one.what)
             }
@@ -229,6 +236,11 @@ impl Group {
             "other key" => format!("{who} found that relay {other} signs with another key"),
             "old epoch" => format!("{who} found that the epoch of relay {other} went back"),
             "namesake" => format!("{who} found that number {other} is used twice"),
+            "engaged" if many => format!("{who} fly their drones"),
+            "engaged" => format!("{who} flies its drone"),
+            "released" => format!("{who} released: a pilot flies"),
+            "blind" => format!("{who} does not know where its drone is"),
+            "restarted" => format!("the autopilot of {who} was switched off and on"),
             "cut" => format!("{who} cut off: too few to go on without the others"),
             "converged" => format!(
                 "converged: {}, SIR {:.3}",

@@ -4,6 +4,7 @@ mod air;
 mod begin;
 mod channel;
 mod ending;
+mod fleet;
 mod flight;
 mod ground;
 mod hearing;
@@ -26,6 +27,7 @@ use uav_relay::{Instant, Placement, Sample};
 use judge::Touched;
 use start::{Start, switched_on};
 
+use super::fleet::Vehicle;
 use super::flying::Seen;
 use super::medium::AirCounts;
 use super::outcome::{Outcome, RelayEnd, Turning};
@@ -127,11 +129,14 @@ impl Chain {
             .medium
             .map_or_else(AirCounts::default, |it| it.counts());
         if let Some(watch) = self.watch {
-            let flown_m = self.flight.and(self.outcome.nearest).map(|it| it.apart_m);
+            let flown_m = self.outcome.nearest.map(|it| it.apart_m);
             let is_judged = self.setup.soak.is_some();
             let watched = watch.end(self.now, is_judged, flown_m);
             self.outcome.watched = Some(watched);
         }
+        let lent = self.members.iter().map(|member| member.lent);
+        let places = self.fleet.iter().map(Vehicle::at);
+        self.outcome.fleet = places.zip(lent).collect();
         self.outcome.relays = self
             .members
             .into_iter()
@@ -164,7 +169,9 @@ impl Chain {
             self.ahead -= 1;
         }
         match happening {
-            Happening::Fly => self.fly(),
+            Happening::Fly if self.fleet.is_empty() => self.fly(),
+            Happening::Fly => self.fly_fleet(),
+            Happening::Restart => self.restart_autopilot(index),
             Happening::Part => self.tell_of_partitions(),
             Happening::Air(event) => self.on_air(event),
             Happening::Strike(kind) => self.strike(kind),

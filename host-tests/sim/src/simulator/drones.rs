@@ -116,6 +116,26 @@ pub struct Nearest {
     pub at: Instant,
 }
 
+impl Nearest {
+    /// The two of `places` that are nearest to each other at `now`; none of fewer than two.
+    pub(super) fn of(places: &[Point], now: Instant) -> Option<Self> {
+        let mut nearest: Option<Self> = None;
+        for (one, at) in places.iter().enumerate() {
+            for (other, beside) in places.iter().enumerate().skip(one + 1) {
+                let apart_m = apart(*at, *beside);
+                if nearest.is_none_or(|least| apart_m < least.apart_m) {
+                    nearest = Some(Self {
+                        apart_m,
+                        pair: [one + 1, other + 1],
+                        at: now,
+                    });
+                }
+            }
+        }
+        nearest
+    }
+}
+
 /// The drones of a run.
 #[derive(Debug)]
 pub(super) struct Flight {
@@ -198,20 +218,8 @@ impl Flight {
 
     /// The two drones that are nearest to each other at `now`; none of fewer than two.
     pub(super) fn nearest(&self, now: Instant) -> Option<Nearest> {
-        let mut nearest: Option<Nearest> = None;
-        for (one, drone) in self.drones.iter().enumerate() {
-            for (other, beside) in self.drones.iter().enumerate().skip(one + 1) {
-                let apart_m = apart(drone.body.at, beside.body.at);
-                if nearest.is_none_or(|least| apart_m < least.apart_m) {
-                    nearest = Some(Nearest {
-                        apart_m,
-                        pair: [one + 1, other + 1],
-                        at: now,
-                    });
-                }
-            }
-        }
-        nearest
+        let places: Vec<Point> = self.drones.iter().map(|drone| drone.body.at).collect();
+        Nearest::of(&places, now)
     }
 }
 
@@ -220,7 +228,7 @@ fn off(rng: &mut ChaCha8Rng, most_m: f64) -> Point {
     [0; 3].map(|_| most_m * rng.random_range(-1.0..=1.0))
 }
 
-fn sum(one: Point, other: Point) -> Point {
+pub(super) fn sum(one: Point, other: Point) -> Point {
     let [x, y, h] = one;
     let [more_x, more_y, more_h] = other;
     [x + more_x, y + more_y, h + more_h]

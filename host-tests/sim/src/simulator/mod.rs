@@ -10,6 +10,7 @@
 //! | [`queue`] | what happens when, in order |
 //! | [`setup`], [`outcome`] | what a chain is run with, and what came of it |
 //! | [`drones`] | drones that fly to where they are told, and know where they are only nearly |
+//! | [`fleet`] | drones with an autopilot each, and their pilots |
 //! | [`flying`] | groups of relays with an agreement of their own |
 //! | [`longest`] | which relays can be in one chain |
 //! | [`optima`], [`optimum`] | where exactly these relays would be if nothing had happened |
@@ -23,6 +24,7 @@ pub mod chain;
 pub mod deaf;
 pub mod drones;
 pub mod faults;
+pub mod fleet;
 pub mod flying;
 pub mod forge;
 pub mod link;

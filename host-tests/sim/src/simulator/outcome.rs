@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use uav_relay::{Duration, Instant, Placement, Profile, Side, Stats};
 
 use super::attack::Struck;
-use super::drones::Nearest;
+use super::drones::{Nearest, Point};
 use super::faults::Injected;
 use super::flying::Seen;
 use super::medium::AirCounts;
@@ -64,6 +64,14 @@ pub enum Turning {
     Uploaded(u16),
     /// It flies it, with all others that were counted.
     Adopted(u16),
+    /// Its autopilot flies to its places from now on.
+    Engaged,
+    /// Its pilot flies, or its autopilot by itself.
+    Released,
+    /// Nobody knows where its drone is.
+    Blind,
+    /// Its autopilot was switched off and on.
+    Restarted,
 }
 
 /// A turning and whose it was.
@@ -170,6 +178,8 @@ pub struct Outcome {
     pub moments: Vec<Moment>,
     /// When two drones were nearest to each other, where their flight was simulated.
     pub nearest: Option<Nearest>,
+    /// Where the drones with an autopilot are in the end, and whether their relays fly them.
+    pub fleet: Vec<(Point, bool)>,
     /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.
     pub unsafe_setpoints: u64,
     /// What happened on the air, where relays shared it.

@@ -31,6 +31,8 @@ pub enum Happening {
     Upload,
     /// All drones fly on for a step.
     Fly,
+    /// Its drone's autopilot is switched off and on.
+    Restart,
     /// It goes silent.
     Kill,
     /// It is switched on again.

@@ -10,6 +10,7 @@ use super::attack::Attack;
 use super::deaf::Deaf;
 use super::drones::FlightSpec;
 use super::faults::Faults;
+use super::fleet::spec::FleetSpec;
 use super::link::LinkSpec;
 use super::medium::access::{self, Access};
 
@@ -88,6 +89,8 @@ pub struct Setup {
     pub attack: Option<Attack>,
     /// How the drones fly, where that is simulated, too.
     pub flight: Option<FlightSpec>,
+    /// The same with an autopilot each, in place of it.
+    pub fleet: Option<FleetSpec>,
     /// On a shared channel: how many relays away a relay is heard.
     pub radio_reach: usize,
     /// On a shared channel: how the radios come by it.
@@ -128,6 +131,7 @@ impl Setup {
             forgetful: Vec::new(),
             attack: None,
             flight: None,
+            fleet: None,
             radio_reach: Self::RADIO_REACH,
             access: Access::Ideal,
             burst: 1.0,

@@ -7,6 +7,7 @@ use uav_relay_sim::simulator::attack::Attack;
 use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 use crate::air::Air;
+use crate::flight::Flight;
 use crate::times::{instant, span};
 use crate::upload::Uploads;
 
@@ -43,7 +44,7 @@ pub(crate) struct Hostile {
     #[arg(long)]
     no_auth: bool,
     /// All relays talk by one radio, which those up to four away hear; so they do with any of --kill, --boot, --partition,
-    /// --deaf, --soak, --air, --forge, --replay and --upload
+    /// --deaf, --soak, --air, --fly, --forge, --replay and --upload
     #[arg(long, conflicts_with = "wires")]
     shared: bool,
     /// Each relay has a wire to either neighbour, even then; there a break is reported, not closed
@@ -51,6 +52,8 @@ pub(crate) struct Hostile {
     wires: bool,
     #[command(flatten)]
     pub(crate) air: Air,
+    #[command(flatten)]
+    pub(crate) flight: Flight,
 }
 
 /// A relay, and when something happens to it.
@@ -73,6 +76,7 @@ impl Hostile {
             || self.is_attack()
             || self.uploads.are_planned()
             || self.air.is_eventful()
+            || self.flight.is_chosen()
     }
 
     fn is_attack(&self) -> bool {
@@ -89,7 +93,8 @@ impl Hostile {
         let all = ones
             .chain(parts)
             .chain(self.uploads.times())
-            .chain(self.air.times());
+            .chain(self.air.times())
+            .chain(self.flight.times());
         all.max().unwrap_or(Instant::ZERO)
     }
 
@@ -117,8 +122,9 @@ impl Hostile {
             return Err(Failure::input(line));
         }
         self.air.agree(uavs)?;
+        self.flight.agree(uavs)?;
         if self.is_eventful() && is_loop {
-            let line = "--closed-loop goes with none of --kill, --boot, --partition, --deaf, --soak, --forge, --replay and --upload";
+            let line = "--closed-loop goes with none of --kill, --boot, --partition, --deaf, --soak, --fly, --forge, --replay and --upload";
             return Err(Failure::input(line));
         }
         if self.uploads.are_planned() && self.no_auth {

@@ -1,6 +1,7 @@
 //! `cargo chain`: simulated relays, each running the on-board code, find their places over simulated serial links.
 
 mod air;
+mod flight;
 mod hostile;
 mod options;
 mod times;
@@ -59,6 +60,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         }
     };
     let mut setup = setup(options, mission)?;
+    options.hostile.flight.prepare(&mut setup, scenario.axis)?;
     setup.profiles = profiles;
     setup.held = mission::held(&scenario, options.uavs);
     let outcome = fly(options, &scenario, setup.clone())?;

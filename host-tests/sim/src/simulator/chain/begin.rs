@@ -40,6 +40,7 @@ impl Chain {
                 node: index,
                 lines: [Line::default(); 2],
                 killed: None,
+                lent: false,
                 starts: 1,
                 swept: 0,
                 stored: None,
@@ -65,7 +66,12 @@ impl Chain {
         for (which, spec) in setup.uploads.iter().enumerate() {
             queue.put(spec.at, which, Happening::Upload);
         }
-        let mut ahead = setup.kills.len() + setup.boots.len() + setup.uploads.len();
+        let restarts = setup.fleet.iter().flat_map(|fleet| &fleet.restarts);
+        for &(index, at) in restarts.clone() {
+            queue.put(at, usize::from(index.saturating_sub(1)), Happening::Restart);
+        }
+        let mut ahead =
+            restarts.count() + setup.kills.len() + setup.boots.len() + setup.uploads.len();
         let parts = setup.partitions.iter().map(|part| (part.from, part.until));
         let deaf = setup.deaf.iter().map(|deaf| (deaf.from, deaf.until));
         for (from, until) in parts.chain(deaf) {
@@ -93,6 +99,7 @@ impl Chain {
                 struck: Struck::default(),
                 moments: Vec::new(),
                 nearest: None,
+                fleet: Vec::new(),
                 unsafe_setpoints: 0,
                 air: AirCounts::default(),
                 watched: None,
@@ -103,6 +110,7 @@ impl Chain {
             ahead,
             attacker: None,
             flight: None,
+            fleet: Vec::new(),
             medium,
             bursts,
             watch: None,

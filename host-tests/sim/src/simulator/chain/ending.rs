@@ -43,7 +43,10 @@ impl Chain {
         if is_in(largest, Phase::Infeasible) {
             return Some(Ending::Infeasible);
         }
-        let settled = self.holding >= largest.len() && holds(largest) && self.has_arrived();
+        let settled = self.holding >= largest.len()
+            && holds(largest)
+            && self.has_arrived()
+            && self.all_hover();
         let others = parts
             .iter()
             .filter(|part| !std::ptr::eq(*part, largest))

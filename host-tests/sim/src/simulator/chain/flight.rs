@@ -2,7 +2,7 @@
 
 use uav_relay::{Instant, Placement};
 
-use super::super::drones::{Flight, Point, apart};
+use super::super::drones::{Flight, Nearest, Point, apart};
 use super::super::queue::Happening;
 use super::state::Chain;
 use crate::command::narrow;
@@ -14,6 +14,7 @@ impl Chain {
             self.flight = Some(Flight::new(spec, self.setup.seed));
             self.queue.put(Instant::ZERO, 0, Happening::Fly);
         }
+        self.line_up();
     }
 
     /// All fly on for a step; those whose relays are on say where they are.
@@ -47,13 +48,17 @@ impl Chain {
                 self.drain(index);
             }
         }
-        let nearest = flight.nearest(now);
+        self.keep(flight.nearest(now));
+        self.queue.put(now + flight.step, 0, Happening::Fly);
+        self.flight = Some(flight);
+    }
+
+    /// Keeps when two drones were nearest to each other.
+    pub(super) fn keep(&mut self, nearest: Option<Nearest>) {
         let known = self.outcome.nearest;
         if nearest.is_some_and(|it| known.is_none_or(|known| it.apart_m < known.apart_m)) {
             self.outcome.nearest = nearest;
         }
-        self.queue.put(now + flight.step, 0, Happening::Fly);
-        self.flight = Some(flight);
     }
 
     /// Whether every drone whose relay is on is where that was agreed to be.
@@ -71,7 +76,7 @@ impl Chain {
     }
 }
 
-fn point(place: Placement) -> Point {
+pub(super) fn point(place: Placement) -> Point {
     [place.x_m, place.y_m, place.altitude_m].map(f64::from)
 }
 

@@ -7,6 +7,7 @@ use uav_relay::{Instant, Placement, Relay};
 use super::super::attack::Attacker;
 use super::super::bursts::Bursts;
 use super::super::drones::Flight;
+use super::super::fleet::Vehicle;
 use super::super::link::Line;
 use super::super::medium::Medium;
 use super::super::outcome::Outcome;
@@ -24,6 +25,8 @@ pub(super) struct Member {
     /// Its lines: toward Tx (or to all), toward Rx.
     pub(super) lines: [Line; 2],
     pub(super) killed: Option<Instant>,
+    /// Whether its setpoint was flown when that was last looked at.
+    pub(super) lent: bool,
     /// How often it has been switched on.
     pub(super) starts: u32,
     /// Passes that it has begun before it was switched on last.
@@ -53,6 +56,7 @@ pub struct Chain {
     pub(super) stations: Vec<Station>,
     pub(super) attacker: Option<Attacker>,
     pub(super) flight: Option<Flight>,
+    pub(super) fleet: Vec<Vehicle>,
     /// The channel that all share, unless each has a line of its own.
     pub(super) medium: Option<Medium>,
     /// Where losses come in runs.

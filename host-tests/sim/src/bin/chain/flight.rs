@@ -1,0 +1,99 @@
+//! Drones with autopilots: that there are any, and what their pilots do.
+
+use clap::Args;
+use uav_relay::Instant;
+use uav_relay::flight::axis::{Axis, LONGEST_M, SHORTEST_M};
+use uav_relay::guard::config::GuardConfig;
+use uav_relay_sim::command::Failure;
+use uav_relay_sim::simulator::fleet::spec::{FleetSpec, Takeover, somewhere};
+use uav_relay_sim::simulator::setup::Setup;
+
+use crate::times::span;
+
+/// How far off a drone takes itself to be at most, all the time and each time that it says so, m; how much gusts move it, m/s.
+const BIAS_M: f64 = 0.5;
+const NOISE_M: f64 = 0.3;
+const GUST_MPS: f64 = 0.3;
+
+/// How far off its setpoint a drone that hovers there may be reported, m: the noise, and what gusts make of it.
+const HOVER_M: f32 = 1.5;
+
+/// The options for that.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Drones")]
+pub(crate) struct Flight {
+    /// With drones: limited speed and acceleration, noise of their positions, gusts, an autopilot each that speaks MAVLink (PX4 and
+    /// ArduCopter in turn), a pilot each who takes off and hands over, the guard; ends when all that fly hover at their places
+    #[arg(long)]
+    fly: bool,
+    /// The pilot of drone I has the sticks from S seconds on, until E or for good. Repeatable
+    #[arg(long, value_name = "I@S[-E]", value_parser = takeover, requires = "fly")]
+    takeover: Vec<Takeover>,
+}
+
+impl Flight {
+    pub(crate) const fn is_chosen(&self) -> bool {
+        self.fly
+    }
+
+    /// When something happens.
+    pub(crate) fn times(&self) -> impl Iterator<Item = Instant> {
+        self.takeover
+            .iter()
+            .map(|takeover| takeover.until.unwrap_or(takeover.from))
+    }
+
+    /// Whether this goes together with a chain of `uavs`.
+    pub(crate) fn agree(&self, uavs: u16) -> Result<(), Failure> {
+        let wrong = |takeover: &&Takeover| !(1..=uavs).contains(&takeover.relay);
+        match self.takeover.iter().find(wrong) {
+            Some(takeover) => Err(Failure::input(format!(
+                "--takeover {}@..: relay must be within 1 to {uavs}",
+                takeover.relay
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Puts the drones into a run, in order along the line.
+    pub(crate) fn prepare(&self, setup: &mut Setup, axis: Option<Axis>) -> Result<(), Failure> {
+        if !self.fly {
+            return Ok(());
+        }
+        let config = setup.mission.config();
+        let distance_m = f64::from(config.distance_m);
+        let axis = axis.or_else(|| somewhere(distance_m)).ok_or_else(|| {
+            Failure::input(format!(
+                "--fly: the line is {distance_m} m long: must be within {SHORTEST_M} to {LONGEST_M} m"
+            ))
+        })?;
+        let all = f64::from(config.relays);
+        let mut guard = GuardConfig::of(&setup.mission, config.common);
+        guard.hover_m = HOVER_M;
+        setup.settings.guard = Some(guard);
+        setup.fleet = Some(FleetSpec {
+            axis,
+            start_x_m: (0..config.relays)
+                .map(|index| distance_m * (f64::from(index) + 0.5) / all)
+                .collect(),
+            height_m: f64::from(config.common.altitude_m),
+            takeovers: self.takeover.clone(),
+            restarts: Vec::new(),
+            gust_mps: GUST_MPS,
+            bias_m: BIAS_M,
+            noise_m: NOISE_M,
+        });
+        Ok(())
+    }
+}
+
+fn takeover(text: &str) -> Result<Takeover, String> {
+    let form = "must be I@S or I@S-E, a relay (1 to N) and seconds after the start (0 to 1e6)";
+    let (relay, times) = text.split_once('@').ok_or(form)?;
+    let relay = relay.parse().map_err(|_| form)?;
+    let (from, until) = span(times).ok_or(form)?;
+    if until.is_some_and(|until| until <= from) {
+        return Err("must be I@S-E with E after S".to_owned());
+    }
+    Ok(Takeover { relay, from, until })
+}

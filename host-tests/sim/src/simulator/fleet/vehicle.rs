@@ -1,0 +1,307 @@
+//! One drone: its body, its modes, what it says and what it does.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::flight::autopilot::carrot::Pace;
+use uav_relay::flight::autopilot::{Autopilot, Kind};
+use uav_relay::flight::mavlink::table::id;
+use uav_relay::{Duration, Instant, Placement};
+
+use super::frames::{Heard, Says, heard};
+use super::pilot::{Mode, Pilot};
+use super::spec::FleetSpec;
+use crate::command::narrow;
+use crate::simulator::drones::{Body, Point, sum};
+
+/// Streams of random numbers begin here: one for each drone.
+const DRONES: u64 = 1_000;
+
+/// How fast it flies and climbs, m/s and m/s².
+const SPEED_MPS: f64 = 10.0;
+const CLIMB_MPS: f64 = 2.0;
+const ACCELERATION_MPS2: f64 = 3.0;
+
+/// A PX4 that hears no target for so long leaves its mode, and hovers (COM_OBL_RC_ACT 5).
+const LOST: Duration = Duration::from_millis(1_000);
+
+/// An autopilot that is switched off and on is away for so long.
+const AWAY: Duration = Duration::from_millis(3_000);
+
+/// How high a pilot who takes over climbs, m: away from the chain.
+const ASIDE_M: f64 = 15.0;
+
+/// `MAV_LANDED_STATE`.
+const ON_GROUND: u8 = 1;
+const IN_AIR: u8 = 2;
+const TAKING_OFF: u8 = 3;
+const LANDING: u8 = 4;
+
+/// A message that is sent again and again.
+#[derive(Clone, Copy, Debug)]
+struct Rate {
+    id: u32,
+    interval: Option<Duration>,
+    due: Instant,
+}
+
+/// A drone, its autopilot, and the relay's link to it.
+#[derive(Debug)]
+pub(in crate::simulator) struct Vehicle {
+    kind: Kind,
+    spec: FleetSpec,
+    pub(in crate::simulator) link: Autopilot,
+    pilot: Pilot,
+    body: Body,
+    gust: Point,
+    bias: Point,
+    armed: bool,
+    landed: u8,
+    mode: Mode,
+    /// Where it hovers, or flies to.
+    goal: Point,
+    told_at: Option<Instant>,
+    began: Instant,
+    away_until: Option<Instant>,
+    rates: [Rate; 4],
+    sequence: u8,
+    rng: ChaCha8Rng,
+}
+
+impl Vehicle {
+    /// The drone of that index, from 0, on the ground.
+    pub(in crate::simulator) fn new(spec: &FleetSpec, index: usize, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(DRONES + u64::try_from(index).unwrap_or(0));
+        let x_m = spec.start_x_m.get(index).copied().unwrap_or(0.0);
+        let at = [x_m, 0.0, 0.0];
+        let bias = [0; 3].map(|_| spec.bias_m * rng.random_range(-1.0..=1.0));
+        Self {
+            kind: FleetSpec::kind(index),
+            link: Autopilot::new(spec.axis, Pace::default(), Instant::ZERO),
+            pilot: Pilot::new(index, &spec.takeovers),
+            body: Body::hovering(at),
+            gust: [0.0; 3],
+            bias,
+            armed: false,
+            landed: ON_GROUND,
+            mode: Mode::Sticks,
+            goal: at,
+            told_at: None,
+            began: Instant::ZERO,
+            away_until: None,
+            rates: Self::rates(Instant::ZERO),
+            sequence: 0,
+            rng,
+            spec: spec.clone(),
+        }
+    }
+
+    /// What it sends unasked: that it is there.
+    fn rates(now: Instant) -> [Rate; 4] {
+        let often = Some(Duration::from_millis(1_000));
+        [
+            (id::HEARTBEAT, often),
+            (id::GLOBAL_POSITION_INT, None),
+            (id::EXTENDED_SYS_STATE, None),
+            (id::POSITION_TARGET_GLOBAL_INT, None),
+        ]
+        .map(|(id, interval)| Rate {
+            id,
+            interval,
+            due: now,
+        })
+    }
+
+    /// Where it is.
+    pub(in crate::simulator) const fn at(&self) -> Point {
+        self.body.at
+    }
+
+    /// Whether it is in the air.
+    pub(in crate::simulator) const fn flies(&self) -> bool {
+        self.landed != ON_GROUND
+    }
+
+    /// Whether the relay is to fly it: its pilot has not taken it.
+    pub(in crate::simulator) fn is_lent(&self, now: Instant) -> bool {
+        !self.pilot.has_sticks(now)
+    }
+
+    /// Its autopilot is switched off, and comes back.
+    pub(in crate::simulator) fn restart(&mut self, now: Instant) {
+        self.away_until = Some(now + AWAY);
+        self.mode = Mode::Hold;
+        self.goal = self.taken();
+        self.told_at = None;
+        self.pilot.has_seen_a_restart(now);
+    }
+
+    /// Its pilot lands it, where it is.
+    pub(in crate::simulator) fn land(&mut self) {
+        if self.landed == IN_AIR {
+            self.landed = LANDING;
+            self.mode = Mode::Sticks;
+            self.goal = self.taken();
+            self.goal[2] = self.bias[2];
+        }
+    }
+
+    /// Flies on until `now`, for `step_s` seconds; then its relay's link hears what it has to say.
+    pub(in crate::simulator) fn go_on(&mut self, now: Instant, step_s: f64) {
+        self.choose(now);
+        self.fly(step_s);
+        if self.away_until.is_some_and(|until| until > now) {
+            return;
+        }
+        if self.away_until.take().is_some() {
+            self.began = now;
+            self.rates = Self::rates(now);
+        }
+        for which in 0..self.rates.len() {
+            let Some(rate) = self.rates.get_mut(which) else {
+                continue;
+            };
+            if let Some(interval) = rate.interval
+                && rate.due <= now
+            {
+                rate.due = now + interval;
+                let id = rate.id;
+                if let Some(says) = self.says(now, id) {
+                    self.sequence = self.sequence.wrapping_add(1);
+                    self.link.handle_bytes(now, &says.frame(self.sequence));
+                }
+            }
+        }
+    }
+
+    /// The pilot's choices, and the autopilot's own.
+    fn choose(&mut self, now: Instant) {
+        if !self.armed && self.pilot.has_armed(now) {
+            self.armed = true;
+            self.landed = TAKING_OFF;
+            self.goal = self.taken();
+            self.goal[2] = self.spec.height_m;
+        }
+        if self.landed == TAKING_OFF && (self.taken()[2] - self.spec.height_m).abs() < 0.3 {
+            self.landed = IN_AIR;
+            self.pilot.is_up(now);
+        }
+        if self.landed == LANDING && self.body.at[2] < 0.2 {
+            self.landed = ON_GROUND;
+            self.body.velocity_mps = [0.0; 3];
+        }
+        if self.landed != IN_AIR {
+            return;
+        }
+        if let Some(mode) = self.pilot.chooses(now)
+            && mode != self.mode
+        {
+            self.mode = mode;
+            self.goal = self.taken();
+            if mode == Mode::Sticks {
+                self.goal[2] += ASIDE_M;
+            }
+        }
+        let streamed = self.told_at.is_some_and(|at| now.since(at) <= LOST);
+        if self.kind == Kind::Px4 && self.mode == Mode::Companion && !streamed {
+            self.mode = Mode::Hold;
+            self.goal = self.taken();
+        }
+    }
+
+    fn fly(&mut self, step_s: f64) {
+        if !self.flies() {
+            return;
+        }
+        let speed = match self.landed {
+            TAKING_OFF | LANDING => CLIMB_MPS,
+            _ => SPEED_MPS,
+        };
+        let to = sum(self.goal, self.bias.map(|part| -part));
+        self.body.fly(to, speed, ACCELERATION_MPS2, step_s);
+        // Gusts come and go within some two seconds.
+        let keeps = (-step_s / 2.0).exp();
+        let drawn = self.spec.gust_mps * (3.0 * (1.0 - keeps * keeps)).sqrt();
+        for (gust, at) in self.gust.iter_mut().zip(&mut self.body.at) {
+            *gust = *gust * keeps + drawn * self.rng.random_range(-1.0..=1.0);
+            *at += *gust * step_s;
+        }
+    }
+
+    /// Where it takes itself to be.
+    fn taken(&self) -> Point {
+        sum(self.body.at, self.bias)
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "wraps after 49 days")]
+    fn says(&mut self, now: Instant, id: u32) -> Option<Says> {
+        match id {
+            id::HEARTBEAT => Some(Says::Heartbeat {
+                autopilot: match self.kind {
+                    Kind::Px4 => 12,
+                    Kind::ArduCopter => 3,
+                },
+                armed: self.armed,
+                custom_mode: match (self.kind, self.mode) {
+                    (Kind::Px4, Mode::Sticks) => 3 << 16,
+                    (Kind::Px4, Mode::Hold) => 4 << 16 | 3 << 24,
+                    (Kind::Px4, Mode::Companion) => 6 << 16,
+                    (Kind::ArduCopter, Mode::Sticks) => 16,
+                    (Kind::ArduCopter, Mode::Hold) => 5,
+                    (Kind::ArduCopter, Mode::Companion) => 4,
+                },
+            }),
+            id::EXTENDED_SYS_STATE => Some(Says::State {
+                landed: self.landed,
+            }),
+            id::GLOBAL_POSITION_INT => {
+                let taken = self.taken();
+                let noise = self.spec.noise_m;
+                let said = taken.map(|part| part + noise * self.rng.random_range(-1.0..=1.0));
+                Some(Says::Position {
+                    boot_ms: (now.since(self.began).as_micros() / 1_000) as u32,
+                    at: self.spec.axis.point(placement(said))?,
+                })
+            }
+            _ if self.kind == Kind::ArduCopter && self.mode == Mode::Companion => {
+                Some(Says::Target {
+                    at: self.spec.axis.point(placement(self.goal))?,
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// The relay's link says something.
+    pub(in crate::simulator) fn hear(&mut self, now: Instant, frame: &[u8]) {
+        if self.away_until.is_some() {
+            return;
+        }
+        match heard(frame) {
+            Some(Heard::Interval { id, interval_us }) => {
+                for rate in self.rates.iter_mut().filter(|rate| rate.id == id) {
+                    rate.interval = Some(Duration::from_micros(interval_us));
+                    rate.due = now;
+                }
+            }
+            Some(Heard::Target(at)) => {
+                self.told_at = Some(now);
+                if self.mode == Mode::Companion
+                    && let Some(place) = self.spec.axis.place(at)
+                {
+                    self.goal = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
+                }
+            }
+            None => {}
+        }
+    }
+}
+
+fn placement(at: Point) -> Placement {
+    let [x_m, y_m, altitude_m] = at.map(narrow);
+    Placement {
+        x_m,
+        y_m,
+        altitude_m,
+    }
+}
