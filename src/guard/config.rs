@@ -2,8 +2,8 @@
 
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
-use crate::settings::WithoutQuorum;
 use crate::time::Duration;
+use crate::without_quorum::WithoutQuorum;
 
 use super::fence::is_place;
 

@@ -3,6 +3,8 @@
 //! Where a hop may end is a surface, the outside of which hears too little. Along most of a chain x is a smooth function of y and h
 //! on it; where the chain climbs straight up, or steps straight aside, it is h or y that is one of the other two.
 
+use crate::place::Placement;
+
 /// A coordinate.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum Coordinate {
@@ -56,4 +58,14 @@ impl Coordinate {
             Self::H => [h, x, y],
         }
     }
+}
+
+/// The coordinates of a place.
+pub(super) const fn triple(place: Placement) -> Triple {
+    [place.x_m, place.y_m, place.altitude_m]
+}
+
+/// One place as seen from another.
+pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
+    [a - x, b - y, c - z]
 }
