@@ -19,6 +19,7 @@ pub(crate) type Triple = [f32; 3];
 
 impl Coordinate {
     /// This coordinate first, then the other two in their order.
+    #[inline(never)] // called from many places
     pub(crate) const fn first(self, [x, y, h]: Triple) -> Triple {
         match self {
             Self::X => [x, y, h],
@@ -28,6 +29,7 @@ impl Coordinate {
     }
 
     /// (x, y, h) again.
+    #[inline(never)] // called from many places
     pub(crate) const fn back(self, [first, second, third]: Triple) -> Triple {
         match self {
             Self::X => [first, second, third],
