@@ -186,7 +186,7 @@ impl core::fmt::Display for SetupError {
             Self::WithoutQuorum => {
                 "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4"
             }
-            Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, hover of 0 to 1e3, and its feature on",
+            Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, relays of 1 to 1000, hover of 0 to 1e3, and its feature on",
         })
     }
 }
