@@ -5,6 +5,8 @@
 //! takes up another of the owner's. So two numbers go together once, and what was said in an earlier one cannot count in a
 //! later one, however late it comes.
 
+use super::fence::Fence;
+use super::own::Own;
 use crate::jitter::Jitter;
 use crate::side::Side;
 
@@ -24,6 +26,9 @@ pub(super) struct Association {
     strays: u8,
     /// Whether there is something to tell.
     pub(super) due: bool,
+    /// Whether the neighbour passed on that the chain is to open, and whether it was last told so.
+    pub(super) opens: bool,
+    pub(super) told_open: bool,
 }
 
 impl Association {
@@ -35,6 +40,8 @@ impl Association {
             heard: 0,
             strays: 0,
             due: true,
+            opens: false,
+            told_open: false,
         }
     }
 
@@ -45,6 +52,34 @@ impl Association {
             self.strays = 0;
         }
         known
+    }
+
+    /// A message of this association, but for what is of the fence.
+    pub(super) fn fence(&self, own: &Own) -> Fence {
+        Fence {
+            association: self.own,
+            echo: self.heard,
+            number: 0,
+            x_m: 0.0,
+            target_m: own.target_m(),
+            across: own.across(),
+            apart_m: 0.0,
+            flags: u8::from(own.still) * Fence::STILL
+                + u8::from(self.told_open) * Fence::OPENS
+                + u8::from(self.opens) * Fence::ECHO_OPENS,
+        }
+    }
+
+    /// What a message of this association says of opening the chain; it is answered if the neighbour has not heard the last of that.
+    pub(super) const fn hear_open(&mut self, fence: &Fence) {
+        self.opens = fence.says(Fence::OPENS);
+        self.due |= fence.says(Fence::ECHO_OPENS) != self.told_open;
+    }
+
+    /// This is passed on from now on.
+    pub(super) const fn pass_open(&mut self, opens: bool) {
+        self.due |= self.told_open != opens;
+        self.told_open = opens;
     }
 
     /// One more message of another association; whether they are too many to be late ones.
@@ -59,12 +94,18 @@ impl Association {
 pub(super) struct KeepOut {
     /// Of the lost relays the nearest node, and the limit, m.
     lost: Option<(u16, f32)>,
+    /// Whether this relay was nearer along x than the separation, and has not come up to the limit since: only where the two are
+    /// across the line keeps them apart.
+    pub(super) near: bool,
 }
 
 impl KeepOut {
     /// Nothing there.
     pub(super) const fn none() -> Self {
-        Self { lost: None }
+        Self {
+            lost: None,
+            near: false,
+        }
     }
 
     /// The limit, m.
@@ -90,7 +131,7 @@ impl KeepOut {
             Side::Downstream => lost >= node,
         };
         if self.lost.is_some_and(|(lost, _)| is_beyond(lost)) {
-            self.lost = None;
+            self.clear();
         }
     }
 
@@ -102,6 +143,6 @@ impl KeepOut {
     }
 
     pub(super) const fn clear(&mut self) {
-        self.lost = None;
+        *self = Self::none();
     }
 }

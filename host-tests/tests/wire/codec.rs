@@ -77,8 +77,9 @@ pub(crate) enum Said {
         mission: u16,
         echo: u16,
         fence: u16,
-        x_m: f32,
-        target_m: f32,
+        /// Where the fence is, where its sender is bound for, y and altitude, how far before the fence, m.
+        places: [f32; 5],
+        flags: u8,
     },
     Offer(Offer),
     Pulse {
@@ -427,14 +428,15 @@ impl Said {
                 mission,
                 echo,
                 fence,
-                x_m,
-                target_m,
+                places,
+                flags,
             } => {
                 out.push(13);
                 for word in [number, mission, echo, fence] {
                     out.extend(word.to_le_bytes());
                 }
-                reals(&mut out, &[*x_m, *target_m]);
+                reals(&mut out, places);
+                out.push(*flags);
             }
             Self::Offer(offer) => out = offer.body(),
             Self::Pulse {
@@ -588,8 +590,8 @@ impl Said {
                 mission,
                 echo,
                 fence,
-                x_m,
-                target_m,
+                places: [x_m, target_m, y_m, altitude_m, apart_m],
+                flags,
             } => Message::Fence {
                 mission,
                 fence: Fence {
@@ -598,6 +600,9 @@ impl Said {
                     number: fence,
                     x_m,
                     target_m,
+                    across: CrossSection { y_m, altitude_m },
+                    apart_m,
+                    flags,
                 },
             },
             Self::Offer(offer) => offer.message(),
@@ -677,10 +682,13 @@ impl Said {
             Self::Decision(decided) => decided.in_range(),
             Self::Fence {
                 number,
-                x_m,
-                target_m,
+                places: [places @ .., apart_m],
+                flags,
                 ..
-            } => *number != 0 && x_m.abs() <= 1e7 && target_m.abs() <= 1e7,
+            } => {
+                let within = places.iter().all(|place| place.abs() <= 1e7);
+                *number != 0 && within && (0.0..=1e5).contains(apart_m) && *flags < 16
+            }
             Self::Offer(offer) => offer.in_range(),
         }
     }
@@ -935,8 +943,8 @@ impl Reader<'_> {
                 mission: self.word()?,
                 echo: self.word()?,
                 fence: self.word()?,
-                x_m: self.real()?,
-                target_m: self.real()?,
+                places: self.reals()?,
+                flags: self.byte()?,
             },
             14 => Said::Offer(self.offer()?),
             15 => Said::Pulse {
