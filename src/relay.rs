@@ -195,6 +195,18 @@ impl Relay {
         self.node.handle_position(now, at, place);
     }
 
+    /// Whether the drone flies to the setpoints from now on: not while its pilot has it, or it is on the ground. A relay is taken to be
+    /// flown until this says otherwise.
+    ///
+    /// Where `Settings::guard` is set, a relay that is not flown has no setpoint, and its neighbours are told that it may be anywhere: they
+    /// stay where they are toward it. Flown again it begins as after a start, with the next place that
+    /// [`handle_position`](Self::handle_position) takes in.
+    ///
+    /// Constant work. To say the same again has no effect.
+    pub fn handle_control(&mut self, now: Instant, flown: bool) {
+        self.node.handle_control(now, flown);
+    }
+
     /// Relays that fell silent at `side` have landed, or were taken away: the guard need not keep clear of them any more.
     ///
     /// Constant work.

@@ -13,11 +13,11 @@
 //! is switched on again. With `--view-file` it stands by what it has said in votes on who is in the chain when it is switched on again
 //! in flight; before another flight that file is removed.
 //!
-//! With `--positions` it is told where the drone is, and its setpoints keep drones apart on their way; without, nothing does, and it
-//! says so.
+//! With `--autopilot`, `--site-tx` and `--site-rx` it flies a drone with a PX4 or an ArduCopter, over a tty or UDP: it streams where to
+//! fly and hears where the drone is, so its setpoints keep drones apart on their way. With `--positions` it is told where the drone is by
+//! another program, which flies to the setpoints that are printed. Without either nothing keeps drones apart, and it says so.
 //!
-//! Every event is one line on standard output; an f32 also as its bits. To make this program yours, hand the setpoint to
-//! your autopilot in `report.rs`. It ends with status 0 at Ctrl-C or SIGTERM, 1 when a tty fails (let systemd start it again),
+//! Every event is one line on standard output; an f32 also as its bits. It ends with status 0 at Ctrl-C or SIGTERM, 1 when a tty fails (let systemd start it again),
 //! 2 when the options are wrong.
 //!
 //! | file | one idea |
@@ -26,6 +26,7 @@
 //! | `mission.rs`, `command.rs` | the part of it that is the mission; what is said of a mistake |
 //! | `tty.rs` | a tty that never blocks, as a `SerialPort` |
 //! | `ports.rs` | the ttys of either wiring, and sleep until one of them or a timer needs the relay |
+//! | `site.rs`, `autopilot.rs` | where the line is on earth; the autopilot, opened again whenever it vanishes |
 //! | `positions.rs` | where the drone is, from a FIFO |
 //! | `relay.rs` | the loop |
 //! | `report.rs`, `line.rs` | the lines it prints |
@@ -39,6 +40,8 @@
 #![cfg_attr(unix, forbid(unsafe_code))]
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
+#[cfg(unix)]
+mod autopilot;
 #[cfg(unix)]
 mod command;
 #[cfg(unix)]
@@ -62,6 +65,8 @@ mod positions;
 mod relay;
 #[cfg(unix)]
 mod report;
+#[cfg(unix)]
+mod site;
 #[cfg(unix)]
 mod system;
 #[cfg(unix)]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
+use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::guard::config::GuardConfig;
 use uav_relay::serial::byte_time;
 use uav_relay::wire::frame::MAX_FRAME;
@@ -12,9 +13,11 @@ use uav_relay::{
     Wiring,
 };
 
+use crate::autopilot::{AutopilotPlan, Where};
 use crate::command::{self, named};
 use crate::key;
 use crate::mission::{self, MissionOptions};
+use crate::site::SiteOptions;
 
 /// A frame's way through two kernels and two USB adapters, and the computing: an adapter alone may wait 16 ms.
 const LATENCY: Duration = Duration::from_millis(40);
@@ -72,8 +75,19 @@ struct Options {
     /// setpoints then keep drones apart on their way
     #[arg(long, value_name = "FIFO")]
     positions: Option<PathBuf>,
+    /// The drone's PX4 or ArduCopter: a tty, or `udp:HOST:PORT`. It is told where to fly, and tells where the drone is
+    #[arg(long, value_name = "TTY|udp:HOST:PORT", requires = "site_tx", conflicts_with = "positions")]
+    autopilot: Option<String>,
+    /// Bit/s on its tty, 1200 to 4000000
+    #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1_200..=4_000_000))]
+    autopilot_baud: u32,
+    /// The drone's greatest speed, m/s, 0.1 to 20
+    #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = |text: &str| command::number(text, 0.1, 20.0))]
+    speed: f32,
+    #[command(flatten)]
+    sites: SiteOptions,
     /// How far off its place a hovering drone may be reported, m, 0 to 1000; it may come nearer to its neighbours by as much
-    #[arg(long, value_name = "M", default_value_t = 1.0, requires = "positions", allow_negative_numbers = true, value_parser = |text: &str| command::number(text, 0.0, 1_000.0))]
+    #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| command::number(text, 0.0, 1_000.0))]
     position_error: f32,
     #[command(flatten)]
     mission: MissionOptions,
@@ -119,6 +133,7 @@ pub(crate) struct Plan {
     pub(crate) ttys: Ttys,
     pub(crate) baud: u32,
     pub(crate) positions: Option<PathBuf>,
+    pub(crate) autopilot: Option<AutopilotPlan>,
 }
 
 /// What frames are signed with.
@@ -176,7 +191,7 @@ fn plan(options: &Options) -> Result<Plan, String> {
         ..GuardConfig::of(&mission, mission.config().common)
     };
     let settings = Settings {
-        guard: options.positions.as_ref().map(|_| guard),
+        guard: (options.positions.is_some() || options.autopilot.is_some()).then_some(guard),
         method: match options.method {
             Method::Align => uav_relay::Method::Align,
             Method::Joint => uav_relay::Method::Joint,
@@ -200,7 +215,28 @@ fn plan(options: &Options) -> Result<Plan, String> {
         ttys,
         baud: options.baud,
         positions: options.positions.clone(),
+        autopilot: autopilot(options)?,
     })
+}
+
+/// The autopilot, and the line that it flies along.
+fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
+    let axis = options.sites.axis(options.mission.distance)?;
+    let (Some(name), Some(axis)) = (&options.autopilot, axis) else {
+        return Ok(None);
+    };
+    let place = match name.strip_prefix("udp:") {
+        Some(address) => Where::Udp(address.to_owned()),
+        None => Where::Tty(PathBuf::from(name), options.autopilot_baud),
+    };
+    Ok(Some(AutopilotPlan {
+        place,
+        axis,
+        pace: Pace {
+            speed_m_s: options.speed,
+            ..Pace::default()
+        },
+    }))
 }
 
 /// How long a frame takes on a channel that all relays share, which has to carry them.

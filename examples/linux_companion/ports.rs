@@ -96,8 +96,8 @@ impl Ports {
             .filter_map(|end| end.0.as_mut())
     }
 
-    /// Sleeps until a tty has bytes, or room after it had none, or `stop` or `positions` has bytes; for `at_most`, or for
-    /// ever.
+    /// Sleeps until a tty has bytes, or room after it had none, `stop` has bytes, or `other` what it waits for; for `at_most`, or for
+    /// ever. Says what was found at `other`, too.
     ///
     /// # Errors
     /// One line if it is not possible to sleep.
@@ -105,8 +105,8 @@ impl Ports {
         &mut self,
         at_most: Option<Duration>,
         stop: BorrowedFd<'_>,
-        positions: Option<BorrowedFd<'_>>,
-    ) -> Result<Woken, String> {
+        other: Option<(BorrowedFd<'_>, PollFlags)>,
+    ) -> Result<(Woken, PollFlags), String> {
         // Longer than a Timespec can be is for ever.
         let timeout = at_most.and_then(|span| Timespec::try_from(span).ok());
         let ttys: Vec<&mut Tty> = self.ttys().collect();
@@ -115,17 +115,23 @@ impl Ports {
             .iter()
             .map(|tty| PollFd::from_borrowed_fd(tty.as_fd(), tty.interest()));
         fds.extend(on_ttys);
-        fds.extend(positions.map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)));
+        fds.extend(other.map(|(fd, interest)| PollFd::from_borrowed_fd(fd, interest)));
         match poll(&mut fds, timeout.as_ref()) {
             Ok(_) => {}
-            Err(Errno::INTR) => return Ok(Woken::Work),
+            Err(Errno::INTR) => return Ok((Woken::Work, PollFlags::empty())),
             Err(error) => return Err(format!("cannot sleep: {error}")),
         }
         let mut found: Vec<PollFlags> = fds.iter().map(PollFd::revents).collect();
         let stopped = !found.remove(0).is_empty();
+        let at_other = if other.is_some() {
+            found.pop().unwrap_or(PollFlags::empty())
+        } else {
+            PollFlags::empty()
+        };
         for (tty, events) in ttys.into_iter().zip(found) {
             tty.noticed(events);
         }
-        Ok(if stopped { Woken::Stop } else { Woken::Work })
+        let woken = if stopped { Woken::Stop } else { Woken::Work };
+        Ok((woken, at_other))
     }
 }

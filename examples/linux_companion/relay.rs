@@ -4,8 +4,10 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 use std::os::fd::AsFd;
 use std::time::{Duration, Instant as Clock};
 
+use rustix::event::PollFlags;
 use uav_relay::{Auth, Event, Key, Relay, Settings, Upload};
 
+use crate::autopilot::Companion;
 use crate::options::Plan;
 use crate::ports::{Ports, Woken};
 use crate::positions::Positions;
@@ -23,6 +25,11 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
     let mut ports = Ports::open(&plan.ttys, plan.baud)?;
     let mut positions = plan.positions.as_deref().map(Positions::open).transpose()?;
     let clock = Clock::now();
+    let mut autopilot = plan
+        .autopilot
+        .as_ref()
+        .map(|plan| Companion::open(plan, now(clock)))
+        .transpose()?;
     let auth = auth(plan)?;
     let settings = Settings {
         auth,
@@ -44,7 +51,10 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
     let names: Vec<String> = ports.ttys().map(|tty| tty.name().to_owned()).collect();
     report.started(&names, plan.baud)?;
     report.signs(auth.map(|auth| auth.epoch))?;
-    positions::started(positions.as_ref())?;
+    match &autopilot {
+        Some(autopilot) => autopilot.started()?,
+        None => positions::started(positions.as_ref())?,
+    }
     if held.is_some() {
         report.resumed(&relay)?;
     }
@@ -57,19 +67,32 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
         {
             relay.handle_position(now(clock), now(clock), place);
         }
+        if let Some(autopilot) = &mut autopilot {
+            autopilot.drive(now(clock), &mut relay)?;
+        }
         let wake = ports.poll(now(clock), &mut relay, &mut |relay| views.keep(relay));
         while let Some(event) = relay.poll_event() {
             if event == Event::Uploaded {
                 store(plan, &relay);
+            }
+            if let Some(autopilot) = &mut autopilot {
+                autopilot.tell(event);
             }
             report.event(now(clock), event, &relay)?;
         }
         if let Some(line) = ports.ttys().find_map(|tty| tty.failure()) {
             return Err(line.to_owned());
         }
+        let also = autopilot.as_ref().map(|it| it.wake(now(clock)));
+        let wake = wake.into_iter().chain(also).min();
         let span = wake.map(|at| Duration::from_micros(at.since(now(clock)).as_micros()));
-        let fifo = positions.as_ref().map(Positions::fd);
-        if ports.sleep(span, stop.as_fd(), fifo)? == Woken::Stop {
+        let fifo = positions.as_ref().map(|it| (it.fd(), PollFlags::IN));
+        let other = fifo.or_else(|| autopilot.as_ref()?.interest());
+        let (woken, found) = ports.sleep(span, stop.as_fd(), other)?;
+        if let Some(autopilot) = &mut autopilot {
+            autopilot.noticed(found);
+        }
+        if woken == Woken::Stop {
             if let Some(positions) = &positions {
                 positions.stopped(now(clock))?;
             }

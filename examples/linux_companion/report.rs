@@ -217,7 +217,7 @@ const fn stream(side: Side) -> &'static str {
     }
 }
 
-/// Replace this by what your autopilot wants to hear: `place.x_m` metres from the transmitter toward the receiver,
+/// Where to fly, for people and other programs: `place.x_m` metres from the transmitter toward the receiver,
 /// `place.y_m` to the right of that line as seen from above, at `place.altitude_m` above the ground.
 fn fly_to(now: Instant, place: Placement) -> Result<(), String> {
     line(

@@ -155,6 +155,12 @@ impl Guard {
         }
     }
 
+    /// Whether the relay flies to the setpoints from `now` on; whether that is news.
+    pub fn control(&mut self, now: Instant, flown: bool) -> bool {
+        let _ = (now, flown);
+        false
+    }
+
     /// What node `from` at `side` says. What is out of range is counted, what is of an earlier association or of another node ignored.
     pub fn hear(&mut self, side: Side, from: u16, fence: &Fence) {
         if !fence.is_valid() {

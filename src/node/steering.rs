@@ -96,6 +96,15 @@ impl Steering {
         }
     }
 
+    /// Whether the drone flies to the setpoints from `now` on.
+    pub(crate) fn control(&mut self, now: Instant, flown: bool) {
+        if let Some(guard) = self.guard()
+            && guard.control(now, flown)
+        {
+            self.remind_at = Some(now + REMINDER);
+        }
+    }
+
     /// The drone was at `place` at time `at`.
     pub(crate) fn position(&mut self, at: Instant, place: Placement) {
         if let Some(guard) = self.guard() {

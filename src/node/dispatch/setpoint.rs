@@ -31,6 +31,12 @@ impl Node {
         self.steer(now);
     }
 
+    /// Whether the drone flies to the setpoints from now on.
+    pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) {
+        self.steering.control(now, flown);
+        self.steer(now);
+    }
+
     /// Who fell silent at `side` is not in the air any more.
     pub(crate) fn clear_lost(&mut self, now: Instant, side: Side) {
         self.steering.clear_lost(side);

@@ -1,0 +1,273 @@
+//! The drone's autopilot, over a tty or UDP: opened again whenever it vanishes.
+
+use std::fmt;
+use std::net::{ToSocketAddrs as _, UdpSocket};
+use std::os::fd::{AsFd as _, BorrowedFd};
+use std::path::PathBuf;
+
+use rustix::event::PollFlags;
+use uav_relay::flight::autopilot::carrot::Pace;
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent};
+use uav_relay::flight::axis::Axis;
+use uav_relay::serial::SerialPort as _;
+use uav_relay::{Duration, Event, Instant, Relay};
+
+use crate::line::line;
+use crate::tty::Tty;
+
+/// Between two tries to open it.
+const AGAIN: Duration = Duration::from_millis(1_000);
+
+/// What waits for a tty that is slow, at most, bytes: some seconds of what is said.
+const WAITING: usize = 4_096;
+
+/// Where it is.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) enum Where {
+    /// On a tty, at that many bit/s.
+    Tty(PathBuf, u32),
+    /// At a host and port, from where it answers.
+    Udp(String),
+}
+
+impl fmt::Display for Where {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tty(path, _) => write!(f, "--autopilot {}", path.display()),
+            Self::Udp(address) => write!(f, "--autopilot udp:{address}"),
+        }
+    }
+}
+
+/// What to reach, and along which line it flies.
+#[derive(Clone, Debug)]
+pub(crate) struct AutopilotPlan {
+    pub(crate) place: Where,
+    pub(crate) axis: Axis,
+    pub(crate) pace: Pace,
+}
+
+#[derive(Debug)]
+enum Port {
+    Tty(Tty),
+    Udp(UdpSocket),
+}
+
+/// The link, and what it goes over.
+#[derive(Debug)]
+pub(crate) struct Companion {
+    plan: AutopilotPlan,
+    link: Autopilot,
+    port: Option<Port>,
+    open_at: Instant,
+    /// Whether it was said that it is gone.
+    told_gone: bool,
+    waiting: Vec<u8>,
+}
+
+impl Companion {
+    /// Opens it. That has to work once: a wrong name is a mistake, a cable that comes loose is not.
+    ///
+    /// # Errors
+    /// One line that says what does not work.
+    pub(crate) fn open(plan: &AutopilotPlan, now: Instant) -> Result<Self, String> {
+        let port = port(&plan.place)?;
+        Ok(Self {
+            link: Autopilot::new(plan.axis, plan.pace, now),
+            plan: plan.clone(),
+            port: Some(port),
+            open_at: now,
+            told_gone: false,
+            waiting: Vec::new(),
+        })
+    }
+
+    /// Says what is flown by what.
+    ///
+    /// # Errors
+    /// As every line: where standard output takes it no more.
+    pub(crate) fn started(&self) -> Result<(), String> {
+        let (place, pace) = (&self.plan.place, self.plan.pace);
+        line(
+            Instant::ZERO,
+            format_args!(
+                "autopilot: by {place}, {} m/s at most; flies once its pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
+                pace.speed_m_s
+            ),
+        )
+    }
+
+    /// Moves bytes either way; hands the relay where the drone is and whether its setpoints are flown, and the autopilot the setpoint.
+    ///
+    /// # Errors
+    /// As every line: where standard output takes it no more.
+    pub(crate) fn drive(&mut self, now: Instant, relay: &mut Relay) -> Result<(), String> {
+        self.reopen(now)?;
+        let mut bytes = [0; 1_024];
+        while let Some(count) = self.read(&mut bytes) {
+            self.link
+                .handle_bytes(now, bytes.get(..count).unwrap_or_default());
+        }
+        self.link.handle_timeout(now);
+        relay.handle_control(now, self.link.is_flown());
+        while let Some(position) = self.link.poll_position() {
+            relay.handle_position(now, position.at, position.place);
+        }
+        self.link.handle_setpoint(now, relay.setpoint());
+        let sir_db = relay.target().map(|target| 10.0 * target.log10());
+        self.link.handle_values(now, sir_db, relay.setpoint());
+        while let Some(frame) = self.link.poll_transmit(now) {
+            self.send(&frame);
+        }
+        self.flush();
+        while let Some(event) = self.link.poll_event() {
+            said(now, event)?;
+        }
+        Ok(())
+    }
+
+    /// Has the operator's ground station show what happened.
+    pub(crate) fn tell(&mut self, event: Event) {
+        let text = match event {
+            Event::Converged => "relay: the chain has agreed on places",
+            Event::Infeasible => "relay: no places meet any target",
+            Event::NeighbourLost { .. } => "relay: a neighbour is lost",
+            Event::Reformed => "relay: the chain formed anew",
+            Event::NoQuorum => "relay: too few others, holds its place",
+            Event::LeaseLapsed => "relay: not certain of the others, holds",
+            Event::IndexTaken { .. } => "relay: its number is used twice",
+            _ => return,
+        };
+        self.link.say(text);
+    }
+
+    /// When to come back at the latest.
+    pub(crate) fn wake(&self, now: Instant) -> Instant {
+        let link = self.link.poll_timeout(now);
+        if self.port.is_some() {
+            link
+        } else {
+            link.min(self.open_at.max(now))
+        }
+    }
+
+    /// What to sleep on.
+    pub(crate) fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
+        match self.port.as_ref()? {
+            Port::Tty(tty) => Some((tty.as_fd(), tty.interest())),
+            Port::Udp(socket) => Some((socket.as_fd(), PollFlags::IN)),
+        }
+    }
+
+    /// Takes note of what poll(2) has found.
+    pub(crate) fn noticed(&mut self, events: PollFlags) {
+        if let Some(Port::Tty(tty)) = &mut self.port {
+            tty.noticed(events);
+        }
+    }
+
+    fn reopen(&mut self, now: Instant) -> Result<(), String> {
+        let failure = match &self.port {
+            Some(Port::Tty(tty)) => tty.failure().map(ToOwned::to_owned),
+            _ => None,
+        };
+        if let Some(failure) = failure {
+            self.port = None;
+            self.waiting.clear();
+            self.open_at = now + AGAIN;
+            if !core::mem::replace(&mut self.told_gone, true) {
+                line(
+                    now,
+                    format_args!("autopilot: {failure}; tried again every second"),
+                )?;
+            }
+        }
+        if self.port.is_none() && self.open_at <= now {
+            self.open_at = now + AGAIN;
+            if let Ok(port) = port(&self.plan.place) {
+                self.port = Some(port);
+                self.told_gone = false;
+                line(now, format_args!("autopilot: {} is back", self.plan.place))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// How many bytes have come; none where there are none.
+    fn read(&mut self, into: &mut [u8]) -> Option<usize> {
+        let count = match self.port.as_mut()? {
+            Port::Tty(tty) => tty.read(into).ok(),
+            // Nobody there yet is no reason to give up.
+            Port::Udp(socket) => socket.recv(into).ok(),
+        };
+        count.filter(|count| *count > 0)
+    }
+
+    fn send(&mut self, frame: &[u8]) {
+        match &self.port {
+            // One that does not take it is too slow for the next one as well: the newest counts.
+            Some(Port::Udp(socket)) => drop(socket.send(frame)),
+            Some(Port::Tty(_)) if self.waiting.len() + frame.len() <= WAITING => {
+                self.waiting.extend_from_slice(frame);
+            }
+            _ => {}
+        }
+    }
+
+    fn flush(&mut self) {
+        if let Some(Port::Tty(tty)) = &mut self.port
+            && !self.waiting.is_empty()
+        {
+            let sent = tty.write(&self.waiting).unwrap_or(0);
+            self.waiting.drain(..sent);
+        }
+    }
+}
+
+fn said(now: Instant, event: AutopilotEvent) -> Result<(), String> {
+    match event {
+        AutopilotEvent::Found(kind) => line(now, format_args!("autopilot: found a {kind:?}")),
+        AutopilotEvent::Restarted => line(now, format_args!("autopilot: was switched off and on")),
+        AutopilotEvent::Refused => line(
+            now,
+            format_args!(
+                "autopilot: does not fly where it is told to; is the place outside its fence?"
+            ),
+        ),
+        AutopilotEvent::State(state) => {
+            let what = match state {
+                State::Silent => "silent; look at the cable, the baud rate and MAVLink 2",
+                State::Grounded => "on the ground, or not armed",
+                State::Standby => "in the air, flown by its pilot",
+                State::Engaged => "flies to the relay's setpoints",
+                State::Blind => "no position; keeps its last target",
+            };
+            line(now, format_args!("autopilot: {what}"))
+        }
+        other => line(now, format_args!("autopilot: {other:?}")),
+    }
+}
+
+fn port(place: &Where) -> Result<Port, String> {
+    match place {
+        Where::Tty(path, baud) => Tty::open("--autopilot", path, *baud).map(Port::Tty),
+        Where::Udp(address) => socket(address)
+            .map(Port::Udp)
+            .map_err(|error| format!("{place}: {error}")),
+    }
+}
+
+fn socket(address: &str) -> std::io::Result<UdpSocket> {
+    let unknown = || std::io::Error::other("is no host and port");
+    let peer = address.to_socket_addrs()?.next().ok_or_else(unknown)?;
+    let any = if peer.is_ipv4() {
+        "0.0.0.0:0"
+    } else {
+        "[::]:0"
+    };
+    let socket = UdpSocket::bind(any)?;
+    socket.connect(peer)?;
+    socket.set_nonblocking(true)?;
+    Ok(socket)
+}
