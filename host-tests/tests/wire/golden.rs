@@ -275,6 +275,11 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
         id: MOST.id - 1,
         ..MOST
     };
+    const LAST: Call = Call {
+        of: (u16::MAX, u16::MAX),
+        view: MOST.id,
+        place: 1000,
+    };
     let frames = vectors().frames;
     let some = |what: fn(&Said) -> bool| {
         assert!(frames.iter().any(|vector| what(&vector.message)));
@@ -307,11 +312,7 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
     some(|said| matches!(said, Said::Proposal(proposal) if proposal.successor.is_none()));
     some(|said| {
         matches!(said, Said::Proposal(proposal) if *proposal == Proposed {
-            call: Call {
-                of: (u16::MAX, u16::MAX),
-                view: MOST.id,
-                place: 1000,
-            },
+            call: LAST,
             agreed: BEFORE,
             votes: 1000,
             lease_left: u16::MAX,
@@ -332,11 +333,7 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
     });
     some(|said| {
         matches!(said, Said::Decision(decision) if *decision == Decided {
-            call: Call {
-                of: (u16::MAX, u16::MAX),
-                view: MOST.id,
-                place: 1000,
-            },
+            call: LAST,
             base: BEFORE,
             view: Some(MOST),
             there: 1000,
