@@ -15,7 +15,9 @@ use uav_relay::{
     Wiring,
 };
 
-use super::codec::{Greeting, Proposed, Said, Seats, SizedView, Swept, plain, wire};
+use super::codec::{
+    Fenced, Greeting, Handed, Judged, Proposed, Said, Seats, Shifted, SizedView, Swept, plain, wire,
+};
 use super::config;
 use super::forming::{ASKS, FRESH, a_hello, granted, hearing, id, long, mark, proposed};
 use super::lies::renamed;
@@ -134,14 +136,14 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     };
     vec![
         Said::Sweep(sweep.clone()),
-        Said::Verdict {
+        Said::Verdict(Judged {
             number,
             mission,
             own: false,
             commit: Some(0),
             slacks: vec![1.0],
             stand: None,
-        },
+        }),
         Said::Busy { number },
         Said::Heartbeat {
             mission,
@@ -155,7 +157,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         Said::Aside { sweep, y_m: -12.5 },
         Said::Gather(seats(number, mission, 3)),
         Said::Gathered(seats(number, mission, 5)),
-        Said::Token {
+        Said::Token(Handed {
             number,
             mission,
             x_m,
@@ -166,15 +168,15 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             columns: 0,
             rows: 0,
             sir: 1.0,
-        },
-        Said::Moved {
+        }),
+        Said::Moved(Shifted {
             number,
             mission,
             x_m: 600.0,
             altitude_m,
             any: true,
             worst: 1.0,
-        },
+        }),
         Said::Hello(Greeting {
             mission,
             neighbour: 4,
@@ -187,14 +189,14 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         }),
         Said::Proposal(proposed(view, (mission, 0), 3, 8)),
         granted(view, (mission, 0), 5, 8),
-        Said::Fence {
+        Said::Fence(Fenced {
             number: 1,
             mission,
             echo: 0,
             fence: 1,
             x_m,
             target_m: x_m,
-        },
+        }),
         Said::Offer(Offer {
             base: mission,
             ..offer()
@@ -340,7 +342,7 @@ fn a_token_goes_onward_and_what_came_of_it_back() {
     relay.handle_bytes(now, from, &framed(4, from, &kinds[8]));
     let out = settle(&mut relay, &mut now);
     assert!(
-        matches!(out[0], (port, Said::Token { number: SECOND, .. }) if port == to),
+        matches!(out[0], (port, Said::Token(Handed { number: SECOND, .. })) if port == to),
         "{out:?}"
     );
     relay.handle_bytes(now, to, &framed(4, to, &kinds[9]));
@@ -348,12 +350,12 @@ fn a_token_goes_onward_and_what_came_of_it_back() {
     let [
         (
             port,
-            Said::Moved {
+            Said::Moved(Shifted {
                 number: SECOND,
                 any: true,
                 worst,
                 ..
-            },
+            }),
         ),
     ] = &out[..]
     else {
@@ -409,7 +411,7 @@ fn what_comes_from_beyond_rx_is_of_no_use() {
     placed(&mut relay, (from, to), &mut now, FIRST);
     let mut kinds = one_of_each(SECOND, digest(relay.mission()));
     for said in &mut kinds {
-        if let Said::Token { x_m, .. } | Said::Moved { x_m, .. } = said {
+        if let Said::Token(Handed { x_m, .. }) | Said::Moved(Shifted { x_m, .. }) = said {
             *x_m = 1000.0_f32.next_up();
         }
     }
@@ -464,26 +466,26 @@ fn tamed(said: Said) -> Said {
             sweep.reaches = sweep.reaches.into_iter().map(into).collect();
             Said::Sweep(sweep)
         }
-        Said::Verdict {
+        Said::Verdict(Judged {
             number,
             mission,
             own,
             mut slacks,
             stand,
             ..
-        } => {
+        }) => {
             slacks.truncate(1);
             for slack in &mut slacks {
                 *slack = slack.abs();
             }
-            Said::Verdict {
+            Said::Verdict(Judged {
                 number,
                 mission,
                 own,
                 commit: (!slacks.is_empty()).then_some(0),
                 slacks,
                 stand: stand.map(into),
-            }
+            })
         }
         Said::Aside { mut sweep, y_m } => {
             (sweep.anchor, sweep.gap, sweep.growth) = (1.0, 0, 0);
@@ -544,11 +546,11 @@ fn the_smallest_targets_are_met_in_a_field() {
                 [
                     (
                         Port::Downstream,
-                        Said::Verdict {
+                        Said::Verdict(Judged {
                             commit: Some(0),
                             slacks,
                             ..
-                        },
+                        }),
                     ),
                 ] => {
                     assert!((1e5..=1e9).contains(&slacks[0]), "{slacks:?}");
