@@ -48,6 +48,9 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
     if held.is_some() {
         report.resumed(&relay)?;
     }
+    if views.stored().is_some() {
+        report.stands_by()?;
+    }
     loop {
         if let Some(positions) = &mut positions
             && let Some(place) = positions.newest(now(clock))?

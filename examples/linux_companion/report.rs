@@ -82,6 +82,17 @@ impl Report {
         )
     }
 
+    /// That the relay stands by what it has said in the votes on views before this start.
+    #[expect(clippy::unused_self, reason = "as the other lines")]
+    pub(crate) fn stands_by(&self) -> Result<(), String> {
+        line(
+            Instant::ZERO,
+            format_args!(
+                "stands by: what it has said in votes before this start; before another flight remove its --view-file"
+            ),
+        )
+    }
+
     pub(crate) fn event(&self, now: Instant, event: Event, relay: &Relay) -> Result<(), String> {
         match event {
             Event::SetpointChanged => match relay.setpoint() {

@@ -10,9 +10,9 @@ use uav_relay::wire::auth::Key;
 use uav_relay::{Duration, Event, Instant, Placement, Relay, Sample, Settings, Wiring};
 
 use super::clock::Clock;
-#[cfg(feature = "upload")]
-use super::kept;
-use super::{board, config, log};
+#[cfg(feature = "auth")]
+use super::journal::Journal;
+use super::{board, config, kept, log};
 #[cfg(feature = "auth")]
 use super::{epoch, flash};
 
@@ -21,16 +21,18 @@ const POSITION_PERIOD: Duration = Duration::from_millis(200);
 
 /// What the links of both variants have in common.
 pub(crate) trait Links {
-    /// Moves bytes between the ports and the relay, and says when to be called again.
-    fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant>;
+    /// Moves bytes between the ports and the relay, and says when to be called again. What the relay has said is kept between what
+    /// comes in and what is sent.
+    fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant>;
 
     /// Logs the counters of each link.
     fn log_counters(&self);
 }
 
 impl<U: SerialPort, D: SerialPort> Links for Pair<U, D> {
-    fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
-        Self::poll(self, now, relay)
+    fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant> {
+        let Drone { relay, views } = drone;
+        self.poll_keeping(now, relay, &mut |relay| views.keep(relay))
     }
 
     fn log_counters(&self) {
@@ -40,8 +42,9 @@ impl<U: SerialPort, D: SerialPort> Links for Pair<U, D> {
 }
 
 impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
-    fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
-        Self::poll(self, now, relay)
+    fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant> {
+        let Drone { relay, views } = drone;
+        self.poll_keeping(now, relay, &mut |relay| views.keep(relay))
     }
 
     fn log_counters(&self) {
@@ -49,17 +52,25 @@ impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
     }
 }
 
+/// The relay, and what it has said; both in places of their own in RAM, since the stack would have to hold them.
+pub(crate) struct Drone {
+    relay: &'static mut Relay,
+    views: &'static mut kept::Views,
+}
+
 /// Flies for good.
-pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, relay: &mut Relay) -> ! {
+pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -> ! {
     let mut autopilot = Autopilot;
     loop {
+        let relay = &mut *drone.relay;
         while let Some(sample) = measured() {
             relay.handle_sample(sample);
         }
         if let Some((at, place)) = autopilot.position() {
             relay.handle_position(clock.now(), at, place);
         }
-        let wake = links.poll(clock.now(), relay);
+        let wake = links.poll(clock.now(), &mut drone);
+        let relay = &mut *drone.relay;
         while let Some(event) = relay.poll_event() {
             log::event(event, relay);
             if event == Event::SetpointChanged
@@ -69,7 +80,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, relay: &mut Relay) 
             }
             #[cfg(feature = "upload")]
             if event == Event::Uploaded {
-                kept::keep(relay);
+                kept::keep_upload(relay);
             }
         }
         if log::asked() {
@@ -82,11 +93,11 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, relay: &mut Relay) 
     }
 }
 
-/// The relay by its configuration; `None` where there is none to fly by.
+/// The drone by its configuration; `None` where there is none to fly by.
 ///
 /// This and [`switch_on`] are functions of their own so that the stack they need is given back.
 #[inline(never)]
-pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> {
+pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<Drone> {
     let field = cortex_m::singleton!(FIELD: config::Room = config::EMPTY)?;
     match config::read(board::block(), field) {
         Ok(config) => {
@@ -98,9 +109,10 @@ pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<&'static mut Relay> 
             let relay = switch_on(&config, auth, wiring, now)?;
             #[cfg(feature = "upload")]
             if auth.is_some() {
-                kept::resume(relay);
+                kept::resume_upload(relay);
             }
-            Some(relay)
+            let views = cortex_m::singleton!(VIEWS: kept::Views = kept::Views::resume(relay, now))?;
+            Some(Drone { relay, views })
         }
         Err(error) => {
             log::refused(error);
@@ -169,16 +181,8 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
             return Err(CannotSign);
         }
     };
-    let sectors = flash::EPOCHS.map(flash::Sector::records);
-    let write = |step: epoch::Step| {
-        flash::EPOCHS.get(step.sector).is_some_and(|sector| {
-            if step.erase {
-                sector.erase();
-            }
-            sector.write(step.entry, &epoch::entry(step.epoch))
-        })
-    };
-    let Some((epoch, kept)) = epoch::begin(sectors, floor, write) else {
+    let mut entries = Journal::new(flash::EPOCHS, epoch::WORDS, epoch::KEY);
+    let Some((epoch, kept)) = epoch::begin(&mut entries, floor) else {
         log::no_epoch();
         return Err(CannotSign);
     };

@@ -4,40 +4,92 @@ use core::ptr::{read_volatile, write_volatile};
 
 use stm32f4xx_hal::pac::FLASH;
 
+#[cfg(feature = "auth")]
 use super::epoch;
+use super::journal::Flash;
 #[cfg(feature = "upload")]
 use super::uploads;
+use super::views;
 
-/// A sector of 128 KiB that no image reaches (`memory.x`).
+/// Where a sector begins that no image reaches (`memory.x`).
 #[derive(Clone, Copy)]
-pub(crate) struct Sector(u32);
+struct Sector(u32);
 
-/// The two that keep the epoch.
-pub(crate) const EPOCHS: [Sector; 2] = [Sector(epoch::SECTORS[0]), Sector(epoch::SECTORS[1])];
+/// Two sectors that keep a log.
+#[derive(Clone, Copy)]
+pub(crate) struct Sectors([Sector; 2]);
 
-/// The two that keep uploads.
+/// Those of what was said in the votes on views.
+pub(crate) const VIEWS: Sectors = Sectors::at(views::SECTORS);
+
+/// Those of the epoch.
+#[cfg(feature = "auth")]
+pub(crate) const EPOCHS: Sectors = Sectors::at(epoch::SECTORS);
+
+/// Those of uploads.
 #[cfg(feature = "upload")]
-pub(crate) const UPLOADS: [Sector; 2] = [Sector(uploads::SECTORS[0]), Sector(uploads::SECTORS[1])];
+pub(crate) const UPLOADS: Sectors = Sectors::at(uploads::SECTORS);
 
-const BYTES: usize = 128 * 1024;
+const KIB: u32 = 1024;
+
+/// Where the flash begins, and the first of its large sectors.
+const FLASH_START: u32 = 0x0800_0000;
+const LARGE: u32 = FLASH_START + 128 * KIB;
+
+impl Sectors {
+    const fn at([first, second]: [u32; 2]) -> Self {
+        Self([Sector(first), Sector(second)])
+    }
+
+    fn get(&self, sector: usize) -> Option<Sector> {
+        self.0.get(sector).copied()
+    }
+}
+
+impl Flash for Sectors {
+    fn words(&self, sector: usize) -> &[u32] {
+        self.get(sector).map_or(&[], Sector::words)
+    }
+
+    fn erase(&mut self, sector: usize) {
+        if let Some(sector) = self.get(sector) {
+            sector.erase();
+        }
+    }
+
+    fn write(&mut self, sector: usize, first: usize, words: &[u32]) -> bool {
+        self.get(sector)
+            .is_some_and(|sector| sector.write(first, words))
+    }
+}
 
 impl Sector {
-    /// What stands there, in records of `N` words; what does not fill one is left out.
-    pub(crate) const fn records<const N: usize>(self) -> &'static [[u32; N]] {
-        // SAFETY: a part of the flash, always readable and aligned. Only this file writes there, and what this function gave
-        // before is not looked at after that.
-        unsafe { core::slice::from_raw_parts(self.0 as *const [u32; N], BYTES / (4 * N)) }
+    /// Words in it. Of the sectors below the large ones, only those of 16 KiB are in use.
+    const fn len(self) -> usize {
+        let bytes = if self.0 < LARGE { 16 * KIB } else { 128 * KIB };
+        bytes as usize / 4
     }
 
-    /// The number that the flash's registers know it by: the large sectors begin with number 5, at 0x0802_0000.
+    /// What stands there.
+    const fn words<'a>(self) -> &'a [u32] {
+        // SAFETY: a part of the flash, always readable and aligned. Only this file writes there, through a `Sectors` that is
+        // borrowed for as long as this is looked at.
+        unsafe { core::slice::from_raw_parts(self.0 as *const u32, self.len()) }
+    }
+
+    /// The number that the flash's registers know it by: the large sectors begin with number 5.
     const fn number(self) -> u8 {
-        let [_, _, third, _] = self.0.to_le_bytes();
-        third / 2 + 4
+        let number = if self.0 < LARGE {
+            (self.0 - FLASH_START) / (16 * KIB)
+        } else {
+            (self.0 - LARGE) / (128 * KIB) + 5
+        };
+        number.to_le_bytes()[0]
     }
 
-    /// Makes it blank. That stops the CPU for a second or two.
+    /// Makes it blank. That stops the CPU: see the files of the logs for how long.
     #[inline(never)]
-    pub(crate) fn erase(self) {
+    fn erase(self) {
         let flash = unlocked();
         // SAFETY: the number of a sector that no image reaches.
         flash.cr().write(|w| unsafe {
@@ -58,13 +110,15 @@ impl Sector {
         flash.acr().modify(|_, w| w.dcen().set_bit());
     }
 
-    /// Writes a record, and reads it back; whether it stands there. That stops the CPU for some 16 microseconds a word.
+    /// Writes words from number `first` of it on, and reads them back; whether they stand there. That stops the CPU for some 16
+    /// microseconds a word.
     #[inline(never)]
-    pub(crate) fn write<const N: usize>(self, record: usize, words: &[u32; N]) -> bool {
-        if record >= BYTES / (4 * N) {
+    fn write(self, first: usize, words: &[u32]) -> bool {
+        let end = first.checked_add(words.len());
+        if end.is_none_or(|end| end > self.len()) {
             return false;
         }
-        let first = (self.0 as *mut [u32; N]).wrapping_add(record).cast::<u32>();
+        let first = (self.0 as *mut u32).wrapping_add(first);
         let flash = unlocked();
         // SAFETY: a size that the register knows.
         flash

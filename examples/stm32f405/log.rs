@@ -105,6 +105,26 @@ pub(crate) fn uploaded(version: u16, kept: bool) {
     }
 }
 
+/// What was said in the votes on views was kept before this start; `taken` tells whether the relay stands by it.
+pub(crate) fn stands_by(taken: bool) {
+    if taken {
+        defmt::info!("what was said in the votes on views before holds");
+    } else {
+        defmt::error!("what was said in the votes on views before is of another firmware");
+    }
+}
+
+/// What was said in the votes on views `kept` again, or not any more.
+pub(crate) fn votes(kept: bool) {
+    if kept {
+        defmt::info!("what is said in the votes on views is kept again");
+    } else {
+        defmt::error!(
+            "what is said in the votes on views cannot be kept: a reboot in flight forgets it"
+        );
+    }
+}
+
 #[cfg(not(feature = "auth"))]
 pub(crate) fn cannot_sign() {
     defmt::error!("configuration refused: it has a key, and this image was built without auth");

@@ -19,8 +19,11 @@
 //! | `drone.rs` | what a drone does, whatever its links are; `Autopilot` is where yours comes in |
 //! | `config.rs` | the configuration, byte by byte |
 //! | `epoch.rs` | with the feature `auth`, the number that rises at every start |
-//! | `uploads.rs`, `kept.rs` | with the feature `upload`, the missions that were uploaded in flight: the log of them, and its use |
-//! | `flash.rs` | the sectors that hold these two, and everything unsafe about them |
+//! | `uploads.rs` | with the feature `upload`, the missions that were uploaded in flight |
+//! | `views.rs` | what the relay has said in the votes on views |
+//! | `kept.rs` | when these two are written and read |
+//! | `journal.rs` | the log in two sectors of flash that each of these three is in |
+//! | `flash.rs` | those sectors, and everything unsafe about them |
 //! | `port.rs` | a serial port that an interrupt serves |
 //! | `clock.rs` | time and sleep |
 //! | `log.rs`, `silent.rs` | the log with `--features defmt`, and without |
@@ -40,9 +43,12 @@ mod drone;
 #[cfg(all(target_os = "none", feature = "auth"))]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod epoch;
-#[cfg(all(target_os = "none", feature = "auth"))]
+#[cfg(target_os = "none")]
 mod flash;
-#[cfg(all(target_os = "none", feature = "upload"))]
+#[cfg(target_os = "none")]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod journal;
+#[cfg(target_os = "none")]
 mod kept;
 #[cfg(target_os = "none")]
 #[cfg_attr(not(feature = "defmt"), path = "silent.rs")]
@@ -52,6 +58,9 @@ mod port;
 #[cfg(all(target_os = "none", feature = "upload"))]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
+#[cfg(target_os = "none")]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod views;
 #[cfg(target_os = "none")]
 mod wires;
 
@@ -64,10 +73,10 @@ fn main() -> ! {
         board::stop()
     };
     // Without a configuration to fly by a drone sleeps for good.
-    let Some(relay) = drone::begin(Wiring::Pair, clock.now()) else {
+    let Some(drone) = drone::begin(Wiring::Pair, clock.now()) else {
         board::stop()
     };
-    drone::fly(clock, links, relay)
+    drone::fly(clock, links, drone)
 }
 
 /// The links, in a place of their own in RAM; a function of its own, so that the stack it needs is given back.

@@ -31,6 +31,10 @@ pub(crate) const fn resumes(_: u16) {}
 #[cfg(feature = "upload")]
 pub(crate) const fn uploaded(_: u16, _: bool) {}
 
+pub(crate) const fn stands_by(_: bool) {}
+
+pub(crate) const fn votes(_: bool) {}
+
 #[cfg(not(feature = "auth"))]
 pub(crate) const fn cannot_sign() {}
 

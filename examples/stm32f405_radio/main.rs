@@ -23,10 +23,14 @@ mod drone;
 #[path = "../stm32f405/epoch.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod epoch;
-#[cfg(all(target_os = "none", feature = "auth"))]
+#[cfg(target_os = "none")]
 #[path = "../stm32f405/flash.rs"]
 mod flash;
-#[cfg(all(target_os = "none", feature = "upload"))]
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/journal.rs"]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod journal;
+#[cfg(target_os = "none")]
 #[path = "../stm32f405/kept.rs"]
 mod kept;
 #[cfg(target_os = "none")]
@@ -42,6 +46,10 @@ mod radio;
 #[path = "../stm32f405/uploads.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/views.rs"]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod views;
 
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
@@ -52,10 +60,10 @@ fn main() -> ! {
         board::stop()
     };
     // Without a configuration to fly by a drone sleeps for good.
-    let Some(relay) = drone::begin(Wiring::Shared, clock.now()) else {
+    let Some(drone) = drone::begin(Wiring::Shared, clock.now()) else {
         board::stop()
     };
-    drone::fly(clock, channel, relay)
+    drone::fly(clock, channel, drone)
 }
 
 /// The link, in a place of its own in RAM; a function of its own, so that the stack it needs is given back.

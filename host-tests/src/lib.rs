@@ -2,3 +2,4 @@
 
 pub mod firmware;
 pub mod fixtures;
+pub mod flights;

@@ -3,6 +3,11 @@
 use std::io::Write as _;
 use std::process::ExitCode;
 
+use uav_relay::{ChannelLoad, Duration};
+
+/// The fastest link there is, bit/s.
+pub const MOST_BAUD: u32 = 10_000_000;
+
 /// Why there is no result: the one line on standard error, and the exit status.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Failure {
@@ -87,6 +92,21 @@ pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
             file.display()
         ))
     })
+}
+
+/// Whether a channel of `baud` carries relays that share it and ask a silent neighbour after `probe_after`.
+///
+/// # Errors
+/// The least that does, and how many relays share the channel.
+pub fn carries(baud: u32, load: ChannelLoad, probe_after: Duration) -> Result<(), String> {
+    let least = load.least_baud(probe_after);
+    if baud >= least {
+        return Ok(());
+    }
+    Err(format!(
+        "--baud {baud}: must be within {least} to {MOST_BAUD}: {} relays share the channel at one place",
+        load.in_range
+    ))
 }
 
 /// A number of the command line, within `least` to `most`.

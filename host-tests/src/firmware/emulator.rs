@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use super::uploads::{self, Record};
 use uav_relay_tools::provision::config;
 
 use super::{MISSING, QEMU};
@@ -34,6 +33,9 @@ pub enum Uart {
 /// QEMU's list begins with USART1, which nothing is connected to.
 const UARTS: [Uart; 3] = [Uart::Usart2, Uart::Usart3, Uart::Uart4];
 
+/// Bytes in the flash, and the address of the first.
+pub type Kept = (u32, Vec<u8>);
+
 /// A drone that is switched on.
 #[derive(Debug)]
 pub struct Emulator {
@@ -45,15 +47,15 @@ pub struct Emulator {
 pub type Sockets = [UnixStream; 3];
 
 impl Emulator {
-    /// Switches a drone on with `image`, `block` at the place of its configuration, and `kept` first in the log of its uploads. `folder`
-    /// is made, and is its own.
+    /// Switches a drone on with `image`, `block` at the place of its configuration, and what else stands in its flash: `kept`, each from
+    /// that address on. `folder` is made, and is its own.
     ///
     /// # Errors
     /// [`MISSING`] if there is no QEMU; otherwise whatever went wrong, QEMU's own words included.
     pub fn start(
         image: &Path,
         block: &[u8],
-        kept: &[Record],
+        kept: &[Kept],
         folder: &Path,
         name: &str,
     ) -> Result<(Self, Sockets), String> {
@@ -62,8 +64,6 @@ impl Emulator {
         std::fs::create_dir_all(&folder).map_err(failed)?;
         let file = folder.join("block.bin");
         std::fs::write(&file, block).map_err(failed)?;
-        let kept_file = folder.join("uploads.bin");
-        std::fs::write(&kept_file, log_of(kept)).map_err(failed)?;
         let said = std::fs::File::create(folder.join("qemu.txt")).map_err(failed)?;
         let mut command = Command::new(QEMU);
         command
@@ -72,10 +72,14 @@ impl Emulator {
             .arg("-kernel")
             .arg(image)
             .args(loaded(&file, config::ADDRESS))
-            .args(loaded(&kept_file, uploads::SECTORS[0]))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(said);
+        for (address, bytes) in kept {
+            let file = folder.join(format!("{address:#x}.bin"));
+            std::fs::write(&file, bytes).map_err(failed)?;
+            command.args(loaded(&file, *address));
+        }
         let mut listeners = Vec::new();
         for uart in UARTS {
             let path = folder.join(format!("{uart:?}"));
@@ -150,18 +154,6 @@ fn loaded(file: &Path, address: u32) -> [String; 2] {
         "-device".to_owned(),
         format!("loader,file={file},addr={address:#x},force-raw=on"),
     ]
-}
-
-/// Two sectors that are blank behind `kept`.
-fn log_of(kept: &[Record]) -> Vec<u8> {
-    const BYTES: usize = 2 * 128 * 1024;
-    let mut bytes: Vec<u8> = kept
-        .iter()
-        .flatten()
-        .flat_map(|word| word.to_le_bytes())
-        .collect();
-    bytes.resize(BYTES, u8::MAX);
-    bytes
 }
 
 impl Drop for Emulator {

@@ -11,6 +11,7 @@ mod process;
 mod pty;
 mod signed;
 mod upload;
+mod views;
 
 use std::time::{Duration, Instant};
 

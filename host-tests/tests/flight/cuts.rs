@@ -42,7 +42,7 @@ fn judge(all: &[[u64; 4]]) {
                 let until = Some(until);
                 setup.partitions.push(Partition { after, from, until });
             }
-            go_on_until(&mut setup, seconds(times[3] + 300));
+            end_at(&mut setup, seconds(times[3] + 300));
             let outcome = run(setup).unwrap();
             least_m = least_m.min(outcome.nearest_m());
             let watched = outcome.watched.unwrap();

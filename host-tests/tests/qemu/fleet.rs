@@ -8,11 +8,10 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use defmt_decoder::Table;
-use host_tests::firmware::emulator::Emulator;
+use host_tests::firmware::emulator::{Emulator, Kept};
 use host_tests::firmware::image;
 use host_tests::firmware::medium::Medium;
 use host_tests::firmware::network::{self, Network};
-use host_tests::firmware::uploads::Record;
 use uav_relay_sim::simulator::faults::{Faults, Injected};
 use uav_relay_sim::simulator::link::LinkSpec;
 use uav_relay_tools::provision::block::Flight;
@@ -82,11 +81,11 @@ impl Fleet {
         Self::begin(which, blocks, &[], None, faults, seed)
     }
 
-    /// The same, with what each drone finds in the log of its uploads.
-    pub(crate) fn with_uploads(
+    /// The same, with what each drone finds in its flash.
+    pub(crate) fn with_flash(
         which: Image,
         blocks: &[Vec<u8>],
-        kept: &[Vec<Record>],
+        kept: &[Vec<Kept>],
         faults: Faults,
         seed: u64,
     ) -> Self {
@@ -107,7 +106,7 @@ impl Fleet {
     fn begin(
         which: Image,
         blocks: &[Vec<u8>],
-        kept: &[Vec<Record>],
+        kept: &[Vec<Kept>],
         transmitter: Option<UnixStream>,
         faults: Faults,
         seed: u64,

@@ -14,3 +14,4 @@ mod radio;
 mod signed;
 mod silence;
 mod upload;
+mod views;

@@ -4,8 +4,10 @@ use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
-use host_tests::firmware::emulator::SPEED;
-use host_tests::firmware::uploads::{Record, record};
+use host_tests::firmware::emulator::{Kept, SPEED};
+use host_tests::firmware::journal::{Journal, WhenFull};
+use host_tests::firmware::ram::Ram;
+use host_tests::firmware::uploads::{SECTORS, WORDS, kept};
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Ground, Key, Progress, Side, Upload, Wiring};
 use uav_relay_sim::scenario::{Interference, Scenario, Source};
@@ -15,6 +17,9 @@ use uav_relay_tools::provision::config::Secret;
 
 use crate::chain::{BAD_DAY, paper, simulated};
 use crate::fleet::{Fleet, Image, PATIENCE};
+
+/// Words of a sector of 128 KiB.
+const LARGE: usize = 32 * 1024;
 
 const KEY: [u8; 32] = *b"three drones and one transmitter";
 
@@ -131,17 +136,22 @@ fn three_fly_what_the_transmitter_uploads() {
 fn three_fly_what_they_were_handed_before_they_were_switched_on() {
     let loaded = paper(3);
     let blocks = blocks(&loaded);
-    let flash: Vec<Vec<Record>> = blocks
+    let flash: Vec<Vec<Kept>> = blocks
         .iter()
         .map(|block| {
             let check = u32::from_le_bytes(*block.last_chunk().unwrap());
-            let [old, new, mut cut] =
-                [2, 3, 4].map(|version| record(&upload(&loaded, version), check));
-            cut[11..].fill(u32::MAX);
-            vec![old, new, cut]
+            let mut flash = Ram::blank(LARGE, 1);
+            let mut log = Journal::new(&mut flash, WORDS, check);
+            for version in [2, 3] {
+                assert!(log.keep(&kept(&upload(&loaded, version)), WhenFull::Refuse));
+            }
+            flash.power = Some(11);
+            let mut log = Journal::new(&mut flash, WORDS, check);
+            assert!(!log.keep(&kept(&upload(&loaded, 4)), WhenFull::Refuse));
+            vec![(SECTORS[0], flash.bytes())]
         })
         .collect();
-    let mut fleet = Fleet::with_uploads(Image::Wires, &blocks, &flash, Faults::default(), 1);
+    let mut fleet = Fleet::with_flash(Image::Wires, &blocks, &flash, Faults::default(), 1);
     assert_eq!(fleet.places(), simulated(&moved(3)));
     for drone in 1..=3 {
         let said = fleet.of_drone(drone).take(4);
@@ -156,6 +166,6 @@ fn three_fly_what_they_were_handed_before_they_were_switched_on() {
     let blocks: Vec<Vec<u8>> = (1..=3)
         .map(|index| fresh.block(index).unwrap().to_vec())
         .collect();
-    let mut fleet = Fleet::with_uploads(Image::Wires, &blocks, &flash, Faults::default(), 1);
+    let mut fleet = Fleet::with_flash(Image::Wires, &blocks, &flash, Faults::default(), 1);
     assert_eq!(fleet.places(), simulated(&loaded));
 }

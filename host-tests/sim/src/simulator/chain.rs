@@ -1,12 +1,14 @@
 //! The relays, connected, run until they hold their places.
 
 mod air;
+mod begin;
 mod channel;
 mod ending;
 mod flight;
 mod ground;
 mod hearing;
 mod judge;
+mod limits;
 mod start;
 mod state;
 mod station;
@@ -15,29 +17,20 @@ mod strike;
 
 pub use state::Chain;
 
-use std::collections::BTreeMap;
-
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::SetupError;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Instant, Method, Placement, Sample, Wiring};
+use uav_relay::{Instant, Placement, Sample};
 
 use judge::Touched;
 use start::{Start, switched_on};
-use state::Member;
-use station::stations;
 
-use super::attack::Struck;
-use super::bursts::Bursts;
-use super::faults::Injected;
 use super::flying::Seen;
-use super::link::Line;
-use super::medium::{Access, AirCounts, Medium};
-use super::outcome::{Ending, Outcome, RelayEnd, Turning};
-use super::queue::{Happening, Queue};
+use super::medium::AirCounts;
+use super::outcome::{Outcome, RelayEnd, Turning};
+use super::queue::Happening;
 use super::setup::Setup;
-use super::watch::Watch;
 
 /// After this many happenings the run is given up: some minutes of computing.
 const MOST_HAPPENINGS: u64 = 400_000_000;
@@ -48,97 +41,7 @@ impl Chain {
     /// # Errors
     /// [`SetupError`] where a profile or setting is refused by the relay.
     pub fn new(setup: Setup) -> Result<Self, SetupError> {
-        let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
-        let mut members = Vec::new();
-        for index in 1..=setup.mission.relays() {
-            let start = Start {
-                index,
-                number: 1,
-                seed: rng.random(),
-                now: Instant::ZERO,
-            };
-            let relay = switched_on(&setup, start, None, None)?;
-            members.push(Member {
-                node: index,
-                lines: [Line::default(); 2],
-                killed: None,
-                starts: 1,
-                swept: 0,
-                stored: None,
-                safe: None,
-                relay,
-                wake: None,
-            });
-        }
-        let mut queue = Queue::default();
-        let stations = stations(&setup);
-        let bursts = (setup.burst > 1.0).then(|| Bursts::new(setup.faults.loss, setup.burst));
-        let shared = setup.settings.wiring == Wiring::Shared;
-        let medium = (shared && setup.access != Access::Ideal).then(|| {
-            let nodes = members.len() + stations.len();
-            Medium::new(setup.access, setup.link, nodes, setup.seed)
-        });
-        for &(index, at) in &setup.kills {
-            queue.put(at, usize::from(index.saturating_sub(1)), Happening::Kill);
-        }
-        for &(index, at) in &setup.boots {
-            queue.put(at, usize::from(index.saturating_sub(1)), Happening::Boot);
-        }
-        for (which, spec) in setup.uploads.iter().enumerate() {
-            queue.put(spec.at, which, Happening::Upload);
-        }
-        let mut ahead = setup.kills.len() + setup.boots.len() + setup.uploads.len();
-        let parts = setup.partitions.iter().map(|part| (part.from, part.until));
-        let deaf = setup.deaf.iter().map(|deaf| (deaf.from, deaf.until));
-        for (from, until) in parts.chain(deaf) {
-            for at in [Some(from), until].into_iter().flatten() {
-                queue.put(at, 0, Happening::Part);
-                ahead += 1;
-            }
-        }
-        let mut chain = Self {
-            stations,
-            setup,
-            members,
-            queue,
-            rng,
-            outcome: Outcome {
-                ending: Ending::OutOfTime,
-                relays: Vec::new(),
-                rounds: Vec::new(),
-                sweeps: 0,
-                messages: 0,
-                bytes: 0,
-                ended: Instant::ZERO,
-                injected: Injected::default(),
-                noticed: BTreeMap::new(),
-                struck: Struck::default(),
-                moments: Vec::new(),
-                nearest: None,
-                unsafe_setpoints: 0,
-                air: AirCounts::default(),
-                watched: None,
-            },
-            now: Instant::ZERO,
-            happenings: 0,
-            holding: 0,
-            ahead,
-            attacker: None,
-            flight: None,
-            medium,
-            bursts,
-            watch: Watch::default(),
-        };
-        if shared || chain.setup.soak.is_some() {
-            chain.begin_watch();
-        }
-        chain.expect_an_attack();
-        chain.take_off();
-        for index in 0..chain.members.len() {
-            chain.drain(index);
-        }
-        chain.look(Touched::All);
-        Ok(chain)
+        Self::begin(setup, |other| run(other).ok())
     }
 
     /// Sweeps that have begun and virtual time so far.
@@ -223,10 +126,10 @@ impl Chain {
         self.outcome.air = self
             .medium
             .map_or_else(AirCounts::default, |it| it.counts());
-        if self.watch.is_on {
+        if let Some(watch) = self.watch {
             let flown_m = self.flight.and(self.outcome.nearest).map(|it| it.apart_m);
             let is_judged = self.setup.soak.is_some();
-            let watched = self.watch.end(self.now, is_judged, flown_m);
+            let watched = watch.end(self.now, is_judged, flown_m);
             self.outcome.watched = Some(watched);
         }
         self.outcome.relays = self
@@ -339,49 +242,10 @@ impl Chain {
             self.transmit(index, transmit.port, bytes);
         }
         self.listen(index);
+        self.check(index);
         let Some(member) = self.members.get_mut(index) else {
             return;
         };
-        let by = member.node;
-        if let Some(place) = member.relay.setpoint()
-            && member.safe != Some(place)
-        {
-            let config = member.relay.mission().config();
-            let end = config.distance_m;
-            // What it was given, or one of the band.
-            let given = self.setup.profiles.iter().find(|(of, _)| *of == by);
-            let altitude = given.map_or(config.common, |(_, own)| *own).altitude_m;
-            let chosen = self.setup.settings.method != Method::Align
-                && !self.setup.held.contains(&by)
-                && (config.band.least_m..=config.band.most_m).contains(&place.altitude_m);
-            let beside = config.lateral.least_m..=config.lateral.most_m;
-            let aside = if self.setup.settings.method == Method::Joint {
-                beside.contains(&place.y_m)
-            } else {
-                place.y_m.to_bits() == 0
-            };
-            let chosen = (0.0..=end).contains(&place.x_m)
-                && aside
-                && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
-            // With a guard it may be on its way from anywhere in the box.
-            let guard = self.setup.settings.guard;
-            let inside = guard.map_or(chosen, |guard| guard.fence.contains(place));
-            self.outcome.unsafe_setpoints += u64::from(!inside);
-            // With a new mission it stays where it is until the next agreement.
-            member.safe = inside.then_some(place);
-        }
-        if let Some((done, sir)) = member.relay.rounds()
-            && sir > 0.0
-            && self.outcome.rounds.len() <= usize::from(done)
-        {
-            // Algorithm 2 moves only what makes the worse of two hops better.
-            debug_assert!(
-                self.attacker.is_some()
-                    || self.outcome.rounds.last().is_none_or(|last| sir >= *last),
-                "round {done} has made the chain worse"
-            );
-            self.outcome.rounds.push(sir);
-        }
         if let Some(at) = member.relay.poll_timeout()
             && member.wake.is_none_or(|wake| at < wake)
         {

@@ -12,7 +12,7 @@
 //! | [`drones`] | drones that fly to where they are told, and know where they are only nearly |
 //! | [`flying`] | groups of relays with an agreement of their own |
 //! | [`longest`] | which relays can be in one chain |
-//! | [`optimum`] | where exactly these relays would be if nothing had happened |
+//! | [`optima`], [`optimum`] | where exactly these relays would be if nothing had happened |
 //! | [`watch`] | how much of the time the chain is right |
 //! | [`many`] | the same run with many seeds |
 //! | [`chain`] | the relays, connected, run until they hold their places |
@@ -29,6 +29,7 @@ pub mod link;
 pub mod longest;
 pub mod many;
 pub mod medium;
+pub mod optima;
 pub mod optimum;
 pub mod outcome;
 pub mod queue;

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use uav_relay::{Instant, Placement, Profile, Side, Stats};
+use uav_relay::{Duration, Instant, Placement, Profile, Side, Stats};
 
 use super::attack::Struck;
 use super::drones::Nearest;
 use super::faults::Injected;
 use super::flying::Seen;
 use super::medium::AirCounts;
-use super::watch::Watched;
 
 /// Something worth a line in the story of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -126,6 +125,22 @@ pub struct RelayEnd {
     pub version: u16,
     /// What it showed.
     pub seen: Seen,
+}
+
+/// What a run was like over its whole time.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Watched {
+    /// When all relays of a view held their places for the first time.
+    pub first_agreement: Option<Instant>,
+    /// The share of the time since then in which all relays that can be in one chain (a longest one) held its optimum; 0 without an
+    /// agreement.
+    pub availability: Option<f64>,
+    /// The longest time since then in which they did not.
+    pub longest_wrong: Option<Duration>,
+    /// The most separate groups that flew an agreement of their own at once.
+    pub most_flying: usize,
+    /// The least distance that two relays ever had, m.
+    pub least_separation_m: Option<f64>,
 }
 
 /// What came of a run.

@@ -170,7 +170,7 @@ impl Setup {
         };
         let overhead = match (self.settings.wiring, self.access) {
             (Wiring::Pair, _) | (_, Access::Ideal) => 0,
-            _ => access::HEADER + access::TURNAROUND,
+            _ => access::OVERHEAD,
         };
         Channel {
             baud: self.link.baud,

@@ -4,29 +4,12 @@ use uav_relay::{Duration, Instant};
 
 use super::drones::{Point, apart};
 use super::flying::{self, Seen};
-use super::optimum::Optima;
-
-/// What a run was like over its whole time.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub struct Watched {
-    /// When all relays of a view held their places for the first time.
-    pub first_agreement: Option<Instant>,
-    /// The share of the time since then in which all relays that can be in one chain (a longest one) held its optimum; 0 without an
-    /// agreement.
-    pub availability: Option<f64>,
-    /// The longest time since then in which they did not.
-    pub longest_wrong: Option<Duration>,
-    /// The most separate groups that flew an agreement of their own at once.
-    pub most_flying: usize,
-    /// The least distance that two relays ever had, m.
-    pub least_separation_m: Option<f64>,
-}
+use super::optima::{Optima, Run};
+pub use super::outcome::Watched;
 
 /// What has been seen of a run so far.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Watch {
-    /// Whether anything is watched.
-    pub is_on: bool,
     pub(super) seen: Vec<Seen>,
     pub(super) optima: Optima,
     /// Where each relay was told to fly last, whatever has become of it since.
@@ -42,13 +25,20 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Begins to watch these relays.
-    pub fn new(seen: Vec<Seen>) -> Self {
+    /// Begins to watch these relays; `run` finds what they are held against.
+    pub fn new(seen: Vec<Seen>, run: Run) -> Self {
         Self {
-            is_on: true,
             stood: vec![None; seen.len()],
             seen,
-            ..Self::default()
+            optima: Optima::new(run),
+            until: Instant::ZERO,
+            first: None,
+            is_right: false,
+            right: Duration::from_micros(0),
+            wrong: Duration::from_micros(0),
+            longest_wrong: Duration::from_micros(0),
+            most_flying: 0,
+            least_m: None,
         }
     }
 

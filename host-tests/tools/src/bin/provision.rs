@@ -5,9 +5,10 @@ use std::process::ExitCode;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::{Parser, ValueEnum};
-use uav_relay::{Adjust, Local, Measure};
-use uav_relay_sim::command::{self, Failure};
+use uav_relay::{Adjust, ChannelLoad, Local, Measure, Settings};
+use uav_relay_sim::command::{self, Failure, MOST_BAUD};
 use uav_relay_sim::scenario::{Interference, Scenario};
+use uav_relay_sim::simulator::medium::access::OVERHEAD;
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::{ADDRESS, LEN, Secret};
 use uav_relay_tools::provision::key;
@@ -54,6 +55,15 @@ struct Options {
     /// by itself from there. Without it the seconds of this machine's clock
     #[arg(long, value_name = "E", requires = "key_file", value_parser = clap::value_parser!(u32).range(1..=0xFFFF_FFFE))]
     epoch: Option<u32>,
+    /// Bits per second on the radio channel that the relays share, 300 to 10000000; refused where that cannot carry them
+    #[arg(long, value_name = "B", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..=i64::from(MOST_BAUD)))]
+    baud: u32,
+    /// Relays that share the channel at one place, 1 to 1000; without it all of them
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    in_range: Option<u16>,
+    /// The relays have a wire between neighbours and share no channel
+    #[arg(long, conflicts_with_all = ["baud", "in_range"])]
+    wires: bool,
     /// File to write the block to
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -116,6 +126,7 @@ fn run(options: &Options) -> Result<String, String> {
     };
     let flight = Flight::new(&scenario, uavs, options.tolerance, network)
         .map_err(|error| format!("{name}: {error}"))?;
+    carried(options)?;
     let secret = secret(options)?;
     let block = flight
         .by(method)
@@ -133,6 +144,21 @@ fn run(options: &Options) -> Result<String, String> {
         "{}: relay {index} of {uavs}, network {network}; {LEN} bytes for {ADDRESS:#010x}",
         file.display()
     ))
+}
+
+/// Refuses a channel that cannot carry the relays, by the timing that the firmware has.
+fn carried(options: &Options) -> Result<(), String> {
+    if options.wires {
+        return Ok(());
+    }
+    let in_range = options.in_range.unwrap_or(options.uavs).min(options.uavs);
+    let load = ChannelLoad {
+        in_range,
+        overhead: u16::try_from(OVERHEAD).unwrap_or(u16::MAX),
+    };
+    let Settings { probe_after, .. } = Settings::default();
+    command::carries(options.baud, load, probe_after)
+        .map_err(|error| format!("{error}; fewer with --in-range, none with --wires"))
 }
 
 fn secret(options: &Options) -> Result<Option<Secret>, String> {

@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use uav_relay::{Instant, Wiring};
-use uav_relay_sim::command::{Failure, number};
+use uav_relay_sim::command::{Failure, carries, number};
 use uav_relay_sim::simulator::bursts::Bursts;
 use uav_relay_sim::simulator::deaf::Deaf;
 use uav_relay_sim::simulator::medium::Access;
@@ -93,14 +93,7 @@ impl Air {
             (_, Some(Sharing::Csma) | None) => Access::Csma,
         };
         if let Some(load) = setup.load() {
-            let least = load.least_baud(setup.settings.probe_after);
-            if self.baud < least {
-                let line = format!(
-                    "--baud {}: must be within {least} to 10000000: {} relays share the channel at one place",
-                    self.baud, load.in_range
-                );
-                return Err(Failure::input(line));
-            }
+            carries(self.baud, load, setup.settings.probe_after).map_err(Failure::input)?;
         }
         if let Some(until) = self.soak {
             setup.soak = Some(until);

@@ -2,6 +2,7 @@
 
 use super::super::flying::Seen;
 use super::super::longest::longest;
+use super::super::optima::Run;
 use super::super::queue::Happening;
 use super::super::watch::Watch;
 use super::state::{Chain, Member};
@@ -27,16 +28,25 @@ impl Touched {
 }
 
 impl Chain {
-    /// Begins to watch the relays.
-    pub(super) fn begin_watch(&mut self) {
-        self.watch = Watch::new(self.members.iter().map(seen).collect());
+    /// Begins to watch the relays; `run` finds what they are held against.
+    pub(super) fn begin_watch(&mut self, run: Run) {
+        let seen = self.members.iter().map(seen).collect();
+        self.watch = Some(Watch::new(seen, run));
     }
 
     /// Sees what has changed.
     pub(super) fn look(&mut self, touched: Touched) {
-        if !self.watch.is_on || touched == Touched::Nobody {
+        if touched == Touched::Nobody {
             return;
         }
+        let Some(mut watch) = self.watch.take() else {
+            return;
+        };
+        self.take_in(&mut watch, touched);
+        self.watch = Some(watch);
+    }
+
+    fn take_in(&self, watch: &mut Watch, touched: Touched) {
         let range = match touched {
             Touched::One(index) => index..index + 1,
             _ => 0..self.members.len(),
@@ -44,37 +54,35 @@ impl Chain {
         let mut is_new = touched == Touched::All;
         let fresh = self.members.get(range.clone()).unwrap_or_default();
         for (at, member) in range.zip(fresh) {
-            is_new |= self.watch.see(at, seen(member));
+            is_new |= watch.see(at, seen(member));
         }
         if !is_new {
             return;
         }
-        self.watch.go_on(self.now);
-        self.watch.take_in(self.now);
+        watch.go_on(self.now);
+        watch.take_in(self.now);
         if self.setup.soak.is_some() {
-            let is_right = self.is_right();
-            self.watch.judge(is_right);
+            let is_right = self.is_right(watch);
+            watch.judge(is_right);
         }
     }
 
     /// Whether a longest chain that there can be of the relays that are on holds its optimum; of several, any one.
     ///
     /// Where all of those are too few for a quorum nobody may fly, and that counts as wrong like any other time without a chain.
-    fn is_right(&mut self) -> bool {
+    fn is_right(&self, watch: &mut Watch) -> bool {
         let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();
         let links = |one, other| self.are_linked(one, other);
         let holds = |at: usize| {
-            self.watch
-                .seen
-                .get(at)
-                .is_some_and(|one| one.place.is_some())
+            let seen = watch.seen.get(at);
+            seen.is_some_and(|one| one.place.is_some())
         };
         let (_, chains) = longest(&on, links, holds);
         for chain in chains {
             let seen: Vec<Seen> = chain
                 .iter()
-                .filter_map(|at| self.watch.seen.get(*at).copied())
+                .filter_map(|at| watch.seen.get(*at).copied())
                 .collect();
             let nodes: Vec<u16> = chain
                 .iter()
@@ -82,8 +90,7 @@ impl Chain {
                 .collect();
             let places: Vec<_> = seen.iter().map(|one| one.place).collect();
             let version = seen.iter().map(|one| one.version).max().unwrap_or(0);
-            let optima = &mut self.watch.optima;
-            if optima.is_met(&self.setup, &nodes, version, &places) {
+            if watch.optima.is_met(&self.setup, &nodes, version, &places) {
                 return true;
             }
         }

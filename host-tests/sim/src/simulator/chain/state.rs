@@ -57,5 +57,6 @@ pub struct Chain {
     pub(super) medium: Option<Medium>,
     /// Where losses come in runs.
     pub(super) bursts: Option<Bursts>,
-    pub(super) watch: Watch,
+    /// Where its whole time counts.
+    pub(super) watch: Option<Watch>,
 }

@@ -22,6 +22,9 @@ pub const HEADER: usize = 6;
 /// hears nobody.
 pub const TURNAROUND: usize = 6;
 
+/// What a frame costs on the air beside its bytes, in bytes.
+pub const OVERHEAD: usize = HEADER + TURNAROUND;
+
 /// A slot of the back-off, in bytes: `aUnitBackoffPeriod`, 20 symbols, so that who senses a slot later hears who has begun.
 pub const SLOT: usize = 10;
 

@@ -1,0 +1,121 @@
+//! The begin of a run: every relay is switched on, and all that is to happen stands in the queue.
+
+use std::collections::BTreeMap;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::{Instant, SetupError, Wiring};
+
+use super::super::attack::Struck;
+use super::super::bursts::Bursts;
+use super::super::faults::Injected;
+use super::super::link::Line;
+use super::super::medium::{Access, AirCounts, Medium};
+use super::super::optima::Run;
+use super::super::outcome::{Ending, Outcome};
+use super::super::queue::{Happening, Queue};
+use super::super::setup::Setup;
+use super::judge::Touched;
+use super::start::{Start, switched_on};
+use super::state::{Chain, Member};
+use super::station::stations;
+
+impl Chain {
+    /// Switches every relay on at time 0. `run` finds what they are held against, where the run is watched.
+    ///
+    /// # Errors
+    /// [`SetupError`] where a profile or setting is refused by the relay.
+    pub(super) fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
+        let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
+        let mut members = Vec::new();
+        for index in 1..=setup.mission.relays() {
+            let start = Start {
+                index,
+                number: 1,
+                seed: rng.random(),
+                now: Instant::ZERO,
+            };
+            let relay = switched_on(&setup, start, None, None)?;
+            members.push(Member {
+                node: index,
+                lines: [Line::default(); 2],
+                killed: None,
+                starts: 1,
+                swept: 0,
+                stored: None,
+                safe: None,
+                relay,
+                wake: None,
+            });
+        }
+        let mut queue = Queue::default();
+        let stations = stations(&setup);
+        let bursts = (setup.burst > 1.0).then(|| Bursts::new(setup.faults.loss, setup.burst));
+        let shared = setup.settings.wiring == Wiring::Shared;
+        let medium = (shared && setup.access != Access::Ideal).then(|| {
+            let nodes = members.len() + stations.len();
+            Medium::new(setup.access, setup.link, nodes, setup.seed)
+        });
+        for &(index, at) in &setup.kills {
+            queue.put(at, usize::from(index.saturating_sub(1)), Happening::Kill);
+        }
+        for &(index, at) in &setup.boots {
+            queue.put(at, usize::from(index.saturating_sub(1)), Happening::Boot);
+        }
+        for (which, spec) in setup.uploads.iter().enumerate() {
+            queue.put(spec.at, which, Happening::Upload);
+        }
+        let mut ahead = setup.kills.len() + setup.boots.len() + setup.uploads.len();
+        let parts = setup.partitions.iter().map(|part| (part.from, part.until));
+        let deaf = setup.deaf.iter().map(|deaf| (deaf.from, deaf.until));
+        for (from, until) in parts.chain(deaf) {
+            for at in [Some(from), until].into_iter().flatten() {
+                queue.put(at, 0, Happening::Part);
+                ahead += 1;
+            }
+        }
+        let mut chain = Self {
+            stations,
+            setup,
+            members,
+            queue,
+            rng,
+            outcome: Outcome {
+                ending: Ending::OutOfTime,
+                relays: Vec::new(),
+                rounds: Vec::new(),
+                sweeps: 0,
+                messages: 0,
+                bytes: 0,
+                ended: Instant::ZERO,
+                injected: Injected::default(),
+                noticed: BTreeMap::new(),
+                struck: Struck::default(),
+                moments: Vec::new(),
+                nearest: None,
+                unsafe_setpoints: 0,
+                air: AirCounts::default(),
+                watched: None,
+            },
+            now: Instant::ZERO,
+            happenings: 0,
+            holding: 0,
+            ahead,
+            attacker: None,
+            flight: None,
+            medium,
+            bursts,
+            watch: None,
+        };
+        if shared || chain.setup.soak.is_some() {
+            chain.begin_watch(run);
+        }
+        chain.expect_an_attack();
+        chain.take_off();
+        for index in 0..chain.members.len() {
+            chain.drain(index);
+        }
+        chain.look(Touched::All);
+        Ok(chain)
+    }
+}

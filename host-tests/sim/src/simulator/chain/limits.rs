@@ -1,0 +1,54 @@
+//! What a relay may never do: leave its limits, or make the chain worse.
+
+use uav_relay::Method;
+
+use super::state::Chain;
+
+impl Chain {
+    /// Holds what relay `index` (from 0) says now against that.
+    pub(super) fn check(&mut self, index: usize) {
+        let Some(member) = self.members.get_mut(index) else {
+            return;
+        };
+        let by = member.node;
+        if let Some(place) = member.relay.setpoint()
+            && member.safe != Some(place)
+        {
+            let config = member.relay.mission().config();
+            let end = config.distance_m;
+            // What it was given, or one of the band.
+            let given = self.setup.profiles.iter().find(|(of, _)| *of == by);
+            let altitude = given.map_or(config.common, |(_, own)| *own).altitude_m;
+            let chosen = self.setup.settings.method != Method::Align
+                && !self.setup.held.contains(&by)
+                && (config.band.least_m..=config.band.most_m).contains(&place.altitude_m);
+            let beside = config.lateral.least_m..=config.lateral.most_m;
+            let aside = if self.setup.settings.method == Method::Joint {
+                beside.contains(&place.y_m)
+            } else {
+                place.y_m.to_bits() == 0
+            };
+            let chosen = (0.0..=end).contains(&place.x_m)
+                && aside
+                && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
+            // With a guard it may be on its way from anywhere in the box.
+            let guard = self.setup.settings.guard;
+            let inside = guard.map_or(chosen, |guard| guard.fence.contains(place));
+            self.outcome.unsafe_setpoints += u64::from(!inside);
+            // With a new mission it stays where it is until the next agreement.
+            member.safe = inside.then_some(place);
+        }
+        if let Some((done, sir)) = member.relay.rounds()
+            && sir > 0.0
+            && self.outcome.rounds.len() <= usize::from(done)
+        {
+            // Algorithm 2 moves only what makes the worse of two hops better.
+            debug_assert!(
+                self.attacker.is_some()
+                    || self.outcome.rounds.last().is_none_or(|last| sir >= *last),
+                "round {done} has made the chain worse"
+            );
+            self.outcome.rounds.push(sir);
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The log that all of it is in: what was kept last is there, whenever power fails.
+
+use host_tests::firmware::journal::{AROUND, BLANK, Journal, WhenFull};
+use host_tests::firmware::ram::Ram;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay_oracle::random::seed;
+
+const KEY: u32 = 0xB10C_B10C;
+const KEPT: usize = 3;
+const RECORD: usize = KEPT + AROUND;
+
+fn log(flash: &mut Ram) -> Journal<&mut Ram> {
+    Journal::new(flash, KEPT, KEY)
+}
+
+fn newest(flash: &mut Ram) -> Option<Vec<u32>> {
+    log(flash).newest().map(<[u32]>::to_vec)
+}
+
+fn entry(number: u32) -> Vec<u32> {
+    vec![number, !number, 7 * number]
+}
+
+#[test]
+fn records_fill_both_sectors_and_the_newest_counts() {
+    // Words that make no record are left over.
+    let mut flash = Ram::blank(4 * RECORD + 3, 1);
+    log(&mut flash).tidy();
+    assert_eq!(newest(&mut flash), None);
+    for number in 1..=8 {
+        assert!(log(&mut flash).keep(&entry(number), WhenFull::Refuse));
+        assert_eq!(newest(&mut flash), Some(entry(number)));
+        let other = Journal::new(&mut flash, KEPT, KEY + 1);
+        assert_eq!(other.newest(), None, "another key");
+    }
+    let full = flash.sectors.clone();
+    assert!(!log(&mut flash).keep(&entry(9), WhenFull::Refuse));
+    assert_eq!((&full, flash.erased.len()), (&flash.sectors, 0));
+    // A start makes room for all records of a sector.
+    log(&mut flash).tidy();
+    assert_eq!(flash.erased, [0]);
+    for number in 9..=12 {
+        assert!(log(&mut flash).keep(&entry(number), WhenFull::Refuse));
+    }
+    assert!(!log(&mut flash).keep(&entry(13), WhenFull::Refuse));
+    assert_eq!(newest(&mut flash), Some(entry(12)));
+}
+
+/// The sector that is erased never has the newest record, and each erase is good for all records of a sector.
+#[test]
+fn a_full_log_goes_on_in_the_sector_with_the_older_records() {
+    let mut flash = Ram::blank(4 * RECORD, 1);
+    for number in 1..=40 {
+        assert!(log(&mut flash).keep(&entry(number), WhenFull::Erase));
+        assert_eq!(newest(&mut flash), Some(entry(number)));
+    }
+    assert_eq!(flash.erased, [0, 1, 0, 1, 0, 1, 0, 1]);
+}
+
+#[test]
+fn a_record_with_any_bit_changed_is_none() {
+    let mut flash = Ram::blank(4 * RECORD, 1);
+    assert!(log(&mut flash).keep(&entry(1), WhenFull::Refuse));
+    assert!(log(&mut flash).keep(&entry(2), WhenFull::Refuse));
+    for bit in 0..32 * RECORD {
+        let mut bad = flash.clone();
+        bad.sectors[0][RECORD + bit / 32] ^= 1 << (bit % 32);
+        assert_eq!(newest(&mut bad), Some(entry(1)), "bit {bit}");
+    }
+    for word in [0, BLANK] {
+        let mut bad = flash.clone();
+        bad.sectors[0].fill(word);
+        assert_eq!(newest(&mut bad), None);
+    }
+}
+
+#[test]
+fn another_key_forgets_and_a_start_makes_room() {
+    let mut flash = Ram::blank(4 * RECORD, 1);
+    for number in 1..=6 {
+        assert!(log(&mut flash).keep(&entry(number), WhenFull::Refuse));
+    }
+    let mut other = Journal::new(&mut flash, KEPT, KEY + 1);
+    other.tidy();
+    assert_eq!(other.newest(), None);
+    assert_eq!(flash.erased, [0, 1]);
+    assert!(flash.sectors.iter().flatten().all(|word| *word == BLANK));
+}
+
+#[test]
+fn a_place_that_is_worn_is_passed_over() {
+    for worn in 0..=5 {
+        let mut flash = Ram::blank(20 * RECORD, 1);
+        assert!(log(&mut flash).keep(&entry(1), WhenFull::Erase));
+        flash.worn = worn;
+        let kept = log(&mut flash).keep(&entry(2), WhenFull::Erase);
+        assert_eq!(kept, worn < 4, "{worn}");
+        assert_eq!(newest(&mut flash), Some(entry(1 + u32::from(kept))));
+        flash.worn = 0;
+        assert!(log(&mut flash).keep(&entry(3), WhenFull::Erase));
+        assert_eq!(newest(&mut flash), Some(entry(3)));
+        assert!(flash.erased.is_empty());
+    }
+    let mut none = Ram::blank(0, 1);
+    assert!(!log(&mut none).keep(&entry(1), WhenFull::Erase));
+}
+
+/// In the middle of an erase, of a record or of a word: what was read back stays, and nothing else is ever found.
+#[test]
+fn nothing_is_lost_whenever_power_fails() {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed(37));
+    let (mut cut, mut erases_cut, mut whole) = (0, 0, 0);
+    for run in 0..300 {
+        let mut flash = Ram::blank(3 * RECORD, run);
+        let mut kept = None;
+        for number in 1..=60 {
+            if rng.random_ratio(1, 3) {
+                flash.power = Some(rng.random_range(1..=RECORD + 2));
+            }
+            if rng.random_ratio(1, 2) {
+                let before = flash.erased.len();
+                log(&mut flash).tidy();
+                let off = flash.power == Some(0);
+                erases_cut += u32::from(off && flash.erased.len() > before);
+                assert_eq!(newest(&mut flash), kept);
+            }
+            let before = flash.erased.len();
+            let stands = log(&mut flash).keep(&entry(number), WhenFull::Erase);
+            let erased = flash.erased.len() > before;
+            // By chance a word that was cut short may be whole.
+            let found = newest(&mut flash);
+            if stands || found == Some(entry(number)) {
+                kept = Some(entry(number));
+            }
+            assert_eq!(found, kept, "run {run}, number {number}");
+            whole += u32::from(stands);
+            if flash.switch_on() {
+                cut += 1;
+                erases_cut += u32::from(erased && !stands);
+            }
+        }
+        assert!(kept > Some(entry(30)), "{kept:?}");
+    }
+    println!("{cut} times power failed, in {erases_cut} erases; {whole} records");
+    assert!(cut > 1_000 && erases_cut > 100 && whole > 5_000);
+}

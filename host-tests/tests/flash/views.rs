@@ -1,0 +1,57 @@
+//! What a drone has said in the votes on views: it stands by it after a reboot. That nothing is lost whenever power fails: `journal.rs`.
+
+use host_tests::firmware::journal::{AROUND, Journal, WhenFull};
+use host_tests::firmware::ram::Ram;
+use host_tests::firmware::views::{SECTORS, WORDS, kept, record};
+use host_tests::fixtures::voted;
+
+/// Words of a sector of 16 KiB.
+const SECTOR: usize = 4 * 1024;
+
+#[test]
+fn as_many_are_kept_before_an_erase_as_the_firmware_says() {
+    assert_eq!(SECTORS[1] - SECTORS[0], 16 * 1024);
+    let mut flash = Ram::blank(SECTOR, 1);
+    for number in 1..=1_000 {
+        let said = voted(7, 5, number, true);
+        let mut log = Journal::new(&mut flash, WORDS, 7);
+        assert!(log.keep(&kept(&said), WhenFull::Erase));
+        assert_eq!(log.newest().and_then(record), Some(said));
+    }
+    assert_eq!(SECTOR / (WORDS + AROUND), 240);
+    assert_eq!(flash.erased, [0, 1, 0], "behind 480, 720 and 960");
+    let mut start = Journal::new(&mut flash, WORDS, 7);
+    start.tidy();
+    assert_eq!(
+        start.newest().and_then(record),
+        Some(voted(7, 5, 1_000, true))
+    );
+}
+
+/// A loss of power in the middle of a record: what was said before holds, and nobody has been told more.
+#[test]
+fn of_a_record_that_is_torn_the_one_before_holds() {
+    for written in 1..WORDS + AROUND {
+        let mut flash = Ram::blank(SECTOR, written as u64);
+        let mut log = Journal::new(&mut flash, WORDS, 7);
+        assert!(log.keep(&kept(&voted(7, 5, 1, true)), WhenFull::Erase));
+        flash.power = Some(written);
+        let mut log = Journal::new(&mut flash, WORDS, 7);
+        assert!(!log.keep(&kept(&voted(7, 5, 2, false)), WhenFull::Erase));
+        assert!(flash.switch_on());
+        let mut log = Journal::new(&mut flash, WORDS, 7);
+        assert_eq!(log.newest().and_then(record), Some(voted(7, 5, 1, true)));
+        assert!(log.keep(&kept(&voted(7, 5, 3, true)), WhenFull::Erase));
+        assert_eq!(log.newest().and_then(record), Some(voted(7, 5, 3, true)));
+    }
+}
+
+#[test]
+fn what_is_no_record_is_none() {
+    assert_eq!(record(&[]), None);
+    assert_eq!(record(&[u32::MAX; WORDS]), None);
+    let other_format = 2;
+    let mut words = kept(&voted(7, 5, 1, true));
+    words[0] = words[0] & !0xFF | other_format;
+    assert_eq!(record(&words), None);
+}

@@ -1,0 +1,77 @@
+//! Emulated drones that were switched off in flight: what they said in the votes on views holds.
+
+use host_tests::firmware::emulator::Kept;
+use host_tests::firmware::journal::{Journal, WhenFull};
+use host_tests::firmware::ram::Ram;
+use host_tests::firmware::views::{SECTORS, WORDS, kept};
+use host_tests::fixtures::voted;
+use uav_relay::ViewRecord;
+use uav_relay::wire::digest::digest;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_tools::provision::block::Flight;
+
+use crate::chain::{paper, simulated};
+use crate::fleet::{Fleet, Image};
+
+/// Words of a sector of 16 KiB.
+const SMALL: usize = 4 * 1024;
+
+fn blocks(flight: &Flight) -> Vec<Vec<u8>> {
+    (1..=flight.mission().relays())
+        .map(|index| flight.block(index).unwrap().to_vec())
+        .collect()
+}
+
+/// The flash of a drone that has said all of `said`, the last of it in a record that a loss of power has cut short.
+fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
+    let check = u32::from_le_bytes(*block.last_chunk().unwrap());
+    let mut flash = Ram::blank(SMALL, 1);
+    for (at, record) in said.iter().enumerate() {
+        let is_last = at + 1 == said.len();
+        flash.power = is_last.then_some(9);
+        let stands = Journal::new(&mut flash, WORDS, check).keep(&kept(record), WhenFull::Erase);
+        assert_eq!(stands, !is_last);
+    }
+    vec![(SECTORS[0], flash.bytes())]
+}
+
+const HOLDS: &str = "what was said in the votes on views before holds";
+
+/// View 40 was agreed on among all three, and they fly again in a later one.
+#[test]
+fn three_that_were_switched_off_stand_by_what_they_said() {
+    let flight = paper(3);
+    let base = digest(flight.mission());
+    let blocks = blocks(&flight);
+    let said = [30, 40, 50].map(|number| voted(base, 3, number, true));
+    let kept: Vec<Vec<Kept>> = blocks.iter().map(|block| flash(block, &said)).collect();
+    let mut fleet = Fleet::with_flash(Image::Radio, &blocks, &kept, Faults::default(), 1);
+    fleet.settle_at(&simulated(&flight));
+    for drone in 1..=3 {
+        let told = fleet.of_drone(drone).filter(|line| line.text == HOLDS);
+        assert_eq!(told.count(), 1, "drone {drone}");
+    }
+}
+
+/// Of three, one is missing: the two others are a quorum of the chain that was loaded, and none of a view that neither of them is in.
+#[test]
+fn two_that_remember_a_view_without_them_do_not_fly_it() {
+    let flight = paper(3);
+    let base = digest(flight.mission());
+    let blocks = blocks(&flight)[..2].to_vec();
+    let said = [voted(base, 1, 40, false), voted(base, 3, 50, true)];
+    let kept: Vec<Vec<Kept>> = blocks.iter().map(|block| flash(block, &said)).collect();
+    let mut fleet = Fleet::with_flash(Image::Radio, &blocks, &kept, Faults::default(), 1);
+    fleet.wait("a quorum that is missed", |lines| {
+        lines.iter().any(|line| line.text == "event NoQuorum")
+    });
+    assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));
+    // The same two without their flash.
+    let mut fleet = Fleet::start(Image::Radio, &blocks, Faults::default(), 1);
+    fleet.wait("places for two", |lines| {
+        [1, 2].iter().all(|drone| {
+            let mut of_drone = lines.iter().filter(|line| line.drone == *drone);
+            of_drone.any(|line| line.setpoint().is_some())
+        })
+    });
+}

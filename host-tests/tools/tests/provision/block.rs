@@ -1,0 +1,186 @@
+//! What stands in a block: the table of `config.rs`, byte by byte, and what a drone reads of it.
+
+use uav_relay::{Adjust, Local, Measure, Method};
+use uav_relay_sim::scenario::Scenario;
+use uav_relay_tools::provision::block::{BlockError, Flight};
+use uav_relay_tools::provision::config::{ConfigError, LEN, MAX_POINTS};
+
+use super::{example, field, in_a_field, paper, reads};
+
+/// A block by hand: `method` as its number and as what adjust is told, and what of it is not the paper's scenario.
+fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
+    let (method, hold, explore_m, rounds) = method;
+    let (interferer, rest) = noise;
+    let mut bytes: Vec<u8> = b"UAVR\x04\0\x24\x01\x03\0\x07\0\x05\0".to_vec();
+    bytes.extend([method, u8::from(hold)]);
+    for number in [1000.0_f32, 4.0, 80.0, 20.0, 1.0, 20.0, 1.0] {
+        bytes.extend(number.to_le_bytes());
+    }
+    for number in interferer.into_iter().chain([1e-4]) {
+        bytes.extend(number.to_le_bytes());
+    }
+    for number in [2e9_f64, libm::pow(10.0, 0.01), libm::pow(10.0, 2.1), 1.0] {
+        bytes.extend(number.to_le_bytes());
+    }
+    for number in band.into_iter().chain([0.0, 0.0, explore_m]) {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes.extend(rounds.to_le_bytes());
+    bytes.extend(rest);
+    bytes.resize(288, 0);
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
+    bytes.extend(crc.to_le_bytes());
+    bytes
+}
+
+const PAPER: ([f32; 3], &[u8]) = ([80.0, 500.0, 400.0], &[]);
+
+/// The table in `config.rs`, byte by byte.
+#[test]
+fn a_block_is_what_the_table_says() {
+    assert_eq!(by_hand((0, false, 0.0, 0), [20.0; 2], PAPER), paper());
+
+    let mut scenario = Scenario {
+        altitude_max_m: 300.0,
+        ..Scenario::default()
+    };
+    let own = scenario.relays.entry(3).or_default();
+    own.altitude_m = Some(20.0);
+    let flight = Flight::new(&scenario, 5, 1e-4, 7).unwrap();
+    let block = flight.clone().by(Method::Joint).block(3).unwrap();
+    assert_eq!(by_hand((1, true, 0.0, 0), [20.0, 300.0], PAPER), block);
+    let adjust = Method::Adjust(Adjust {
+        rounds: 0x1234,
+        explore_m: 2.5,
+        local: Local::Fine,
+    });
+    let block = flight.by(adjust).block(3).unwrap();
+    assert_eq!(by_hand((2, true, 2.5, 0x1234), [20.0, 300.0], PAPER), block);
+
+    // Upsilon = (alpha + beta - 1) / ((alpha - 1) I_max), which for alpha = 2 is (1 + beta) / I_max.
+    let mut rest = b"\x03\0".to_vec();
+    rest.extend(2e-10_f32.to_le_bytes());
+    rest.extend(100_000_u32.to_le_bytes());
+    for (x, upsilon) in [(0.0_f32, 1e10_f32), (100.0, 1.5e10), (200.0, 2e10)] {
+        rest.extend(x.to_le_bytes());
+        rest.extend(upsilon.to_le_bytes());
+    }
+    let measure = Measure {
+        i_max_w: 2e-10,
+        samples: 100_000,
+    };
+    let flight = Flight::new(&in_a_field(3), 5, 1e-4, 7).unwrap();
+    let block = flight.measuring(Some(measure)).block(3).unwrap();
+    assert_eq!(
+        by_hand((0, false, 0.0, 0), [20.0; 2], ([0.0; 3], &rest)),
+        block
+    );
+}
+
+/// What is set, and whatever else a block can say, comes back as it was.
+#[test]
+fn a_drone_reads_what_it_is_to_do() {
+    let scenario = Scenario {
+        altitude_max_m: 120.0,
+        ..Scenario::load(&example()).unwrap()
+    };
+    let adjust = Method::Adjust(Adjust {
+        rounds: 1,
+        explore_m: 0.0,
+        local: Local::Fine,
+    });
+    for method in [Method::Align, Method::Joint, adjust] {
+        let flight = Flight::new(&scenario, 6, 1e-4, 9).unwrap().by(method);
+        for index in 1..=6 {
+            let config = reads(&flight.block(index).unwrap()).unwrap();
+            assert_eq!(config.method, method);
+            assert_eq!(config.measure, None);
+            // Relay 2 has an altitude of its own, relay 5 but a power.
+            assert_eq!(config.hold_altitude, index == 2);
+            let band = config.mission.config().band;
+            assert_eq!((band.least_m, band.most_m), (40.0, 120.0));
+        }
+    }
+    for points in [1, 2, MAX_POINTS] {
+        let flight = Flight::new(&in_a_field(points), 6, 1e-4, 9).unwrap();
+        let config = reads(&flight.block(1).unwrap()).unwrap();
+        assert_eq!(config.mission, *flight.mission());
+    }
+}
+
+#[test]
+fn a_block_that_cannot_say_it_is_not_written() {
+    let too_many = Flight::new(&in_a_field(17), 5, 1e-4, 7);
+    assert_eq!(too_many.err(), Some(BlockError::Points(17)));
+    let grid = Adjust {
+        local: Local::Grid {
+            columns: 9,
+            rows: 9,
+        },
+        ..Adjust::default()
+    };
+    let measure = Measure {
+        i_max_w: 2e-10,
+        samples: 99,
+    };
+    let of = |scenario: &Scenario| Flight::new(scenario, 5, 1e-4, 7).unwrap();
+    for (flight, error) in [
+        (
+            of(&Scenario::default()).by(Method::Adjust(grid)),
+            BlockError::Changed,
+        ),
+        (
+            of(&in_a_field(3)).by(Method::Joint),
+            BlockError::Config(ConfigError::Method),
+        ),
+        (
+            of(&in_a_field(3)).by(Method::Adjust(Adjust::default())),
+            BlockError::Config(ConfigError::Method),
+        ),
+        (
+            of(&in_a_field(3)).measuring(Some(measure)),
+            BlockError::Config(ConfigError::Measure),
+        ),
+    ] {
+        assert_eq!(flight.block(3), Err(error));
+    }
+}
+
+#[test]
+fn a_drone_reads_the_very_mission_of_the_scenario() {
+    let scenario = Scenario::load(&example()).unwrap();
+    let flight = Flight::new(&scenario, 6, 1e-3, 9).unwrap();
+    for index in 1..=6 {
+        let config = reads(&flight.block(index).unwrap()).unwrap();
+        assert_eq!(config.mission, *flight.mission());
+        assert_eq!((config.identity.index, config.identity.network), (index, 9));
+        let altitude = if index == 2 { 55.0 } else { 40.0 };
+        let power = if index == 5 { 1.0 } else { 2.0 };
+        assert_eq!(
+            (config.profile.altitude_m, config.profile.power_w),
+            (altitude, power)
+        );
+    }
+    for index in [0, 7] {
+        assert_eq!(
+            flight.block(index),
+            Err(BlockError::Config(ConfigError::Index))
+        );
+    }
+}
+
+#[test]
+fn no_bit_can_flip_unnoticed() {
+    for (at, of) in (0..LEN).zip([paper(), field(4)].iter().cycle()) {
+        for bit in 0..8 {
+            let mut block = *of;
+            block[at] ^= 1 << bit;
+            let expected = match at {
+                0..4 => ConfigError::Magic,
+                4..8 => ConfigError::Version,
+                _ => ConfigError::Crc,
+            };
+            assert_eq!(reads(&block), Err(expected), "bit {bit} of byte {at}");
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! The command: what it writes, and what it refuses.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use uav_relay::{Adjust, Measure, Method};
+use uav_relay_sim::scenario::Scenario;
+use uav_relay_tools::provision::block::Flight;
+use uav_relay_tools::provision::config::Block;
+
+use super::{paper, provision, reads, refusal};
+
+#[test]
+fn the_command_writes_the_block() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("relay3.bin");
+    let output = provision(&[
+        "--uavs",
+        "5",
+        "--index",
+        "3",
+        "--network",
+        "7",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(std::fs::read(&out).unwrap(), paper());
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        text.contains("relay 3 of 5, network 7") && text.contains("0x080e0000"),
+        "{text}"
+    );
+}
+
+#[test]
+fn the_command_writes_what_the_relay_is_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("relay.bin");
+    let file = folder.path().join("field.toml");
+    let written = |more: &[&str]| {
+        let mut arguments = vec!["--uavs", "5", "--index", "3", "--network", "7"];
+        arguments.extend(["--out", out.to_str().unwrap()]);
+        arguments.extend(more);
+        let output = provision(&arguments);
+        assert!(output.status.success(), "{output:?}");
+        let block: Block = std::fs::read(&out).unwrap().try_into().unwrap();
+        reads(&block).unwrap()
+    };
+    assert_eq!(written(&["--method", "align"]), reads(&paper()).unwrap());
+    assert_eq!(written(&["--method", "joint"]).method, Method::Joint);
+    let adjust = Adjust::default();
+    assert_eq!(
+        written(&["--method", "adjust"]).method,
+        Method::Adjust(adjust)
+    );
+    let adjust = Adjust {
+        rounds: 7,
+        explore_m: 2.5,
+        ..adjust
+    };
+    assert_eq!(
+        written(&["--method", "adjust", "--rounds", "7", "--explore", "2.5"]).method,
+        Method::Adjust(adjust)
+    );
+    std::fs::write(&file, toml(3)).unwrap();
+    let file = file.to_str().unwrap();
+    let config = written(&["--scenario", file, "--samples", "2000"]);
+    let flight = Flight::new(&Scenario::load(Path::new(file)).unwrap(), 5, 1e-4, 7).unwrap();
+    assert_eq!(config.mission, *flight.mission());
+    assert_eq!(
+        config.measure,
+        Some(Measure {
+            i_max_w: 2e-10,
+            samples: 2_000
+        })
+    );
+}
+
+/// A scenario with a field of `points` points.
+fn toml(points: usize) -> String {
+    let mut text = "[geometry]\ndistance_m = 1000.0\naltitude_m = 20.0\n\
+                    [power]\ntx_w = 80.0\nuav_w = 1.0\n\
+                    [field]\ni_max_w = 2e-10\n"
+        .to_owned();
+    for k in 0..points {
+        writeln!(text, "[[field.beta]]\nx_m = {k}.0\nalpha = 2.0\nbeta = 1.5").unwrap();
+    }
+    text
+}
+
+#[test]
+fn what_cannot_be_done_is_said_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("block.bin");
+    let out = out.to_str().unwrap();
+    let fields = [3, 17].map(|points| {
+        let file = folder.path().join(format!("{points}.toml"));
+        std::fs::write(&file, toml(points)).unwrap();
+        file.to_str().unwrap().to_owned()
+    });
+    let [field, long_field] = fields.each_ref().map(String::as_str);
+    let plain = ["--uavs", "5", "--index", "1", "--out", out];
+    for (arguments, words) in [
+        (&["--method", "stochastic"][..], "'--method <M>'"),
+        (&["--rounds", "0"], "0 is not in 1..=65535"),
+        (&["--explore=-1"], "must be a number within 0.0 to 100000.0"),
+        (
+            &["--explore", "NaN"],
+            "must be a number within 0.0 to 100000.0",
+        ),
+        (
+            &["--explore", "100001"],
+            "must be a number within 0.0 to 100000.0",
+        ),
+        (&["--samples", "99"], "99 is not in 100..=1000000"),
+        (
+            &["--samples", "100"],
+            "--samples 100: is for a scenario with a [field]",
+        ),
+        (
+            &["--scenario", field, "--method", "altitude"],
+            "3.toml: method must be align in a field",
+        ),
+        (
+            &["--scenario", long_field],
+            "17.toml: field: a drone has room for 16 points, and these are 17",
+        ),
+    ] {
+        let arguments = [&plain[..], arguments].concat();
+        let text = refusal(&arguments);
+        assert!(text.contains(words), "{arguments:?}: {text}");
+    }
+    assert!(!Path::new(out).exists());
+}
+
+#[test]
+fn what_is_wrong_is_said_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("block.bin");
+    let out = out.to_str().unwrap();
+    for (arguments, words) in [
+        (
+            &["--uavs", "5", "--index", "6", "--out", out][..],
+            "--index 6: must be within 1 to 5",
+        ),
+        (
+            &["--uavs", "5", "--index", "0", "--out", out],
+            "'--index <I>'",
+        ),
+        (&["--uavs", "5", "--out", out], "--index <I>"),
+        (
+            &[
+                "--uavs",
+                "5",
+                "--index",
+                "1",
+                "--network",
+                "65536",
+                "--out",
+                out,
+            ],
+            "--network",
+        ),
+        (
+            &[
+                "--uavs",
+                "5",
+                "--index",
+                "1",
+                "--tolerance",
+                "2",
+                "--out",
+                out,
+            ],
+            "tolerance must be within",
+        ),
+        (
+            &["--uavs", "600", "--index", "1", "--out", out],
+            "no placement",
+        ),
+        (
+            &["--uavs", "5", "--index", "1", "--out", "/nowhere/block.bin"],
+            "--out cannot be written",
+        ),
+        (
+            &[
+                "--scenario",
+                "/nowhere.toml",
+                "--uavs",
+                "5",
+                "--index",
+                "1",
+                "--out",
+                out,
+            ],
+            "/nowhere.toml",
+        ),
+    ] {
+        let text = refusal(arguments);
+        assert!(text.contains(words), "{arguments:?}: {text}");
+    }
+    assert!(!Path::new(out).exists());
+}
+
+/// A channel of the firmware's data rate carries 25 relays; with more it is refused, with the numbers.
+#[test]
+fn a_channel_that_cannot_carry_the_chain_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("block.bin");
+    let out = out.to_str().unwrap();
+    let plain = ["--index", "1", "--out", out, "--uavs"];
+    for (arguments, least, in_range) in [
+        (&["26"][..], 117_334, 26),
+        (&["9", "--baud", "37546"], 37_547, 9),
+        (&["100", "--in-range", "40"], 183_040, 40),
+        (&["5", "--in-range", "9", "--baud", "9600"], 18_774, 5),
+    ] {
+        let baud = arguments.iter().skip_while(|it| **it != "--baud").nth(1);
+        let baud = baud.unwrap_or(&"115200");
+        let line = format!(
+            "--baud {baud}: must be within {least} to 10000000: {in_range} relays share the channel at one place; fewer with --in-range, none with --wires\n"
+        );
+        assert_eq!(refusal(&[&plain[..], arguments].concat()), line);
+    }
+    assert!(!Path::new(out).exists());
+    for arguments in [
+        &["25"][..],
+        &["26", "--wires"],
+        &["26", "--in-range", "9"],
+        &["26", "--baud", "117334"],
+        &["9", "--baud", "37547"],
+    ] {
+        let output = provision(&[&plain[..], arguments].concat());
+        assert!(output.status.success(), "{output:?}");
+    }
+    let both = [&plain[..], &["9", "--wires", "--baud", "9600"]].concat();
+    assert!(refusal(&both).contains("--wires"));
+}
