@@ -23,10 +23,9 @@
 //! long as a pulse takes, up to a quarter of `dead_after`.
 
 use super::context::{Context, Effects};
-use super::retransmit::{Retransmit, Trip};
+use super::retransmit::{Again, Retransmit};
 use super::timing::{PAUSE, earliest, longest_lease, tenths};
 use super::view::electorate::Held;
-use crate::mission::Heading;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
@@ -179,6 +178,12 @@ impl Lease {
             match pulse.number.wrapping_sub(current.number) {
                 0 => {
                     self.due.back = true;
+                    if current.done.is_some() {
+                        self.retransmit.asked(context.now, context.way_back());
+                    } else {
+                        let hop_time = context.settings().hop_time;
+                        self.retransmit.came_again(context.now, hop_time);
+                    }
                     return Effects::REPEATED;
                 }
                 1 if current.done.is_some() => {
@@ -210,8 +215,7 @@ impl Lease {
             handed_on: context.now,
             done: None,
         });
-        self.retransmit.heard();
-        self.retransmit.stop();
+        self.retransmit.begin();
         self.due = LeaseDue::default();
         if context.is_last() {
             self.finish(context);
@@ -228,7 +232,7 @@ impl Lease {
         current.done = Some(context.now);
         let current = *current;
         self.relied_on = self.relied_on.max(context.now + from_tenths(current.span));
-        self.retransmit.stop();
+        self.retransmit.answered(context.now, context.way_back());
         if !context.leads() {
             self.due.back = true;
             return;
@@ -276,8 +280,7 @@ impl Lease {
         if pulsed.done {
             self.finish(context);
         } else {
-            self.retransmit.heard();
-            self.retransmit.sent(context.now, trip(context));
+            self.retransmit.arrived(context.now, context.way_onward());
         }
         Effects {
             heard_onward: Some(current.handed_on),
@@ -288,8 +291,10 @@ impl Lease {
     /// Does what is due: a pulse at the leader, one more time, or nothing any more.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let now = context.now;
-        let resent = self.retransmit.is_due(now);
+        let again = self.retransmit.take_due(now, context.settings().hop_time);
+        let resent = again == Some(Again::Onward);
         self.due.onward |= resent;
+        self.due.back |= again == Some(Again::Back);
         if self.next_at.is_some_and(|at| at <= now) {
             self.next_at = None;
             let number = self.current.map_or(0, |current| current.number);
@@ -314,7 +319,7 @@ impl Lease {
         let current = self
             .current
             .filter(|current| due && current.done.is_none())?;
-        self.retransmit.sent(context.now, trip(context));
+        self.retransmit.sent(context.now, context.way_onward());
         Some(Message::Pulse(Pulse {
             number: current.number,
             mission: context.digest(),
@@ -336,19 +341,5 @@ impl Lease {
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
         let pulse = earliest(self.next_at, self.retransmit.next_timeout());
         earliest(pulse, self.until())
-    }
-}
-
-/// What an answer has to travel: to the last relay of the view and back.
-fn trip(context: &Context<'_>) -> Trip {
-    let mission = context.mission();
-    let hops = match mission.heading() {
-        Heading::TowardRx => mission.relays().saturating_sub(context.index()),
-        Heading::TowardTx => context.index().saturating_sub(1),
-    };
-    Trip {
-        hop_time: context.settings().hop_time,
-        hops,
-        slow: false,
     }
 }

@@ -166,8 +166,11 @@ impl Node {
             probe_after,
             ..
         } = self.member.settings;
-        let first = hop_time.times(2 * u32::from(self.member.all));
-        self.view.await_first(now + probe_after + first);
+        let all = u32::from(self.member.all);
+        // Where every other frame is lost a hop takes some six times as long as it can.
+        let usual = now + probe_after + hop_time.times(2 * all);
+        let slow = now + hop_time.times(12 * all);
+        self.view.await_first(usual.max(slow));
     }
 
     fn context(&self, now: Instant) -> Context<'_> {
