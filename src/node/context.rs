@@ -127,7 +127,11 @@ impl<'a> Context<'a> {
     /// The way of what came of it from here to the leader.
     pub(crate) fn way_back(&self) -> Trip {
         let relays = self.mission().relays();
-        self.way(relays.saturating_sub(self.way_onward().hops).saturating_sub(1))
+        self.way(
+            relays
+                .saturating_sub(self.way_onward().hops)
+                .saturating_sub(1),
+        )
     }
 
     /// One of so many hops, on which nobody computes.
