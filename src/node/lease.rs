@@ -8,6 +8,7 @@
 //! | --- | --- | --- |
 //! | leader | it is time, and none is under way | a pulse: hand it on |
 //! | any | the next pulse | the lease counts from when it handed on the one before; hand it on |
+//! | any | the first ones, each with more than twice the span of the one before | no lease yet: it would not last until the one after |
 //! | any | the same again | say whether it has come back |
 //! | last | a pulse | it has come back: say so |
 //! | any | it has come back | say so; at the leader the lease counts from when it began, and the next one is due after a period |
@@ -187,7 +188,7 @@ impl Lease {
                     return Effects::REPEATED;
                 }
                 1 if current.done.is_some() => {
-                    self.grant(context.now, current);
+                    self.grant(context.now, current, pulse.lease);
                     effects.heard_back = current.done;
                 }
                 // The leader has begun anew, or this relay was not asked for long.
@@ -199,8 +200,13 @@ impl Lease {
         effects
     }
 
-    /// All took part in `pulse`; so long ago, perhaps, that the lease has run out since.
-    fn grant(&mut self, now: Instant, pulse: Current) {
+    /// All took part in `pulse`; so long ago, perhaps, that the lease has run out since. `next` is the span of the one after.
+    ///
+    /// Where that is more than twice as long, the first ones were too short: the lease would run out before it could be renewed.
+    fn grant(&mut self, now: Instant, pulse: Current, next: u16) {
+        if self.state == LeaseState::Open && next / 2 > pulse.span {
+            return;
+        }
         let until = pulse.handed_on + from_tenths(pulse.span);
         if until > now {
             let until = self.until().map_or(until, |at| at.max(until));
@@ -241,12 +247,13 @@ impl Lease {
         let period = self.period(context.settings());
         // The first two follow each other at once: nobody else has a lease before the second.
         let first = self.state == LeaseState::Open;
-        self.grant(context.now, current);
         let took = context.now.since(current.handed_on);
         // A run of lost frames is remembered for some minutes.
         let part = self.slowest.as_micros() / 64;
         let lately = self.slowest.as_micros().saturating_sub(part);
         self.slowest = took.max(Duration::from_micros(lately));
+        let next = self.given(context.settings());
+        self.grant(context.now, current, next);
         let soon = context.now + PAUSE;
         let paced = current.handed_on + period;
         self.next_at = Some(if first { soon } else { paced.max(soon) });

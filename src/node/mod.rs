@@ -61,6 +61,7 @@ use round::Round;
 use round::state::Phase;
 use sample::{Meter, Sample};
 use steering::Steering;
+use timing::first_pass;
 use view::ViewChange;
 use view::electorate::Held;
 use view::record::{RecordError, ViewRecord};
@@ -161,15 +162,10 @@ impl Node {
 
     /// By when the first pass should have come, were this the beginning.
     fn await_first(&mut self, now: Instant) {
-        let Settings {
-            hop_time,
-            probe_after,
-            ..
-        } = self.member.settings;
-        let all = u32::from(self.member.all);
-        // Where every other frame is lost a hop takes some six times as long as it can.
-        let usual = now + probe_after + hop_time.times(2 * all);
-        let slow = now + hop_time.times(12 * all);
+        let (settings, all) = (&self.member.settings, self.member.all);
+        let there_and_back = settings.hop_time.times(2 * u32::from(all));
+        let usual = now + settings.probe_after + there_and_back;
+        let slow = now + first_pass(settings, all);
         self.view.await_first(usual.max(slow));
     }
 

@@ -22,7 +22,7 @@
 use super::liveness::{Liveness, patience, tick};
 use crate::jitter::Jitter;
 use crate::node::context::Proposer;
-use crate::node::timing::longest_lease;
+use crate::node::timing::{first_pass, longest_lease};
 use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
@@ -249,7 +249,8 @@ impl Neighbour {
             // Where others may have closed up since, it makes itself known soon.
             let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
             let wait = match settings.wiring {
-                Wiring::Pair => patience(settings, all),
+                // The first pass comes without being asked for.
+                Wiring::Pair => patience(settings, all).max(first_pass(settings, all)),
                 Wiring::Shared => soon,
             };
             Some(now + wait)
