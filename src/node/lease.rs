@@ -19,7 +19,7 @@
 //! Who votes for a view without members of this one says until when they may hold it, span after it last said so; that is never
 //! before r lets go.
 //!
-//! The span is `dead_after`, or four times as long as a pulse took lately and two periods, at most eight times `dead_after`: where many
+//! The span is `dead_after`, or three times as long as a pulse took lately and two periods, at most eight times `dead_after`: where many
 //! frames are lost a silence says less. The period from one to the next is half of `probe_after`, or twice as
 //! long as a pulse takes, up to a quarter of `dead_after`.
 
@@ -248,8 +248,8 @@ impl Lease {
         // The first two follow each other at once: nobody else has a lease before the second.
         let first = self.state == LeaseState::Open;
         let took = context.now.since(current.handed_on);
-        // A run of lost frames is remembered for some minutes.
-        let part = self.slowest.as_micros() / 64;
+        // A run of lost frames is remembered for a minute or two.
+        let part = self.slowest.as_micros() / 32;
         let lately = self.slowest.as_micros().saturating_sub(part);
         self.slowest = took.max(Duration::from_micros(lately));
         let next = self.given(context.settings());
@@ -268,7 +268,7 @@ impl Lease {
 
     /// What the leader gives the others, in tenths of a second.
     fn given(&self, settings: &Settings) -> u16 {
-        let slow = self.slowest.times(4).as_micros();
+        let slow = self.slowest.times(3).as_micros();
         let wanted = slow.saturating_add(self.period(settings).times(2).as_micros());
         let most = longest_lease(settings);
         let span = Duration::from_micros(wanted)
