@@ -23,10 +23,10 @@ mod turn;
 mod turning;
 
 use super::context::{Context, Effects, Member};
-use super::retransmit::{Retransmit, Trip};
+use super::retransmit::{Again, Retransmit, Trip};
 use super::sample::{Meter, Sample};
 use super::timing::{PAUSE, earliest};
-use crate::mission::{Heading, Profile};
+use crate::mission::Profile;
 use crate::place::Placement;
 use crate::settings::Measure;
 use crate::time::Instant;
@@ -85,9 +85,8 @@ impl Round {
             Message::Moved(moved) if ADJUST => computation.on_moved(context, moved),
             Message::Busy { sweep } => {
                 if computation.phase() == Phase::Waiting && *sweep == computation.number() {
-                    // It has arrived: what is missing is the answer, and that may take its time.
-                    self.retransmit.heard();
-                    self.await_answer(context);
+                    let trip = self.trip(context);
+                    self.retransmit.arrived(context.now, trip);
                 }
                 return Effects::NONE;
             }
@@ -98,8 +97,15 @@ impl Round {
 
     /// Does what is due. Bounded by one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
-        let resent =
-            self.retransmit.is_due(context.now) && self.computation.phase() == Phase::Waiting;
+        let hop_time = context.settings().hop_time;
+        let resent = match self.retransmit.take_due(context.now, hop_time) {
+            Some(Again::Onward) => self.computation.phase() == Phase::Waiting,
+            Some(Again::Back) => {
+                self.due.back = true;
+                false
+            }
+            None => false,
+        };
         self.due.onward |= resent;
         if self.work_at.is_none_or(|at| at > context.now) {
             return Effects {
@@ -142,17 +148,19 @@ impl Round {
                     onward: true,
                     ..RoundDue::default()
                 };
-                self.retransmit.heard();
-                self.retransmit.stop();
+                self.retransmit.begin();
                 self.work_at = None;
                 Effects::NONE
             }
             Action::Busy => {
                 self.due.busy = true;
+                let hop_time = context.settings().hop_time;
+                self.retransmit.came_again(context.now, hop_time);
                 Effects::REPEATED
             }
             Action::Repeat => {
                 self.due.back = true;
+                self.retransmit.asked(context.now, context.way_back());
                 Effects::REPEATED
             }
             Action::Answer { agreed } => {
@@ -160,7 +168,7 @@ impl Round {
                     back: true,
                     ..RoundDue::default()
                 };
-                self.retransmit.stop();
+                self.retransmit.answered(context.now, context.way_back());
                 // Now that it knows what the others bring along it may have the chain to solve.
                 self.work_at = None;
                 if self.computation.is_solving(context) {
@@ -253,17 +261,15 @@ impl Round {
     }
 
     fn await_answer(&mut self, context: &Context<'_>) {
-        let member = context.member;
-        let hops = match member.mission.heading() {
-            Heading::TowardRx => member.mission.relays().saturating_sub(member.index),
-            Heading::TowardTx => member.index.saturating_sub(1),
-        };
-        let trip = Trip {
-            hop_time: member.settings.hop_time,
-            hops,
-            slow: self.computation.is_slow(),
-        };
+        let trip = self.trip(context);
         self.retransmit.sent(context.now, trip);
+    }
+
+    fn trip(&self, context: &Context<'_>) -> Trip {
+        Trip {
+            slow: self.computation.is_slow(),
+            ..context.way_onward()
+        }
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
