@@ -431,7 +431,9 @@ impl Neighbour {
     pub(crate) fn confirmed(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.confirmed(at);
         if self.is_mutual() {
-            let next = (at + self.patience).max(now + self.tick);
+            let next = (self.liveness.heard() + self.patience).max(now + self.tick);
+            // What answers something said long ago is no reason to ask sooner.
+            let next = self.look_at.map_or(next, |at| at.max(next));
             // Another node than before is to be counted once its grace is over.
             let waits = self.node != self.counted && now < self.grace;
             self.look_at = Some(if waits { next.min(self.grace) } else { next });

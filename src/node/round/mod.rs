@@ -9,6 +9,10 @@
 //! | `seats`, `gathering` | what it has to know of the others for that, and the pass that gathers it |
 //! | `turn`, `turning` | a turn of Algorithm 2 |
 //! | `leader`, `task` | what comes before a pass begins: which one, and what for |
+//!
+//! What answers a relay is a sign of life, from when the relay said what is answered: what came of a pass, by the neighbour onward, as of
+//! when the pass was first handed on; the next pass, by the neighbour back, as of when what came of the last one was first handed back. A
+//! leader whose firmware has it begin again does not wait for that: then the sign is too new by one pass at most.
 
 mod chosen;
 mod computation;
@@ -19,6 +23,8 @@ pub(crate) mod state;
 mod sweep;
 mod sweeping;
 mod task;
+#[cfg(test)]
+mod tests;
 mod turn;
 mod turning;
 
@@ -50,6 +56,8 @@ pub(crate) struct Round {
     work_at: Option<Instant>,
     due: RoundDue,
     computation: Computation,
+    /// When the current pass was handed onward first, or what came of it was handed back.
+    said_at: Option<Instant>,
 }
 
 impl Round {
@@ -65,6 +73,7 @@ impl Round {
             computation: Computation::new(leads, number, profile, measure),
             retransmit: Retransmit::new(seed),
             work_at: None,
+            said_at: None,
             due: RoundDue {
                 onward: false,
                 back: false,
@@ -76,6 +85,7 @@ impl Round {
     /// A message of the mission and the view that this relay is in, from the neighbour that has it to say. Bounded by 16 reaches.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
+        let (before, said_at) = (computation.state, self.said_at);
         let next = match message {
             Message::Sweep(sweep) => computation.on_sweep(context, sweep),
             Message::Verdict(answer) => computation.on_verdict(context, answer),
@@ -92,7 +102,12 @@ impl Round {
             }
             _ => return Effects::NONE,
         };
-        self.proceed(context, next)
+        let state = computation.state;
+        Effects {
+            heard_onward: said_at.filter(|_| state.answers(before)),
+            heard_back: said_at.filter(|_| state.follows(before)),
+            ..self.proceed(context, next)
+        }
     }
 
     /// Does what is due. Bounded by one portion of a computation.
@@ -150,6 +165,7 @@ impl Round {
                 };
                 self.retransmit.begin();
                 self.work_at = None;
+                self.said_at = Some(context.now);
                 Effects::NONE
             }
             Action::Busy => {
@@ -169,6 +185,7 @@ impl Round {
                     ..RoundDue::default()
                 };
                 self.retransmit.answered(context.now, context.way_back());
+                self.said_at = Some(context.now);
                 // Now that it knows what the others bring along it may have the chain to solve.
                 self.work_at = None;
                 if self.computation.is_solving(context) {
@@ -212,6 +229,7 @@ impl Round {
         self.due = RoundDue::default();
         self.retransmit.stop();
         self.work_at = None;
+        self.said_at = None;
     }
 
     /// The new view is in force, in which this relay `leads` or not, and has something to work out at once or not.
