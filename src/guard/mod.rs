@@ -71,7 +71,7 @@ mod reachable;
 #[cfg(test)]
 mod tests;
 
-use crate::place::{CrossSection, Placement};
+use crate::place::Placement;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
@@ -97,8 +97,6 @@ pub struct Guard {
     born: Instant,
     /// Before the first setpoint: where the relay was reported last.
     found: Option<Placement>,
-    /// Where the relay was across the line when it was reported last.
-    across: CrossSection,
     follower: FenceFollower,
     owner: FenceOwner,
     refused: u32,
@@ -118,7 +116,6 @@ impl Guard {
             jitter,
             born: now,
             found: None,
-            across: CrossSection::on_line(0.0),
             refused: 0,
         }
     }
@@ -145,7 +142,6 @@ impl Guard {
         if !is_placement(place) {
             return bump(&mut self.refused);
         }
-        self.across = place.cross_section();
         let own = &mut self.own;
         if own.setpoint.is_some() {
             own.reachable.report(at, place.x_m, &own.config);
@@ -301,7 +297,8 @@ impl Guard {
                 !own.open
                     && (target.x_m - setpoint.x_m).abs() <= own.config.rounding()
                     && own.reachable.is_still()
-                    && own.is_near(self.across, target.cross_section())
+                    && own.is_across()
+                    && own.still
             }
             _ => false,
         }
