@@ -29,6 +29,7 @@ mod stats;
 pub mod time;
 mod view;
 pub mod wire;
+mod without_quorum;
 
 pub use channel::Channel;
 pub use channel_load::ChannelLoad;
@@ -44,9 +45,7 @@ pub use optimiser::local::Local;
 pub use optimiser::search::Schedule;
 pub use place::Placement;
 pub use relay::{Port, Relay, Transmit};
-pub use settings::{
-    Adjust, Identity, Measure, Method, Settings, SetupError, Wiring, WithoutQuorum,
-};
+pub use settings::{Adjust, Identity, Measure, Method, Settings, SetupError, Wiring};
 pub use side::Side;
 pub use stats::Stats;
 pub use time::{Duration, Instant};
@@ -56,6 +55,7 @@ pub use wire::auth::{Auth, Key};
 pub use wire::frame::FrameBuf;
 #[cfg(feature = "upload")]
 pub use wire::upload::Upload;
+pub use without_quorum::WithoutQuorum;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

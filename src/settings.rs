@@ -5,9 +5,9 @@ use crate::mission::{Mission, Profile};
 use crate::optimiser::joint::MOST_SOLVED;
 use crate::optimiser::local::Local;
 use crate::optimiser::search::Schedule;
-use crate::place::Placement;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
+use crate::without_quorum::WithoutQuorum;
 
 /// Which relay this is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -74,46 +74,6 @@ pub struct Measure {
     pub i_max_w: f32,
     /// Samples to take at a place before what they say is used, 100 to 1 000 000.
     pub samples: u32,
-}
-
-/// What a relay does while its part of the chain is too small to fly anything, so that it is in nobody's way.
-///
-/// Set it alike on all relays: then those that leave keep their order and their distances.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum WithoutQuorum {
-    /// It stays where it was agreed to be.
-    #[default]
-    Hold,
-    /// It leaves the line, along y and upward from there; with a guard as far as its box goes
-    /// ([`GuardConfig::with_room_for`]).
-    Leave {
-        /// How far to the side, m: -1e4 to 1e4.
-        y_m: f32,
-        /// How far up, m: 0 to 1e4.
-        up_m: f32,
-    },
-}
-
-impl WithoutQuorum {
-    fn is_valid(self) -> bool {
-        match self {
-            Self::Hold => true,
-            Self::Leave { y_m, up_m } => (-1e4..=1e4).contains(&y_m) && (0.0..=1e4).contains(&up_m),
-        }
-    }
-
-    /// Where a relay is to be then that was agreed to be at `place`.
-    pub(crate) fn place(self, place: Placement) -> Placement {
-        match self {
-            Self::Hold => place,
-            Self::Leave { y_m, up_m } => Placement {
-                y_m: place.y_m + y_m,
-                altitude_m: place.altitude_m + up_m,
-                ..place
-            },
-        }
-    }
 }
 
 /// What a firmware may choose.
@@ -226,7 +186,7 @@ impl core::fmt::Display for SetupError {
             Self::WithoutQuorum => {
                 "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4"
             }
-            Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, hover of 0 to 1e3, and its feature on",
+            Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, relays of 1 to 1000, hover of 0 to 1e3, and its feature on",
         })
     }
 }

@@ -7,6 +7,7 @@
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
 use crate::power_ratio::PowerRatio;
+use crate::root::sqrt;
 
 /// How little is heard of the interference at `at`, as a relay there sees it: the one term in which kinds of it differ.
 ///
@@ -90,7 +91,7 @@ pub enum Extremum {
 pub fn first_hop_turn(interferer: &Interferer, altitude_m: f32) -> Extremum {
     let x = interferer.x_m;
     let q = square(x) + square(interferer.y_m);
-    let root = libm::hypotf(q, 2.0 * x * altitude_m);
+    let root = sqrt(square(q) + square(2.0 * x * altitude_m));
     if x > 0.0 {
         Extremum::Valley((q + root) / (2.0 * x))
     } else if x < 0.0 {

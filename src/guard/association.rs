@@ -5,6 +5,8 @@
 //! takes up another of the owner's. So two numbers go together once, and what was said in an earlier one cannot count in a
 //! later one, however late it comes.
 
+use super::fence::Fence;
+use super::own::Own;
 use crate::jitter::Jitter;
 use crate::side::Side;
 
@@ -24,6 +26,9 @@ pub(super) struct Association {
     strays: u8,
     /// Whether there is something to tell.
     pub(super) due: bool,
+    /// Whether the neighbour passed on that the chain is to open, and whether it was last told so.
+    pub(super) opens: bool,
+    pub(super) told_open: bool,
 }
 
 impl Association {
@@ -35,6 +40,8 @@ impl Association {
             heard: 0,
             strays: 0,
             due: true,
+            opens: false,
+            told_open: false,
         }
     }
 
@@ -47,6 +54,34 @@ impl Association {
         known
     }
 
+    /// A message of this association, but for what is of the fence.
+    pub(super) fn fence(&self, own: &Own) -> Fence {
+        Fence {
+            association: self.own,
+            echo: self.heard,
+            number: 0,
+            x_m: 0.0,
+            target_m: own.target_m(),
+            across: own.across(),
+            apart_m: 0.0,
+            flags: u8::from(own.still) * Fence::STILL
+                + u8::from(self.told_open) * Fence::OPENS
+                + u8::from(self.opens) * Fence::ECHO_OPENS,
+        }
+    }
+
+    /// What a message of this association says of opening the chain; it is answered if the neighbour has not heard the last of that.
+    pub(super) const fn hear_open(&mut self, fence: &Fence) {
+        self.opens = fence.says(Fence::OPENS);
+        self.due |= fence.says(Fence::ECHO_OPENS) != self.told_open;
+    }
+
+    /// This is passed on from now on.
+    pub(super) const fn pass_open(&mut self, opens: bool) {
+        self.due |= self.told_open != opens;
+        self.told_open = opens;
+    }
+
     /// One more message of another association; whether they are too many to be late ones.
     pub(super) const fn stray(&mut self) -> bool {
         self.strays = self.strays.saturating_add(1);
@@ -55,16 +90,22 @@ impl Association {
 }
 
 /// Where a relay that fell silent may still hover, as a limit of this relay's own x.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
     /// Of the lost relays the nearest node, and the limit, m.
     lost: Option<(u16, f32)>,
+    /// Where along x this relay may be no farther than the separation from it, and has not been beyond since, m: only where the two are
+    /// across the line keeps them apart. Not a number where that is over.
+    near_m: f32,
 }
 
 impl KeepOut {
     /// Nothing there.
     pub(super) const fn none() -> Self {
-        Self { lost: None }
+        Self {
+            lost: None,
+            near_m: f32::NAN,
+        }
     }
 
     /// The limit, m.
@@ -90,18 +131,37 @@ impl KeepOut {
             Side::Downstream => lost >= node,
         };
         if self.lost.is_some_and(|(lost, _)| is_beyond(lost)) {
-            self.lost = None;
+            self.clear();
         }
     }
 
-    /// The first setpoint is `x_m`: whoever was lost before was never heard, and may hover anywhere beyond.
-    pub(super) fn begin(&mut self, x_m: f32) {
+    /// The first setpoint is `x_m`: whoever was lost before was never heard, and may hover anywhere beyond, from `near_m` on the
+    /// separation apart.
+    pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
+            self.near_m = near_m;
+        }
+    }
+
+    /// The relay that was lost last was nearer than the separation, or may have been, unless this one is at `near_m` or beyond.
+    pub(super) const fn near(&mut self, near_m: f32) {
+        self.near_m = near_m;
+    }
+
+    /// Whether that may still be so.
+    pub(super) const fn is_near(&self) -> bool {
+        !self.near_m.is_nan()
+    }
+
+    /// This relay is somewhere now; `is_beyond` says whether that is beyond a limit.
+    pub(super) fn part(&mut self, is_beyond: impl Fn(f32) -> bool) {
+        if is_beyond(self.near_m) {
+            self.near_m = f32::NAN;
         }
     }
 
     pub(super) const fn clear(&mut self) {
-        self.lost = None;
+        *self = Self::none();
     }
 }

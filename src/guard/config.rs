@@ -1,9 +1,10 @@
 //! The box that no setpoint leaves, and what else is set before flight.
 
-use crate::mission::{Mission, Profile};
-use crate::place::Placement;
-use crate::settings::WithoutQuorum;
+use crate::mission::{MAX_RELAYS, Mission, Profile};
+use crate::place::{CrossSection, Placement};
+use crate::root::sqrt;
 use crate::time::Duration;
+use crate::without_quorum::WithoutQuorum;
 
 use super::fence::is_place;
 
@@ -44,13 +45,15 @@ impl Geofence {
 pub struct GuardConfig {
     /// The box that no setpoint leaves.
     pub fence: Geofence,
-    /// How far apart relays are follower along x, m: 0 to 1e5.
+    /// How far apart relays are kept, m: 0 to 1e5; the same on all relays.
     pub separation_m: f32,
-    /// How far off its setpoint a relay may be reported that hovers there, m: 0 to 1e3. This much is taken from the separation at
+    /// Number of relays of the mission, 1 to 1000; the same on all relays.
+    pub relays: u16,
+    /// How far off its setpoint a relay may be reported that hovers there, m in each coordinate: 0 to 1e3. This much is taken from the separation at
     /// each of two relays.
     pub hover_m: f32,
     /// How long after [`Guard::steer`](super::Guard::steer) gave a setpoint the relay flies toward it at the latest: the way of the
-    /// setpoint to the flight controller, and the time to stop from the greatest speed along x.
+    /// setpoint to the flight controller, and the time to stop from the greatest speed.
     pub lag: Duration,
 }
 
@@ -73,6 +76,7 @@ impl GuardConfig {
                 most_altitude_m: config.band.most_m.max(profile.altitude_m),
             },
             separation_m: config.min_separation_m,
+            relays: config.relays,
             hover_m: 0.0,
             lag: LAG,
         }
@@ -102,6 +106,7 @@ impl GuardConfig {
             && is_place(fence.most_altitude_m)
             && fence.least_altitude_m <= fence.most_altitude_m
             && (0.0..=1e5).contains(&self.separation_m)
+            && (1..=MAX_RELAYS).contains(&self.relays)
             && (0.0..=1e3).contains(&self.hover_m)
     }
 
@@ -123,6 +128,25 @@ impl GuardConfig {
     pub(super) fn holds(&self, x_m: f32) -> bool {
         let fence = &self.fence;
         x_m >= fence.least_x_m - self.hover_m && x_m <= fence.most_x_m + self.hover_m
+    }
+
+    /// Where node `node`, which is to be at `x_m`, waits while the chain is open: places in order stay in order, and come to be the
+    /// separation apart wherever the relays of the mission fit the box so.
+    #[inline(never)] // called from several places
+    pub(super) fn open_place(&self, node: u16, x_m: f32) -> f32 {
+        let least_m = self.fence.least_x_m;
+        let span_m = self.fence.most_x_m - least_m;
+        let step_m = self.separation_m + self.rounding();
+        let taken_m = f32::from(self.relays.saturating_sub(1)) * step_m;
+        let left = (span_m - taken_m).max(0.0) / span_m.max(f32::MIN_POSITIVE);
+        let before = f32::from(node.saturating_sub(1)) * step_m;
+        (least_m + before + left * (x_m - least_m)).min(self.fence.most_x_m)
+    }
+
+    /// How far apart along x two relays have to be at least that are at `one` and `other` across the line, m.
+    pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
+        let apart = self.separation_m;
+        sqrt((apart * apart - one.apart_squared(other)).max(0.0))
     }
 
     /// What rounding may make of a place, m: four steps of an f32 at the far end of the box.

@@ -1,5 +1,7 @@
 //! What two neighbours tell each other about the fence between them, and why a relay may not get on.
 
+use crate::place::CrossSection;
+
 /// What a relay tells a neighbour about the fence between them. It is a state, not a step: it may be lost, come twice, late, or
 /// in another order.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -15,15 +17,40 @@ pub struct Fence {
     pub x_m: f32,
     /// Where the sender is to be in the end, m along x, -1e7 to 1e7.
     pub target_m: f32,
+    /// Where the sender flies across the line, or is on its way to, m: both -1e7 to 1e7.
+    pub across: CrossSection,
+    /// From the owner: how far before the fence it stays, m along x, 0 to 1e5. Where that is less than the separation, the
+    /// follower stays where it is across the line.
+    pub apart_m: f32,
+    /// What else it says: the sum of those of [`STILL`](Self::STILL) to [`ECHO_OPENS`](Self::ECHO_OPENS) that hold.
+    pub flags: u8,
 }
 
 /// No place is farther than this from Tx, m.
 const FARTHEST_M: f32 = 1e7;
 
 impl Fence {
+    /// The sender has arrived where it flies across the line.
+    pub const STILL: u8 = 1;
+    /// From the follower: it agrees to `apart_m` of the newest fence.
+    pub const AGREES: u8 = 2;
+    /// The sender, or a relay beyond it, has to move across the line and needs the separation along x for that.
+    pub const OPENS: u8 = 4;
+    /// The same as the sender has last heard it from the receiver.
+    pub const ECHO_OPENS: u8 = 8;
+
+    pub(super) const fn says(&self, flag: u8) -> bool {
+        self.flags & flag != 0
+    }
+
     /// Whether its numbers are within their ranges.
     pub fn is_valid(&self) -> bool {
-        self.association != 0 && is_place(self.x_m) && is_place(self.target_m)
+        let CrossSection { y_m, altitude_m } = self.across;
+        let places = [self.x_m, self.target_m, y_m, altitude_m];
+        self.association != 0
+            && places.into_iter().all(is_place)
+            && (0.0..=1e5).contains(&self.apart_m)
+            && self.flags < 2 * Self::ECHO_OPENS
     }
 }
 
@@ -35,7 +62,7 @@ pub enum HoldReason {
     Unheard,
     /// The neighbour stands on the wrong side of this relay: neither moves.
     Order,
-    /// The two are to be closer along x than the separation.
+    /// The two are to be closer along x than they may come yet, by where they are across the line.
     Close,
     /// A relay that fell silent may still hover there.
     Lost,

@@ -2,7 +2,7 @@
 
 use super::association::{Association, KeepOut};
 use super::fence::{Fence, HoldReason};
-use super::reachable::ReachableInterval;
+use super::own::Own;
 use crate::jitter::Jitter;
 use crate::side::Side;
 
@@ -18,6 +18,10 @@ pub(super) struct FenceFollower {
     number: u16,
     /// Where it is, m.
     fence_m: f32,
+    /// How far before it the neighbour asked to stay, m; infinite for the separation.
+    asked_m: f32,
+    /// What of that this relay has agreed to, m.
+    taken_m: f32,
     /// Where the neighbour is to be, m.
     target_m: f32,
     /// Whether this relay has cleared a fence.
@@ -33,6 +37,8 @@ impl FenceFollower {
             keep_out: KeepOut::none(),
             number: 0,
             fence_m: f32::NEG_INFINITY,
+            asked_m: f32::INFINITY,
+            taken_m: f32::INFINITY,
             target_m: 0.0,
             clear: false,
             told: false,
@@ -40,19 +46,29 @@ impl FenceFollower {
     }
 
     /// Another neighbour, 0 for none.
-    pub(super) fn link(&mut self, node: u16, reachable: &ReachableInterval, jitter: &mut Jitter) {
-        self.renew(reachable, jitter);
+    pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
+        self.renew(own, jitter);
         self.association.node = node;
     }
 
     /// Begins anew; where this relay may go because of the neighbour so far stays as a keep_out, and that is nowhere if it was
     /// never heard.
-    fn renew(&mut self, reachable: &ReachableInterval, jitter: &mut Jitter) {
+    fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if self.association.node != 0 {
             // As far as this relay has come, not as far as it was asked to.
-            let limit_m = self.least(reachable).min(reachable.at_m);
-            keep_out.raise(Side::Upstream, self.association.node, limit_m);
+            let limit_m = self.least(own).min(own.reachable.at_m);
+            let separation_m = own.config.separation_m;
+            // What may be missing where the neighbour was allowed to come nearer than the separation, or was never heard.
+            let missing_m = separation_m - self.asked_m.min(self.taken_m).min(separation_m);
+            keep_out.raise(Side::Upstream, self.association.node, limit_m + missing_m);
+            if missing_m > 0.0 {
+                keep_out.near(limit_m + missing_m);
+            } else if !self.is_agreed() {
+                keep_out.near(limit_m + separation_m);
+            } else if !self.clear {
+                keep_out.near(self.fence_m);
+            }
         }
         *self = Self {
             keep_out,
@@ -60,16 +76,11 @@ impl FenceFollower {
         };
     }
 
-    pub(super) fn hear(
-        &mut self,
-        fence: &Fence,
-        reachable: &ReachableInterval,
-        jitter: &mut Jitter,
-    ) {
+    pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
         if self.association.heard == 0 {
             self.association.heard = fence.association;
         } else if fence.association != self.association.heard && self.association.stray() {
-            self.renew(reachable, jitter);
+            self.renew(own, jitter);
             self.association.heard = fence.association;
         }
         // It is answered in any case: it may have been said again because an answer was lost.
@@ -77,6 +88,7 @@ impl FenceFollower {
         if !self.association.knows(fence.association, fence.echo) {
             return;
         }
+        self.association.hear_open(fence);
         self.target_m = fence.target_m;
         let ahead = fence.number.wrapping_sub(self.number);
         if fence.number != 0 && (self.number == 0 || (1..AHEAD).contains(&ahead)) {
@@ -85,24 +97,58 @@ impl FenceFollower {
             }
             self.number = fence.number;
             self.fence_m = fence.x_m;
+            self.asked_m = fence.apart_m;
             self.told = false;
         }
     }
 
     /// How far back this relay may go, m; above where it is, it is asked to go there.
     #[inline(never)] // called from several places
-    pub(super) fn least(&self, reachable: &ReachableInterval) -> f32 {
+    pub(super) fn least(&self, own: &Own) -> f32 {
         let granted = match (self.association.node, self.number) {
             (0, _) => f32::NEG_INFINITY,
-            (_, 0) => reachable.at_m,
+            (_, 0) => own.reachable.at_m,
             _ => self.fence_m,
         };
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
-    /// Whether the altitude is free as far as this side is concerned.
-    pub(super) const fn is_clear(&self) -> bool {
-        self.association.node == 0 || self.clear
+    /// Whether this relay may move across the line as far as this side is concerned.
+    pub(super) fn is_clear(&self, own: &Own) -> bool {
+        (self.association.node == 0 || self.clear) && !self.is_held(own) && !self.keep_out.is_near()
+    }
+
+    /// Whether this relay has to stay where it is across the line, since that may keep the two apart.
+    pub(super) fn is_held(&self, own: &Own) -> bool {
+        self.asked_m < own.config.separation_m
+    }
+
+    /// Whether the neighbour may have been too near since it was switched on.
+    pub(super) const fn is_tight(&self) -> bool {
+        self.is_agreed() && !self.clear
+    }
+
+    /// Whether the two are to be closer along x than the separation.
+    pub(super) fn is_close(&self, own: &Own) -> bool {
+        self.is_agreed() && own.is_close(own.target_m() - self.target_m)
+    }
+
+    /// Agrees to what the neighbour asked, if with `downstream_m` on the other side its two neighbours stay the separation apart.
+    pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
+        let missing_m = own.config.separation_m - self.asked_m;
+        let enough = missing_m <= downstream_m + own.config.rounding();
+        if self.asked_m >= self.taken_m || enough {
+            self.taken_m = self.asked_m;
+        }
+    }
+
+    /// How near the neighbour upstream may come at most, m, as far as the one downstream is concerned.
+    pub(super) const fn taken_m(&self) -> f32 {
+        if self.keep_out.is_near() || self.is_agreed() && !self.clear {
+            0.0
+        } else {
+            self.taken_m
+        }
     }
 
     /// Whether nobody is there, or whoever is has found this relay beyond it: before, it announces no fence.
@@ -116,29 +162,29 @@ impl FenceFollower {
     }
 
     /// After a report: the owner waits to hear that the newest fence has been cleared.
-    pub(super) fn settle(&mut self, reachable: &ReachableInterval) {
-        if self.is_agreed() && reachable.is_known() && reachable.low_m >= self.fence_m {
+    pub(super) fn settle(&mut self, own: &Own) {
+        if self.is_agreed() && own.reachable.is_known() && own.reachable.low_m >= self.fence_m {
             self.clear = true;
             self.association.due |= !self.told;
         }
     }
 
     /// What there is to tell.
-    pub(super) fn tell(&mut self, reachable: &ReachableInterval, target_m: f32) -> Option<Fence> {
+    pub(super) fn tell(&mut self, own: &Own) -> Option<Fence> {
         if self.association.node == 0 || !core::mem::take(&mut self.association.due) {
             return None;
         }
-        self.told = reachable.low_m >= self.fence_m;
-        Some(Fence {
-            association: self.association.own,
-            echo: self.association.heard,
-            number: self.number,
-            x_m: reachable.low_m,
-            target_m,
-        })
+        self.told = own.reachable.low_m >= self.fence_m;
+        let mut fence = self.association.fence(own);
+        (fence.number, fence.x_m) = (self.number, own.reachable.low_m);
+        if self.taken_m <= self.asked_m {
+            fence.flags += Fence::AGREES;
+        }
+        Some(fence)
     }
 
-    pub(super) fn hold_reason(&self, target_m: f32, near: f32) -> Option<HoldReason> {
+    pub(super) fn hold_reason(&self, own: &Own) -> Option<HoldReason> {
+        let target_m = own.target_m();
         if self
             .keep_out
             .limit_m()
@@ -152,6 +198,7 @@ impl FenceFollower {
         if !self.is_agreed() {
             return Some(HoldReason::Unheard);
         }
-        (target_m - self.target_m < near).then_some(HoldReason::Close)
+        let step_m = target_m - self.target_m + own.config.rounding();
+        (step_m < self.taken_m.min(own.config.separation_m)).then_some(HoldReason::Close)
     }
 }

@@ -1,17 +1,19 @@
 //! Keeps relays apart while they fly from one agreed set of places to the next, whatever is lost or late between them.
 //!
-//! Relays stand in order along x, so relays that are the separation apart *along x* from their neighbours are that far from
-//! every other relay, at whatever altitudes: that is what the guard keeps, and why it does not count height. Places that were
-//! agreed closer along x than that (methods that choose altitudes do so in dense chains) are approached as far as this
-//! allows, and [`Guard::hold_reason`] says so.
+//! Relays stand in order along x. As a rule neighbours are the separation apart *along x*, and then so are all relays, whatever they do
+//! across the line. Where two are to be closer along x, since they fly beside or above each other, they come closer once both have
+//! arrived across the line, and stay there until they are the separation apart along x again: what the two are apart across the line
+//! then counts. Two relays with one between them stay the separation apart along x in any case, so that no relay has to know more
+//! than its neighbours. Places that do not allow that are approached as far as it does, and [`Guard::hold_reason`] says so.
 //!
-//! Between two neighbours there is a *fence*, a line across x. The relay upstream of it, its *owner*, stays the separation
-//! before it; the other one, the *follower*, stays at it or beyond.
+//! Between two neighbours there is a *fence*, a plane across x. The relay upstream of it, its *owner*, stays so far before it as the two
+//! have agreed on, the *step*; the other one, the *follower*, stays at it or beyond.
 //!
 //! | file | one idea |
 //! | --- | --- |
 //! | [`config`] | the box that no setpoint leaves, and what else is set before flight |
-//! | `reachable` | where the relay may be, by what was reported and what it was told to fly to |
+//! | `own` | where the relay is to be, was told to fly, and whether it has arrived across the line |
+//! | `reachable` | where the relay may be along x, by what was reported and what it was told to fly to |
 //! | `association` | which incarnation of the neighbour a message is from, so that late ones cannot be mistaken |
 //! | `owner` | the fence downstream, which this relay places |
 //! | `follower` | the fence upstream, which the neighbour places |
@@ -25,12 +27,17 @@
 //! | 1 | The follower never lowers its setpoint below the newest fence it has heard of, and flies up to it if it is below. | what it promises holds |
 //! | 2 | It tells the newest fence it has heard of, and the low end of its own stretch. | - |
 //! | 3 | The owner counts on the lowest of: that low end, if told together with the newest fence; every fence announced since. | no message under way can make the follower come nearer than it is counted on |
-//! | 4 | The owner never raises its setpoint to less than the separation before what it counts on. | the stretches of the two are the separation apart |
-//! | 5 | The owner announces no fence nearer than the separation beyond the high end of its own stretch. | a fence it lowers is one it has cleared already |
-//! | 6 | As far as 5 allows, the fence goes halfway between the two agreed places (and half the separation on). | both can get where they are to be |
-//! | 7 | The first fence is right at the owner's own stretch; other fences, and changes of altitude, begin when the follower has cleared it. | a start that is too close is opened first, and no relay sinks onto another |
+//! | 4 | The owner never raises its setpoint to less than the step before what it counts on. | the stretches of the two are the step apart |
+//! | 5 | The owner announces no fence nearer than the step beyond the high end of its own stretch. | a fence it lowers is one it has cleared already |
+//! | 6 | As far as 5 allows, the fence goes halfway between the two agreed places (and half the step on). | both can get where they are to be |
+//! | 7 | The first fence is the separation beyond the owner's own stretch; other fences, and moves across the line, begin when the follower has cleared it. | a start that is too close is opened first, and no relay sinks onto another |
 //! | 8 | A setpoint stays until both neighbours are known to be in order: the follower has told that it is beyond the owner, the owner has announced a fence. It tells one of them only once it knows that of the other one. | nothing is granted unheard (switched on, rebooted, newly linked); relays in the wrong order, and all others, stay where they are |
 //! | 9 | Nothing lapses with time: of a neighbour that is replaced or starts anew, the last limit stays until it speaks for itself, or [`Guard::forget`]; if it was never heard, this relay goes no farther toward it. | a silent relay that still hovers is not flown into |
+//! | 10 | With a fence the owner says which step it asks for. From one below the separation until the next one that is the separation, neither moves across the line: not the owner since it asked, not the follower since it heard. | what the follower told of its place across the line stays true |
+//! | 11 | The step is the separation. It becomes less when the follower has told, together with the newest fence, that it has arrived across the line, where, and that it agrees: then it is the largest of what is asked for, of what the two places across the line leave to be kept along x, and of what rule 12 asks for. The owner announces a larger one only once it is that far before what it counts on. | the two are the separation apart in space |
+//! | 12 | The steps upstream and downstream of a relay add up to the separation at least: it agrees to no smaller one upstream before, and takes no smaller one downstream after. | relays that are not neighbours are the separation apart along x |
+//! | 13 | A relay that has to move across the line and may not by rule 10, or that started too close to a neighbour that is to be close, has the chain *open*: it says so to both sides, and everybody passes that on. Then all go to places in the same order that are the separation apart along x, and steps are the separation. | there is room to move across the line |
+//! | 14 | From a neighbour that fell silent within the separation along x this relay goes off to the separation, and does not move across the line before; nor where it never heard the neighbour, or had not cleared the first fence, before it has gone as far. | where the silent one hovers across the line still counts |
 //!
 //! # Why everybody arrives
 //!
@@ -40,10 +47,15 @@
 //! receiver's end. Then every relay finds its place between its fences. Fences go along with the flight, so that is one
 //! flight's time and a few messages a relay at the worst.
 //!
+//! Where neighbours are to be closer along x, the same holds of the places in an open chain, so each relay gets to move across the line,
+//! and none needs that again before the next agreement. Then the steps become what they are to be, and the same holds of the places
+//! agreed on.
+//!
 //! # What is not promised
 //!
 //! - Hovering off the reported place by up to [`GuardConfig::hover_m`] takes as much from the separation at either relay, and as
-//!   much again each time that one is rebooted before a fence has opened what is missing.
+//!   much again each time that one is rebooted before a fence has opened what is missing. What a relay hovers off across the line counts
+//!   where the two are within the separation along x.
 //! - A relay says nothing before it has both a place to go to and a report of where it is: until then nobody moves toward it.
 //! - A relay that is rebooted has forgotten whom it was linked to: it has to begin with the neighbours of the mission and be
 //!   linked around those that are silent, so that rule 9 holds it back.
@@ -53,12 +65,13 @@ mod association;
 pub mod config;
 mod fence;
 mod follower;
+mod own;
 mod owner;
 mod reachable;
 #[cfg(test)]
 mod tests;
 
-use crate::place::{CrossSection, Placement};
+use crate::place::Placement;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
@@ -68,50 +81,41 @@ use config::GuardConfig;
 use fence::is_place;
 pub use fence::{Fence, HoldReason};
 use follower::FenceFollower;
+use own::Own;
 use owner::FenceOwner;
 use reachable::ReachableInterval;
 
 /// One relay's guard: where it was agreed to be goes in, where it is safe to fly now comes out.
 ///
 /// Feed it with [`commit`](Self::commit), [`position`](Self::position), [`hear`](Self::hear), [`link`](Self::link); after each,
-/// call [`steer`](Self::steer), fly to what it gives, then send what [`poll`](Self::poll) has to say. Every call does a few dozen
-/// operations, none depends on the length of the chain.
+/// call [`steer`](Self::steer), fly to what it gives, then send what [`poll`](Self::poll) has to say. Every call does some hundred
+/// operations and two square roots at most, none depends on the length of the chain.
 #[derive(Clone, Copy, Debug)]
 pub struct Guard {
-    config: GuardConfig,
+    own: Own,
     jitter: Jitter,
     born: Instant,
-    /// Where the relay was agreed to be, inside the box.
-    target: Option<Placement>,
     /// Before the first setpoint: where the relay was reported last.
     found: Option<Placement>,
-    setpoint: Option<Placement>,
-    reachable: ReachableInterval,
-    /// Where the relay was across the line when it was reported last.
-    across: CrossSection,
     follower: FenceFollower,
     owner: FenceOwner,
     refused: u32,
 }
 
 impl Guard {
-    /// A guard that starts at `now` between `neighbours`, toward Tx and toward Rx; `None` where the chain ends.
+    /// A guard that starts at `now` between `neighbours`, toward Tx and toward Rx, as the mission has them; `None` where the chain ends.
     ///
     /// `config` has to be valid ([`GuardConfig::is_valid`]); `seed` has to differ from relay to relay and from start to start.
     pub fn new(config: GuardConfig, neighbours: [Option<u16>; 2], seed: u32, now: Instant) -> Self {
-        let [upstream, downstream] = neighbours;
+        let [upstream, downstream] = neighbours.map(Option::unwrap_or_default);
         let mut jitter = Jitter::new(seed);
         Self {
-            config,
-            follower: FenceFollower::new(upstream.unwrap_or(0), &mut jitter),
-            owner: FenceOwner::new(downstream.unwrap_or(0), &mut jitter),
+            own: Own::new(config, upstream.saturating_add(1), now),
+            follower: FenceFollower::new(upstream, &mut jitter),
+            owner: FenceOwner::new(downstream, &mut jitter),
             jitter,
             born: now,
-            target: None,
             found: None,
-            setpoint: None,
-            reachable: ReachableInterval::unknown(now),
-            across: CrossSection::on_line(0.0),
             refused: 0,
         }
     }
@@ -121,14 +125,14 @@ impl Guard {
         if !is_placement(place) {
             return bump(&mut self.refused);
         }
-        self.target = Some(self.config.cut(place));
+        self.own.target = Some(self.own.config.cut(place));
         self.follower.association.due = true;
         self.owner.association.due = true;
     }
 
     /// Whether `place` is where the relay is on its way to, or is.
     pub fn is_for(&self, place: Placement) -> bool {
-        self.target == Some(self.config.cut(place))
+        self.own.target == Some(self.own.config.cut(place))
     }
 
     /// The flight controller has found that the relay was at `place` at time `at`: when that was measured, not when it was read.
@@ -138,11 +142,12 @@ impl Guard {
         if !is_placement(place) {
             return bump(&mut self.refused);
         }
-        self.across = place.cross_section();
-        if self.setpoint.is_some() {
-            self.reachable.report(at, place.x_m, &self.config);
-        } else if at >= self.born && self.config.holds(place.x_m) {
-            self.found = Some(self.config.cut(place));
+        let own = &mut self.own;
+        if own.setpoint.is_some() {
+            own.reachable.report(at, place.x_m, &own.config);
+            own.report(at, place);
+        } else if at >= self.born && own.config.holds(place.x_m) {
+            self.found = Some(own.config.cut(place));
         }
     }
 
@@ -153,12 +158,10 @@ impl Guard {
         }
         match side {
             Side::Upstream if self.follower.association.node == from => {
-                self.follower.hear(fence, &self.reachable, &mut self.jitter);
+                self.follower.hear(fence, &self.own, &mut self.jitter);
             }
             Side::Downstream if self.owner.association.node == from => {
-                let apart = self.config.separation_m;
-                self.owner
-                    .hear(fence, &self.reachable, apart, &mut self.jitter);
+                self.owner.hear(fence, &self.own, &mut self.jitter);
             }
             _ => {}
         }
@@ -172,12 +175,10 @@ impl Guard {
         let node = neighbour.unwrap_or(0);
         match side {
             Side::Upstream if self.follower.association.node != node => {
-                self.follower.link(node, &self.reachable, &mut self.jitter);
+                self.follower.link(node, &self.own, &mut self.jitter);
             }
             Side::Downstream if self.owner.association.node != node => {
-                let apart = self.config.separation_m;
-                self.owner
-                    .link(node, &self.reachable, apart, &mut self.jitter);
+                self.owner.link(node, &self.own, &mut self.jitter);
             }
             _ => {}
         }
@@ -195,52 +196,86 @@ impl Guard {
     ///
     /// `now` is when the setpoint is handed on: the relay flies toward it [`GuardConfig::lag`] later.
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
-        let target = self.target?;
-        let Some(before) = self.setpoint else {
+        let target = self.own.target?;
+        let Some(before) = self.own.setpoint else {
             let found = self.found?;
-            self.reachable = ReachableInterval::at(found.x_m, now);
-            self.follower.keep_out.begin(found.x_m);
-            self.owner.keep_out.begin(found.x_m);
-            self.setpoint = Some(found);
-            return self.setpoint;
+            self.own.reachable = ReachableInterval::at(found.x_m, now);
+            let (x_m, apart) = (found.x_m, self.own.config.separation_m);
+            self.follower.keep_out.begin(x_m, x_m + apart);
+            self.owner.keep_out.begin(x_m, x_m - apart);
+            self.own.go(found, now);
+            return self.own.setpoint;
         };
-        let apart = self.config.separation_m;
-        self.follower.settle(&self.reachable);
-        let least = self.follower.least(&self.reachable);
-        let most = self.owner.most(&self.reachable, apart);
-        let x_m = target.x_m.max(least).min(most);
+        self.follower.settle(&self.own);
+        self.clear_near();
+        let clear = self.follower.is_clear(&self.own) && self.owner.is_clear(&self.own);
+        self.open(clear);
+        let own = &self.own;
+        let taken_m = self.follower.taken_m();
+        let apart = if own.open {
+            own.config.separation_m
+        } else {
+            self.owner.apart(own, taken_m)
+        };
+        let least = self.follower.least(own);
+        let most = self.owner.most(own, apart);
+        let x_m = own.goal_m().max(least).min(most);
         // Whatever the limits ask for: toward a neighbour only as far as it has granted, back never beyond what was promised.
         let x_m = x_m.max(least.min(before.x_m)).min(most.max(before.x_m));
-        let is_ordered = self.follower.is_ordered() && self.owner.is_ordered(&self.reachable);
+        let is_ordered = self.follower.is_ordered() && self.owner.is_ordered(own);
         let x_m = if is_ordered { x_m } else { before.x_m };
-        let clear = self.follower.is_clear() && self.owner.is_clear();
         let across = if clear { target } else { before };
         let wanted = across.cross_section().at(x_m);
-        let next = self.config.cut(wanted);
-        self.reachable.go(next.x_m, now);
-        self.setpoint = Some(next);
+        let next = own.config.cut(wanted);
+        self.own.reachable.go(next.x_m, now);
+        self.own.go(next, now);
         if self.follower.is_ordered() {
-            self.owner.settle(&self.reachable, target.x_m, apart);
+            self.owner.settle(&self.own, taken_m);
         }
-        self.setpoint
+        self.own.setpoint
+    }
+
+    /// Who has come up to the limit that a lost neighbour leaves is as far from it as it has to be.
+    fn clear_near(&mut self) {
+        let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
+        self.follower.keep_out.part(|near_m| low_m >= near_m);
+        self.owner.keep_out.part(|near_m| high_m <= near_m);
+    }
+
+    /// Whether the chain is to open, which each relay passes on away from whoever needs it.
+    fn open(&mut self, clear: bool) {
+        let own = &mut self.own;
+        let waits = !clear && !own.is_across();
+        let close = self.follower.is_close(own) || self.owner.is_close(own);
+        let tight = close && (self.follower.is_tight() || self.owner.is_tight());
+        let needs = tight || waits && (self.follower.is_held(own) || self.owner.holds(own));
+        let (up, down) = (&mut self.follower.association, &mut self.owner.association);
+        own.open = needs || up.opens || down.opens;
+        let (upward, downward) = (needs || down.opens, needs || up.opens);
+        up.pass_open(upward);
+        down.pass_open(downward);
     }
 
     /// Where it is safe to fly, as [`steer`](Self::steer) gave it last.
     pub const fn setpoint(&self) -> Option<Placement> {
-        self.setpoint
+        self.own.setpoint
     }
 
     /// The next thing to tell a neighbour: on which side, to which node, what.
     pub fn poll(&mut self) -> Option<(Side, u16, Fence)> {
-        let target = self.target.filter(|_| self.reachable.is_known())?;
-        if self.owner.is_ordered(&self.reachable)
-            && let Some(fence) = self.follower.tell(&self.reachable, target.x_m)
-        {
-            return Some((Side::Upstream, self.follower.association.node, fence));
+        let own = &self.own;
+        if own.target.is_none() || !own.reachable.is_known() {
+            return None;
         }
-        let apart = self.config.separation_m;
+        if self.owner.is_ordered(own) {
+            let taken_m = self.follower.taken_m();
+            self.follower.agree(own, self.owner.apart(own, taken_m));
+            if let Some(fence) = self.follower.tell(own) {
+                return Some((Side::Upstream, self.follower.association.node, fence));
+            }
+        }
         let moves = self.follower.is_ordered();
-        let fence = self.owner.tell(&self.reachable, target.x_m, apart, moves)?;
+        let fence = self.owner.tell(own, self.follower.taken_m(), moves)?;
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 
@@ -256,14 +291,14 @@ impl Guard {
 
     /// Whether the setpoint is the agreed place, cut to the box, and the relay was reported to be there since.
     pub fn is_there(&self) -> bool {
-        let off = self.config.rounding();
-        let near = |is: f32, to_be: f32| (to_be - is).abs() <= self.config.hover_m + off;
-        match (self.target, self.setpoint) {
+        let own = &self.own;
+        match (own.target, own.setpoint) {
             (Some(target), Some(setpoint)) => {
-                (target.x_m - setpoint.x_m).abs() <= off
-                    && self.reachable.is_still()
-                    && near(self.across.y_m, target.y_m)
-                    && near(self.across.altitude_m, target.altitude_m)
+                !own.open
+                    && (target.x_m - setpoint.x_m).abs() <= own.config.rounding()
+                    && own.reachable.is_still()
+                    && own.is_across()
+                    && own.still
             }
             _ => false,
         }
@@ -273,11 +308,10 @@ impl Guard {
     ///
     /// While a new agreement spreads it may tell of places that are not to be.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
-        let target = self.target?.x_m;
-        let near = self.config.separation_m - self.config.rounding();
+        self.own.target?;
         match side {
-            Side::Upstream => self.follower.hold_reason(target, near),
-            Side::Downstream => self.owner.hold_reason(&self.reachable, target, near),
+            Side::Upstream => self.follower.hold_reason(&self.own),
+            Side::Downstream => self.owner.hold_reason(&self.own, self.follower.taken_m()),
         }
     }
 

@@ -2,8 +2,9 @@
 
 use super::association::{Association, KeepOut};
 use super::fence::{Fence, HoldReason};
-use super::reachable::ReachableInterval;
+use super::own::Own;
 use crate::jitter::Jitter;
+use crate::place::CrossSection;
 use crate::side::Side;
 
 /// This relay's side of the fence toward Rx.
@@ -15,10 +16,17 @@ pub(super) struct FenceOwner {
     number: u16,
     /// Where it is, m; infinite before the first.
     fence_m: f32,
+    /// How far before it this relay asked to stay, m; infinite for the separation.
+    asked_m: f32,
+    /// How far it does since the neighbour agreed, where nothing else asks for more.
+    granted_m: f32,
     /// What the neighbour is counted on to stay at or beyond, m; without end before it has spoken.
     counted_m: f32,
     /// Where it is to be, m.
     target_m: f32,
+    /// Where it flies across the line, and whether it has arrived there.
+    across: CrossSection,
+    still: bool,
     /// Whether it has heard of the newest fence.
     answered: bool,
     /// Whether it has cleared the first fence.
@@ -32,32 +40,35 @@ impl FenceOwner {
             keep_out: KeepOut::none(),
             number: 0,
             fence_m: f32::INFINITY,
+            asked_m: f32::INFINITY,
+            granted_m: f32::INFINITY,
             counted_m: f32::NEG_INFINITY,
             target_m: 0.0,
+            across: CrossSection::on_line(0.0),
+            still: false,
             answered: false,
             clear: false,
         }
     }
 
     /// Another neighbour, 0 for none.
-    pub(super) fn link(
-        &mut self,
-        node: u16,
-        reachable: &ReachableInterval,
-        apart: f32,
-        jitter: &mut Jitter,
-    ) {
-        self.renew(reachable, apart, jitter);
+    pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
+        self.renew(own, jitter);
         self.association.node = node;
     }
 
     /// Begins anew; where this relay may go because of the neighbour so far stays as a keep_out, and that is nowhere if it was
     /// never heard.
-    fn renew(&mut self, reachable: &ReachableInterval, apart: f32, jitter: &mut Jitter) {
+    fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if self.association.node != 0 {
-            let limit_m = self.most(reachable, apart);
+            let limit_m = self.most(own, own.config.separation_m);
             keep_out.raise(Side::Downstream, self.association.node, limit_m);
+            if !self.is_ordered(own) {
+                keep_out.near(limit_m - own.config.separation_m);
+            } else if self.holds(own) || !self.clear {
+                keep_out.near(limit_m);
+            }
         }
         *self = Self {
             keep_out,
@@ -70,22 +81,28 @@ impl FenceOwner {
     }
 
     /// Whether nobody is there, or whoever is stands beyond this relay.
-    pub(super) fn is_ordered(&self, reachable: &ReachableInterval) -> bool {
-        self.association.node == 0 || self.is_heard() && self.is_beyond(reachable)
+    pub(super) fn is_ordered(&self, own: &Own) -> bool {
+        self.association.node == 0 || self.is_heard() && self.is_beyond(own)
     }
 
-    /// Whether the neighbour is known to be beyond this relay.
-    fn is_beyond(&self, reachable: &ReachableInterval) -> bool {
-        self.counted_m >= reachable.high_m
+    /// Whether the neighbour is known to be beyond this relay, but for what the two were reported off: one above the other may both have
+    /// been rebooted.
+    fn is_beyond(&self, own: &Own) -> bool {
+        self.counted_m + 2.0 * own.config.hover_m >= own.reachable.high_m
     }
 
-    pub(super) fn hear(
-        &mut self,
-        fence: &Fence,
-        reachable: &ReachableInterval,
-        apart: f32,
-        jitter: &mut Jitter,
-    ) {
+    /// How far this relay stays from what the neighbour is counted on, m, where the follower has allowed the one upstream `taken_m`.
+    pub(super) fn apart(&self, own: &Own, taken_m: f32) -> f32 {
+        let separation_m = own.config.separation_m;
+        self.granted_m.max(separation_m - taken_m).min(separation_m)
+    }
+
+    /// Whether the places across the line have to stay, since they may keep the two apart.
+    pub(super) fn holds(&self, own: &Own) -> bool {
+        self.asked_m.min(self.granted_m) < own.config.separation_m
+    }
+
+    pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
         if !self.is_heard() && fence.echo == self.association.own {
             self.association.heard = fence.association;
             self.association.due = true;
@@ -94,34 +111,50 @@ impl FenceOwner {
         }
         if !self.association.knows(fence.association, fence.echo) {
             if self.is_heard() && self.association.stray() {
-                self.renew(reachable, apart, jitter);
+                self.renew(own, jitter);
             }
             return;
         }
+        self.association.hear_open(fence);
         self.target_m = fence.target_m;
+        (self.across, self.still) = (fence.across, fence.says(Fence::STILL));
         self.answered = fence.number == self.number;
         if self.answered {
             self.counted_m = self.counted_m.max(fence.x_m.min(self.fence_m));
             self.clear |= self.number != 0 && fence.x_m >= self.fence_m;
+            if self.still && fence.says(Fence::AGREES) {
+                let least_m = own.config.least_step(own.across(), fence.across);
+                self.granted_m = self.granted_m.min(self.asked_m.max(least_m));
+            }
         } else {
             self.association.due = true;
         }
     }
 
-    /// How far this relay may go, m.
+    /// How far this relay may go, m, if it is to stay `apart` from the neighbour.
     #[inline(never)] // called from several places
-    pub(super) fn most(&self, reachable: &ReachableInterval, apart: f32) -> f32 {
-        let granted = match (self.association.node, self.is_beyond(reachable)) {
+    pub(super) fn most(&self, own: &Own, apart: f32) -> f32 {
+        let granted = match (self.association.node, self.is_beyond(own)) {
             (0, _) => f32::INFINITY,
             (_, true) => self.counted_m - apart,
-            (_, false) => reachable.at_m,
+            (_, false) => own.reachable.at_m,
         };
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
-    /// Whether the altitude is free as far as this side is concerned.
-    pub(super) const fn is_clear(&self) -> bool {
-        self.association.node == 0 || self.clear
+    /// Whether this relay may move across the line as far as this side is concerned.
+    pub(super) fn is_clear(&self, own: &Own) -> bool {
+        (self.association.node == 0 || self.clear) && !self.holds(own) && !self.keep_out.is_near()
+    }
+
+    /// Whether the neighbour may have been too near since it was switched on.
+    pub(super) const fn is_tight(&self) -> bool {
+        self.is_heard() && !self.clear
+    }
+
+    /// Whether the two are to be closer along x than the separation.
+    pub(super) fn is_close(&self, own: &Own) -> bool {
+        self.is_heard() && own.is_close(self.target_m - own.target_m())
     }
 
     /// Whether there is nothing that the neighbour still has to hear of, or to do.
@@ -129,77 +162,90 @@ impl FenceOwner {
         self.clear && self.answered && self.counted_m >= self.fence_m
     }
 
-    /// Where the fence may be best now, m, if there is to be one, and whether it is there for good.
+    /// How far before the fence this relay would best stay, m: less than the separation only if both have arrived across the line and
+    /// are to be that close.
+    fn best_apart(&self, own: &Own) -> f32 {
+        let separation_m = own.config.separation_m;
+        let step_m = self.target_m - own.target_m();
+        let settled = self.clear && self.still && own.still && own.is_across() && !own.open;
+        if !(settled && own.is_close(step_m)) {
+            return separation_m;
+        }
+        let least_m = own.config.least_step(own.across(), self.across);
+        step_m.max(least_m).min(separation_m)
+    }
+
+    /// Where the fence may be best now, m, if there is to be one, and how far this relay would stay before it; and whether it is there
+    /// for good.
     #[inline(never)] // called from several places
-    fn wish(
-        &self,
-        reachable: &ReachableInterval,
-        target_m: f32,
-        apart: f32,
-    ) -> Option<(f32, bool)> {
-        if !self.is_heard() || !self.is_beyond(reachable) {
+    fn wish(&self, own: &Own, taken_m: f32) -> Option<(f32, f32, bool)> {
+        if !self.is_heard() || !self.is_beyond(own) {
             return None;
         }
-        let nearest = reachable.high_m + apart;
+        let best = self.best_apart(own);
+        // More than now only if it has come so far.
+        let now_m = self.counted_m - own.reachable.high_m + own.config.rounding();
+        let ask = if best > self.granted_m.max(now_m) {
+            self.asked_m
+        } else {
+            best
+        };
+        let nearest = own.reachable.high_m + self.apart(own, taken_m).max(ask);
         if !self.clear {
-            return Some((nearest, true));
+            return Some((nearest, ask, true));
         }
-        let goal = 0.5 * (target_m + self.target_m + apart);
-        Some((goal.max(nearest), goal >= nearest))
+        let other_m = own.goal_of(self.association.node, self.target_m);
+        let goal = 0.5 * (own.goal_m() + other_m + best);
+        Some((goal.max(nearest), ask, goal >= nearest))
     }
 
     /// After the setpoint has moved: a fence that gets where it stays is told at once, what is under way only when reminded.
-    pub(super) fn settle(&mut self, reachable: &ReachableInterval, target_m: f32, apart: f32) {
-        if let Some((x_m, last)) = self.wish(reachable, target_m, apart) {
-            let stays = last || reachable.is_still();
-            self.association.due |= stays && self.is_elsewhere(x_m);
+    pub(super) fn settle(&mut self, own: &Own, taken_m: f32) {
+        if let Some((x_m, ask, last)) = self.wish(own, taken_m) {
+            let stays = last || own.reachable.is_still();
+            self.association.due |= stays && self.is_other(own, x_m, ask);
         }
     }
 
-    fn is_elsewhere(&self, x_m: f32) -> bool {
-        self.number == 0 || (x_m - self.fence_m).abs() > 0.0
+    fn is_other(&self, own: &Own, x_m: f32, ask: f32) -> bool {
+        let asked = self.asked_m.min(own.config.separation_m);
+        self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (ask - asked).abs() > 0.0
     }
 
     /// What there is to tell. It is here that the fence moves, if it may: what nobody is told costs no number.
-    pub(super) fn tell(
-        &mut self,
-        reachable: &ReachableInterval,
-        target_m: f32,
-        apart: f32,
-        moves: bool,
-    ) -> Option<Fence> {
+    pub(super) fn tell(&mut self, own: &Own, taken_m: f32, moves: bool) -> Option<Fence> {
         if self.association.node == 0 || !core::mem::take(&mut self.association.due) {
             return None;
         }
-        let wish = self.wish(reachable, target_m, apart);
-        if let Some((x_m, _)) = wish.filter(|(x_m, _)| moves && self.is_elsewhere(*x_m)) {
+        let wish = self.wish(own, taken_m);
+        if let Some((x_m, ask, _)) =
+            wish.filter(|(x_m, ask, _)| moves && self.is_other(own, *x_m, *ask))
+        {
             self.number = match self.number.wrapping_add(1) {
                 0 => 1,
                 number => number,
             };
             self.fence_m = x_m;
+            self.asked_m = ask;
+            self.granted_m = self.granted_m.max(ask);
             self.answered = false;
             self.counted_m = self.counted_m.min(x_m);
         }
+        let x_m = if self.number == 0 {
+            own.reachable.high_m
+        } else {
+            self.fence_m
+        };
         Some(Fence {
-            association: self.association.own,
-            echo: self.association.heard,
             number: self.number,
-            x_m: if self.number == 0 {
-                reachable.high_m
-            } else {
-                self.fence_m
-            },
-            target_m,
+            x_m,
+            apart_m: self.asked_m.min(own.config.separation_m),
+            ..self.association.fence(own)
         })
     }
 
-    pub(super) fn hold_reason(
-        &self,
-        reachable: &ReachableInterval,
-        target_m: f32,
-        near: f32,
-    ) -> Option<HoldReason> {
+    pub(super) fn hold_reason(&self, own: &Own, taken_m: f32) -> Option<HoldReason> {
+        let target_m = own.target_m();
         if self
             .keep_out
             .limit_m()
@@ -213,9 +259,11 @@ impl FenceOwner {
         if !self.is_heard() {
             return Some(HoldReason::Unheard);
         }
-        if !self.is_beyond(reachable) {
+        if !self.is_beyond(own) {
             return Some(HoldReason::Order);
         }
-        (self.target_m - target_m < near).then_some(HoldReason::Close)
+        let step_m = self.target_m - target_m;
+        let far = step_m + own.config.rounding() < self.apart(own, taken_m);
+        far.then_some(HoldReason::Close)
     }
 }

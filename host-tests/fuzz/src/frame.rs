@@ -279,9 +279,10 @@ fn look_at(message: &Message) {
         }
         Message::Pulse(pulse) => assert!(pulse.lease > 0),
         Message::Fence { fence, .. } => {
-            assert!(
-                fence.association != 0 && fence.x_m.abs() <= 1e7 && fence.target_m.abs() <= 1e7
-            );
+            let across = fence.across;
+            let places = [fence.x_m, fence.target_m, across.y_m, across.altitude_m];
+            assert!(fence.association != 0 && places.iter().all(|place| place.abs() <= 1e7));
+            assert!((0.0..=1e5).contains(&fence.apart_m) && fence.flags < 16);
         }
         Message::Offer { upload, .. } => {
             let same = Mission::try_new(*upload.config()).is_ok();

@@ -201,9 +201,11 @@ impl Body<'_, '_> {
         self.association();
         self.relay();
         let distance_m = self.known.distance_m;
-        for _ in 0..2 {
+        for _ in 0..4 {
             self.float(|input| input.even(-distance_m, 2.0 * distance_m));
         }
+        self.float(|input| input.even(0.0, 0.1 * distance_m));
+        self.small(0, 15);
     }
 
     fn moved(&mut self) {

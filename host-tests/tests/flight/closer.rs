@@ -1,4 +1,4 @@
-//! Places that were agreed closer to each other along the line than the guard lets drones come.
+//! Places that were agreed closer to each other along the line than the separation.
 
 use host_tests::flights::with_room;
 use rand::SeedableRng;
@@ -15,12 +15,13 @@ fn places(outcome: &Outcome) -> Vec<Placement> {
     places.collect()
 }
 
-/// Of 200 random scenes with room beside the line: in how many agreed neighbours stand closer along x than the separation, and how far
-/// from their places the drones end.
+/// Of 200 random scenes with room beside the line: in how many agreed neighbours stand closer along x than the separation, in how many
+/// of those the drones do not get there, and how near any two come on the way.
 #[test]
-fn drones_end_near_places_that_are_closer_than_they_may_come() {
+fn drones_get_to_places_that_are_closer_along_x() {
     let mut rng = ChaCha8Rng::seed_from_u64(number("SEED", 1));
     let (mut scenes, mut closer, mut far) = (0, 0, Vec::new());
+    let mut least = f64::INFINITY;
     while scenes < 200 {
         let scene = in_space(&mut rng, &(2..=12));
         let Some((mission, profiles)) = of_link(&scene.link, 1e-4) else {
@@ -64,19 +65,27 @@ fn drones_end_near_places_that_are_closer_than_they_may_come() {
         setup.flight = Some(FlightSpec::exact(start, speed_mps, step));
         setup.settings.guard = Some(GuardConfig::of(&mission, config.common));
         end_at(&mut setup, seconds(2_000));
-        let ends = places(&run(setup).unwrap());
-        let off = ends
-            .iter()
-            .zip(&to_be)
-            .map(|(is, to_be)| (is.x_m - to_be.x_m).abs());
+        let outcome = run(setup).unwrap();
+        let ends = places(&outcome);
+        let nearest_m = outcome.nearest_m();
+        least = least.min(nearest_m / f64::from(apart_m));
+        let parts = |place: Placement| [place.x_m, place.y_m, place.altitude_m];
+        let off = ends.iter().zip(&to_be).map(|(is, to_be)| {
+            let parts = parts(*is).into_iter().zip(parts(*to_be));
+            parts
+                .map(|(is, to_be)| (is - to_be).abs())
+                .fold(0.0, f32::max)
+        });
         far.push(off.fold(0.0, f32::max) / apart_m);
     }
     far.sort_by(f32::total_cmp);
+    let short = far.iter().filter(|off| **off > 1e-3).count();
     println!(
-        "{closer} of {scenes} scenes; there the drone that is farthest off ends {:.2} separations off in the median, {:.2} at most",
-        far[far.len() / 2],
+        "{closer} of {scenes} scenes; in {short} of them a drone does not get there, and ends {:.2} separations off at most; the nearest two of any come within {least:.4}",
         far[far.len() - 1]
     );
-    // A relay has to stand aside for those that have no room; it is not left where it was.
+    // Three relays of which each two neighbours are closer along x, and the outer ones, too.
+    assert!(closer > 10 && short <= 2, "{far:?}");
     assert!(far[far.len() - 1] < 3.0, "{far:?}");
+    assert!(least > 0.999, "{least}");
 }

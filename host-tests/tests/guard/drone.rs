@@ -179,16 +179,18 @@ impl Drone {
         }
     }
 
-    /// From the lowest to the highest x where it may be from now on if nobody tells it anything any more.
-    pub(crate) fn stretch(&self) -> (f64, f64) {
-        let at = self.body.at[0];
-        let stop = self.body.stops_at(self.acceleration)[0];
-        let (low, high) = (at.min(stop), at.max(stop));
-        let mut ends = (low.min(self.goal[0]), high.max(self.goal[0]));
-        for (_, [x, ..]) in &self.orders {
-            ends = (ends.0.min(*x), ends.1.max(*x));
-        }
-        ends
+    /// From the lowest to the highest x, y and altitude where it may be from now on if nobody tells it anything any more.
+    pub(crate) fn stretch(&self) -> [(f64, f64); 3] {
+        let stop = self.body.stops_at(self.acceleration);
+        [0, 1, 2].map(|part| {
+            let orders = self.orders.iter().map(|(_, order)| order[part]);
+            let at = [self.body.at, stop, self.goal].map(|point| point[part]);
+            at.into_iter()
+                .chain(orders)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
+                    (low.min(at), high.max(at))
+                })
+        })
     }
 }
 

@@ -29,13 +29,14 @@ fn nobody_comes_too_close_and_everybody_arrives() {
         .collect();
     let sum = |of: fn(&Report) -> u64| reports.iter().map(of).sum::<u64>();
     println!(
-        "{} schedules, {} drone-steps, {} agreements heard, {} reboots, {} relays silent, {} gone",
+        "{} schedules, {} drone-steps, {} agreements heard, {} reboots, {} relays silent, {} gone, {} neighbours that end closer along x",
         reports.len(),
         sum(|report| report.steps),
         sum(|report| report.heard),
         sum(|report| report.reboots),
         sum(|report| report.silences),
         sum(|report| report.gone),
+        sum(|report| report.close),
     );
     let closest = reports
         .iter()
@@ -60,5 +61,6 @@ fn nobody_comes_too_close_and_everybody_arrives() {
         sum(|report| report.reboots) > 0
             && sum(|report| report.silences) > 0
             && sum(|report| report.gone) > 0
+            && sum(|report| report.close) > 0
     );
 }

@@ -7,6 +7,8 @@
 //! | D | 0.1 % to 50 % more than the relays take at the separation in 40 %; else 2 to 20 times that |
 //! | reports off by | 0 in 70 %; else up to a twentieth of the separation |
 //! | start and agreed places | anywhere across the line; in order, the separation apart along x, crowded at Tx, at Rx, in the middle, or spread |
+//! | neighbours | closer along x than the separation in half of the agreements, by where they are across the line |
+//! | agreements, too | 40 s before and some seconds after a relay is linked around: closer neighbours, and others |
 //! | agreements | 0 to 6 in 200 s, each heard by a relay with 80 %, up to 60 s late; 20 % closer along x than the separation |
 //! | speed | changes every 20 s on average, 0 in 25 %, else 1 m/s to 40 m/s |
 //! | acceleration | without a limit in 50 %, else 4 m/s^2 to 40 m/s^2 |
@@ -35,6 +37,8 @@ pub(crate) struct Report {
     pub(crate) reboots: u64,
     pub(crate) silences: u64,
     pub(crate) gone: u64,
+    /// Neighbours that end closer along x than the separation.
+    pub(crate) close: u64,
     pub(crate) closest_m: f64,
     pub(crate) share_of_time: f64,
     pub(crate) messages: f64,
@@ -110,6 +114,7 @@ fn confines(rng: &mut ChaCha8Rng) -> GuardConfig {
             most_altitude_m: 120.0,
         },
         separation_m: separation as f32,
+        relays: 1,
         hover_m: hover as f32,
         lag: Duration::from_millis(rng.random_range(0..=600)),
     }
@@ -128,6 +133,7 @@ fn line(
         taken * rng.random_range(2.0..=20.0)
     };
     confines.fence.most_x_m = distance.max(10.0) as f32;
+    confines.relays = relays as u16;
     let starts = places(rng, &confines, relays);
     (confines, starts)
 }
@@ -159,6 +165,49 @@ fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize) -> Vec<Po
         .collect()
 }
 
+/// The same with half of the neighbours closer along x, and the separation apart in space: relays that are not neighbours stay that far
+/// apart along x. Where `wild`, they do not: some take turns at two places across the line.
+fn closer(
+    rng: &mut ChaCha8Rng,
+    confines: &GuardConfig,
+    mut at: Vec<Point>,
+    wild: bool,
+) -> Vec<Point> {
+    let rounding = 5e-7 * f64::from(confines.fence.most_x_m);
+    let apart = 1.0001 * f64::from(confines.separation_m) + rounding;
+    let fence = confines.fence;
+    let inside = |y: f64, h: f64| {
+        (f64::from(fence.least_y_m)..=f64::from(fence.most_y_m)).contains(&y)
+            && (f64::from(fence.least_altitude_m)..=f64::from(fence.most_altitude_m)).contains(&h)
+    };
+    let mut before = apart;
+    for k in 1..at.len() {
+        let [x, y, h] = at[k - 1];
+        let most = (at[k][0] - x).min(apart);
+        let least = if wild { 0.0 } else { (apart - before).max(0.0) };
+        before = at[k][0] - x;
+        if rng.random_bool(0.5) || least >= most {
+            continue;
+        }
+        let step = if rng.random_bool(0.3) {
+            least
+        } else {
+            rng.random_range(least..=most)
+        };
+        let aside = (apart * apart - step * step).max(0.0).sqrt();
+        let turn = rng.random_range(0.0..=std::f64::consts::TAU);
+        let (y, h) = (y + aside * turn.sin(), h + aside * turn.cos());
+        if wild && k > 1 && rng.random_bool(0.5) {
+            at[k] = [x + step, at[k - 2][1], at[k - 2][2]].map(|part| f64::from(part as f32));
+            before = step;
+        } else if inside(y, h) {
+            at[k] = [x + step, y, h].map(|part| f64::from(part as f32));
+            before = step;
+        }
+    }
+    at
+}
+
 /// Everything that may happen does.
 fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     world.faults = Faults {
@@ -172,7 +221,23 @@ fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     };
     let mut plan = agreements(rng, world);
     plan.extend(speeds(rng, world.drones.len()));
-    plan.extend(troubles(rng, world.drones.len()));
+    let troubles = troubles(rng, world.drones.len());
+    let around_s: Vec<f64> = troubles
+        .iter()
+        .filter(|(_, what)| matches!(what, What::Around(..)))
+        .map(|(at_s, _)| *at_s)
+        .collect();
+    // Who is left agrees on other places: first they were close to the one that fell silent, then they are not.
+    for at_s in around_s {
+        let before = places(rng, &world.confines, world.drones.len());
+        let before = closer(rng, &world.confines, before, false);
+        let after = places(rng, &world.confines, world.drones.len());
+        for (k, (before, after)) in before.into_iter().zip(after).enumerate() {
+            plan.push((at_s - 40.0, What::Hear(k, before)));
+            plan.push((at_s + rng.random_range(0.0..=5.0), What::Hear(k, after)));
+        }
+    }
+    plan.extend(troubles);
     plan.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut plan = plan.into_iter().peekable();
     while world.now_s < ROUGH_S {
@@ -194,10 +259,12 @@ fn agreements(rng: &mut ChaCha8Rng, world: &World) -> Vec<(f64, What)> {
         if rng.random_bool(0.2) {
             confines.separation_m *= rng.random_range(0.0..=1.0);
         }
-        for (k, at) in places(rng, &confines, world.drones.len())
-            .into_iter()
-            .enumerate()
-        {
+        let mut agreed = places(rng, &confines, world.drones.len());
+        if rng.random_bool(0.5) {
+            let wild = rng.random_bool(0.3);
+            agreed = closer(rng, &world.confines, agreed, wild);
+        }
+        for (k, at) in agreed.into_iter().enumerate() {
             if rng.random_bool(0.8) {
                 plan.push((
                     at_s + 60.0 * rng.random_range(0.0..=1.0_f64).powi(3),
@@ -334,7 +401,13 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     let left: Vec<usize> = (0..world.drones.len())
         .filter(|k| world.drones[*k].flies)
         .collect();
-    let targets = places(rng, &world.confines, left.len());
+    let mut targets = places(rng, &world.confines, left.len());
+    if rng.random_bool(0.5) {
+        targets = closer(rng, &world.confines, targets, false);
+        let apart_m = f64::from(world.confines.separation_m);
+        let steps = targets.windows(2).map(|pair| pair[1][0] - pair[0][0]);
+        report.close += steps.filter(|step| *step < 0.99 * apart_m).count() as u64;
+    }
     let relays = world.drones.len();
     let gone: Vec<bool> = world.drones.iter().map(|drone| !drone.flies).collect();
     for (k, target) in left.iter().zip(&targets) {

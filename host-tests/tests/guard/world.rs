@@ -146,21 +146,19 @@ impl World {
         let floor = separation - self.allowed_m();
         let flying: Vec<&Drone> = self.drones.iter().filter(|drone| drone.flies).collect();
         self.steps += flying.len() as u64;
-        for pair in flying.windows(2) {
-            let margin = pair[1].stretch().0 - pair[0].stretch().1 - floor;
-            self.closest_m = self.closest_m.min(margin);
-            assert!(
-                margin >= 0.0,
-                "SEED={}: at {:.1} s they may come within {:.6} m of {separation}: {:?} and {:?}",
-                self.seed,
-                self.now_s,
-                margin + floor,
-                pair[0],
-                pair[1],
-            );
-        }
         for (k, one) in flying.iter().enumerate() {
             for other in &flying[..k] {
+                let margin = between(one.stretch(), other.stretch()) - floor;
+                self.closest_m = self.closest_m.min(margin);
+                assert!(
+                    margin >= 0.0,
+                    "SEED={}: at {:.1} s they may come within {:.6} m of {separation}: {:#?} and {:#?}",
+                    self.seed,
+                    self.now_s,
+                    margin + floor,
+                    other,
+                    one,
+                );
                 let apart = nearest((one.was, one.body.at), (other.was, other.body.at));
                 assert!(
                     apart >= floor,
@@ -176,6 +174,14 @@ impl World {
 /// The neighbours of drone `k` of so many, as the mission has it.
 pub(crate) fn beside(k: usize, relays: usize) -> [Option<usize>; 2] {
     [k.checked_sub(1), (k + 1 < relays).then_some(k + 1)]
+}
+
+/// How far apart two boxes are, m.
+fn between(one: [(f64, f64); 3], other: [(f64, f64); 3]) -> f64 {
+    length([0, 1, 2].map(|part| {
+        let ((low, high), (least, most)) = (one[part], other[part]);
+        (low - most).max(least - high).max(0.0)
+    }))
 }
 
 /// How close two drones come that both fly straight on during a step, m.

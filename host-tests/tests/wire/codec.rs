@@ -20,6 +20,7 @@ mod votes;
 
 use serde::Deserialize;
 use uav_relay::guard::Fence;
+use uav_relay::place::CrossSection;
 use uav_relay::wire::message::{Message, MessageError, Pulse, Pulsed};
 
 pub(crate) use frame::{header, plain, sealed, wire};
@@ -84,27 +85,33 @@ pub(crate) struct Fenced {
     pub(crate) mission: u16,
     pub(crate) echo: u16,
     pub(crate) fence: u16,
-    pub(crate) x_m: f32,
-    pub(crate) target_m: f32,
+    /// Where the fence is, where its sender is bound for, y and altitude, how far before the fence, m.
+    pub(crate) places: [f32; 5],
+    pub(crate) flags: u8,
 }
 
 impl Fenced {
     fn body(&self) -> Vec<u8> {
         let mut out = pass(13, [self.number, self.mission]);
         words(&mut out, &[self.echo, self.fence]);
-        reals(&mut out, &[self.x_m, self.target_m]);
+        reals(&mut out, &self.places);
+        out.push(self.flags);
         out
     }
 
     fn message(&self) -> Message {
+        let [x_m, target_m, y_m, altitude_m, apart_m] = self.places;
         Message::Fence {
             mission: self.mission,
             fence: Fence {
                 association: self.number,
                 echo: self.echo,
                 number: self.fence,
-                x_m: self.x_m,
-                target_m: self.target_m,
+                x_m,
+                target_m,
+                across: CrossSection { y_m, altitude_m },
+                apart_m,
+                flags: self.flags,
             },
         }
     }
@@ -115,13 +122,15 @@ impl Fenced {
             mission: rest.word()?,
             echo: rest.word()?,
             fence: rest.word()?,
-            x_m: rest.real()?,
-            target_m: rest.real()?,
+            places: rest.reals()?,
+            flags: rest.byte()?,
         })
     }
 
     fn in_range(&self) -> bool {
-        self.number != 0 && self.x_m.abs() <= 1e7 && self.target_m.abs() <= 1e7
+        let [places @ .., apart_m] = self.places;
+        let within = places.iter().all(|place| place.abs() <= 1e7);
+        self.number != 0 && within && (0.0..=1e5).contains(&apart_m) && self.flags < 16
     }
 }
 

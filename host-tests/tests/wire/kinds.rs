@@ -170,8 +170,8 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             mission,
             echo: 0,
             fence: 1,
-            x_m,
-            target_m: x_m,
+            places: [x_m, x_m, 1.0, 1.0, 1.0],
+            flags: 3,
         }),
         Said::Offer(Offer {
             base: mission,

@@ -343,17 +343,23 @@ fn formings() -> BoxedStrategy<Said> {
     let fence = (
         1..=u16::MAX,
         any::<[u16; 3]>(),
-        metres(-1e7).prop_map(|x_m| x_m.min(1e7)),
-        metres(-1e7).prop_map(|x_m| x_m.min(1e7)),
+        [-1e7, -1e7, -1e7, -1e7, 0.0].map(metres),
+        0_u8..16,
     )
-        .prop_map(|(number, [mission, echo, fence], x_m, target_m)| {
+        .prop_map(|(number, [mission, echo, fence], places, flags)| {
             Said::Fence(Fenced {
                 number,
                 mission,
                 echo,
                 fence,
-                x_m,
-                target_m,
+                places: [
+                    places[0].min(1e7),
+                    places[1].min(1e7),
+                    places[2].min(1e7),
+                    places[3].min(1e7),
+                    places[4].min(1e5),
+                ],
+                flags,
             })
         });
     prop_oneof![hello, proposal, decision, fence].boxed()

@@ -1,6 +1,6 @@
 //! Two relays and the fence between them.
 
-use super::{One, at, config};
+use super::{One, at, config, fence};
 use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
 use crate::side::Side;
@@ -241,13 +241,7 @@ fn a_new_life_is_told_from_an_old_one() {
 #[test]
 fn who_does_not_know_the_order_tells_nobody() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
-    let heard = Fence {
-        association: 9,
-        echo: 0,
-        number: 0,
-        x_m: 50.0,
-        target_m: 50.0,
-    };
+    let heard = fence(9, 50.0, 50.0);
     one.hears(Side::Upstream, 1, heard);
     one.is_at(100.0);
     while let Some((side, ..)) = one.guard.poll() {

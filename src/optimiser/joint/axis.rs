@@ -3,6 +3,8 @@
 //! Where a hop may end is a surface, the outside of which hears too little. Along most of a chain x is a smooth function of y and h
 //! on it; where the chain climbs straight up, or steps straight aside, it is h or y that is one of the other two.
 
+use crate::place::Placement;
+
 /// A coordinate.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum Coordinate {
@@ -17,6 +19,7 @@ pub(crate) type Triple = [f32; 3];
 
 impl Coordinate {
     /// This coordinate first, then the other two in their order.
+    #[inline(never)] // called from many places
     pub(crate) const fn first(self, [x, y, h]: Triple) -> Triple {
         match self {
             Self::X => [x, y, h],
@@ -26,6 +29,7 @@ impl Coordinate {
     }
 
     /// (x, y, h) again.
+    #[inline(never)] // called from many places
     pub(crate) const fn back(self, [first, second, third]: Triple) -> Triple {
         match self {
             Self::X => [first, second, third],
@@ -56,4 +60,14 @@ impl Coordinate {
             Self::H => [h, x, y],
         }
     }
+}
+
+/// The coordinates of a place.
+pub(super) const fn triple(place: Placement) -> Triple {
+    [place.x_m, place.y_m, place.altitude_m]
+}
+
+/// One place as seen from another.
+pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
+    [a - x, b - y, c - z]
 }

@@ -1,6 +1,6 @@
 //! Where relays are across the line, in six bytes each.
 
-use super::link::Room;
+use super::room::Room;
 use crate::mission::Band;
 use crate::place::CrossSection;
 

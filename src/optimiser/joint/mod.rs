@@ -10,7 +10,9 @@
 //! | `hop` | how a hop's end moves with everything it depends on |
 //! | `outlook` | what the rest of the chain is worth, as the relay before it sees it |
 //! | `policy` | a relay's step, and how it follows what changed before it |
-//! | `link` | one relay and the hop into it: both passes, one relay's worth of each |
+//! | `room` | where a relay may fly across the line |
+//! | `site`, `weigh` | one relay and the hop into it: one relay's worth of the pass forward, and of the pass back |
+//! | `ends` | what the first and the last hop can meet |
 //! | `ascent` | how far the target is raised, and what is taken of a step |
 //! | `starts`, `seek`, `cells` | where an ascent begins; the target of a chain that does not change; a place in six bytes |
 //! | [`solver`] | a whole chain without a message |
@@ -18,15 +20,18 @@
 mod ascent;
 mod axis;
 mod cells;
+mod ends;
 mod hop;
-mod link;
 mod outlook;
 mod policy;
+mod room;
 mod seek;
+mod site;
 pub mod solver;
 mod starts;
+mod weigh;
 
-pub use link::Room;
+pub use room::Room;
 pub use solver::{Seat, Solver};
 
 /// The most relays of a chain that relays solve by the joint method; without the feature `altitude` they solve none.

@@ -1,6 +1,8 @@
 //! What a relay does in one iteration of the joint method: its step, and how it follows what changed before it.
 
 use super::axis::{Coordinate, Triple};
+use crate::root::sqrt;
+use crate::sir::square;
 
 /// A relay's step, by the two coordinates that do not follow from the hop.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -102,7 +104,7 @@ impl Policy {
 /// The symmetric matrix (yy, yh, hh) with each eigenvalue turned below zero.
 fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     let (mean, half) = (0.5 * (yy + hh), 0.5 * (yy - hh));
-    let root = libm::hypotf(half, yh);
+    let root = sqrt(square(half) + square(yh));
     let least = (FLATTEST * (mean.abs() + root)).max(1e-20);
     let (high, low) = (mean + root, mean - root);
     if high <= -least {

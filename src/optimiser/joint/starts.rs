@@ -8,8 +8,8 @@ use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use crate::sir::square;
 
-use super::axis::Triple;
-use super::link::{Room, minus, triple};
+use super::axis::{Triple, minus, triple};
+use super::room::Room;
 
 /// One of them.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -1,0 +1,95 @@
+//! The relay itself: where it is to be, where it was told to fly, where it may be by now.
+
+use super::config::GuardConfig;
+use super::reachable::ReachableInterval;
+use crate::place::{CrossSection, Placement};
+use crate::time::Instant;
+
+/// What both fences go by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Own {
+    pub(super) config: GuardConfig,
+    /// The number of its node.
+    node: u16,
+    /// Where it was agreed to be, inside the box.
+    pub(super) target: Option<Placement>,
+    pub(super) setpoint: Option<Placement>,
+    pub(super) reachable: ReachableInterval,
+    /// When the setpoint changed across the line.
+    turned: Instant,
+    /// Whether it has arrived there across the line.
+    pub(super) still: bool,
+    /// Whether the chain is to open, by what is known here.
+    pub(super) open: bool,
+}
+
+impl Own {
+    pub(super) const fn new(config: GuardConfig, node: u16, now: Instant) -> Self {
+        Self {
+            config,
+            node,
+            target: None,
+            setpoint: None,
+            reachable: ReachableInterval::unknown(now),
+            turned: now,
+            still: false,
+            open: false,
+        }
+    }
+
+    /// The next setpoint.
+    pub(super) fn go(&mut self, setpoint: Placement, now: Instant) {
+        if self.across() != setpoint.cross_section() {
+            self.turned = now;
+            self.still = false;
+        }
+        self.setpoint = Some(setpoint);
+    }
+
+    /// It was at `place` at time `at`: across the line it has arrived if that was long enough after it was told to go there.
+    pub(super) fn report(&mut self, at: Instant, place: Placement) {
+        self.still |= at >= self.turned + self.config.lag
+            && self.is_near(place.cross_section(), self.across());
+    }
+
+    /// Whether `is` is `to_be` but for what a relay hovers off.
+    fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
+        let most = self.config.hover_m + self.config.rounding();
+        (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most
+    }
+
+    /// Where it was told to fly across the line.
+    pub(super) fn across(&self) -> CrossSection {
+        self.setpoint.unwrap_or_default().cross_section()
+    }
+
+    /// Whether that is where it is to be.
+    pub(super) fn is_across(&self) -> bool {
+        self.target
+            .is_none_or(|target| target.cross_section() == self.across())
+    }
+
+    /// Where it was agreed to be, m along x.
+    pub(super) fn target_m(&self) -> f32 {
+        self.target.unwrap_or_default().x_m
+    }
+
+    /// Where it is to be for now, m along x.
+    pub(super) fn goal_m(&self) -> f32 {
+        self.goal_of(self.node, self.target_m())
+    }
+
+    /// Where `node` is to be for now that was agreed to be at `target_m`.
+    pub(super) fn goal_of(&self, node: u16, target_m: f32) -> f32 {
+        if self.open {
+            self.config.open_place(node, target_m)
+        } else {
+            target_m
+        }
+    }
+
+    /// Whether places with this step between them are closer along x than the separation.
+    pub(super) fn is_close(&self, step_m: f32) -> bool {
+        step_m < self.config.separation_m - self.config.rounding()
+    }
+}

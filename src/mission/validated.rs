@@ -1,0 +1,208 @@
+//! A mission whose parameters have been checked, and what is asked of it.
+
+use super::config::MissionConfig;
+use super::error::MissionError;
+use super::parts::{Heading, Interference, Interferer, within};
+use crate::field::Field;
+use crate::power_ratio::PowerRatio;
+
+/// A validated mission, with what is derived from it once.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Mission {
+    pub(super) config: MissionConfig,
+    pub(super) tx_gain: PowerRatio,
+    /// What a relay's transmit power is worth on a drone-to-drone hop, 1/W: eta / (`mu_los` `p_MSI`), in a field m^2/W:
+    /// `Upsilon_max` / `mu_los`.
+    pub(super) relay_gain_per_w: f64,
+    /// What it is worth on the last hop, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) / eta.
+    pub(super) receiver_gain_per_w: f64,
+}
+
+impl Mission {
+    /// Checks every parameter. Usable in a constant, where [`Mission::new`] turns a mistake into a failed build.
+    ///
+    /// # Errors
+    /// [`MissionError`] names the parameter that is outside its range.
+    pub const fn try_new(config: MissionConfig) -> Result<Self, MissionError> {
+        let MissionConfig {
+            relays: _,
+            distance_m,
+            min_separation_m,
+            tx_power_w,
+            common,
+            band,
+            lateral,
+            channel,
+            interference,
+            tolerance,
+        } = config;
+        if !within(distance_m, 1.0, 1e6) {
+            return Err(MissionError::Distance);
+        }
+        if !within(min_separation_m, 0.0, 1e5) {
+            return Err(MissionError::Separation);
+        }
+        if let Err(error) = config.room() {
+            return Err(error);
+        }
+        if !within(tx_power_w, 1e-6, 1e6) {
+            return Err(MissionError::TxPower);
+        }
+        if !common.is_valid() {
+            return Err(MissionError::Common);
+        }
+        if !band.is_of_altitudes() || !within(common.altitude_m, band.least_m, band.most_m) {
+            return Err(MissionError::Band);
+        }
+        if !lateral.is_room_beside() {
+            return Err(MissionError::Lateral);
+        }
+        if let Interference::Source(interferer) = &interference {
+            if !within(interferer.power_w, 1e-6, 1e9) {
+                return Err(MissionError::InterfererPower);
+            }
+            if !within(interferer.x_m, -1e7, 1e7) || !within(interferer.y_m, -1e7, 1e7) {
+                return Err(MissionError::InterfererPlace);
+            }
+        }
+        if !within(tolerance, 1e-6, 0.1) {
+            return Err(MissionError::Tolerance);
+        }
+        if matches!(interference, Interference::Field(_)) && !cfg!(feature = "field") {
+            return Err(MissionError::Field);
+        }
+        let eta = channel.eta();
+        let (tx_gain, relay_gain_per_w, receiver_gain_per_w) = match interference {
+            Interference::Source(interferer) => {
+                let p_msi = interferer.power_w as f64;
+                let beyond = interferer.x_m as f64 - distance_m as f64;
+                let aside = interferer.y_m as f64;
+                (
+                    tx_power_w as f64 / p_msi,
+                    eta / channel.mu_los() / p_msi,
+                    channel.mu_nlos() / eta * (beyond * beyond + aside * aside) / p_msi,
+                )
+            }
+            Interference::Field(field) => {
+                let most = field.largest() as f64;
+                (
+                    tx_power_w as f64 * most / eta,
+                    most / channel.mu_los(),
+                    field.upsilon(distance_m) as f64 / eta,
+                )
+            }
+        };
+        Ok(Self {
+            config,
+            tx_gain: PowerRatio::new(tx_gain),
+            relay_gain_per_w,
+            receiver_gain_per_w,
+        })
+    }
+
+    /// As [`Mission::try_new`], for a mission that is a constant of the firmware.
+    ///
+    /// # Panics
+    /// On a parameter outside its range: in a `const` that is a failed build, which is what this is for. For numbers that
+    /// are only known at run time use [`Mission::try_new`].
+    #[expect(
+        clippy::panic,
+        reason = "in a constant this fails the build, as documented"
+    )]
+    pub const fn new(config: MissionConfig) -> Self {
+        match Self::try_new(config) {
+            Ok(mission) => mission,
+            Err(MissionError::Relays) => panic!("relays must be within 1 to 1000"),
+            Err(MissionError::Distance) => panic!("distance_m must be within 1 to 1e6"),
+            Err(MissionError::TooManyForDistance) => {
+                panic!("(relays - 1) x min_separation_m is above distance_m")
+            }
+            Err(MissionError::TxPower) => panic!("tx_power_w must be within 1e-6 to 1e6"),
+            Err(MissionError::Common) => {
+                panic!("common.altitude_m or common.power_w is out of range")
+            }
+            Err(_) => panic!("a mission parameter is out of range"),
+        }
+    }
+
+    /// The parameters as they were given.
+    pub const fn config(&self) -> &MissionConfig {
+        &self.config
+    }
+
+    /// Number of relays N.
+    pub const fn relays(&self) -> u16 {
+        self.config.relays
+    }
+
+    /// What degrades the hops.
+    pub const fn interference(&self) -> &Interference {
+        &self.config.interference
+    }
+
+    /// The interferer, where there is one.
+    pub const fn interferer(&self) -> Option<&Interferer> {
+        match &self.config.interference {
+            Interference::Source(interferer) => Some(interferer),
+            Interference::Field(_) => None,
+        }
+    }
+
+    /// The field, where there is one.
+    pub const fn field(&self) -> Option<&Field> {
+        match &self.config.interference {
+            Interference::Field(field) if cfg!(feature = "field") => Some(field),
+            _ => None,
+        }
+    }
+
+    /// Which way the places are worked out.
+    pub const fn heading(&self) -> Heading {
+        match self.field() {
+            None => Heading::TowardRx,
+            Some(_) => Heading::TowardTx,
+        }
+    }
+
+    /// The relay that works out its place first, and begins the passes: 1, or N in a field.
+    pub const fn leader(&self) -> u16 {
+        match self.heading() {
+            Heading::TowardRx => 1,
+            Heading::TowardTx => self.config.relays,
+        }
+    }
+
+    /// The relay that comes after `index` on a pass; `None` after the last.
+    pub const fn after(&self, index: u16) -> Option<u16> {
+        match self.heading() {
+            Heading::TowardRx if index < self.config.relays => Some(index + 1),
+            Heading::TowardTx if index > 1 => Some(index - 1),
+            _ => None,
+        }
+    }
+
+    /// The same mission with another number of relays.
+    ///
+    /// # Errors
+    /// [`MissionError::Relays`] or [`MissionError::TooManyForDistance`].
+    pub const fn with_relays(&self, relays: u16) -> Result<Self, MissionError> {
+        let config = MissionConfig {
+            relays,
+            ..self.config
+        };
+        match config.room() {
+            Ok(()) => Ok(Self { config, ..*self }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The same mission, whose relays may stand as close as they like.
+    pub(crate) const fn unseparated(&self) -> Self {
+        let config = MissionConfig {
+            min_separation_m: 0.0,
+            ..self.config
+        };
+        Self { config, ..*self }
+    }
+}

@@ -1,0 +1,59 @@
+//! The ends of a chain: the most that its first and last hop can meet, and the slack at Rx.
+
+use super::outlook::Outlook;
+use super::room::Room;
+use crate::mission::{Interferer, Mission};
+use crate::place::{CrossSection, Placement};
+use crate::root::sqrt;
+use crate::sir::{Sender, square};
+
+/// What of a ceiling is aimed at.
+const LITTLE: f32 = 0.999_97;
+
+/// The most that a first hop into `room` meets, but for a little that leaves the relay its choice.
+pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
+    let m = interferer;
+    let squared = square(room.band.least_m);
+    let behind = m.x_m.min(0.0);
+    let sum = square(m.x_m) + square(m.y_m) + 2.0 * squared;
+    let across = square(m.x_m - behind) + squared;
+    let most = (sum + sqrt((square(sum) - 4.0 * squared * across).max(0.0))) / (2.0 * squared);
+    let far = -1.0 / (most - 1.0).max(1e-6);
+    let at = room.nearest(CrossSection {
+        y_m: far * m.y_m,
+        altitude_m: 0.0,
+    });
+    let at = at.at((far * behind).min(mission.config().distance_m));
+    LITTLE * Sender::transmitter(mission).sir_at(mission, 0.0, at)
+}
+
+/// The most that the hop from a relay of `power_w` in `room` to Rx meets, but for a little.
+pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
+    let across = room
+        .nearest(CrossSection::default())
+        .apart_squared(CrossSection::default());
+    LITTLE * mission.receiver_gain(power_w) / across
+}
+
+/// The slack of a last relay of `power_w` in `room`, which is `at`, for `target`, and its outlook.
+pub(super) fn tail(
+    mission: &Mission,
+    power_w: f32,
+    room: Room,
+    target: f32,
+    at: Placement,
+) -> (f32, Outlook) {
+    let most = last_most(mission, power_w, room);
+    let reach_m = sqrt(mission.receiver_gain(power_w) / target.min(most));
+    let (slack, outlook) = Outlook::tail(reach_m, mission.config().distance_m, at);
+    if target > most {
+        return (
+            slack,
+            Outlook {
+                by_target: 0.0,
+                ..outlook
+            },
+        );
+    }
+    (slack, outlook)
+}

@@ -1,0 +1,229 @@
+//! One relay of a chain under trial, with the hop into it: where it goes.
+
+use super::axis::{Coordinate, Triple, triple};
+use super::ends::first_most;
+use super::policy::Policy;
+use super::room::Room;
+use crate::mission::{Interferer, Mission};
+use crate::optimiser::spacing::Hop;
+use crate::place::{CrossSection, Placement};
+use crate::root::sqrt;
+use crate::sir::{Sender, square};
+
+/// How near the rim of what a hop reaches a relay goes, in squares.
+const RIM: f32 = 0.999_99;
+
+/// The least separation is taken for that much larger, so that what is left missing is none.
+pub(super) const MARGIN: f32 = 1.0005;
+
+/// A relay, as its place is chosen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Site<'a> {
+    pub(super) interferer: &'a Interferer,
+    pub(super) sender: Sender,
+    pub(super) room: Room,
+    pub(super) distance_m: f32,
+    /// The least distance to the sender, m.
+    pub(super) apart_m: f32,
+    /// No hop meets more.
+    pub(super) most: f32,
+}
+
+impl<'a> Site<'a> {
+    /// The relay that `sender` feeds and `room` is left to; `first` if that is Tx, from which it may stand as near as it likes.
+    pub(crate) fn new(
+        mission: &'a Mission,
+        interferer: &'a Interferer,
+        sender: Sender,
+        first: bool,
+        room: Room,
+    ) -> Self {
+        let config = mission.config();
+        Self {
+            interferer,
+            sender,
+            room,
+            distance_m: config.distance_m,
+            apart_m: if first {
+                0.0
+            } else {
+                MARGIN * config.min_separation_m
+            },
+            most: if first {
+                first_most(mission, interferer, room)
+            } else {
+                f32::INFINITY
+            },
+        }
+    }
+
+    /// The same as near to its sender as it likes, too.
+    pub(crate) fn unparted(self) -> Self {
+        Self {
+            apart_m: 0.0,
+            ..self
+        }
+    }
+
+    /// The place at `wanted`, or as far toward it as the hop goes, for `target`, with the sender at `from_m` along x; `None` where no
+    /// hop meets it. Beyond Rx nobody goes.
+    pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
+        let target = target.min(self.most);
+        let at = self.within_reach(target, from_m, wanted)?;
+        let hop = Hop::free(self.interferer, self.sender, at, self.distance_m);
+        Some(at.at(hop.stretched(target, from_m)?))
+    }
+
+    /// `wanted`, or what of the room lies on the way there, from where a hop gets on best, and is reached without going back along x;
+    /// `None` where there is none.
+    ///
+    /// What a hop reaches for c > 1 is a ball: its middle is (p - m) / (c - 1) beyond the sender's place p, its radius sqrt(c) |p - m| /
+    /// (c - 1).
+    fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
+        let wanted = self.room.nearest(wanted);
+        let Some((middle, rim)) = self.disk(target, from_m, from_m) else {
+            return Some(wanted);
+        };
+        if wanted.apart_squared(middle) <= rim {
+            return Some(wanted);
+        }
+        let best = self.room.nearest(middle);
+        toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
+    }
+
+    /// The middle and the squared radius of what a hop reaches for c > 1 at `x_m` or beyond.
+    fn disk(&self, target: f32, from_m: f32, x_m: f32) -> Option<(CrossSection, f32)> {
+        let Sender { at: from, gain } = self.sender;
+        let e = gain.excess(target);
+        if !(e > 0.0) {
+            return None;
+        }
+        let m = self.interferer;
+        let (ahead, aside, above) = (m.x_m - from_m, from.y_m - m.y_m, from.altitude_m);
+        let squared = square(ahead) + square(aside) + square(above);
+        // By how much the middle is before that, or beyond Rx.
+        let before = e * (x_m - from_m) + ahead;
+        let beyond = -(e * (self.distance_m - from_m) + ahead);
+        let off = before.max(beyond).max(0.0);
+        let rim = (RIM * gain.ratio(target) * squared - square(off)) / square(e);
+        let middle = CrossSection {
+            y_m: from.y_m + aside / e,
+            altitude_m: from.altitude_m + above / e,
+        };
+        Some((middle, rim))
+    }
+
+    /// Where the relay goes across the line for `share` of its `policy`, when the sender is at `from` instead of `change` before that.
+    pub(crate) fn wanted(
+        &self,
+        target: f32,
+        from: Placement,
+        nominal: Placement,
+        policy: &Policy,
+        share: f32,
+        change: Triple,
+    ) -> CrossSection {
+        let target = target.min(self.most);
+        let by = policy.apply(share, change);
+        let [_, a, b] = policy.axis.first(triple(nominal));
+        let (a, b) = (a + by[0], b + by[1]);
+        match policy.axis {
+            Coordinate::X => {
+                let wanted = self.room.nearest(CrossSection {
+                    y_m: a,
+                    altitude_m: b,
+                });
+                // What was right above Rx stays there.
+                let there = nominal.x_m >= self.distance_m;
+                let disk = self.disk(target, from.x_m, self.distance_m);
+                match disk.filter(|_| there) {
+                    Some((middle, rim)) if wanted.apart_squared(middle) > rim => {
+                        toward(nominal.cross_section(), wanted, middle, rim).unwrap_or(wanted)
+                    }
+                    _ => wanted,
+                }
+            }
+            Coordinate::Y => {
+                let b = self.room.band.nearest(b);
+                let y = self.along(
+                    policy,
+                    target,
+                    from,
+                    [a.max(from.x_m).min(self.distance_m), b],
+                );
+                CrossSection {
+                    y_m: y.unwrap_or(nominal.y_m),
+                    altitude_m: b,
+                }
+            }
+            Coordinate::H => {
+                let b = self.room.lateral.nearest(b);
+                let h = self.along(
+                    policy,
+                    target,
+                    from,
+                    [a.max(from.x_m).min(self.distance_m), b],
+                );
+                CrossSection {
+                    y_m: b,
+                    altitude_m: h.unwrap_or(nominal.altitude_m),
+                }
+            }
+        }
+    }
+
+    /// The coordinate that follows from the other two, `at`, by the hop `from` the sender.
+    fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
+        let gain = self.sender.gain;
+        let target = if gain.excess(target) > 0.0 {
+            target
+        } else {
+            target * (2.0 - RIM)
+        };
+        let (e, c) = (gain.excess(target), gain.ratio(target));
+        let [m, m1, m2] = policy.axis.first(self.source());
+        let [p, p1, p2] = policy.axis.first(triple(from));
+        let [a, b] = at;
+        let u = if policy.rising { m - p } else { p - m };
+        let rest = square(m1 - a) + square(m2 - b) - c * (square(a - p1) + square(b - p2));
+        let root = c * square(u) + e * rest;
+        if !(root >= 0.0) {
+            return None;
+        }
+        let r = sqrt(root);
+        let d = if !(e > 0.0) {
+            (u + r) / -e.min(-1e-6)
+        } else if u >= 0.0 {
+            (square(u) + rest) / (u + r)
+        } else {
+            (r - u) / e
+        };
+        Some(if policy.rising { p + d } else { p - d })
+    }
+
+    pub(super) const fn source(&self) -> Triple {
+        [self.interferer.x_m, self.interferer.y_m, 0.0]
+    }
+}
+
+/// What lies on the way from `best` to `wanted` within a circle; `None` if nothing does.
+fn toward(
+    best: CrossSection,
+    wanted: CrossSection,
+    middle: CrossSection,
+    rim: f32,
+) -> Option<CrossSection> {
+    // |best + share w - middle|^2 = rim
+    let left = rim - best.apart_squared(middle);
+    let (wy, wh) = (wanted.y_m - best.y_m, wanted.altitude_m - best.altitude_m);
+    let (cy, ch) = (best.y_m - middle.y_m, best.altitude_m - middle.altitude_m);
+    let (a, b) = (square(wy) + square(wh), wy * cy + wh * ch);
+    if !(left >= 0.0 && a > 0.0) {
+        return None;
+    }
+    let share = left / (b + sqrt(square(b) + a * left));
+    Some(CrossSection {
+        y_m: best.y_m + share * wy,
+        altitude_m: best.altitude_m + share * wh,
+    })
+}

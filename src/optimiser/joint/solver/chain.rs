@@ -1,0 +1,118 @@
+//! The chain as the passes see it: who sends to whom, which altitudes are kept to, what its first and last hop can meet.
+
+use crate::mission::{Interferer, Mission};
+use crate::optimiser::joint::ends;
+use crate::optimiser::joint::outlook::Outlook;
+use crate::optimiser::joint::room::Room;
+use crate::optimiser::joint::site::Site;
+use crate::place::{CrossSection, Placement};
+use crate::power_ratio::PowerRatio;
+use crate::sir::Sender;
+
+use super::seat::Seat;
+
+/// What the passes have in common.
+#[derive(Clone, Copy)]
+pub(super) struct SolverContext<'a, F> {
+    pub(super) mission: &'a Mission,
+    pub(super) interferer: &'a Interferer,
+    pub(super) seat_of: &'a F,
+    /// What the power is worth that the mission has all relays hold.
+    pub(super) gain: PowerRatio,
+}
+
+impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
+    pub(super) fn distance_m(&self) -> f32 {
+        self.mission.config().distance_m
+    }
+
+    /// The sender of relay `index`, which stands at `from`.
+    pub(super) fn sender(&self, index: u16, from: Placement) -> Sender {
+        if index <= 1 {
+            return Sender::transmitter(self.mission);
+        }
+        let power_w = (self.seat_of)(index - 1).power_w;
+        let common = power_w.to_bits() == self.mission.config().common.power_w.to_bits();
+        Sender {
+            at: from.cross_section(),
+            gain: if common {
+                self.gain
+            } else {
+                self.mission.relay_gain(power_w)
+            },
+        }
+    }
+
+    /// The altitude that relay `index` keeps to, if it keeps to one while others choose.
+    pub(super) fn held_at(&self, index: u16) -> Option<f32> {
+        let Room { band, .. } = (self.seat_of)(index).room;
+        let free = !self.mission.config().band.is_single();
+        (free && band.is_single()).then_some(band.least_m)
+    }
+
+    /// Whether any relay does.
+    pub(super) fn holds(&self) -> bool {
+        (1..=self.mission.relays()).any(|index| self.held_at(index).is_some())
+    }
+
+    /// The altitude at relay `index` on the way from one that does to the next.
+    pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
+        let relays = self.mission.relays();
+        let held = |index: u16| Some((index, self.held_at(index)?));
+        let before = (1..=index).rev().find_map(held);
+        let after = (index..=relays).find_map(held);
+        let least_m = self.mission.config().band.least_m;
+        let end = |at, other: Option<(u16, f32)>| {
+            (at, other.filter(|_| level).map_or(least_m, |(_, h)| h))
+        };
+        let (from, low) = before.unwrap_or(end(0, after));
+        let (to, high) = after.unwrap_or(end(relays + 1, before));
+        let share = f32::from(index - from) / f32::from((to - from).max(1));
+        low + share * (high - low)
+    }
+
+    /// Relay `index`, fed from `from`.
+    pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
+        let sender = self.sender(index, from);
+        Site::new(self.mission, self.interferer, sender, index <= 1, room)
+    }
+
+    /// The slack of the last relay at `at`, and its outlook.
+    pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
+        let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
+        ends::tail(self.mission, power_w, room, target, at)
+    }
+
+    /// No chain meets more than the first hop or the last one can have.
+    pub(super) fn ceiling(&self) -> f32 {
+        let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
+        let first = (self.seat_of)(1).room;
+        let first = ends::first_most(self.mission, self.interferer, first);
+        let last = ends::last_most(self.mission, power_w, room);
+        libm::logf(first.min(last).clamp(1e-30, 1e30))
+    }
+
+    /// The largest gain of any hop, in ln gamma: above it nobody leaps to the far side of the interferer.
+    pub(super) fn floor(&self) -> f32 {
+        let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
+        let relay = own.fold(0.0, f32::max);
+        let gain = self.mission.relay_gain(relay).value();
+        libm::logf(self.mission.tx_gain().value().max(gain)) + 0.01
+    }
+}
+
+/// Where in `room`, right above Rx, a relay hears Tx best.
+pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
+    let tx = Sender::transmitter(chain.mission);
+    let mut best = (0.0, CrossSection::default());
+    for y_m in [room.lateral.least_m, 0.0, room.lateral.most_m] {
+        for altitude_m in [room.band.least_m, room.band.most_m] {
+            let at = room.nearest(CrossSection { y_m, altitude_m });
+            let sir = tx.sir_at(chain.mission, 0.0, at.at(chain.distance_m()));
+            if sir > best.0 {
+                best = (sir, at);
+            }
+        }
+    }
+    best.1
+}

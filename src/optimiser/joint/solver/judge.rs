@@ -1,0 +1,213 @@
+//! The highest target of a chain as it is, and what comes after it is found.
+
+use core::task::Poll;
+
+use super::chain::SolverContext;
+use super::polish::GAIN;
+use super::seat::Seat;
+use super::segment::last_of;
+use super::state::Solver;
+use super::work::{Purpose, Work};
+use crate::optimiser::joint::ascent::{Ascent, AscentStep};
+use crate::optimiser::joint::seek::Seek;
+use crate::optimiser::joint::starts::Start;
+use crate::optimiser::search::Infeasible;
+
+/// How close to the optimum a start is judged, in ln gamma.
+pub(super) const JUDGED: f32 = 4e-6;
+
+/// How close to the ceiling of the first or the last hop is close enough, in ln gamma.
+pub(super) const CEILING: f32 = 5e-5;
+
+/// How far above that ceiling the other hops are when a chain is probed first, in ln gamma.
+const PROBED: f32 = 3e-4;
+
+impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+    pub(super) fn seek(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        seek: Seek,
+        purpose: Purpose,
+    ) -> Poll<Result<f32, Infeasible>> {
+        let Poll::Ready(slack) = self.plain(chain, seek.sigma, purpose, false) else {
+            return Poll::Pending;
+        };
+        let met = slack.is_some_and(|slack| slack >= 0.0);
+        if met && self.pass.holds_back {
+            let place_m = self.pass.from.x_m;
+            self.work = Work::Stand(last_of(chain.mission), place_m, seek, purpose);
+            return Poll::Pending;
+        }
+        self.tried(chain, seek, purpose, met.then_some(false))
+    }
+
+    /// One segment less till it is known whether all relays can stand where those after them need it; the last of this one is to
+    /// stand at `place_m`. Bounded by twenty relays.
+    pub(super) fn stand(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        segment: u8,
+        place_m: f32,
+        seek: Seek,
+        purpose: Purpose,
+    ) -> Poll<Result<f32, Infeasible>> {
+        match (
+            self.stands(chain, segment, place_m, libm::expf(seek.sigma)),
+            segment.checked_sub(1),
+        ) {
+            (Some(place_m), Some(before)) => {
+                self.work = Work::Stand(before, place_m, seek, purpose);
+                Poll::Pending
+            }
+            (place_m, _) => self.tried(chain, seek, purpose, place_m.map(|_| true)),
+        }
+    }
+
+    /// What came of a target: that it is `met`, and whether relays have to hold back.
+    pub(super) fn tried(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        mut seek: Seek,
+        purpose: Purpose,
+        met: Option<bool>,
+    ) -> Poll<Result<f32, Infeasible>> {
+        self.restart();
+        if purpose == Purpose::Probe {
+            // If it does not meet the ceiling, its other hops have to be shorter.
+            self.work = if met.is_some() {
+                self.again = true;
+                let sigma = chain.ceiling() + 2.0 * CEILING;
+                Work::Seek(Seek::down(sigma, 1e-5, 2.0, 1e-6), Purpose::Last)
+            } else {
+                let turn = self.ascent.probed();
+                self.next(turn, chain)
+            };
+            return Poll::Pending;
+        }
+        if purpose == Purpose::Move {
+            self.work = if let Some(holds_back) = met {
+                self.moved = self.moved.saturating_add(1);
+                Work::Seek(Seek::up(seek.sigma, holds_back, GAIN, 1e-6), Purpose::Last)
+            } else {
+                let (index, _, _) = self.move_of(chain.mission);
+                self.keep(index, 0.0, self.kept);
+                self.moving += 1;
+                Work::Polish(seek.sigma - GAIN)
+            };
+            return Poll::Pending;
+        }
+        self.work = if seek.tried(met) {
+            Work::Seek(seek, purpose)
+        } else {
+            match (seek.found(), purpose) {
+                (Some((sigma, holds_back)), Purpose::Last) if self.again => {
+                    self.holds_back = holds_back;
+                    Work::Polish(sigma)
+                }
+                (Some((sigma, _)), Purpose::Last) => {
+                    if self.best.is_none_or(|(best, _)| sigma > best) {
+                        self.best = Some((sigma, self.number));
+                    }
+                    self.given_up()
+                }
+                (Some((sigma, _)), Purpose::Raise) => {
+                    Work::Settle(sigma.min(self.ascent.limit()), purpose)
+                }
+                (Some((sigma, _)), _) => Work::Settle(sigma, purpose),
+                (None, Purpose::Last) if self.again => return Poll::Ready(Err(Infeasible)),
+                (None, _) => self.given_up(),
+            }
+        };
+        Poll::Pending
+    }
+
+    pub(super) fn settle(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        sigma: f32,
+        purpose: Purpose,
+    ) -> Poll<Result<f32, Infeasible>> {
+        let Poll::Ready(slack) = self.plain(chain, sigma, purpose, true) else {
+            return Poll::Pending;
+        };
+        self.ascent.penalty = self.pass.penalty;
+        self.restart();
+        self.held = None;
+        let Some(slack) = slack else {
+            self.work = self.given_up();
+            return Poll::Pending;
+        };
+        self.work = match purpose {
+            Purpose::Start => {
+                let floor = match self.start {
+                    Start::Near => chain.floor(),
+                    _ => f32::NEG_INFINITY,
+                };
+                let penalty = self.ascent.penalty;
+                self.ascent = Ascent::new(chain.distance_m(), sigma, slack, floor)
+                    .probed_at(chain.ceiling() + PROBED);
+                self.ascent.penalty = penalty;
+                self.look_back(chain.mission)
+            }
+            Purpose::Raise => {
+                let turn = self.ascent.raised(sigma, slack);
+                self.next(turn, chain)
+            }
+            Purpose::Tighten => {
+                let turn = self.ascent.tightened(slack);
+                self.next(turn, chain)
+            }
+            Purpose::Judge | Purpose::Last | Purpose::Probe | Purpose::Move => {
+                self.judged(sigma, chain.ceiling())
+            }
+        };
+        Poll::Pending
+    }
+
+    /// An ascent has come to `sigma`: by the rules of the sweep.
+    pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
+        let sigma = sigma.min(ceiling + CEILING);
+        let seek = if self.again {
+            Seek::down(sigma + 2e-5, 1e-5, 2.0, 1e-6)
+        } else {
+            Seek::down(sigma + JUDGED, JUDGED, 3.0, JUDGED)
+        };
+        Work::Seek(seek, Purpose::Last)
+    }
+
+    /// Whether the start may still be the best.
+    pub(super) fn is_promising(&self) -> bool {
+        self.again || self.best.is_none_or(|(best, _)| self.ascent.sigma > best)
+    }
+
+    pub(super) fn next(
+        &mut self,
+        turn: AscentStep,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+    ) -> Work {
+        self.restart();
+        match turn {
+            AscentStep::Try { share, sigma } => Work::Forward(share, sigma, false),
+            AscentStep::Raise if self.ascent.at_limit() => {
+                let sigma = chain.ceiling() - CEILING;
+                Work::Seek(Seek::down(sigma, 1e-5, 2.0, 1e-6), Purpose::Probe)
+            }
+            AscentStep::Raise => {
+                let Ascent { sigma, .. } = self.ascent;
+                Work::Seek(Seek::up(sigma, false, 0.02, 1e-5), Purpose::Raise)
+            }
+            AscentStep::Again => self.look_back(chain.mission),
+            AscentStep::Over if self.is_promising() && self.ascent.tighten() => {
+                Work::Settle(self.ascent.sigma, Purpose::Tighten)
+            }
+            AscentStep::Over => {
+                self.walled |= self.ascent.penalty > 0.0;
+                let sigma = self.ascent.sigma;
+                Work::Seek(
+                    Seek::down(sigma + JUDGED, JUDGED, 3.0, JUDGED),
+                    Purpose::Judge,
+                )
+            }
+        }
+    }
+}

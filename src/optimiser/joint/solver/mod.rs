@@ -1,0 +1,32 @@
+//! A whole chain by the joint method, without a message: what every relay that holds the mission works out by itself.
+//!
+//! Differential dynamic programming keeps a policy for every relay between the pass back and the pass forward. Here a relay takes six
+//! bytes: the chain is cut into segments, of each of which only the outlook at its end is kept, and the policies of one segment are
+//! worked out again when the pass forward comes to it.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | `state` | what a solver keeps, and one portion of its work |
+//! | `work` | what it is at, and what for |
+//! | `order` | which start comes next, and the shape it gives the chain |
+//! | `plain` | a pass that changes nothing |
+//! | `passes` | the pass back and the pass forward of an ascent |
+//! | `judge` | what comes after a target is found |
+//! | `sweep` | the chain by the rules of the sweep |
+//! | `polish` | one relay after the other tries another place |
+//! | `chain`, `segment`, `seat` | what the passes have in common; ten relays of a chain; what one brings along |
+
+mod chain;
+mod judge;
+mod order;
+mod passes;
+mod plain;
+mod polish;
+mod seat;
+mod segment;
+mod state;
+mod sweep;
+mod work;
+
+pub use seat::Seat;
+pub use state::Solver;

@@ -1,0 +1,143 @@
+//! The state of a solver, and one portion of its work after the other.
+
+use core::task::Poll;
+
+use super::chain::SolverContext;
+use super::seat::Seat;
+use super::segment::{Mark, SEGMENT, STAGES, Stage};
+use super::work::{ForwardPass, Work};
+use crate::mission::Mission;
+use crate::optimiser::joint::ascent::Ascent;
+use crate::optimiser::joint::cells::Cell;
+use crate::optimiser::joint::starts::Start;
+use crate::optimiser::search::Infeasible;
+use crate::place::CrossSection;
+
+/// A chain being solved, for at most `RELAYS` relays; `SEGMENTS` is at least a tenth of that.
+#[derive(Clone, Debug)]
+pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
+    pub(super) number: u8,
+    pub(super) start: Start,
+    /// The best so far: its target in ln gamma, and the number of its start.
+    pub(super) best: Option<(f32, u8)>,
+    /// Whether the best start is done once more, since the chain that is kept came of another.
+    pub(super) again: bool,
+    pub(super) ascent: Ascent,
+    pub(super) work: Work,
+    pub(super) pass: ForwardPass,
+    /// Whether relays have to hold back for what was found.
+    pub(super) holds_back: bool,
+    /// Whether any start came up against the least separation.
+    pub(super) walled: bool,
+    /// Which move of the polish is tried, how many were taken, and where its relay was.
+    pub(super) moving: u16,
+    pub(super) moved: u8,
+    pub(super) kept: Cell,
+    /// The segment whose policies are at hand.
+    pub(super) held: Option<u8>,
+    pub(super) stages: [Stage; STAGES],
+    pub(super) marks: [Mark; SEGMENTS],
+    pub(super) cells: [Cell; RELAYS],
+}
+
+impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+    /// Begins; `None` in a field, where the chain has more than `RELAYS` relays, or without the feature `altitude`.
+    pub fn new(mission: &Mission) -> Option<Self> {
+        let fits = usize::from(mission.relays()) <= RELAYS.min(STAGES * SEGMENTS);
+        (fits && mission.interferer().is_some()).then(|| Self {
+            number: 0,
+            start: Start::Far,
+            best: None,
+            again: false,
+            ascent: Ascent::new(1.0, 0.0, 0.0, 0.0),
+            work: Work::Begin,
+            pass: ForwardPass::default(),
+            holds_back: false,
+            walled: false,
+            moving: 0,
+            moved: 0,
+            kept: Cell::default(),
+            held: None,
+            stages: [Stage::default(); STAGES],
+            marks: [Mark::default(); SEGMENTS],
+            cells: [Cell::default(); RELAYS],
+        })
+    }
+
+    /// Where relay `index` is to fly across the line, once the chain is solved.
+    pub fn at(&self, index: u16, seat: Seat) -> CrossSection {
+        self.cell(index).place(seat.room)
+    }
+
+    pub(super) fn cell(&self, index: u16) -> Cell {
+        let at = usize::from(index).wrapping_sub(1);
+        self.cells.get(at).copied().unwrap_or_default()
+    }
+
+    /// Goes on for one portion: ten relays back and forward, or twenty without a change. The target, linear SIR, once the chain is
+    /// solved; `seat_of` gives what relay 1..=N brings along, and must answer the same every time.
+    ///
+    /// # Errors
+    /// [`Infeasible`] when no target can be met.
+    pub fn step(
+        &mut self,
+        mission: &Mission,
+        seat_of: impl Fn(u16) -> Seat,
+    ) -> Poll<Result<f32, Infeasible>> {
+        let Some(interferer) = mission.interferer() else {
+            return Poll::Ready(Err(Infeasible));
+        };
+        let chain = SolverContext {
+            mission,
+            interferer,
+            seat_of: &seat_of,
+            gain: mission.relay_gain(mission.config().common.power_w),
+        };
+        match self.work {
+            Work::Begin => self.begin(&chain),
+            Work::Seek(seek, purpose) => self.seek(&chain, seek, purpose),
+            Work::Settle(sigma, purpose) => self.settle(&chain, sigma, purpose),
+            Work::Stand(segment, place_m, seek, purpose) => {
+                self.stand(&chain, segment, place_m, seek, purpose)
+            }
+            Work::Polish(sigma) => self.polish(&chain, sigma),
+            Work::Back(segment) => {
+                self.back(&chain, segment);
+                Poll::Pending
+            }
+            Work::Forward(share, sigma, kept) => {
+                self.forward(&chain, share, sigma, kept);
+                Poll::Pending
+            }
+        }
+    }
+
+    /// A pass begins at Tx.
+    pub(super) fn restart(&mut self) {
+        self.pass = ForwardPass::default();
+    }
+
+    /// Keeps the `cell` of relay `index`, which comes after one at `x_m`.
+    pub(super) fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
+        if let Some(mark) = self.mark(index) {
+            mark.x_m = x_m;
+        }
+        let at = usize::from(index).wrapping_sub(1);
+        if let Some(kept) = self.cells.get_mut(at) {
+            *kept = cell;
+        }
+    }
+
+    /// The mark before relay `index`, the first of its segment.
+    pub(super) fn mark(&mut self, index: u16) -> Option<&mut Mark> {
+        let at = usize::from(index).wrapping_sub(1);
+        self.marks
+            .get_mut(at / SEGMENT)
+            .filter(|_| at.is_multiple_of(SEGMENT))
+    }
+
+    /// Whether relays have to hold back for the target that was found.
+    pub const fn holds_back(&self) -> bool {
+        self.holds_back
+    }
+}

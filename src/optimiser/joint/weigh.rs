@@ -1,0 +1,132 @@
+//! What the place of a relay is worth to the one before: one relay's worth of a pass back.
+
+use super::axis::{Coordinate, Triple, minus, triple};
+use super::hop::Reach;
+use super::outlook::Outlook;
+use super::policy::Policy;
+use super::room::Room;
+use super::site::Site;
+use crate::place::Placement;
+use crate::root::sqrt;
+use crate::sir::square;
+
+/// What one part of the least separation that is missing costs, in parts of D: a slope that no gain of slack outweighs.
+const STIFFNESS: f32 = 100.0;
+
+/// How near an end of its room a relay is at it, in parts of D.
+const EDGE: f32 = 2e-6;
+
+/// How much of its length a hop may leave and still be as long as it may be.
+const TIGHT: f32 = 1e-3;
+
+impl Site<'_> {
+    /// By how much the relay at `to` is nearer to the interferer than a hop of the least separation allows, in squares, m^2, and the
+    /// weight of that: |p' - p|^2 = |p' - m|^2 / c is then less than d_min^2.
+    fn near(&self, c: f32, to: Placement) -> (f32, f32) {
+        if !(self.apart_m > 0.0) {
+            return (0.0, 0.0);
+        }
+        let m = self.interferer;
+        let least = c * square(self.apart_m);
+        let squared = square(m.x_m - to.x_m) + square(m.y_m - to.y_m) + square(to.altitude_m);
+        let weight = STIFFNESS * self.distance_m / square(least);
+        ((least - squared).max(0.0), weight)
+    }
+
+    /// What the relay at `to` takes off the slack for being there, m.
+    pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
+        let (near, weight) = self.near(self.sender.gain.ratio(target), to);
+        0.5 * weight * square(near)
+    }
+
+    /// The policy of the relay at `to`, which moves by up to `trust` of its distance from the interferer. `outlook` is what it sees,
+    /// and becomes what the relay before, at `from`, sees of the slack through it.
+    ///
+    /// Work: some 400 multiplications and two square roots.
+    pub(crate) fn weigh(
+        &self,
+        target: f32,
+        trust: f32,
+        from: Placement,
+        to: Placement,
+        outlook: &mut Outlook,
+    ) -> Policy {
+        let capped = target > self.most;
+        let c = self.sender.gain.ratio(target.min(self.most));
+        let source = self.source();
+        let place = triple(to);
+        let (near, weight) = self.near(c, to);
+        let [dx, dy, dh] = minus(source, place);
+        if near > 0.0 {
+            let slope = [2.0 * dx, 2.0 * dy, 2.0 * dh];
+            outlook.penalise(weight, near, slope, c * square(self.apart_m));
+        }
+        let Room { lateral, band } = self.room;
+        let low = [from.x_m, lateral.least_m, band.least_m];
+        let high = [self.distance_m, lateral.most_m, band.most_m];
+        let (low, high) = (minus(low, place), minus(high, place));
+        let at_end = to.x_m >= self.distance_m - EDGE * self.distance_m;
+        let [hx, hy, hh] = minus(place, triple(from));
+        let reached = c * (square(hx) + square(hy) + square(hh));
+        let spare = square(dx) + square(dy) + square(dh) - reached;
+        let loose = at_end && spare > TIGHT * reached;
+        let (axis, normal) = if loose {
+            (Coordinate::X, 0.0)
+        } else {
+            self.axis(c, from, to, low, high)
+        };
+        let hop = if at_end && axis == Coordinate::X {
+            Reach::FIXED
+        } else {
+            let [source, from, place] = [source, triple(from), place].map(|p| axis.first(p));
+            let hop = Reach::new(c, source, from, place);
+            Reach {
+                by_target: if capped { 0.0 } else { hop.by_target },
+                ..hop
+            }
+        };
+        let far = trust * sqrt(square(dx) + square(dy) + square(dh));
+        let [_, l1, l2] = axis.first(low.map(|low| low.max(-far).min(0.0)));
+        let [_, h1, h2] = axis.first(high.map(|high| high.min(far).max(0.0)));
+        let policy = outlook.pass(axis, &hop, [l1, l2], [h1, h2]);
+        Policy {
+            rising: (normal < 0.0) == (c > 1.0),
+            ..policy
+        }
+    }
+
+    /// The coordinate that is to follow, one that is not at an end of its room `low` to `high`, and the slope of F by it: the steeper,
+    /// the better.
+    fn axis(
+        &self,
+        c: f32,
+        from: Placement,
+        to: Placement,
+        low: Triple,
+        high: Triple,
+    ) -> (Coordinate, f32) {
+        let rounding = EDGE * self.distance_m;
+        let [dx, dy, dh] = minus(triple(to), self.source());
+        let [hx, hy, hh] = minus(triple(to), triple(from));
+        let [nx, ny, nh] = [dx - c * hx, dy - c * hy, dh - c * hh];
+        let ([lx, ly, lh], [ux, uy, uh]) = (low, high);
+        let mut best = (Coordinate::X, nx);
+        // Rather x, by which the chain gets on.
+        let mut steepest = if lx >= -rounding || ux <= rounding {
+            0.0
+        } else {
+            1.5 * nx.abs()
+        };
+        for (axis, normal, low, high) in [(Coordinate::Y, ny, ly, uy), (Coordinate::H, nh, lh, uh)]
+        {
+            // What a leap does not reach is within a ball, and a relay at its foot may rise from there.
+            let rises = c <= 1.0 && ux <= rounding;
+            let free = (low < -rounding || rises) && high > rounding;
+            if (c > 1.0 || rises) && free && normal.abs() > steepest {
+                steepest = normal.abs();
+                best = (axis, normal);
+            }
+        }
+        best
+    }
+}
