@@ -10,6 +10,16 @@
 /// for every mantissa: a factor of 4 changes nothing but the exponent of the result, so two octaves stand for all.
 #[inline(never)] // called from many places: 2.4 KB of flash otherwise
 pub(crate) fn sqrt(x: f32) -> f32 {
+    sqrt_in_place(x)
+}
+
+/// The same where a sweep spends its time: without a call.
+#[expect(
+    clippy::inline_always,
+    reason = "a call would cost a sweep a hundred instructions"
+)]
+#[inline(always)]
+pub(crate) fn sqrt_in_place(x: f32) -> f32 {
     if !(x >= f32::MIN_POSITIVE) {
         return 0.0;
     }

@@ -2,5 +2,6 @@
 
 pub mod firmware;
 pub mod fixtures;
+pub mod flights;
 #[cfg(target_os = "linux")]
 pub mod python;

@@ -1,6 +1,7 @@
 //! The simulated chain: what it settles on, what that costs, and that no fault changes it.
 
 use host_tests::fixtures::mission;
+use host_tests::flights::settle;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::plan;
@@ -21,13 +22,6 @@ fn reached(link: &Link, outcome: &Outcome) -> f64 {
         .map(|relay| f64::from(relay.setpoint.unwrap().x_m))
         .collect();
     link.chain_sir(&x)
-}
-
-fn settle(setup: Setup) -> Outcome {
-    let outcome = run(setup).unwrap();
-    assert_eq!(outcome.ending, Ending::Settled);
-    assert_eq!(outcome.unsafe_setpoints, 0);
-    outcome
 }
 
 #[test]

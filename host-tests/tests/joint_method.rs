@@ -1,8 +1,9 @@
 //! Places, sides and altitudes together: how near the true optimum the chain comes, in how many messages, whatever happens to frames.
 
+use host_tests::flights::with_room;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::{Adjust, Band, Instant, Method, Mission, MissionConfig, Profile, Side};
+use uav_relay::{Adjust, Instant, Method, Mission, MissionConfig, Profile, Side};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::joint::{CROWDED, ROOMY, Scenario, scenario, with_own};
 use uav_relay_oracle::random::{self, log_uniform};
@@ -16,18 +17,7 @@ use uav_relay_sim::simulator::setup::Setup;
 /// The setup of a chain that chooses altitudes within `corridor`; `None` where a relay would refuse the numbers.
 fn setup(link: &Link, corridor: Corridor) -> Option<Setup> {
     let (mission, profiles) = of_link(link, 1e-4)?;
-    let config = MissionConfig {
-        band: Band {
-            least_m: corridor.least_m as f32,
-            most_m: corridor.most_m as f32,
-        },
-        lateral: Band {
-            least_m: corridor.left_m as f32,
-            most_m: corridor.right_m as f32,
-        },
-        ..*mission.config()
-    };
-    let mut setup = Setup::new(Mission::try_new(config).ok()?);
+    let mut setup = Setup::new(with_room(mission.config(), corridor)?);
     setup.profiles = profiles;
     setup.settings.method = Method::Joint;
     Some(setup)

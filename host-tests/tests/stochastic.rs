@@ -1,5 +1,6 @@
 //! Algorithm 4: places in a field of interference, by messages from Rx toward Tx, agreed or measured.
 
+use host_tests::flights::settle;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::plan::silent_place;
@@ -10,9 +11,9 @@ use uav_relay_oracle::random::{self, log_uniform};
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Station};
 use uav_relay_sim::beta::beta_w;
-use uav_relay_sim::simulator::chain::{Chain, run};
+use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::faults::Faults;
-use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 
 fn mission(link: &StochasticLink, min_separation_m: f32) -> Mission {
@@ -57,13 +58,6 @@ fn places(outcome: &Outcome) -> Vec<f64> {
         .iter()
         .map(|relay| f64::from(relay.setpoint.unwrap().x_m))
         .collect()
-}
-
-fn settle(setup: Setup) -> Outcome {
-    let outcome = run(setup).unwrap();
-    assert_eq!(outcome.ending, Ending::Settled);
-    assert_eq!(outcome.unsafe_setpoints, 0);
-    outcome
 }
 
 /// The closed form of one hop backward, from where it is heard; errors as parts of the hop.

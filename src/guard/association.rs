@@ -90,13 +90,13 @@ impl Association {
 }
 
 /// Where a relay that fell silent may still hover, as a limit of this relay's own x.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
     /// Of the lost relays the nearest node, and the limit, m.
     lost: Option<(u16, f32)>,
-    /// Whether this relay was nearer along x than the separation, and has not come up to the limit since: only where the two are
-    /// across the line keeps them apart.
-    pub(super) near: bool,
+    /// Where along x this relay may be no farther than the separation from it, and has not been beyond since, m: only where the two are
+    /// across the line keeps them apart. Not a number where that is over.
+    near_m: f32,
 }
 
 impl KeepOut {
@@ -104,7 +104,7 @@ impl KeepOut {
     pub(super) const fn none() -> Self {
         Self {
             lost: None,
-            near: false,
+            near_m: f32::NAN,
         }
     }
 
@@ -135,10 +135,29 @@ impl KeepOut {
         }
     }
 
-    /// The first setpoint is `x_m`: whoever was lost before was never heard, and may hover anywhere beyond.
-    pub(super) fn begin(&mut self, x_m: f32) {
+    /// The first setpoint is `x_m`: whoever was lost before was never heard, and may hover anywhere beyond, from `near_m` on the
+    /// separation apart.
+    pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
+            self.near_m = near_m;
+        }
+    }
+
+    /// The relay that was lost last was nearer than the separation, or may have been, unless this one is at `near_m` or beyond.
+    pub(super) const fn near(&mut self, near_m: f32) {
+        self.near_m = near_m;
+    }
+
+    /// Whether that may still be so.
+    pub(super) const fn is_near(&self) -> bool {
+        !self.near_m.is_nan()
+    }
+
+    /// This relay is somewhere now; `is_beyond` says whether that is beyond a limit.
+    pub(super) fn part(&mut self, is_beyond: impl Fn(f32) -> bool) {
+        if is_beyond(self.near_m) {
+            self.near_m = f32::NAN;
         }
     }
 

@@ -59,10 +59,16 @@ impl FenceFollower {
             // As far as this relay has come, not as far as it was asked to.
             let limit_m = self.least(own).min(own.reachable.at_m);
             let separation_m = own.config.separation_m;
-            // What is missing where the neighbour was allowed to come nearer than the separation.
+            // What may be missing where the neighbour was allowed to come nearer than the separation, or was never heard.
             let missing_m = separation_m - self.asked_m.min(self.taken_m).min(separation_m);
             keep_out.raise(Side::Upstream, self.association.node, limit_m + missing_m);
-            keep_out.near |= missing_m > 0.0;
+            if missing_m > 0.0 {
+                keep_out.near(limit_m + missing_m);
+            } else if !self.is_agreed() {
+                keep_out.near(limit_m + separation_m);
+            } else if !self.clear {
+                keep_out.near(self.fence_m);
+            }
         }
         *self = Self {
             keep_out,
@@ -109,7 +115,7 @@ impl FenceFollower {
 
     /// Whether this relay may move across the line as far as this side is concerned.
     pub(super) fn is_clear(&self, own: &Own) -> bool {
-        (self.association.node == 0 || self.clear) && !self.is_held(own) && !self.keep_out.near
+        (self.association.node == 0 || self.clear) && !self.is_held(own) && !self.keep_out.is_near()
     }
 
     /// Whether this relay has to stay where it is across the line, since that may keep the two apart.
@@ -117,9 +123,14 @@ impl FenceFollower {
         self.asked_m < own.config.separation_m
     }
 
-    /// Whether the neighbour was too near when it was switched on, and is to stay near.
-    pub(super) fn is_tight(&self, own: &Own) -> bool {
-        self.is_agreed() && !self.clear && own.is_close(own.target_m() - self.target_m)
+    /// Whether the neighbour may have been too near since it was switched on.
+    pub(super) const fn is_tight(&self) -> bool {
+        self.is_agreed() && !self.clear
+    }
+
+    /// Whether the two are to be closer along x than the separation.
+    pub(super) fn is_close(&self, own: &Own) -> bool {
+        self.is_agreed() && own.is_close(own.target_m() - self.target_m)
     }
 
     /// Agrees to what the neighbour asked, if with `downstream_m` on the other side its two neighbours stay the separation apart.
@@ -133,7 +144,7 @@ impl FenceFollower {
 
     /// How near the neighbour upstream may come at most, m, as far as the one downstream is concerned.
     pub(super) const fn taken_m(&self) -> f32 {
-        if self.keep_out.near || self.is_agreed() && !self.clear {
+        if self.keep_out.is_near() || self.is_agreed() && !self.clear {
             0.0
         } else {
             self.taken_m

@@ -37,7 +37,7 @@
 //! | 11 | The step is the separation. It becomes less when the follower has told, together with the newest fence, that it has arrived across the line, where, and that it agrees: then it is the largest of what is asked for, of what the two places across the line leave to be kept along x, and of what rule 12 asks for. The owner announces a larger one only once it is that far before what it counts on. | the two are the separation apart in space |
 //! | 12 | The steps upstream and downstream of a relay add up to the separation at least: it agrees to no smaller one upstream before, and takes no smaller one downstream after. | relays that are not neighbours are the separation apart along x |
 //! | 13 | A relay that has to move across the line and may not by rule 10, or that started too close to a neighbour that is to be close, has the chain *open*: it says so to both sides, and everybody passes that on. Then all go to places in the same order that are the separation apart along x, and steps are the separation. | there is room to move across the line |
-//! | 14 | From a neighbour that fell silent within the separation along x this relay goes off to the separation, and does not move across the line before. | the silent one may start to move |
+//! | 14 | From a neighbour that fell silent within the separation along x this relay goes off to the separation, and does not move across the line before; nor where it never heard the neighbour, or had not cleared the first fence, before it has gone as far. | where the silent one hovers across the line still counts |
 //!
 //! # Why everybody arrives
 //!
@@ -71,7 +71,7 @@ mod reachable;
 #[cfg(test)]
 mod tests;
 
-use crate::place::{CrossSection, Placement};
+use crate::place::Placement;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
@@ -97,8 +97,6 @@ pub struct Guard {
     born: Instant,
     /// Before the first setpoint: where the relay was reported last.
     found: Option<Placement>,
-    /// Where the relay was across the line when it was reported last.
-    across: CrossSection,
     follower: FenceFollower,
     owner: FenceOwner,
     refused: u32,
@@ -118,7 +116,6 @@ impl Guard {
             jitter,
             born: now,
             found: None,
-            across: CrossSection::on_line(0.0),
             refused: 0,
         }
     }
@@ -145,7 +142,6 @@ impl Guard {
         if !is_placement(place) {
             return bump(&mut self.refused);
         }
-        self.across = place.cross_section();
         let own = &mut self.own;
         if own.setpoint.is_some() {
             own.reachable.report(at, place.x_m, &own.config);
@@ -210,8 +206,9 @@ impl Guard {
         let Some(before) = self.own.setpoint else {
             let found = self.found?;
             self.own.reachable = ReachableInterval::at(found.x_m, now);
-            self.follower.keep_out.begin(found.x_m);
-            self.owner.keep_out.begin(found.x_m);
+            let (x_m, apart) = (found.x_m, self.own.config.separation_m);
+            self.follower.keep_out.begin(x_m, x_m + apart);
+            self.owner.keep_out.begin(x_m, x_m - apart);
             self.own.go(found, now);
             return self.own.setpoint;
         };
@@ -246,21 +243,17 @@ impl Guard {
 
     /// Who has come up to the limit that a lost neighbour leaves is as far from it as it has to be.
     fn clear_near(&mut self) {
-        let reachable = &self.own.reachable;
-        let (follower, owner) = (&mut self.follower.keep_out, &mut self.owner.keep_out);
-        follower.near &= follower
-            .limit_m()
-            .is_some_and(|limit_m| reachable.low_m < limit_m);
-        owner.near &= owner
-            .limit_m()
-            .is_some_and(|limit_m| reachable.high_m > limit_m);
+        let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
+        self.follower.keep_out.part(|near_m| low_m >= near_m);
+        self.owner.keep_out.part(|near_m| high_m <= near_m);
     }
 
     /// Whether the chain is to open, which each relay passes on away from whoever needs it.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let waits = !clear && !own.is_across();
-        let tight = self.follower.is_tight(own) || self.owner.is_tight(own);
+        let close = self.follower.is_close(own) || self.owner.is_close(own);
+        let tight = close && (self.follower.is_tight() || self.owner.is_tight());
         let needs = tight || waits && (self.follower.is_held(own) || self.owner.holds(own));
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         own.open = needs || up.opens || down.opens;
@@ -310,7 +303,8 @@ impl Guard {
                 !own.open
                     && (target.x_m - setpoint.x_m).abs() <= own.config.rounding()
                     && own.reachable.is_still()
-                    && own.is_near(self.across, target.cross_section())
+                    && own.is_across()
+                    && own.still
             }
             _ => false,
         }

@@ -53,7 +53,7 @@ impl Own {
     }
 
     /// Whether `is` is `to_be` but for what a relay hovers off.
-    pub(super) fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
+    fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
         let most = self.config.hover_m + self.config.rounding();
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most
     }

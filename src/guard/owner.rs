@@ -64,7 +64,11 @@ impl FenceOwner {
         if self.association.node != 0 {
             let limit_m = self.most(own, own.config.separation_m);
             keep_out.raise(Side::Downstream, self.association.node, limit_m);
-            keep_out.near |= self.holds(own);
+            if !self.is_ordered(own) {
+                keep_out.near(limit_m - own.config.separation_m);
+            } else if self.holds(own) || !self.clear {
+                keep_out.near(limit_m);
+            }
         }
         *self = Self {
             keep_out,
@@ -140,12 +144,17 @@ impl FenceOwner {
 
     /// Whether this relay may move across the line as far as this side is concerned.
     pub(super) fn is_clear(&self, own: &Own) -> bool {
-        (self.association.node == 0 || self.clear) && !self.holds(own) && !self.keep_out.near
+        (self.association.node == 0 || self.clear) && !self.holds(own) && !self.keep_out.is_near()
     }
 
-    /// Whether the neighbour was too near when it was switched on, and is to stay near.
-    pub(super) fn is_tight(&self, own: &Own) -> bool {
-        self.is_heard() && !self.clear && own.is_close(self.target_m - own.target_m())
+    /// Whether the neighbour may have been too near since it was switched on.
+    pub(super) const fn is_tight(&self) -> bool {
+        self.is_heard() && !self.clear
+    }
+
+    /// Whether the two are to be closer along x than the separation.
+    pub(super) fn is_close(&self, own: &Own) -> bool {
+        self.is_heard() && own.is_close(self.target_m - own.target_m())
     }
 
     /// Whether there is nothing that the neighbour still has to hear of, or to do.

@@ -1,5 +1,6 @@
 //! What a relay is and flies, as every layer is handed it, and what a layer asks of the others.
 
+use super::retransmit::Trip;
 use super::timing::{longest_lease, tenths};
 use super::view::electorate::Held;
 use crate::mission::{Band, Heading, Mission};
@@ -110,6 +111,34 @@ impl<'a> Context<'a> {
 
     pub(crate) fn is_last(&self) -> bool {
         self.mission().after(self.index()).is_none()
+    }
+
+    /// The way of a pass from here to the last relay of the view.
+    pub(crate) fn way_onward(&self) -> Trip {
+        let mission = self.mission();
+        self.way(match mission.heading() {
+            Heading::TowardRx => mission.relays().saturating_sub(self.index()),
+            Heading::TowardTx => self.index().saturating_sub(1),
+        })
+    }
+
+    /// The way of what came of it from here to the leader.
+    pub(crate) fn way_back(&self) -> Trip {
+        let relays = self.mission().relays();
+        self.way(
+            relays
+                .saturating_sub(self.way_onward().hops)
+                .saturating_sub(1),
+        )
+    }
+
+    /// One of so many hops, on which nobody computes.
+    pub(crate) const fn way(&self, hops: u16) -> Trip {
+        Trip {
+            hop_time: self.member.settings.hop_time,
+            hops,
+            slow: false,
+        }
     }
 
     /// Whether a neighbour may stand at `place`.

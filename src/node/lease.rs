@@ -8,6 +8,7 @@
 //! | --- | --- | --- |
 //! | leader | it is time, and none is under way | a pulse: hand it on |
 //! | any | the next pulse | the lease counts from when it handed on the one before; hand it on |
+//! | any | the first ones, each with more than twice the span of the one before | no lease yet: it would not last until the one after |
 //! | any | the same again | say whether it has come back |
 //! | last | a pulse | it has come back: say so |
 //! | any | it has come back | say so; at the leader the lease counts from when it began, and the next one is due after a period |
@@ -18,15 +19,14 @@
 //! Who votes for a view without members of this one says until when they may hold it, span after it last said so; that is never
 //! before r lets go.
 //!
-//! The span is `dead_after`, or four times as long as a pulse took lately and two periods, at most eight times `dead_after`: where many
+//! The span is `dead_after`, or three times as long as a pulse took lately and two periods, at most eight times `dead_after`: where many
 //! frames are lost a silence says less. The period from one to the next is half of `probe_after`, or twice as
 //! long as a pulse takes, up to a quarter of `dead_after`.
 
 use super::context::{Context, Effects};
-use super::retransmit::{Retransmit, Trip};
+use super::retransmit::{Again, Retransmit};
 use super::timing::{PAUSE, earliest, longest_lease, tenths};
 use super::view::electorate::Held;
-use crate::mission::Heading;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
@@ -179,10 +179,16 @@ impl Lease {
             match pulse.number.wrapping_sub(current.number) {
                 0 => {
                     self.due.back = true;
+                    if current.done.is_some() {
+                        self.retransmit.asked(context.now, context.way_back());
+                    } else {
+                        let hop_time = context.settings().hop_time;
+                        self.retransmit.came_again(context.now, hop_time);
+                    }
                     return Effects::REPEATED;
                 }
                 1 if current.done.is_some() => {
-                    self.grant(context.now, current);
+                    self.grant(context.now, current, pulse.lease);
                     effects.heard_back = current.done;
                 }
                 // The leader has begun anew, or this relay was not asked for long.
@@ -194,8 +200,13 @@ impl Lease {
         effects
     }
 
-    /// All took part in `pulse`; so long ago, perhaps, that the lease has run out since.
-    fn grant(&mut self, now: Instant, pulse: Current) {
+    /// All took part in `pulse`; so long ago, perhaps, that the lease has run out since. `next` is the span of the one after.
+    ///
+    /// Where that is more than twice as long, the first ones were too short: the lease would run out before it could be renewed.
+    fn grant(&mut self, now: Instant, pulse: Current, next: u16) {
+        if self.state == LeaseState::Open && next / 2 > pulse.span {
+            return;
+        }
         let until = pulse.handed_on + from_tenths(pulse.span);
         if until > now {
             let until = self.until().map_or(until, |at| at.max(until));
@@ -210,8 +221,7 @@ impl Lease {
             handed_on: context.now,
             done: None,
         });
-        self.retransmit.heard();
-        self.retransmit.stop();
+        self.retransmit.begin();
         self.due = LeaseDue::default();
         if context.is_last() {
             self.finish(context);
@@ -228,7 +238,7 @@ impl Lease {
         current.done = Some(context.now);
         let current = *current;
         self.relied_on = self.relied_on.max(context.now + from_tenths(current.span));
-        self.retransmit.stop();
+        self.retransmit.answered(context.now, context.way_back());
         if !context.leads() {
             self.due.back = true;
             return;
@@ -237,12 +247,13 @@ impl Lease {
         let period = self.period(context.settings());
         // The first two follow each other at once: nobody else has a lease before the second.
         let first = self.state == LeaseState::Open;
-        self.grant(context.now, current);
         let took = context.now.since(current.handed_on);
-        // A run of lost frames is remembered for some minutes.
-        let part = self.slowest.as_micros() / 64;
+        // A run of lost frames is remembered for a minute or two.
+        let part = self.slowest.as_micros() / 32;
         let lately = self.slowest.as_micros().saturating_sub(part);
         self.slowest = took.max(Duration::from_micros(lately));
+        let next = self.given(context.settings());
+        self.grant(context.now, current, next);
         let soon = context.now + PAUSE;
         let paced = current.handed_on + period;
         self.next_at = Some(if first { soon } else { paced.max(soon) });
@@ -257,7 +268,7 @@ impl Lease {
 
     /// What the leader gives the others, in tenths of a second.
     fn given(&self, settings: &Settings) -> u16 {
-        let slow = self.slowest.times(4).as_micros();
+        let slow = self.slowest.times(3).as_micros();
         let wanted = slow.saturating_add(self.period(settings).times(2).as_micros());
         let most = longest_lease(settings);
         let span = Duration::from_micros(wanted)
@@ -276,8 +287,7 @@ impl Lease {
         if pulsed.done {
             self.finish(context);
         } else {
-            self.retransmit.heard();
-            self.retransmit.sent(context.now, trip(context));
+            self.retransmit.arrived(context.now, context.way_onward());
         }
         Effects {
             heard_onward: Some(current.handed_on),
@@ -288,8 +298,10 @@ impl Lease {
     /// Does what is due: a pulse at the leader, one more time, or nothing any more.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let now = context.now;
-        let resent = self.retransmit.is_due(now);
+        let again = self.retransmit.take_due(now, context.settings().hop_time);
+        let resent = again == Some(Again::Onward);
         self.due.onward |= resent;
+        self.due.back |= again == Some(Again::Back);
         if self.next_at.is_some_and(|at| at <= now) {
             self.next_at = None;
             let number = self.current.map_or(0, |current| current.number);
@@ -314,7 +326,7 @@ impl Lease {
         let current = self
             .current
             .filter(|current| due && current.done.is_none())?;
-        self.retransmit.sent(context.now, trip(context));
+        self.retransmit.sent(context.now, context.way_onward());
         Some(Message::Pulse(Pulse {
             number: current.number,
             mission: context.digest(),
@@ -336,19 +348,5 @@ impl Lease {
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
         let pulse = earliest(self.next_at, self.retransmit.next_timeout());
         earliest(pulse, self.until())
-    }
-}
-
-/// What an answer has to travel: to the last relay of the view and back.
-fn trip(context: &Context<'_>) -> Trip {
-    let mission = context.mission();
-    let hops = match mission.heading() {
-        Heading::TowardRx => mission.relays().saturating_sub(context.index()),
-        Heading::TowardTx => context.index().saturating_sub(1),
-    };
-    Trip {
-        hop_time: context.settings().hop_time,
-        hops,
-        slow: false,
     }
 }

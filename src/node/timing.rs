@@ -14,6 +14,12 @@ pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(LONGEST)
 }
 
+/// How long the first pass may take through a chain of `all` relays and back: where every other frame is lost a hop takes some ten times as
+/// long as it can, either way.
+pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
+    settings.hop_time.times(24 * u32::from(all))
+}
+
 /// Tenths of a second, rounded up.
 pub(crate) fn tenths(span: Duration) -> u16 {
     // In words of 32 bits: nothing else in a relay divides 64 by more than a power of two, and the routine for it takes 900 bytes of flash.

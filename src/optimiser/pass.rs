@@ -16,7 +16,7 @@ use super::spacing::{Hop, Stand, receiver_reach};
 use super::verdict::Verdict;
 use crate::mission::{Heading, Mission, Profile};
 use crate::place::Station;
-use crate::root::sqrt;
+use crate::root::sqrt_in_place;
 use crate::sir::{Sender, square};
 
 /// Points of a field that are looked at in one call: for as many targets as that makes, and one at least.
@@ -188,7 +188,7 @@ impl Link<'_> {
             // Cut at 1e9 m, as the last hop toward Rx: an infinite slack would not be sent.
             let squared = (mission.tx_gain().value() * quiet / target).min(1e18) - beyond;
             // Where no place is near enough, by how much the square is negative: it stays continuous in the target.
-            Some(place - sqrt(squared.abs()).copysign(squared))
+            Some(place - sqrt_in_place(squared.abs()).copysign(squared))
         };
         let heard = Heard::new(mission, self.measured_per_w);
         let here = value(reach, heard.quiet(reach))?;

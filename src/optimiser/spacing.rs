@@ -38,7 +38,7 @@
 
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Station};
-use crate::root::sqrt;
+use crate::root::{sqrt, sqrt_in_place};
 use crate::sir::{Sender, square};
 
 /// Where the relay before on the pass is to stand.
@@ -170,7 +170,7 @@ impl Hop {
         if discriminant < 0.0 && c < 0.0 {
             return None;
         }
-        let r = sqrt(discriminant);
+        let r = sqrt_in_place(discriminant);
         let d = if ahead { c / (u + r) } else { (r - u) / e };
         if !(d >= self.least_step) {
             return None;
@@ -286,7 +286,7 @@ impl Hop {
         if discriminant < 0.0 {
             return None;
         }
-        let r = sqrt(discriminant);
+        let r = sqrt_in_place(discriminant);
         let d = if u >= 0.0 {
             (square(u) + h) / (u + r)
         } else {

@@ -28,7 +28,7 @@ fn one_that_comes_back_between_two_that_closed_up_gets_its_place() {
             let expected = undisturbed(&setup);
             setup.kills.push((silent, seconds(150)));
             setup.boots.push((silent, seconds(150 + off)));
-            go_on_until(&mut setup, seconds(150 + off + 240));
+            end_at(&mut setup, seconds(150 + off + 240));
             let outcome = run(setup).unwrap();
             let nearest = outcome.nearest;
             assert!(
@@ -54,7 +54,7 @@ fn while_two_are_in_the_wrong_order_all_stay() {
         let flight = setup.flight.as_mut().unwrap();
         flight.start.swap(first, first + 1);
         let before: Vec<f64> = flight.start.iter().map(|at| at[0]).collect();
-        go_on_until(&mut setup, seconds(400));
+        end_at(&mut setup, seconds(400));
         let outcome = run(setup).unwrap();
         assert!(outcome.nearest_m() >= floor_m(1), "{:?}", outcome.nearest);
         let ends = ends(&outcome);

@@ -1,7 +1,8 @@
 //! Places that were agreed closer to each other along the line than the separation.
 
+use host_tests::flights::with_room;
 use rand::SeedableRng;
-use uav_relay::{Band, Duration, Method, Placement};
+use uav_relay::{Duration, Method, Placement};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random::joint::in_space;
 use uav_relay_sim::simulator::chain::run;
@@ -26,21 +27,10 @@ fn drones_get_to_places_that_are_closer_along_x() {
         let Some((mission, profiles)) = of_link(&scene.link, 1e-4) else {
             continue;
         };
-        let corridor = scene.corridor;
-        let config = MissionConfig {
-            band: Band {
-                least_m: corridor.least_m as f32,
-                most_m: corridor.most_m as f32,
-            },
-            lateral: Band {
-                least_m: corridor.left_m as f32,
-                most_m: corridor.right_m as f32,
-            },
-            ..*mission.config()
-        };
-        let Ok(mission) = Mission::try_new(config) else {
+        let Some(mission) = with_room(mission.config(), scene.corridor) else {
             continue;
         };
+        let config = *mission.config();
         let mut setup = Setup::on_shared_channel(mission);
         setup.profiles = profiles;
         setup.settings.method = Method::Joint;
@@ -74,7 +64,7 @@ fn drones_get_to_places_that_are_closer_along_x() {
         let step = Duration::from_millis(200);
         setup.flight = Some(FlightSpec::exact(start, speed_mps, step));
         setup.settings.guard = Some(GuardConfig::of(&mission, config.common));
-        go_on_until(&mut setup, seconds(2_000));
+        end_at(&mut setup, seconds(2_000));
         let outcome = run(setup).unwrap();
         let ends = places(&outcome);
         let nearest_m = outcome.nearest_m();

@@ -26,7 +26,7 @@ fn across(room: bool) -> [Vec<[f32; 2]>; 2] {
             from: seconds(60),
             until: Some(seconds(120)),
         });
-        go_on_until(&mut setup, end);
+        end_at(&mut setup, end);
         let outcome = run(setup).unwrap();
         assert!(outcome.nearest_m() >= floor_m(1), "{:?}", outcome.nearest);
         assert_eq!(outcome.unsafe_setpoints, 0);

@@ -8,11 +8,11 @@ mod cuts;
 mod leave;
 mod storms;
 
-use host_tests::fixtures::mission;
+use host_tests::flights::{eight_apart, end_at, in_a_row, seconds};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use uav_relay::Instant;
 use uav_relay::guard::config::GuardConfig;
-use uav_relay::{Instant, Mission, MissionConfig};
 use uav_relay_sim::simulator::drones::FlightSpec;
 use uav_relay_sim::simulator::outcome::{Outcome, Turning};
 use uav_relay_sim::simulator::setup::{Partition, Setup};
@@ -28,24 +28,14 @@ const ROUNDING_M: f64 = 2e-3;
 
 /// Eight drones in order along x that know it, on one radio channel.
 fn eight(rng: &mut ChaCha8Rng) -> Setup {
-    let config = MissionConfig {
-        min_separation_m: SEPARATION_M as f32,
-        ..*mission(8).config()
-    };
-    let mission = Mission::try_new(config).unwrap();
+    let mission = eight_apart(SEPARATION_M as f32);
     let mut setup = Setup::on_shared_channel(mission);
-    let guard = GuardConfig::of(&mission, config.common);
+    let guard = GuardConfig::of(&mission, mission.config().common);
     setup.settings.guard = Some(GuardConfig {
         hover_m: NOISE_M as f32,
         ..guard
     });
-    let mut x_m = 0.0;
-    let start = (0..8)
-        .map(|_| {
-            x_m += SEPARATION_M + 2.0 * (BIAS_M + NOISE_M) + rng.random_range(0.0..60.0_f64);
-            [x_m, 0.0, 20.0]
-        })
-        .collect();
+    let start = in_a_row(rng, SEPARATION_M + 2.0 * (BIAS_M + NOISE_M));
     setup.flight = Some(FlightSpec::multicopters(start, BIAS_M, NOISE_M));
     setup.seed = rng.random();
     setup
@@ -57,21 +47,6 @@ fn eight(rng: &mut ChaCha8Rng) -> Setup {
 /// the noise besides: in flight, or hovering where it said it was when it was switched on, as much again each time.
 fn floor_m(starts: usize) -> f64 {
     SEPARATION_M - 2.0 * BIAS_M - 2.0 * starts as f64 * NOISE_M - ROUNDING_M
-}
-
-const fn seconds(seconds: u64) -> Instant {
-    Instant::from_millis(1_000 * seconds)
-}
-
-/// Has the run go on until `at`, whatever comes of it before.
-fn go_on_until(setup: &mut Setup, at: Instant) {
-    // Nobody is beyond the last relay, so nobody is parted.
-    setup.partitions.push(Partition {
-        after: setup.mission.relays(),
-        from: at,
-        until: None,
-    });
-    setup.deadline = at;
 }
 
 /// When all eight have come to the view that they are in at the end, if that is one of all.

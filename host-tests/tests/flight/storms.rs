@@ -78,7 +78,7 @@ fn storm(seed: u64) -> Setup {
         let guard = setup.settings.guard;
         setup.settings.guard = guard.map(|guard| guard.with_room_for(leaves));
     }
-    go_on_until(&mut setup, seconds(STORM_S + 60));
+    end_at(&mut setup, seconds(STORM_S + 60));
     setup
 }
 

@@ -8,6 +8,7 @@
 //! | reports off by | 0 in 70 %; else up to a twentieth of the separation |
 //! | start and agreed places | anywhere across the line; in order, the separation apart along x, crowded at Tx, at Rx, in the middle, or spread |
 //! | neighbours | closer along x than the separation in half of the agreements, by where they are across the line |
+//! | agreements, too | 40 s before and some seconds after a relay is linked around: closer neighbours, and others |
 //! | agreements | 0 to 6 in 200 s, each heard by a relay with 80 %, up to 60 s late; 20 % closer along x than the separation |
 //! | speed | changes every 20 s on average, 0 in 25 %, else 1 m/s to 40 m/s |
 //! | acceleration | without a limit in 50 %, else 4 m/s^2 to 40 m/s^2 |
@@ -165,8 +166,13 @@ fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize) -> Vec<Po
 }
 
 /// The same with half of the neighbours closer along x, and the separation apart in space: relays that are not neighbours stay that far
-/// apart along x.
-fn closer(rng: &mut ChaCha8Rng, confines: &GuardConfig, mut at: Vec<Point>) -> Vec<Point> {
+/// apart along x. Where `wild`, they do not: some take turns at two places across the line.
+fn closer(
+    rng: &mut ChaCha8Rng,
+    confines: &GuardConfig,
+    mut at: Vec<Point>,
+    wild: bool,
+) -> Vec<Point> {
     let rounding = 5e-7 * f64::from(confines.fence.most_x_m);
     let apart = 1.0001 * f64::from(confines.separation_m) + rounding;
     let fence = confines.fence;
@@ -178,7 +184,7 @@ fn closer(rng: &mut ChaCha8Rng, confines: &GuardConfig, mut at: Vec<Point>) -> V
     for k in 1..at.len() {
         let [x, y, h] = at[k - 1];
         let most = (at[k][0] - x).min(apart);
-        let least = (apart - before).max(0.0);
+        let least = if wild { 0.0 } else { (apart - before).max(0.0) };
         before = at[k][0] - x;
         if rng.random_bool(0.5) || least >= most {
             continue;
@@ -191,7 +197,10 @@ fn closer(rng: &mut ChaCha8Rng, confines: &GuardConfig, mut at: Vec<Point>) -> V
         let aside = (apart * apart - step * step).max(0.0).sqrt();
         let turn = rng.random_range(0.0..=std::f64::consts::TAU);
         let (y, h) = (y + aside * turn.sin(), h + aside * turn.cos());
-        if inside(y, h) {
+        if wild && k > 1 && rng.random_bool(0.5) {
+            at[k] = [x + step, at[k - 2][1], at[k - 2][2]].map(|part| f64::from(part as f32));
+            before = step;
+        } else if inside(y, h) {
             at[k] = [x + step, y, h].map(|part| f64::from(part as f32));
             before = step;
         }
@@ -212,7 +221,23 @@ fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     };
     let mut plan = agreements(rng, world);
     plan.extend(speeds(rng, world.drones.len()));
-    plan.extend(troubles(rng, world.drones.len()));
+    let troubles = troubles(rng, world.drones.len());
+    let around_s: Vec<f64> = troubles
+        .iter()
+        .filter(|(_, what)| matches!(what, What::Around(..)))
+        .map(|(at_s, _)| *at_s)
+        .collect();
+    // Who is left agrees on other places: first they were close to the one that fell silent, then they are not.
+    for at_s in around_s {
+        let before = places(rng, &world.confines, world.drones.len());
+        let before = closer(rng, &world.confines, before, false);
+        let after = places(rng, &world.confines, world.drones.len());
+        for (k, (before, after)) in before.into_iter().zip(after).enumerate() {
+            plan.push((at_s - 40.0, What::Hear(k, before)));
+            plan.push((at_s + rng.random_range(0.0..=5.0), What::Hear(k, after)));
+        }
+    }
+    plan.extend(troubles);
     plan.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut plan = plan.into_iter().peekable();
     while world.now_s < ROUGH_S {
@@ -236,7 +261,8 @@ fn agreements(rng: &mut ChaCha8Rng, world: &World) -> Vec<(f64, What)> {
         }
         let mut agreed = places(rng, &confines, world.drones.len());
         if rng.random_bool(0.5) {
-            agreed = closer(rng, &world.confines, agreed);
+            let wild = rng.random_bool(0.3);
+            agreed = closer(rng, &world.confines, agreed, wild);
         }
         for (k, at) in agreed.into_iter().enumerate() {
             if rng.random_bool(0.8) {
@@ -377,7 +403,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
         .collect();
     let mut targets = places(rng, &world.confines, left.len());
     if rng.random_bool(0.5) {
-        targets = closer(rng, &world.confines, targets);
+        targets = closer(rng, &world.confines, targets, false);
         let apart_m = f64::from(world.confines.separation_m);
         let steps = targets.windows(2).map(|pair| pair[1][0] - pair[0][0]);
         report.close += steps.filter(|step| *step < 0.99 * apart_m).count() as u64;

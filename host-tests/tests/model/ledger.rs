@@ -96,7 +96,8 @@ impl Signs {
         }
     }
 
-    /// An answer is a sign of when its question was asked; what comes back of a pulse, of when that was handed on.
+    /// An answer is a sign of when its question was asked; what comes back of a pulse or a pass, of when that was handed on; and the next
+    /// one, of when what came back of the last was.
     fn heard(&mut self, message: &Message, tick: Duration, now: Instant) {
         match message {
             Message::Heartbeat { answer, .. } => {
@@ -113,11 +114,17 @@ impl Signs {
                     self.open = 0;
                 }
             }
-            Message::Pulse(_) | Message::Pulsed(_) => {
+            Message::Hello(_)
+            | Message::Busy { .. }
+            | Message::Fence { .. }
+            | Message::Proposal(_)
+            | Message::Decision(_)
+            | Message::Offer { .. } => {}
+            // A pulse, a pass, or what came of one.
+            _ => {
                 (self.last, self.perhaps) = (now, now);
                 self.perhaps_open = 0;
             }
-            _ => {}
         }
     }
 

@@ -2,9 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::Duration;
 use uav_relay::guard::config::GuardConfig;
-use uav_relay_sim::simulator::drones::FlightSpec;
 
 use super::*;
 
@@ -16,23 +14,10 @@ const ROUNDING_M: f64 = 2e-3;
 /// Eight drones that take off close to each other, and a new mission while they are under way or hover.
 fn flight(seed: u64) -> (Setup, MissionConfig) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let config = MissionConfig {
-        min_separation_m: SEPARATION_M,
-        ..*mission(8).config()
-    };
-    let base = Mission::try_new(config).unwrap();
+    let base = eight_apart(SEPARATION_M);
     let mut setup = signed(base, true);
-    setup.settings.guard = Some(GuardConfig::of(&base, config.common));
-    let mut x_m = 0.0;
-    let start = (0..8)
-        .map(|_| {
-            x_m += f64::from(SEPARATION_M) + 0.01 + rng.random_range(0.0..60.0_f64);
-            [x_m, 0.0, 20.0]
-        })
-        .collect();
-    let speed_mps = (0..8).map(|_| rng.random_range(0.5..15.0)).collect();
-    let step = Duration::from_millis(200);
-    setup.flight = Some(FlightSpec::exact(start, speed_mps, step));
+    setup.settings.guard = Some(GuardConfig::of(&base, base.config().common));
+    setup.flight = Some(exact(&mut rng, f64::from(SEPARATION_M) + 0.01));
     setup.seed = rng.random();
     setup.faults.loss = rng.random_range(0.0..0.4);
     let config = moved(

@@ -11,6 +11,7 @@ mod schedules;
 use std::collections::{BTreeMap, BTreeSet};
 
 use host_tests::fixtures::mission;
+use host_tests::flights::{bad_day, eight_apart, exact, own_profiles, seconds};
 use uav_relay::{Instant, Interference, Interferer, Mission, MissionConfig, Side, Upload};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, Turning};
@@ -52,10 +53,6 @@ fn upload(
         at,
         upload: Upload::new(base, version, config).unwrap(),
     }
-}
-
-const fn seconds(seconds: u64) -> Instant {
-    Instant::from_millis(1_000 * seconds)
 }
 
 /// Holds a run to what must be true of any: who agrees to a view flies the mission that all others in it fly, and only once as many

@@ -2,9 +2,8 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::{Duration, Profile};
+use uav_relay::Duration;
 use uav_relay_oracle::random::seed;
-use uav_relay_sim::simulator::faults::Faults;
 
 use super::*;
 
@@ -31,25 +30,8 @@ fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let shared = rng.random_bool(0.8);
     let base = mission(8);
     let mut setup = signed(base, shared);
-    if rng.random_bool(0.3) {
-        setup.profiles = (1..=8)
-            .map(|index| {
-                let power_w = rng.random_range(0.5..2.0);
-                let altitude_m = rng.random_range(15.0..40.0);
-                let own = Profile {
-                    altitude_m,
-                    power_w,
-                };
-                (index, own)
-            })
-            .collect();
-    }
-    setup.faults = Faults {
-        loss: rng.random_range(0.0..=0.5),
-        corrupt: rng.random_range(0.0..=0.2),
-        duplicate: rng.random_range(0.0..=0.2),
-        reorder: rng.random_range(0.0..=0.2),
-    };
+    setup.profiles = own_profiles(rng);
+    setup.faults = bad_day(rng);
     setup.settings.predict = rng.random_bool(0.7);
     let keeps = [0.0, 0.5, 1.0][rng.random_range(0..3)];
     setup.forgetful = (1..=8).filter(|_| !rng.random_bool(keeps)).collect();

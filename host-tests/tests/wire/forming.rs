@@ -8,8 +8,8 @@ use uav_relay::{
 };
 
 use super::codec::{Call, Decided, Greeting, Proposed, Said, SizedView, plain, wire};
+use super::kinds::{FIRST, framed, one_of_each, sent};
 use super::receive::{counted, relay};
-use super::sequence::{FIRST, framed, one_of_each, sent};
 
 pub(crate) const ASKS: u8 = 1;
 pub(crate) const FORMS: u8 = 2;

@@ -16,8 +16,8 @@ use super::bodies::{
     verdict_on, with, written, zeros,
 };
 use super::codec::{Said, Seats};
+use super::kinds::{FIRST, SECOND, framed, one_of_each, sent, settle, source};
 use super::receive::{FIELD, counted, relay_of};
-use super::sequence::{FIRST, SECOND, framed, one_of_each, sent, settle, source};
 
 fn aside() -> Said {
     Said::Aside {

@@ -8,7 +8,9 @@ use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message};
 
-use super::codec::{self, Call, Decided, Greeting, Proposed, Said, SizedView, Swept};
+use super::codec::{
+    self, Call, Decided, Greeting, Handed, Judged, Proposed, Said, Shifted, SizedView, Swept,
+};
 use super::offer::Offer;
 
 #[derive(Deserialize)]
@@ -155,9 +157,11 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
     some(|said| matches!(said, Said::Sweep(Swept { gap: 255, .. })));
     some(|said| matches!(said, Said::Sweep(sweep) if sweep.anchor == f32::MIN_POSITIVE));
     some(|said| matches!(said, Said::Sweep(sweep) if sweep.anchor == f32::MAX));
-    some(|said| matches!(said, Said::Verdict { commit: None, slacks, .. } if slacks.is_empty()));
     some(
-        |said| matches!(said, Said::Verdict { commit: Some(15), slacks, .. } if slacks.len() == 16),
+        |said| matches!(said, Said::Verdict(Judged { commit: None, slacks, .. }) if slacks.is_empty()),
+    );
+    some(
+        |said| matches!(said, Said::Verdict(Judged { commit: Some(15), slacks, .. }) if slacks.len() == 16),
     );
     some(|said| matches!(said, Said::Busy { .. }));
     some(|said| {
@@ -225,36 +229,36 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
         |said| matches!(said, Said::Gathered(seats) if seats.seats.iter().any(|seat| seat.1 == 0.0)),
     );
     some(|said| matches!(said, Said::Sweep(sweep) if sweep.anchor < 0.0));
-    some(|said| matches!(said, Said::Verdict { stand: None, .. }));
-    some(|said| matches!(said, Said::Verdict { stand: Some(x_m), .. } if *x_m == 0.0));
-    some(|said| matches!(said, Said::Verdict { stand: Some(x_m), .. } if *x_m == 1e6));
-    some(|said| matches!(said, Said::Verdict { own: true, .. }));
-    some(|said| matches!(said, Said::Verdict { own: false, .. }));
-    some(|said| matches!(said, Said::Token { turn: 0, .. }));
-    some(|said| matches!(said, Said::Token { turn: 1, .. }));
+    some(|said| matches!(said, Said::Verdict(Judged { stand: None, .. })));
+    some(|said| matches!(said, Said::Verdict(Judged { stand: Some(x_m), .. }) if *x_m == 0.0));
+    some(|said| matches!(said, Said::Verdict(Judged { stand: Some(x_m), .. }) if *x_m == 1e6));
+    some(|said| matches!(said, Said::Verdict(Judged { own: true, .. })));
+    some(|said| matches!(said, Said::Verdict(Judged { own: false, .. })));
+    some(|said| matches!(said, Said::Token(Handed { turn: 0, .. })));
+    some(|said| matches!(said, Said::Token(Handed { turn: 1, .. })));
     some(|said| {
         matches!(
             said,
-            Said::Token {
+            Said::Token(Handed {
                 turn: 2,
                 columns: 0,
                 ..
-            }
+            })
         )
     });
     some(|said| {
         matches!(
             said,
-            Said::Token {
+            Said::Token(Handed {
                 turn: 2,
                 columns: 2,
                 rows: 255,
                 ..
-            }
+            })
         )
     });
-    some(|said| matches!(said, Said::Moved { any: true, .. }));
-    some(|said| matches!(said, Said::Moved { worst, .. } if *worst == f32::MAX));
+    some(|said| matches!(said, Said::Moved(Shifted { any: true, .. })));
+    some(|said| matches!(said, Said::Moved(Shifted { worst, .. }) if *worst == f32::MAX));
     let longest = |of_four: bool| {
         let known = frames
             .iter()
@@ -274,6 +278,11 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
     const BEFORE: SizedView = SizedView {
         id: MOST.id - 1,
         ..MOST
+    };
+    const LAST: Call = Call {
+        of: (u16::MAX, u16::MAX),
+        view: MOST.id,
+        place: 1000,
     };
     let frames = vectors().frames;
     let some = |what: fn(&Said) -> bool| {
@@ -307,11 +316,7 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
     some(|said| matches!(said, Said::Proposal(proposal) if proposal.successor.is_none()));
     some(|said| {
         matches!(said, Said::Proposal(proposal) if *proposal == Proposed {
-            call: Call {
-                of: (u16::MAX, u16::MAX),
-                view: MOST.id,
-                place: 1000,
-            },
+            call: LAST,
             agreed: BEFORE,
             votes: 1000,
             lease_left: u16::MAX,
@@ -332,11 +337,7 @@ fn the_vectors_hold_every_hello_proposal_and_decision() {
     });
     some(|said| {
         matches!(said, Said::Decision(decision) if *decision == Decided {
-            call: Call {
-                of: (u16::MAX, u16::MAX),
-                view: MOST.id,
-                place: 1000,
-            },
+            call: LAST,
             base: BEFORE,
             view: Some(MOST),
             there: 1000,

@@ -5,8 +5,8 @@ use uav_relay::{Event, Port, Relay, Wiring};
 
 use super::codec::Said;
 use super::forming::{ASKS, FLIES, FORMS, FRESH, READY, between, events, long};
+use super::kinds::{FIRST, one_of_each};
 use super::receive::{counted, relay};
-use super::sequence::{FIRST, one_of_each};
 use super::signed::{Peer, said, with_key};
 use super::uploads::{NOW, held, hello, mission_id, upload};
 

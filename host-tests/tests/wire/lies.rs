@@ -11,7 +11,7 @@ use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::{Instant, Port, Wiring};
 
-use super::codec::{Decided, Proposed, Said, plain, wire};
+use super::codec::{Decided, Fenced, Handed, Judged, Proposed, Said, Shifted, plain, wire};
 use super::config;
 use super::receive::{drain, relay};
 use super::strategies::{messages, sweeps};
@@ -31,15 +31,15 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         Said::Gather(seats) | Said::Gathered(seats) => {
             (seats.number, seats.mission) = (as_number, as_mission);
         }
-        Said::Verdict {
+        Said::Verdict(Judged {
             number, mission, ..
-        }
-        | Said::Token {
+        })
+        | Said::Token(Handed {
             number, mission, ..
-        }
-        | Said::Moved {
+        })
+        | Said::Moved(Shifted {
             number, mission, ..
-        }
+        })
         | Said::Pulse {
             number, mission, ..
         }
@@ -48,7 +48,9 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         } => (*number, *mission) = (as_number, as_mission),
         Said::Busy { number } => *number = as_number,
         // The number of a fence is that of a talk, never 0.
-        Said::Heartbeat { mission, .. } | Said::Fence { mission, .. } => *mission = as_mission,
+        Said::Heartbeat { mission, .. } | Said::Fence(Fenced { mission, .. }) => {
+            *mission = as_mission;
+        }
         Said::Hello(hello) => (hello.newest, hello.mission) = (view(as_number), as_mission),
         // Of a view that flies the mission that was loaded.
         Said::Proposal(proposed) => {

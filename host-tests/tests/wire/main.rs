@@ -6,6 +6,7 @@
 use proptest::test_runner::{Config, RngSeed};
 use uav_relay_oracle::random::seed;
 
+mod anything;
 mod bodies;
 mod codec;
 mod damage;
@@ -14,6 +15,7 @@ mod forming;
 mod gathering;
 mod golden;
 mod ground;
+mod kinds;
 mod ladder;
 mod lies;
 mod offer;

@@ -10,7 +10,10 @@ use super::bodies::{
     ENCODING, HEADER, VALUE, assert_ranges, assert_refused_cut_and_longer, assert_refused_padded,
     single, verdict_on, with, written, zeros,
 };
-use super::codec::{Call, Decided, Greeting, Proposed, Said, SizedView, Swept, plain, sealed};
+use super::codec::{
+    Call, Decided, Greeting, Handed, Judged, Proposed, Said, Shifted, SizedView, Swept, plain,
+    sealed,
+};
 use super::golden::vectors;
 use super::offer::offer;
 
@@ -24,26 +27,26 @@ fn sweep() -> Said {
 }
 
 fn verdict(commit: Option<u8>, slacks: &[f32]) -> Said {
-    Said::Verdict {
+    Said::Verdict(Judged {
         number: 1,
         mission: 2,
         own: false,
         commit,
         slacks: slacks.to_vec(),
         stand: None,
-    }
+    })
 }
 
 /// A verdict with a stand, which is at 10.
 fn stood(x_m: f32) -> Said {
-    Said::Verdict {
+    Said::Verdict(Judged {
         number: 1,
         mission: 2,
         own: false,
         commit: Some(0),
         slacks: Vec::new(),
         stand: Some(x_m),
-    }
+    })
 }
 
 fn measured() -> Said {
@@ -54,7 +57,7 @@ fn measured() -> Said {
 }
 
 fn token(turn: u8, explore_m: f32, columns: u8, rows: u8) -> Said {
-    Said::Token {
+    Said::Token(Handed {
         number: 1,
         mission: 2,
         x_m: 100.0,
@@ -65,18 +68,18 @@ fn token(turn: u8, explore_m: f32, columns: u8, rows: u8) -> Said {
         columns,
         rows,
         sir: 1.5,
-    }
+    })
 }
 
 fn moved() -> Said {
-    Said::Moved {
+    Said::Moved(Shifted {
         number: 1,
         mission: 2,
         x_m: 100.0,
         altitude_m: 20.0,
         any: false,
         worst: 1.5,
-    }
+    })
 }
 
 const HELLO: Greeting = Greeting {

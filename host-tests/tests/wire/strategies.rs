@@ -7,7 +7,8 @@ use proptest::prelude::*;
 use uav_relay::wire::frame::Header;
 
 use super::codec::{
-    Call, Decided, Greeting, Proposed, Said, Seats, SizedView, Swept, plain, sealed, targets, wire,
+    Call, Decided, Fenced, Greeting, Handed, Judged, Proposed, Said, Seats, Shifted, SizedView,
+    Swept, plain, sealed, targets, wire,
 };
 use super::offered::{NUMBERS, offers};
 
@@ -217,7 +218,7 @@ fn tokens() -> BoxedStrategy<Said> {
                 (turn, explore_m, columns, rows),
                 sir,
             )| {
-                Said::Token {
+                Said::Token(Handed {
                     number,
                     mission,
                     x_m,
@@ -228,7 +229,7 @@ fn tokens() -> BoxedStrategy<Said> {
                     columns,
                     rows,
                     sir,
-                }
+                })
             },
         )
         .boxed()
@@ -237,16 +238,16 @@ fn tokens() -> BoxedStrategy<Said> {
 fn moves() -> BoxedStrategy<Said> {
     let numbers = (any::<u16>(), any::<u16>());
     (numbers, along(), altitudes(), any::<bool>(), sirs())
-        .prop_map(
-            |((number, mission), x_m, altitude_m, any, worst)| Said::Moved {
+        .prop_map(|((number, mission), x_m, altitude_m, any, worst)| {
+            Said::Moved(Shifted {
                 number,
                 mission,
                 x_m,
                 altitude_m,
                 any,
                 worst,
-            },
-        )
+            })
+        })
         .boxed()
 }
 
@@ -345,8 +346,8 @@ fn formings() -> BoxedStrategy<Said> {
         [-1e7, -1e7, -1e7, -1e7, 0.0].map(metres),
         0_u8..16,
     )
-        .prop_map(
-            |(number, [mission, echo, fence], places, flags)| Said::Fence {
+        .prop_map(|(number, [mission, echo, fence], places, flags)| {
+            Said::Fence(Fenced {
                 number,
                 mission,
                 echo,
@@ -359,8 +360,8 @@ fn formings() -> BoxedStrategy<Said> {
                     places[4].min(1e5),
                 ],
                 flags,
-            },
-        );
+            })
+        });
     prop_oneof![hello, proposal, decision, fence].boxed()
 }
 
@@ -394,16 +395,16 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         vec(metres(-2e9), 0..=16),
         proptest::option::of(along()),
     )
-        .prop_map(
-            |(number, mission, own, commit, slacks, stand)| Said::Verdict {
+        .prop_map(|(number, mission, own, commit, slacks, stand)| {
+            Said::Verdict(Judged {
                 number,
                 mission,
                 own,
                 commit,
                 slacks,
                 stand,
-            },
-        );
+            })
+        });
     prop_oneof![
         3 => sweeps(0),
         3 => verdicts,

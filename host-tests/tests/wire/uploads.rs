@@ -11,9 +11,9 @@ use super::codec::{Greeting, Said};
 use super::forming::{
     ASKS, FLIES, FORMS, FRESH, events, granted, hearing, id, long, mark, proposed,
 };
+use super::kinds::{FIRST, framed, one_of_each, sent};
 use super::offer::{KEPT, Offer, offer};
 use super::receive::{FIELD, counted, relay};
-use super::sequence::{FIRST, framed, one_of_each, sent};
 use super::signed::{Peer, said, set, with_key};
 
 pub(crate) const NOW: Instant = Instant::ZERO;

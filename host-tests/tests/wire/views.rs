@@ -7,8 +7,8 @@ use super::codec::{Proposed, Said, SizedView};
 use super::forming::{
     ASKS, FORMS, FRESH, a_hello, events, granted, hearing, id, long, mark, proposed, soon,
 };
+use super::kinds::{FIRST, framed, one_of_each, sent};
 use super::receive::{counted, relay};
-use super::sequence::{FIRST, framed, one_of_each, sent};
 
 /// Relay `own` of 8 with its part in `view`, which relay `own` - 1 has handed it as one of eight; it has nothing to say.
 fn in_view(own: u16, view: u32) -> (Relay, u16) {

@@ -81,7 +81,9 @@ impl Node {
         let settings = &self.member.settings;
         let far = self.layers.neighbours.at(side.other());
         let distance = beyond.abs_diff(own);
-        there && (far.is_two_way(distance, now, settings) || far.comes_along(distance))
+        // Of two links that cross the one that ends nearest to Rx is given up.
+        let crosses = side == Side::Downstream && far.goes_past(distance);
+        there && (far.is_two_way(distance, now, settings) || far.comes_along(distance) || crosses)
     }
 
     /// How many relays there are on that side in the part of the chain that this relay is in, as it was counted last.

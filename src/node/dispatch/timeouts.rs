@@ -2,7 +2,7 @@
 
 use super::state::Node;
 use crate::event::About;
-use crate::settings::Settings;
+use crate::node::timing::first_pass;
 use crate::side::Side;
 use crate::time::Instant;
 
@@ -130,12 +130,10 @@ impl Node {
 
     /// By when the first pass should have come, were this the beginning.
     pub(super) fn await_first(&mut self, now: Instant) {
-        let Settings {
-            hop_time,
-            probe_after,
-            ..
-        } = self.member.settings;
-        let first = hop_time.times(2 * u32::from(self.member.all));
-        self.layers.view.await_first(now + probe_after + first);
+        let (settings, all) = (&self.member.settings, self.member.all);
+        let there_and_back = settings.hop_time.times(2 * u32::from(all));
+        let usual = now + settings.probe_after + there_and_back;
+        let slow = now + first_pass(settings, all);
+        self.layers.view.await_first(usual.max(slow));
     }
 }

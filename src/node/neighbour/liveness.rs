@@ -1,7 +1,7 @@
 //! When a neighbour counts as lost.
 //!
-//! A sign of life answers something that this relay said: a heartbeat with the number of its question, or what comes back of a pulse. It counts
-//! from when that was said, so what was recorded and is played later is none. After `Settings::probe_after` without one, or the time that a
+//! A sign of life answers something that this relay said: a heartbeat with the number of its question, what comes back of a pulse or of a
+//! pass, or the next one. It counts from when that was said, so what was recorded and is played later is none. After `Settings::probe_after` without one, or the time that a
 //! message takes through the whole chain and back where that is longer, the neighbour is asked again and again. It is lost once all of this holds:
 //!
 //! | | lost not before | because |
@@ -96,6 +96,11 @@ impl Liveness {
             longest: self.longest.max(self.unanswered),
             ..Self::new(now)
         };
+    }
+
+    /// When it is known to have been there, or when this relay was switched on.
+    pub(crate) const fn heard(&self) -> Instant {
+        self.heard
     }
 
     /// Whether it has been heard and is not lost.

@@ -9,7 +9,9 @@
 //!
 //! A span is `dead_after` less `probe_after`, or as long as a run of lost frames may be by what the channel has shown. A node that has been taken is paired with until it says that it has taken this relay, too.
 //! A node that takes another one is not taken. *Better* is a nearer node that has somebody beyond it who hears it, and a farther one by which more
-//! relays hang together: then the link that is missing is on the other side of the node taken, and it is left out.
+//! relays hang together: then the link that is missing is on the other side of the node taken, and it is left out. Where two links cross, as
+//! 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other, neither of the two parts could go on: of them that of the node nearest to Rx is
+//! given up, 4 takes 3, and 2 is left out.
 //!
 //! While it searches, it sends hellos to the four nearest nodes there: as many as three relays in a row may be lost at once. In a hold-down
 //! a node has to be heard all through: `probe_after` at first; after a fourth loss on that side `dead_after`, and twice as long after every
@@ -20,7 +22,7 @@
 use super::liveness::{Liveness, patience, tick};
 use crate::jitter::Jitter;
 use crate::node::context::Proposer;
-use crate::node::timing::longest_lease;
+use crate::node::timing::{first_pass, longest_lease};
 use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
@@ -247,7 +249,8 @@ impl Neighbour {
             // Where others may have closed up since, it makes itself known soon.
             let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
             let wait = match settings.wiring {
-                Wiring::Pair => patience(settings, all),
+                // The first pass comes without being asked for.
+                Wiring::Pair => patience(settings, all).max(first_pass(settings, all)),
                 Wiring::Shared => soon,
             };
             Some(now + wait)
@@ -315,6 +318,11 @@ impl Neighbour {
     /// Whether the neighbour here is linked, and less than `distance` places away.
     pub(crate) fn comes_along(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_there() && self.distance < distance
+    }
+
+    /// Whether the neighbour here is linked, and more than `distance` places away.
+    pub(crate) fn goes_past(&self, distance: u16) -> bool {
+        self.is_mutual() && self.liveness.is_there() && self.distance > distance
     }
 
     /// Node `distance` places away has said which one it takes on this side, and whether it hears this relay.
@@ -423,7 +431,9 @@ impl Neighbour {
     pub(crate) fn confirmed(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.confirmed(at);
         if self.is_mutual() {
-            let next = (at + self.patience).max(now + self.tick);
+            let next = (self.liveness.heard() + self.patience).max(now + self.tick);
+            // What answers something said long ago is no reason to ask sooner.
+            let next = self.look_at.map_or(next, |at| at.max(next));
             // Another node than before is to be counted once its grace is over.
             let waits = self.node != self.counted && now < self.grace;
             self.look_at = Some(if waits { next.min(self.grace) } else { next });

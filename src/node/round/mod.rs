@@ -9,6 +9,10 @@
 //! | `seats`, `gathering` | what it has to know of the others for that, and the pass that gathers it |
 //! | `turn`, `turning` | a turn of Algorithm 2 |
 //! | `leader`, `task` | what comes before a pass begins: which one, and what for |
+//!
+//! What answers a relay is a sign of life, from when the relay said what is answered: what came of a pass, by the neighbour onward, as of
+//! when the pass was first handed on; the next pass, by the neighbour back, as of when what came of the last one was first handed back. A
+//! leader whose firmware has it begin again does not wait for that: then the sign is too new by one pass at most.
 
 mod chosen;
 mod computation;
@@ -19,14 +23,16 @@ pub(crate) mod state;
 mod sweep;
 mod sweeping;
 mod task;
+#[cfg(test)]
+mod tests;
 mod turn;
 mod turning;
 
 use super::context::{Context, Effects, Member};
-use super::retransmit::{Retransmit, Trip};
+use super::retransmit::{Again, Retransmit, Trip};
 use super::sample::{Meter, Sample};
 use super::timing::{PAUSE, earliest};
-use crate::mission::{Heading, Profile};
+use crate::mission::Profile;
 use crate::place::Placement;
 use crate::settings::Measure;
 use crate::time::Instant;
@@ -50,6 +56,8 @@ pub(crate) struct Round {
     work_at: Option<Instant>,
     due: RoundDue,
     computation: Computation,
+    /// When the current pass was handed onward first, or what came of it was handed back.
+    said_at: Option<Instant>,
 }
 
 impl Round {
@@ -65,6 +73,7 @@ impl Round {
             computation: Computation::new(leads, number, profile, measure),
             retransmit: Retransmit::new(seed),
             work_at: None,
+            said_at: None,
             due: RoundDue {
                 onward: false,
                 back: false,
@@ -76,6 +85,7 @@ impl Round {
     /// A message of the mission and the view that this relay is in, from the neighbour that has it to say. Bounded by 16 reaches.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
+        let (before, said_at) = (computation.state, self.said_at);
         let next = match message {
             Message::Sweep(sweep) => computation.on_sweep(context, sweep),
             Message::Verdict(answer) => computation.on_verdict(context, answer),
@@ -85,21 +95,32 @@ impl Round {
             Message::Moved(moved) if ADJUST => computation.on_moved(context, moved),
             Message::Busy { sweep } => {
                 if computation.phase() == Phase::Waiting && *sweep == computation.number() {
-                    // It has arrived: what is missing is the answer, and that may take its time.
-                    self.retransmit.heard();
-                    self.await_answer(context);
+                    let trip = self.trip(context);
+                    self.retransmit.arrived(context.now, trip);
                 }
                 return Effects::NONE;
             }
             _ => return Effects::NONE,
         };
-        self.proceed(context, next)
+        let state = computation.state;
+        Effects {
+            heard_onward: said_at.filter(|_| state.answers(before)),
+            heard_back: said_at.filter(|_| state.follows(before)),
+            ..self.proceed(context, next)
+        }
     }
 
     /// Does what is due. Bounded by one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
-        let resent =
-            self.retransmit.is_due(context.now) && self.computation.phase() == Phase::Waiting;
+        let hop_time = context.settings().hop_time;
+        let resent = match self.retransmit.take_due(context.now, hop_time) {
+            Some(Again::Onward) => self.computation.phase() == Phase::Waiting,
+            Some(Again::Back) => {
+                self.due.back = true;
+                false
+            }
+            None => false,
+        };
         self.due.onward |= resent;
         if self.work_at.is_none_or(|at| at > context.now) {
             return Effects {
@@ -142,17 +163,20 @@ impl Round {
                     onward: true,
                     ..RoundDue::default()
                 };
-                self.retransmit.heard();
-                self.retransmit.stop();
+                self.retransmit.begin();
                 self.work_at = None;
+                self.said_at = Some(context.now);
                 Effects::NONE
             }
             Action::Busy => {
                 self.due.busy = true;
+                let hop_time = context.settings().hop_time;
+                self.retransmit.came_again(context.now, hop_time);
                 Effects::REPEATED
             }
             Action::Repeat => {
                 self.due.back = true;
+                self.retransmit.asked(context.now, context.way_back());
                 Effects::REPEATED
             }
             Action::Answer { agreed } => {
@@ -160,7 +184,8 @@ impl Round {
                     back: true,
                     ..RoundDue::default()
                 };
-                self.retransmit.stop();
+                self.retransmit.answered(context.now, context.way_back());
+                self.said_at = Some(context.now);
                 // Now that it knows what the others bring along it may have the chain to solve.
                 self.work_at = None;
                 if self.computation.is_solving(context) {
@@ -204,6 +229,7 @@ impl Round {
         self.due = RoundDue::default();
         self.retransmit.stop();
         self.work_at = None;
+        self.said_at = None;
     }
 
     /// The new view is in force, in which this relay `leads` or not, and has something to work out at once or not.
@@ -253,17 +279,15 @@ impl Round {
     }
 
     fn await_answer(&mut self, context: &Context<'_>) {
-        let member = context.member;
-        let hops = match member.mission.heading() {
-            Heading::TowardRx => member.mission.relays().saturating_sub(member.index),
-            Heading::TowardTx => member.index.saturating_sub(1),
-        };
-        let trip = Trip {
-            hop_time: member.settings.hop_time,
-            hops,
-            slow: self.computation.is_slow(),
-        };
+        let trip = self.trip(context);
         self.retransmit.sent(context.now, trip);
+    }
+
+    fn trip(&self, context: &Context<'_>) -> Trip {
+        Trip {
+            slow: self.computation.is_slow(),
+            ..context.way_onward()
+        }
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {

@@ -232,6 +232,17 @@ impl RoundState {
         self.phase == Phase::Waiting && number == self.number
     }
 
+    /// Whether what came of the pass of `before` has come since.
+    pub(crate) fn answers(self, before: Self) -> bool {
+        let came = before.phase == Phase::Waiting && self.phase != Phase::Waiting;
+        came && self.number == before.number
+    }
+
+    /// Whether the next pass has come since `before`, whose own had been answered.
+    pub(crate) fn follows(self, before: Self) -> bool {
+        before.is_answered() && self.number != before.number
+    }
+
     /// Whether something can be handed back.
     pub(crate) fn is_answered(self) -> bool {
         matches!(self.phase, Phase::Answered | Phase::Holding)

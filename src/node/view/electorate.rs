@@ -25,8 +25,8 @@
 //! the leader who waits for it never hears that all have. A relay that was no member has no voice.
 //!
 //! *Who is a member.* A proposal is handed on by each relay to one other alone, so it goes one way, and who has taken part in it is in the
-//! view that may come of it, whether or not it hears the decision. A relay remembers the last [`VOTES`] proposals that it has heard
-//! no decision of. One that is in a view and has forgotten so is safe, and has no voice until the next one.
+//! view that may come of it, whether or not it hears the decision. Of the proposals that it has heard no decision of a relay remembers
+//! [`VOTES`], the earliest and the latest. One that is in a view and has forgotten so is safe, and has no voice until the next one.
 //!
 //! *What it takes.* Who has been switched on without the [`ViewRecord`](crate::ViewRecord) that it left belongs to the chain as it was
 //! loaded, and to nothing that came after. So no promise holds that it gave: those who know of no view but the first must not be a
@@ -133,11 +133,7 @@ impl Electorate {
             return None;
         }
         self.promised = proposal;
-        let mut voted = [proposal; VOTES];
-        for (kept, earlier) in voted.iter_mut().skip(1).zip(self.voted) {
-            *kept = earlier;
-        }
-        self.voted = voted;
+        self.remember(proposal);
         let told = told.unwrap_or(Poll::of(self.agreed));
         if told.agreed.id > self.agreed.id {
             self.learn(told.agreed);
@@ -169,6 +165,17 @@ impl Electorate {
             poll.rest = poll.rest.min(held.rest_of(self.agreed.id));
         }
         Some(poll)
+    }
+
+    /// It has taken part in `proposal`. Where there is no room for more the earliest ones stay: once some have accepted a view, the
+    /// later proposals that come to them bring that one again.
+    fn remember(&mut self, proposal: ViewId) {
+        let full = self.voted.last() != Some(&ViewId::LOADED);
+        let moves = if full { VOTES / 2 } else { VOTES };
+        let mut next = proposal;
+        for kept in self.voted.iter_mut().take(moves) {
+            next = core::mem::replace(kept, next);
+        }
     }
 
     /// `view` is known to be agreed on.
@@ -564,13 +571,19 @@ mod tests {
         }
         assert!(relay.has_voted(view.id));
         let mut more = relay;
+        for number in 200..300 {
+            more.vote(2, id(number, 2), None, left(0)).unwrap();
+        }
+        assert!(more.has_voted(id(102, 2)) && more.has_voted(id(296, 2)));
+        assert!(!more.has_voted(id(103, 2)), "one too many");
+        let mut more = relay;
         let told = Poll::of(view);
         assert_eq!(
             relay
                 .vote(2, id(200, 3), Some(told), left(0))
                 .map(|poll| poll.votes),
-            Some(0),
-            "one too many"
+            Some(1),
+            "the earliest stays"
         );
         more.learn(view);
         assert!(more.member);

@@ -42,7 +42,7 @@ mod tests;
 
 use super::context::{Context, Decided, Effects, Member, Proposer};
 use super::numbering::Stragglers;
-use super::retransmit::{Retransmit, Trip};
+use super::retransmit::{Again, Retransmit};
 use super::timing::{PAUSE, earliest};
 use crate::jitter::Jitter;
 use crate::settings::Settings;
@@ -302,8 +302,12 @@ impl ViewChange {
         if again {
             if self.state == ViewState::Proposed {
                 self.due.busy = true;
+                let hop_time = context.settings().hop_time;
+                self.retransmit.came_again(context.now, hop_time);
             } else {
                 self.due.decision = true;
+                let way = context.way(proposal.place);
+                self.retransmit.asked(context.now, way);
             }
             return Effects {
                 repeated: true,
@@ -367,8 +371,7 @@ impl ViewChange {
             decided: None,
             lease_left: 0,
         });
-        self.retransmit.heard();
-        self.retransmit.stop();
+        self.retransmit.begin();
         self.due = ViewDue::default();
         let effects = if context.end {
             self.decide(context)
@@ -474,7 +477,8 @@ impl ViewChange {
         }
         self.state = ViewState::Decided;
         self.refused = decided.is_none();
-        self.retransmit.stop();
+        let way = context.way(proposed.place.saturating_sub(1));
+        self.retransmit.answered(context.now, way);
         self.due = ViewDue {
             decision: !leads,
             ..ViewDue::default()
@@ -511,9 +515,8 @@ impl ViewChange {
             .awaited()
             .is_some_and(|proposed| proposed.view.mark() == number);
         if known {
-            // What is missing is the decision, and that may take its time.
-            self.retransmit.heard();
-            self.retransmit.sent(context.now, trip(context));
+            let way = context.way(context.member.all);
+            self.retransmit.arrived(context.now, way);
         }
         known
     }
@@ -531,9 +534,14 @@ impl ViewChange {
         fresh: bool,
     ) -> Effects {
         let mut resent = false;
-        if self.retransmit.is_due(context.now) && self.state == ViewState::Proposed {
-            self.due.proposal = true;
-            resent = true;
+        let hop_time = context.settings().hop_time;
+        match self.retransmit.take_due(context.now, hop_time) {
+            Some(Again::Onward) if self.state == ViewState::Proposed => {
+                self.due.proposal = true;
+                resent = true;
+            }
+            Some(Again::Back) => self.due.decision = true,
+            _ => {}
         }
         let effects = if self.is_due(context.now) {
             self.ask_at = None;
@@ -598,7 +606,8 @@ impl ViewChange {
             return None;
         }
         let proposed = *proposed;
-        self.retransmit.sent(context.now, trip(context));
+        let way = context.way(context.member.all);
+        self.retransmit.sent(context.now, way);
         Some(Message::Proposal(Proposal {
             mission_id: proposed.mission_id,
             view: proposed.view,
@@ -628,14 +637,5 @@ impl ViewChange {
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
         earliest(self.ask_at, self.retransmit.next_timeout())
-    }
-}
-
-/// What a decision has to travel: at most through all relays of the mission.
-const fn trip(context: &Context<'_>) -> Trip {
-    Trip {
-        hop_time: context.member.settings.hop_time,
-        hops: context.member.all,
-        slow: false,
     }
 }

@@ -1,6 +1,6 @@
 //! Offers of mad neighbours: the numbers of a whole mission, most of them in range, some of them the relay's own.
 
-use super::Body;
+use super::parts::Body;
 
 /// What the paper's scenario has after the number of relays and before the interferer: D and the least separation in m, power
 /// of Tx in W, common altitude in m, common power in W.

@@ -37,24 +37,36 @@ fn station(base: &Mission, epoch: u32) -> Ground {
     )
 }
 
+/// Four relays, and the offers of version 1 that were caught on their way to them.
+fn caught(base: &Mission, loss: f64) -> (Air, Vec<Vec<u8>>) {
+    let mut air = Air::of(base, |_| auth(KEY, 1), loss);
+    air.run(60);
+    air.withheld = is_offer;
+    begin_upload(&mut air, base, 1);
+    while air.recorded.is_empty() {
+        air.run(1);
+    }
+    air.ground = None;
+    let offers = std::mem::take(&mut air.recorded);
+    (air, offers)
+}
+
+/// The ground begins to upload version 1.
+fn begin_upload(air: &mut Air, base: &Mission, epoch: u32) {
+    let mut ground = station(base, epoch);
+    ground.upload(air.now, moved(base, 1)).unwrap();
+    air.ground = Some(ground);
+}
+
 /// The ground's offers are caught on their way, and its operator thinks better of it. Later they are played.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same() {
     let after = Settings::default().dead_after.times(2).as_micros() / 1_000_000;
     for (wait, loss) in [(after + 2, 0.0), (3_600, 0.0), (after + 2, 0.3)] {
         let base = mission(4);
-        let mut air = Air::of(&base, |_| auth(KEY, 1), loss);
-        air.run(60);
-        air.withheld = is_offer;
-        let mut ground = station(&base, 1);
-        ground.upload(air.now, moved(&base, 1)).unwrap();
-        air.ground = Some(ground);
-        while air.recorded.is_empty() {
-            air.run(1);
-        }
-        air.ground = None;
+        let (mut air, mut offers) = caught(&base, loss);
         air.run(wait);
-        let offers = std::mem::take(&mut air.recorded);
+        offers.append(&mut air.recorded);
         let stale = |air: &Air| {
             air.relays
                 .iter()
@@ -75,9 +87,7 @@ fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same(
         assert!(stale(&air) > before, "it is counted");
         // The next day.
         air.withheld = |_| false;
-        let mut ground = station(&base, 2);
-        ground.upload(air.now, moved(&base, 1)).unwrap();
-        air.ground = Some(ground);
+        begin_upload(&mut air, &base, 2);
         let mut seconds = 0;
         while air.relays.iter().any(|relay| relay.version() != 1) {
             air.run(1);
@@ -95,19 +105,9 @@ fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same(
 #[test]
 fn an_offer_that_comes_at_once_is_taken() {
     let base = mission(4);
-    let mut air = Air::of(&base, |_| auth(KEY, 1), 0.0);
-    air.run(60);
-    air.withheld = is_offer;
-    let mut ground = station(&base, 1);
-    ground.upload(air.now, moved(&base, 1)).unwrap();
-    air.ground = Some(ground);
-    while air.recorded.is_empty() {
-        air.run(1);
-    }
-    air.ground = None;
+    let (mut air, offers) = caught(&base, 0.0);
     air.run(10);
-    let offer = air.recorded[0].clone();
-    air.play(&offer);
+    air.play(&offers[0]);
     air.run(1);
     assert!(air.relays[0].upload().is_some());
 }

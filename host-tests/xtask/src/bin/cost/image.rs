@@ -97,20 +97,19 @@ pub(crate) fn run(command: &mut Command) -> Result<Output, String> {
     }
 }
 
+/// A command of cargo about one example with the firmware profile.
+fn cargo(command: &str, example: &str) -> Command {
+    let mut cargo = Command::new("cargo");
+    cargo
+        .args([command, "--package", "uav-relay"])
+        .args(["--profile", "firmware", "--target", TARGET])
+        .args(["--example", example]);
+    cargo
+}
+
 /// Builds one example with the firmware profile; where its ELF is.
 pub(crate) fn build(example: &str, more: &[&str]) -> Result<PathBuf, String> {
-    let arguments = [
-        "build",
-        "-p",
-        "uav-relay",
-        "--profile",
-        "firmware",
-        "--target",
-        TARGET,
-        "--example",
-        example,
-    ];
-    run(Command::new("cargo").args(arguments).args(more))?;
+    run(cargo("build", example).args(more))?;
     Ok(PathBuf::from("target")
         .join(TARGET)
         .join("firmware/examples")
@@ -175,22 +174,7 @@ pub(crate) fn deepest_stack(elf: &Path) -> Result<(u64, u64), String> {
 /// Links every relay image with a panic handler that cannot be linked; and, as a control, one that does panic.
 pub(crate) fn no_panic() -> Result<(), String> {
     let link = |features: &[&str], flags: &[&str]| {
-        let arguments = [
-            "rustc",
-            "-p",
-            "uav-relay",
-            "--profile",
-            "firmware",
-            "--target",
-            TARGET,
-            "--example",
-            RELAY,
-        ];
-        run(Command::new("cargo")
-            .args(arguments)
-            .args(features)
-            .arg("--")
-            .args(flags))
+        run(cargo("rustc", RELAY).args(features).arg("--").args(flags))
     };
     for (what, features, _) in IMAGES {
         link(features, &["--cfg", "prove_no_panic"])

@@ -1,0 +1,210 @@
+//! One message of each kind, and a relay that is told them.
+
+use host_tests::fixtures::{NETWORK, paper};
+use uav_relay::wire::digest::digest;
+use uav_relay::wire::frame;
+use uav_relay::wire::frame::{Header, MAX_FRAME};
+use uav_relay::{
+    Band, Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, Relay, Wiring,
+};
+
+use super::codec::{Fenced, Greeting, Handed, Judged, Said, Seats, Shifted, Swept, plain, wire};
+use super::forming::{granted, id, proposed};
+use super::offer::{Offer, offer};
+use super::receive::{drain, relay_of};
+use super::stream::unstuffed;
+
+/// A field of next to no interference.
+pub(crate) const WEAK: Field = Field::new(&[FieldPoint {
+    x_m: 0.0,
+    upsilon_per_w: 1e32,
+}]);
+
+/// The number of the first pass of a leader's life, and of the one after it.
+pub(crate) const FIRST: u16 = 64;
+pub(crate) const SECOND: u16 = 65;
+
+/// The paper's scenario with this interference, between 20 m and 300 m, with room to both sides.
+pub(crate) fn mission(interference: Interference) -> MissionConfig {
+    MissionConfig {
+        interference,
+        band: Band {
+            least_m: 20.0,
+            most_m: 300.0,
+        },
+        lateral: Band {
+            least_m: -60.0,
+            most_m: 40.0,
+        },
+        ..paper(8)
+    }
+}
+
+/// The same with the paper's interferer.
+pub(crate) fn source() -> MissionConfig {
+    mission(paper(8).interference)
+}
+
+/// The stream of one frame to relay `own` from the side of `port`.
+pub(crate) fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
+    let header = Header {
+        network: NETWORK,
+        sender: if port == Port::Upstream {
+            own - 1
+        } else {
+            own + 1
+        },
+        destination: own,
+        counter: 0,
+    };
+    wire(&plain(header, &said.body()))
+}
+
+/// What `relay` sends at `now`: ports, and bodies as the rules read them.
+pub(crate) fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
+    let mut out = Vec::new();
+    let mut buffer = [0; MAX_FRAME];
+    while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
+        let plain = unstuffed(&buffer[..transmit.len - 1]).unwrap();
+        assert!(frame::decode(&plain).is_ok());
+        let said = Said::read(&plain[10..plain.len() - 4]).unwrap();
+        out.push((transmit.port, said));
+    }
+    out
+}
+
+/// Lets time pass until `relay` has no work to do, at most a second; what it sends on the way.
+pub(crate) fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> {
+    let mut out = sent(relay, *now);
+    for _ in 0..1000 {
+        *now = *now + Duration::from_millis(1);
+        relay.handle_timeout(*now);
+        out.extend(sent(relay, *now));
+    }
+    out
+}
+
+/// What relay `index` brings along.
+pub(crate) fn seats(number: u16, mission: u16, index: u16) -> Seats {
+    Seats {
+        number,
+        mission,
+        after: 0,
+        seats: vec![(index, 30.0, 0.5)],
+    }
+}
+
+/// One message of each tag, of this pass.
+pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
+    let x_m = 400.0;
+    let altitude_m = 20.0;
+    let power_w = 1.0;
+    let view = id(u32::from(number).max(1), 1);
+    let sweep = Swept {
+        number,
+        mission,
+        anchor: 1.0,
+        gap: 0,
+        growth: 0,
+        altitude_m,
+        power_w,
+        reaches: vec![x_m],
+    };
+    vec![
+        Said::Sweep(sweep.clone()),
+        Said::Verdict(Judged {
+            number,
+            mission,
+            own: false,
+            commit: Some(0),
+            slacks: vec![1.0],
+            stand: None,
+        }),
+        Said::Busy { number },
+        Said::Heartbeat {
+            mission,
+            ask: 0,
+            answer: 0,
+        },
+        Said::Measured {
+            sweep: sweep.clone(),
+            upsilon_per_w: 1e8,
+        },
+        Said::Aside { sweep, y_m: -12.5 },
+        Said::Gather(seats(number, mission, 3)),
+        Said::Gathered(seats(number, mission, 5)),
+        Said::Token(Handed {
+            number,
+            mission,
+            x_m,
+            altitude_m,
+            power_w,
+            turn: 2,
+            explore_m: 10.0,
+            columns: 0,
+            rows: 0,
+            sir: 1.0,
+        }),
+        Said::Moved(Shifted {
+            number,
+            mission,
+            x_m: 600.0,
+            altitude_m,
+            any: true,
+            worst: 1.0,
+        }),
+        Said::Hello(Greeting {
+            mission,
+            neighbour: 4,
+            behind: 1,
+            newest: view,
+            holds: (mission, 0),
+            nonce: 0,
+            hears: 1,
+            flags: 16,
+        }),
+        Said::Proposal(proposed(view, (mission, 0), 3, 8)),
+        granted(view, (mission, 0), 5, 8),
+        Said::Fence(Fenced {
+            number: 1,
+            mission,
+            echo: 0,
+            fence: 1,
+            places: [x_m, x_m, 1.0, 1.0, 1.0],
+            flags: 3,
+        }),
+        Said::Offer(Offer {
+            base: mission,
+            ..offer()
+        }),
+        Said::Pulse {
+            number,
+            mission,
+            lease: 150,
+        },
+        Said::Pulsed {
+            number,
+            mission,
+            done: true,
+        },
+    ]
+}
+
+/// Relay 4 of 8 and the ports that a pass comes from and goes to.
+pub(crate) fn relay_4(config: MissionConfig) -> (Relay, Port, Port) {
+    let relay = relay_of(config, 4, Wiring::Pair);
+    match config.interference {
+        Interference::Source(_) => (relay, Port::Upstream, Port::Downstream),
+        Interference::Field(_) => (relay, Port::Downstream, Port::Upstream),
+    }
+}
+
+/// Has `relay` take its place by pass `number`.
+pub(crate) fn placed(relay: &mut Relay, (from, to): (Port, Port), now: &mut Instant, number: u16) {
+    let kinds = one_of_each(number, digest(relay.mission()));
+    for (port, said) in [(from, &kinds[0]), (to, &kinds[1])] {
+        relay.handle_bytes(*now, port, &framed(4, port, said));
+        drain(relay, *now);
+    }
+    assert!(relay.setpoint().is_some());
+}

@@ -1,0 +1,133 @@
+//! What of a round is a sign of life.
+
+use super::Round;
+use crate::mission::Mission;
+use crate::mission::tests::paper;
+use crate::node::context::{Context, Effects, Member};
+use crate::node::view::electorate::Held;
+use crate::optimiser::search::Schedule;
+use crate::settings::Settings;
+use crate::time::{Duration, Instant};
+use crate::view::ViewId;
+use crate::wire::message::Message;
+
+const RELAYS: u16 = 3;
+
+/// Three relays in a line that try one target a sweep, and a clock that runs on with each step.
+struct Line {
+    members: [Member; RELAYS as usize],
+    rounds: [Round; RELAYS as usize],
+    now: Instant,
+}
+
+impl Line {
+    fn new() -> Self {
+        let settings = Settings {
+            predict: false,
+            schedule: Schedule::FixedStep { step: 0.1 },
+            ..Settings::default()
+        };
+        let mission = Mission::try_new(paper(RELAYS)).unwrap();
+        let profile = mission.config().common;
+        let of = |at: u16| Member::new(mission, settings, at + 1);
+        let mut rounds = [0, 1, 2].map(|at| Round::new(at == 0, 7, profile, None, at));
+        rounds[0].work_soon(Instant::ZERO);
+        Self {
+            members: [0, 1, 2].map(of),
+            rounds,
+            now: Instant::ZERO,
+        }
+    }
+
+    fn step<T>(&mut self, at: usize, call: impl FnOnce(&mut Round, &Context<'_>) -> T) -> T {
+        self.now = self.now + Duration::from_millis(1);
+        let member = &self.members[at];
+        let context = Context {
+            now: self.now,
+            member,
+            latest: member.active,
+            end: member.index == RELAYS,
+            held: Held {
+                lease_left: Duration::from_micros(0),
+                view: ViewId::LOADED,
+                rest: None,
+            },
+        };
+        call(&mut self.rounds[at], &context)
+    }
+
+    fn hear(&mut self, at: usize, message: &Message) -> Effects {
+        self.step(at, |round, context| round.handle(context, message))
+    }
+
+    fn onward(&mut self, at: usize) -> Message {
+        loop {
+            if let Some(message) = self.step(at, |round, context| round.take_onward(context, true))
+            {
+                return message;
+            }
+            self.step(at, Round::handle_timeout);
+        }
+    }
+
+    fn back(&mut self, at: usize) -> Message {
+        self.step(at, |round, context| round.take_back(context, true))
+            .unwrap()
+    }
+}
+
+fn heard(effects: Effects) -> [Option<Instant>; 2] {
+    [effects.heard_onward, effects.heard_back]
+}
+
+#[test]
+fn an_answer_counts_from_when_what_it_answers_was_said_and_nothing_that_comes_again_counts() {
+    let mut line = Line::new();
+    // When relay 2 handed back what came of the last sweep.
+    let mut handed_back = None;
+    let (mut old_sweep, mut old_verdict) = (None, None);
+    for sweep in 0..5 {
+        let pass = line.onward(0);
+        assert!(matches!(pass, Message::Sweep(_)), "{pass:?}");
+        assert_eq!(
+            heard(line.hear(1, &pass)),
+            [None, handed_back],
+            "sweep {sweep}"
+        );
+        let handed_on = Some(line.now);
+        assert_eq!(heard(line.hear(1, &pass)), [None; 2]);
+        if let (Some(sweep), Some(verdict)) = (&old_sweep, &old_verdict) {
+            assert_eq!(heard(line.hear(1, sweep)), [None; 2]);
+            assert_eq!(heard(line.hear(1, verdict)), [None; 2]);
+        }
+        let on = line.onward(1);
+        line.hear(2, &on);
+        // It is said once more. Which of the two is answered is not known: the first one counts.
+        line.step(1, |round, _| round.resend());
+        line.onward(1);
+        let verdict = line.back(2);
+        assert_eq!(heard(line.hear(1, &verdict)), [handed_on, None]);
+        handed_back = Some(line.now);
+        assert_eq!(heard(line.hear(1, &verdict)), [None; 2]);
+        let answer = line.back(1);
+        assert!(line.hear(0, &answer).heard_onward.is_some());
+        (old_sweep, old_verdict) = (Some(pass), Some(verdict));
+    }
+}
+
+#[test]
+fn the_first_pass_of_a_view_answers_nothing() {
+    let mut line = Line::new();
+    let pass = line.onward(0);
+    line.hear(1, &pass);
+    let on = line.onward(1);
+    line.hear(2, &on);
+    let verdict = line.back(2);
+    line.hear(1, &verdict);
+    for at in 0..3 {
+        line.rounds[at].suspend();
+        line.rounds[at].renew(line.now, at == 0, false);
+    }
+    let pass = line.onward(0);
+    assert_eq!(heard(line.hear(1, &pass)), [None; 2]);
+}
