@@ -66,8 +66,11 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
             }
             *successor = successor.filter(|(proposal, _)| *proposal < call.view);
         }
-        Said::Decision(Decided { call, .. }) => {
+        Said::Decision(Decided { call, base, .. }) => {
             (call.view, call.of) = (view(as_number), (as_mission, 0));
+            if base.id >= call.view {
+                base.id = 0;
+            }
         }
         Said::Offer(offer) => offer.base = as_mission,
     }

@@ -120,7 +120,7 @@ const PROPOSAL: Proposed = Proposed {
 };
 
 const DECISION: Decided = Decided {
-    call: CALL,
+    call: PROPOSAL.call,
     base: VIEW,
     view: Some(VIEW),
     there: 1,
@@ -426,9 +426,13 @@ fn a_view_is_named_by_a_relay_that_may_propose_it() {
                     proposed && (VIEW.id..PROPOSAL.call.view).contains(&view),
                 ),
                 (Said::Proposal(PROPOSAL), 29, proposed && view <= VIEW.id),
-                (Said::Decision(DECISION), 5, proposed),
+                (Said::Decision(DECISION), 5, proposed && view > VIEW.id),
                 // What it follows may be the chain as it was loaded.
-                (Said::Decision(DECISION), 11, proposed || view == 0),
+                (
+                    Said::Decision(DECISION),
+                    11,
+                    (proposed || view == 0) && view < DECISION.call.view,
+                ),
                 (Said::Decision(DECISION), 18, proposed),
             ] {
                 assert_eq!(fits(&said, at, view), expected, "{said:?}, {at}: {view:x}");

@@ -331,15 +331,18 @@ fn formings() -> BoxedStrategy<Said> {
         1 => counts(1).prop_map(|relays| SizedView { id: 0, relays }),
     ];
     let decision = (calls(), bases, granted, counts(1), spans());
-    let decision = decision.prop_map(|(call, base, view, there, lease_left)| {
-        Said::Decision(Decided {
-            call,
-            base,
-            view,
-            there,
-            lease_left,
-        })
-    });
+    let decision = decision.prop_filter_map(
+        "proposed after what it follows",
+        |(call, base, view, there, lease_left)| {
+            (base.id < call.view).then_some(Said::Decision(Decided {
+                call,
+                base,
+                view,
+                there,
+                lease_left,
+            }))
+        },
+    );
     let fence = (
         1..=u16::MAX,
         any::<[u16; 3]>(),

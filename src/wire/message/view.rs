@@ -249,7 +249,7 @@ impl Decision {
             && view.is_none_or(|view| is_proposed(view.id) && is_size(view.relays));
         let (mission_id, proposal, place) = call
             .checked()
-            .filter(|_| known)
+            .filter(|(_, proposal, _)| known && base.id < *proposal)
             .ok_or(MessageError::Value)?;
         Ok(Self {
             mission_id,

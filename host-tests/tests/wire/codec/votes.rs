@@ -182,6 +182,7 @@ impl Decided {
     pub(super) fn in_range(self) -> bool {
         self.call.in_range()
             && self.base.is_view()
+            && self.base.id < self.call.view
             && is_count(self.there)
             && self.view.is_none_or(SizedView::is_proposed)
     }
