@@ -76,7 +76,12 @@ struct Options {
     #[arg(long, value_name = "FIFO")]
     positions: Option<PathBuf>,
     /// The drone's PX4 or ArduCopter: a tty, or `udp:HOST:PORT`. It is told where to fly, and tells where the drone is
-    #[arg(long, value_name = "TTY|udp:HOST:PORT", requires = "site_tx", conflicts_with = "positions")]
+    #[arg(
+        long,
+        value_name = "TTY|udp:HOST:PORT",
+        requires = "site_tx",
+        conflicts_with = "positions"
+    )]
     autopilot: Option<String>,
     /// Bit/s on its tty, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1_200..=4_000_000))]
