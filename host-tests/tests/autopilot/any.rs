@@ -33,13 +33,14 @@ fn no_target_leaves_that_is_not_finite_and_near() {
                 0 => vehicle.armed = rng.random(),
                 1 => {
                     use MavLandedState as L;
-                    vehicle.landed = [
+                    let states = [
                         L::MAV_LANDED_STATE_UNDEFINED,
                         L::MAV_LANDED_STATE_ON_GROUND,
                         L::MAV_LANDED_STATE_IN_AIR,
                         L::MAV_LANDED_STATE_TAKEOFF,
                         L::MAV_LANDED_STATE_LANDING,
-                    ][rng.random_range(0..5)];
+                    ];
+                    vehicle.landed = states[rng.random_range(0..5)];
                 }
                 2 => {
                     vehicle.mode =
