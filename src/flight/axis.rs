@@ -269,6 +269,46 @@ fn chord(arc: f64, radius: f64) -> f64 {
     arc * (1.0 - q * q / 6.0)
 }
 
+/// Sine and cosine of an angle in units of 10⁻⁷ degrees.
+///
+/// The angle within an eighth of a turn of an axis is exact in integers; the sine and cosine of that are fdlibm's series, within a unit in the
+/// last place. A function for any f64 would be ten times as large, for turns that no place on earth makes.
+#[inline(never)] // called from several places
+fn sine_and_cosine(units: i32) -> [f64; 2] {
+    const EIGHTH: i32 = 450_000_000;
+    let eighths = units / EIGHTH;
+    let quarters = eighths / 2 + eighths % 2;
+    let x = f64::from(units - quarters * 2 * EIGHTH) * UNIT;
+    let z = x * x;
+    let series = |terms: [f64; 6]| terms.into_iter().fold(0.0, |sum, term| sum * z + term);
+    let sin = x + x * z * series(SINE);
+    let cos = 1.0 - z / 2.0 + z * z * series(COSINE);
+    match quarters & 3 {
+        0 => [sin, cos],
+        1 => [cos, -sin],
+        2 => [-sin, -cos],
+        _ => [-cos, sin],
+    }
+}
+
+/// fdlibm's coefficients for up to an eighth of a turn, the highest power first.
+const SINE: [f64; 6] = [
+    1.589_690_995_211_55e-10,
+    -2.505_076_025_340_686_3e-8,
+    2.755_731_370_707_006_8e-6,
+    -1.984_126_982_985_795e-4,
+    8.333_333_333_322_49e-3,
+    -1.666_666_666_666_663_2e-1,
+];
+const COSINE: [f64; 6] = [
+    -1.135_964_755_778_819_5e-11,
+    2.087_572_321_298_175e-9,
+    -2.755_731_435_139_066_3e-7,
+    2.480_158_728_947_673e-5,
+    -1.388_888_888_887_411e-3,
+    4.166_666_666_666_66e-2,
+];
+
 /// The ellipsoid's radius of curvature where its normal is `normal`, in the direction `along`.
 fn radius(normal: Vector, along: Vector) -> f64 {
     let sin2 = normal.z * normal.z;
@@ -303,8 +343,8 @@ impl Vector {
 
     /// The point of that latitude and longitude at height 0.
     fn on_ellipsoid(point: Geodetic) -> Self {
-        let (sin_lat, cos_lat) = libm::sincos(f64::from(point.lat_e7) * UNIT);
-        let (sin_lon, cos_lon) = libm::sincos(f64::from(point.lon_e7) * UNIT);
+        let [sin_lat, cos_lat] = sine_and_cosine(point.lat_e7);
+        let [sin_lon, cos_lon] = sine_and_cosine(point.lon_e7);
         let prime = A_M / libm::sqrt(1.0 - E2 * sin_lat * sin_lat);
         Self {
             x: prime * cos_lat * cos_lon,
@@ -380,6 +420,21 @@ mod tests {
     use super::{Axis, AxisError, LONGEST_M};
     use crate::flight::geodetic::Geodetic;
     use crate::place::Placement;
+
+    #[test]
+    fn sine_and_cosine_are_those_of_libm() {
+        let mut units = i32::MIN;
+        for step in 0_i32..20_000 {
+            for units in [units, (step - 10_000) * 180_000] {
+                let [sin, cos] = super::sine_and_cosine(units);
+                // The angle as an f64 is off by more than the series is.
+                let (expected_sin, expected_cos) = libm::sincos(f64::from(units) * super::UNIT);
+                assert!((sin - expected_sin).abs() < 1e-15, "{units}");
+                assert!((cos - expected_cos).abs() < 1e-15, "{units}");
+            }
+            units = units.wrapping_add(214_733);
+        }
+    }
 
     fn site(lat_deg: f64, lon_deg: f64, amsl_m: f64) -> Geodetic {
         Geodetic::from_degrees(lat_deg, lon_deg, amsl_m).expect("on earth")

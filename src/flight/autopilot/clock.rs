@@ -5,8 +5,8 @@ use crate::time::{Duration, Instant};
 /// A clock that is this much behind what it was has begun anew: no message is on its way so long.
 const RESTARTED: Duration = Duration::from_millis(2_000);
 
-/// The clocks drift apart by less than a thousandth.
-const DRIFT: u64 = 1_000;
+/// The clocks drift apart by less than one part in 2^10.
+const DRIFT: u32 = 10;
 
 /// The shortest time that a message was on its way, and what has been said by it. A message that came late does not move the clock.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,7 +28,7 @@ impl RemoteClock {
         // How much later than the quickest one this message came.
         let late = i128::from(passed) - meant;
         let restarted = late > i128::from(RESTARTED.as_micros());
-        let allowed = passed / DRIFT;
+        let allowed = passed >> DRIFT;
         if restarted || late < i128::from(allowed) {
             self.anchor = Some((now, said));
         }

@@ -107,8 +107,12 @@ impl Parser {
         let skipped = rest.iter().take_while(|byte| **byte != MAGIC).count();
         let from = length + skipped;
         let left = self.bytes.len().saturating_sub(from);
-        if left > 0 {
-            self.bytes.copy_within(from.., 0);
+        // By hand: what `copy_within` calls is a kilobyte and a half of flash.
+        for at in 0..left {
+            let byte = self.bytes.get(from + at).copied().unwrap_or_default();
+            if let Some(place) = self.bytes.get_mut(at) {
+                *place = byte;
+            }
         }
         self.bytes.truncate(left);
     }
