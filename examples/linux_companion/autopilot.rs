@@ -129,17 +129,7 @@ impl Companion {
 
     /// Has the operator's ground station show what happened.
     pub(crate) fn tell(&mut self, event: Event) {
-        let text = match event {
-            Event::Converged => "relay: the chain has agreed on places",
-            Event::Infeasible => "relay: no places meet any target",
-            Event::NeighbourLost { .. } => "relay: a neighbour is lost",
-            Event::Reformed => "relay: the chain formed anew",
-            Event::NoQuorum => "relay: too few others, holds its place",
-            Event::LeaseLapsed => "relay: not certain of the others, holds",
-            Event::IndexTaken { .. } => "relay: its number is used twice",
-            _ => return,
-        };
-        self.link.say(text);
+        self.link.handle_event(event);
     }
 
     /// When to come back at the latest.
