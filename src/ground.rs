@@ -8,7 +8,7 @@
 //! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
 
 use crate::mission::Mission;
-use crate::node::neighbour::state::CANDIDATES;
+use crate::node::neighbour::hearing::CANDIDATES;
 use crate::relay::signed::{greeting, say};
 use crate::settings::Wiring;
 use crate::side::Side;

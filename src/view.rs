@@ -1,5 +1,7 @@
 //! Which view of the chain: who is in it, as it was agreed.
 
+use crate::mission::MAX_RELAYS;
+
 /// The name of a view, in the order of proposals: a number, and the node that proposed it, so that no two nodes propose one view.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -30,6 +32,11 @@ impl ViewId {
     /// The node that proposed it, 0 for none.
     pub const fn proposer(self) -> u16 {
         (self.0 & ((1 << NODE) - 1)) as u16
+    }
+
+    /// Whether a node can have proposed it.
+    pub(crate) const fn is_proposed(self) -> bool {
+        self.number() > 0 && 1 <= self.proposer() && self.proposer() <= MAX_RELAYS
     }
 
     /// The first view after this one that `node`, 1 to 1000, may propose; `None` after four million.

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use rustix::event::PollFlags;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
-use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent};
+use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
 use uav_relay::flight::axis::Axis;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Duration, Event, Instant, Relay};
@@ -217,7 +217,7 @@ impl Companion {
 
 fn said(now: Instant, event: AutopilotEvent) -> Result<(), String> {
     match event {
-        AutopilotEvent::Found(kind) => line(now, format_args!("autopilot: found a {kind:?}")),
+        AutopilotEvent::Found(kind) => line(now, format_args!("autopilot: found {}", called(kind))),
         AutopilotEvent::Restarted => line(now, format_args!("autopilot: was switched off and on")),
         AutopilotEvent::Refused => line(
             now,
@@ -236,6 +236,13 @@ fn said(now: Instant, event: AutopilotEvent) -> Result<(), String> {
             line(now, format_args!("autopilot: {what}"))
         }
         other => line(now, format_args!("autopilot: {other:?}")),
+    }
+}
+
+const fn called(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Px4 => "a PX4",
+        Kind::ArduCopter => "an ArduCopter",
     }
 }
 

@@ -1,7 +1,7 @@
 //! A scenario that says where its ends are on earth.
 
 use uav_relay::flight::geodetic::Geodetic;
-use uav_relay_sim::scenario::{Problem, Scenario, ScenarioError};
+use uav_relay_sim::scenario::{Line, Problem, Scenario, ScenarioError};
 
 const REST: &str =
     "[power]\ntx_w = 80\nuav_w = 1\n[[interferer]]\npower_w = 80\nx_m = 500\ny_m = 400\n";
@@ -17,7 +17,7 @@ const SITES: &str = "tx = { lat_deg = 47.40, lon_deg = 8.54, amsl_m = 420.0 }\n\
 #[test]
 fn the_distance_follows_from_the_sites() {
     let scenario = parse("", SITES).unwrap();
-    let axis = scenario.axis.unwrap();
+    let Line { axis, sites } = scenario.line.unwrap();
     assert_eq!(scenario.distance_m.to_bits(), axis.distance_m().to_bits());
     // By GeographicLib.
     assert!(
@@ -26,7 +26,7 @@ fn the_distance_follows_from_the_sites() {
         scenario.distance_m
     );
     let rx = Geodetic::from_degrees(47.41, 8.55, 431.0).unwrap();
-    assert_eq!(scenario.sites.unwrap()[1], rx);
+    assert_eq!(sites[1], rx);
     assert!((f64::from(axis.place(rx).unwrap().x_m) - scenario.distance_m).abs() < 1e-3);
     assert!(parse("distance_m = 1343.8", SITES).is_ok(), "the same one");
 }

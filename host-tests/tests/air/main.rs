@@ -7,6 +7,7 @@ mod aloha;
 mod bursts;
 mod chain;
 mod flying;
+mod hour;
 mod medium;
 mod soak;
 mod table;

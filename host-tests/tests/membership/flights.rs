@@ -1,10 +1,9 @@
 //! Drones that fly: with a guard no two of them ever come nearer than the separation, whatever is lost, late or silent.
 
+use host_tests::flights::{eight_apart, exact};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::guard::config::GuardConfig;
-use uav_relay::{Duration, MissionConfig};
-use uav_relay_sim::simulator::drones::FlightSpec;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 
@@ -15,28 +14,12 @@ const SEPARATION_M: f32 = 5.0;
 /// What a place may be off by rounding, m: places are f32 of up to 1 km.
 const ROUNDING_M: f64 = 2e-3;
 
-/// Eight drones in order along x, at least the separation apart, each with its own speed.
-fn flight(rng: &mut ChaCha8Rng) -> FlightSpec {
-    let mut x_m = 0.0;
-    let start = (0..8)
-        .map(|_| {
-            x_m += f64::from(SEPARATION_M) + 0.01 + rng.random_range(0.0..60.0_f64);
-            [x_m, 0.0, 20.0]
-        })
-        .collect();
-    let speed_mps = (0..8).map(|_| rng.random_range(0.5..15.0)).collect();
-    FlightSpec::exact(start, speed_mps, Duration::from_millis(200))
-}
-
+/// A guarded flight of eight drones that begin at least the separation apart.
 fn guarded(rng: &mut ChaCha8Rng) -> Setup {
-    let config = MissionConfig {
-        min_separation_m: SEPARATION_M,
-        ..*mission(8).config()
-    };
-    let mission = Mission::try_new(config).unwrap();
+    let mission = eight_apart(SEPARATION_M);
     let mut setup = Setup::on_shared_channel(mission);
-    setup.settings.guard = Some(GuardConfig::of(&mission, config.common));
-    setup.flight = Some(flight(rng));
+    setup.settings.guard = Some(GuardConfig::of(&mission, mission.config().common));
+    setup.flight = Some(exact(rng, f64::from(SEPARATION_M) + 0.01));
     setup.seed = rng.random();
     setup
 }

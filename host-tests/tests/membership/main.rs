@@ -8,6 +8,7 @@ mod parts;
 mod schedules;
 
 use host_tests::fixtures::mission;
+use host_tests::flights::{go_on_until, seconds};
 use uav_relay::{Duration, Instant, Mission};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome, Turning};
@@ -16,20 +17,6 @@ use uav_relay_sim::simulator::setup::{Partition, Setup};
 /// The paper's chain of `relays` on one radio channel.
 fn paper(relays: u16) -> Setup {
     Setup::on_shared_channel(mission(relays))
-}
-
-const fn seconds(seconds: u64) -> Instant {
-    Instant::from_millis(1_000 * seconds)
-}
-
-/// Has the run go on until `at`, whatever has come of it before.
-fn go_on_until(setup: &mut Setup, at: Instant) {
-    // Nobody is beyond the last relay, so nobody is parted.
-    setup.partitions.push(Partition {
-        after: setup.mission.relays(),
-        from: at,
-        until: None,
-    });
 }
 
 /// The relays that are left in the end, by their number from 1.

@@ -1,10 +1,10 @@
 //! Random schedules of faults at eight relays.
 
+use host_tests::flights::{bad_day, own_profiles};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::{Duration, Profile};
+use uav_relay::Duration;
 use uav_relay_oracle::random::seed;
-use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
@@ -17,27 +17,8 @@ const RECOVERY: Duration = Duration::from_millis(300_000);
 /// time of the first minute, half of them switched on again after up to another minute.
 fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let mut setup = paper(8);
-    if rng.random_bool(0.3) {
-        setup.profiles = (1..=8)
-            .map(|index| {
-                let power_w = rng.random_range(0.5..2.0);
-                let altitude_m = rng.random_range(15.0..40.0);
-                (
-                    index,
-                    Profile {
-                        altitude_m,
-                        power_w,
-                    },
-                )
-            })
-            .collect();
-    }
-    setup.faults = Faults {
-        loss: rng.random_range(0.0..=0.5),
-        corrupt: rng.random_range(0.0..=0.2),
-        duplicate: rng.random_range(0.0..=0.2),
-        reorder: rng.random_range(0.0..=0.2),
-    };
+    setup.profiles = own_profiles(rng);
+    setup.faults = bad_day(rng);
     setup.settings.predict = rng.random_bool(0.7);
     setup.auth = rng.random_bool(0.3);
     setup.seed = rng.random();

@@ -71,8 +71,7 @@ pub(crate) fn scenario(
         d / f64::from(n) * log_uniform(rng, 0.03, 1.0)
     };
     let scenario = Scenario {
-        axis: None,
-        sites: None,
+        line: None,
         distance_m: d,
         altitude_m,
         altitude_min_m: altitude_m,

@@ -71,8 +71,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     let waves = link.mu_los.sqrt();
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
     Scenario {
-        axis: None,
-        sites: None,
+        line: None,
         distance_m: link.distance_m,
         altitude_m: corridor.least_m,
         altitude_min_m: corridor.least_m,

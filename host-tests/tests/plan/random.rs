@@ -75,8 +75,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
         BTreeMap::new()
     };
     Scenario {
-        axis: None,
-        sites: None,
+        line: None,
         distance_m: d,
         altitude_m,
         altitude_min_m: round((altitude_m * rng.random_range(0.5..1.0)).max(0.2)).min(altitude_m),

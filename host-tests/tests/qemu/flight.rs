@@ -56,7 +56,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
         altitude_m: 19.7,
     };
     let socket = fleet.autopilots.remove(0);
-    let mut vehicle = Vehicle::new(kind, socket, scenario().axis.unwrap(), from);
+    let mut vehicle = Vehicle::new(kind, socket, scenario().line.unwrap().axis, from);
 
     // On the ground it is found, and asked for what it says; nothing is to move.
     vehicle.until("requests for messages", |vehicle| {

@@ -21,7 +21,7 @@ impl Node {
             Decided::Granted { relays, lease_left } => (relays, lease_left),
             Decided::Earlier => {
                 if leads {
-                    self.layers.view.ask(now);
+                    self.layers.view.asking.ask(now);
                 }
                 return;
             }
@@ -35,7 +35,7 @@ impl Node {
         let mission = self.layers.update.mission_of(&self.member, id);
         let mission = mission.and_then(|mission| mission.with_relays(relays).ok());
         let Some(mission) = mission else {
-            return self.layers.view.ask(now);
+            return self.layers.view.asking.ask(now);
         };
         let before = self.member.mission.relays();
         self.member.index = match mission.heading() {
@@ -62,7 +62,7 @@ impl Node {
         self.raise(Event::Reformed);
         if id != self.layers.update.latest() {
             // A newer one has come in the meantime.
-            self.layers.view.ask(now);
+            self.layers.view.asking.ask(now);
         }
     }
 

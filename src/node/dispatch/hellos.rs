@@ -3,7 +3,7 @@
 use super::state::Node;
 #[cfg(feature = "upload")]
 use crate::node::mission_update::takes_uploads;
-use crate::node::neighbour::state::CANDIDATES;
+use crate::node::neighbour::hearing::CANDIDATES;
 use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::message::Hello;
@@ -45,7 +45,7 @@ impl Node {
             newest: self.layers.view.newest(),
             neighbour: self.layers.neighbours.at(side).node(),
             ask,
-            form: self.layers.view.asks() && side == self.back(),
+            form: self.layers.view.asking.asks() && side == self.back(),
             fresh: self.layers.round.is_fresh(),
             ready: false,
             // Who has just been switched on is in no part yet.

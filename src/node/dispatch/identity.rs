@@ -68,7 +68,7 @@ impl Node {
             self.raise(Event::SetpointChanged);
         }
         if !self.layers.round.is_fresh() {
-            self.layers.view.ask(now);
+            self.layers.view.asking.ask(now);
         }
     }
 }

@@ -89,7 +89,7 @@ impl Node {
             // It has said that it is of this mission: then the two are in different views.
             let of_mission = self.layers.neighbours.at(side).holds.is_some();
             if of_mission && message.is_of_a_view() && message.is_onward() {
-                self.layers.view.ask(now);
+                self.layers.view.asking.ask(now);
             }
         }
         known

@@ -5,7 +5,7 @@ use crate::node::lease::Lease;
 use crate::node::mission_update::MissionUpdate;
 use crate::node::neighbour::Neighbours;
 use crate::node::round::Round;
-use crate::node::view::ViewChange;
+use crate::node::view::change::ViewChange;
 use crate::side::Side;
 use crate::time::Instant;
 

@@ -105,7 +105,7 @@ impl Node {
             self.layers.neighbours.at_mut(side).offer = true;
             self.layers.update.begin_offers(side);
         }
-        self.layers.view.ask(now);
+        self.layers.view.asking.ask(now);
     }
 
     /// The same by the relay's own firmware.

@@ -3,7 +3,8 @@
 use super::state::Node;
 use crate::event::About;
 use crate::node::mission_update::takes_uploads;
-use crate::node::neighbour::state::{CANDIDATES, Candidate};
+use crate::node::neighbour::candidate::Candidate;
+use crate::node::neighbour::hearing::CANDIDATES;
 use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::message::Hello;
@@ -53,9 +54,9 @@ impl Node {
             let newer = takes_uploads(&self.member) && hello.holds > self.layers.update.latest();
             if hello.form && !newer && (hello.newest >= known || hello.fresh && !waits) {
                 if self.layers.view.newest() > known {
-                    self.layers.view.ask_anew(now);
+                    self.layers.view.asking.ask_anew(now);
                 } else {
-                    self.layers.view.ask(now);
+                    self.layers.view.asking.ask(now);
                 }
             }
         } else if self.searches() {
@@ -125,7 +126,7 @@ impl Node {
         let newer = self.layers.view.newest() > self.member.view;
         if newer && !self.layers.neighbours.at(side).has_grace(now) {
             // One of the two has missed something.
-            self.layers.view.ask(now);
+            self.layers.view.asking.ask(now);
         }
         self.layers.resend();
     }

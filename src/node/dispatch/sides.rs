@@ -4,7 +4,7 @@ use super::state::Node;
 use crate::event::About;
 use crate::node::mission_update::takes_uploads;
 use crate::node::namesake::Twice;
-use crate::node::neighbour::state::CANDIDATES;
+use crate::node::neighbour::hearing::CANDIDATES;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::time::Instant;

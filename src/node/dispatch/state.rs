@@ -13,7 +13,7 @@ use crate::node::round::Round;
 use crate::node::round::state::Phase;
 use crate::node::sample::Sample;
 use crate::node::steering::Steering;
-use crate::node::view::ViewChange;
+use crate::node::view::change::ViewChange;
 use crate::node::view::record::{RecordError, ViewRecord};
 use crate::settings::{Identity, Method, Settings};
 use crate::side::Side;
@@ -112,7 +112,7 @@ impl Node {
             self.layers.round.suspend();
         }
         if effects.view_needed {
-            self.layers.view.ask(now);
+            self.layers.view.asking.ask(now);
         }
         if effects.ask {
             let back = self.back();

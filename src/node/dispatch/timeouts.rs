@@ -34,7 +34,7 @@ impl Node {
             }
         }
         if self.awaits_first() && self.is_solving(now) {
-            if self.layers.view.is_due(now) {
+            if self.layers.view.asking.is_due(now) {
                 self.await_first(now);
             }
         } else {
@@ -85,7 +85,7 @@ impl Node {
             self.raise_about(About::Lost, side, node);
         }
         if ends {
-            self.layers.view.hasten(now);
+            self.layers.view.asking.hasten(now);
         }
         self.review(now);
     }
@@ -93,7 +93,7 @@ impl Node {
     /// Asks for a new view if the chain is another than the one agreed on.
     pub(super) fn review(&mut self, now: Instant) {
         if self.layers.neighbours.have_changed(now) {
-            self.layers.view.ask(now);
+            self.layers.view.asking.ask(now);
         }
         if self.layers.neighbours.at(self.onward()).has_no_peer()
             && self.layers.view.awaited().is_some()
@@ -125,7 +125,7 @@ impl Node {
 
     /// Whether no pass has come yet, and it has not asked for a view.
     fn awaits_first(&self) -> bool {
-        self.layers.round.is_fresh() && !self.layers.view.asks()
+        self.layers.round.is_fresh() && !self.layers.view.asking.asks()
     }
 
     /// By when the first pass should have come, were this the beginning.
@@ -134,6 +134,6 @@ impl Node {
         let there_and_back = settings.hop_time.times(2 * u32::from(all));
         let usual = now + settings.probe_after + there_and_back;
         let slow = now + first_pass(settings, all);
-        self.layers.view.await_first(usual.max(slow));
+        self.layers.view.asking.await_first(usual.max(slow));
     }
 }

@@ -3,9 +3,24 @@
 //! | file | one idea |
 //! | --- | --- |
 //! | [`state`] | which node is taken for the neighbour on one side: its state table |
+//! | `said` | what the nodes on one side say: whom they hear, and whom they take |
+//! | `outgoing` | the heartbeats and hellos that they are owed |
+//! | [`candidate`] | a node that is not taken, as its hello has it |
+//! | [`hearing`] | which nodes were heard lately |
+//! | `damping` | links that come and go |
+//! | `agreed` | who was there when a view was decided on |
+//! | `hellos`, `signs` | what waits to be sent |
 //! | [`liveness`] | when a neighbour counts as lost |
 
+mod agreed;
+pub(crate) mod candidate;
+mod damping;
+pub(crate) mod hearing;
+mod hellos;
 pub(crate) mod liveness;
+mod outgoing;
+mod said;
+mod signs;
 pub(crate) mod state;
 
 use super::timing::earliest;

@@ -113,7 +113,7 @@ impl CallBody {
         };
         let proposal = ViewId::from_bits(u32::from_le_bytes(self.proposal));
         let place = u16::from_le_bytes(self.place);
-        let known = is_proposed(proposal) && is_size(place);
+        let known = proposal.is_proposed() && is_size(place);
         known.then_some((mission_id, proposal, place))
     }
 }
@@ -141,14 +141,9 @@ impl SizedBody {
     }
 }
 
-/// Whether a node can have proposed that.
-fn is_proposed(id: ViewId) -> bool {
-    is_size(id.proposer()) && id.number() > 0
-}
-
 /// Whether a chain can be in it.
 fn is_view(view: View) -> bool {
-    (view.id == ViewId::LOADED || is_proposed(view.id)) && is_size(view.relays)
+    (view.id == ViewId::LOADED || view.id.is_proposed()) && is_size(view.relays)
 }
 
 fn is_size(relays: u16) -> bool {
@@ -198,8 +193,8 @@ impl Proposal {
         let known = is_view(agreed)
             && poll.votes <= agreed.relays
             && successor.is_none_or(|successor| {
-                is_proposed(successor.proposal)
-                    && is_proposed(successor.view.id)
+                successor.proposal.is_proposed()
+                    && successor.view.id.is_proposed()
                     && is_size(successor.view.relays)
             });
         let (mission_id, view, place) = call
@@ -246,7 +241,7 @@ impl Decision {
         let view = view.map(SizedBody::view);
         let known = is_view(base)
             && is_size(there)
-            && view.is_none_or(|view| is_proposed(view.id) && is_size(view.relays));
+            && view.is_none_or(|view| view.id.is_proposed() && is_size(view.relays));
         let (mission_id, proposal, place) = call
             .checked()
             .filter(|(_, proposal, _)| known && base.id < *proposal)

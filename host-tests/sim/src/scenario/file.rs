@@ -140,8 +140,7 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
     }
     let (line, distance_m) = site::line(file, raw.site, geometry.distance_m)?;
     Ok(Scenario {
-        axis: line.map(|line| line.axis),
-        sites: line.map(|line| line.sites),
+        line,
         distance_m,
         altitude_m,
         altitude_min_m,

@@ -7,6 +7,7 @@ use uav_relay::flight::geodetic::Geodetic;
 use super::check::mistake;
 use super::error::{Problem, ScenarioError};
 use super::keys::number;
+use super::spec::Line;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -21,13 +22,6 @@ struct RawSite {
     lat_deg: f64,
     lon_deg: f64,
     amsl_m: f64,
-}
-
-/// The line on earth, and what it was made from.
-#[derive(Clone, Copy)]
-pub(super) struct Line {
-    pub(super) axis: Axis,
-    pub(super) sites: [Geodetic; 2],
 }
 
 /// The line between the two sites, if there are sites, and the distance from Tx to Rx: the one given, or that of the sites.

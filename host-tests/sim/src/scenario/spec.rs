@@ -12,9 +12,7 @@ use uav_relay::flight::geodetic::Geodetic;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// The line from Tx to Rx on earth, where the scenario says where the two are.
-    pub axis: Option<Axis>,
-    /// Tx and Rx themselves, from which that line is made.
-    pub sites: Option<[Geodetic; 2]>,
+    pub line: Option<Line>,
     /// Distance D from Tx to Rx, in metres, 1 to 1e6.
     pub distance_m: f64,
     /// Common altitude of the relays, in metres, 0.1 to 1e5.
@@ -39,6 +37,15 @@ pub struct Scenario {
     pub interference: Interference,
     /// What differs for single relays, by relay number (1 to 1000, 1 is next to Tx).
     pub relays: BTreeMap<u16, RelayOverride>,
+}
+
+/// The line on earth, and what it was made from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// The line.
+    pub axis: Axis,
+    /// The transmitter's site and the receiver's.
+    pub sites: [Geodetic; 2],
 }
 
 /// The radio channel: its carrier and the excess losses over free space.
@@ -130,8 +137,7 @@ impl Default for Scenario {
     /// The paper's multi-hop scenario: 1 km, relays at 20 m and 4 m apart at least, one 80 W interferer halfway.
     fn default() -> Self {
         Self {
-            axis: None,
-            sites: None,
+            line: None,
             distance_m: 1000.0,
             altitude_m: 20.0,
             altitude_min_m: 20.0,

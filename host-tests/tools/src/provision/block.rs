@@ -111,7 +111,7 @@ impl Flight {
             method: Method::Align,
             measure: None,
             secret: None,
-            sites: scenario.sites.map(|ends| Sites {
+            sites: scenario.line.map(|line| line.sites).map(|ends| Sites {
                 ends: ends.map(|at| [at.lat_e7, at.lon_e7, at.amsl_mm]),
                 speed_m_s: 0.0,
             }),

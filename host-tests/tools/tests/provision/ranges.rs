@@ -204,7 +204,8 @@ fn any_bytes_are_a_configuration_or_an_error() {
         samples: 1_000,
     };
     let field_of_four = field_of_four.measuring(Some(measure));
-    for flight in [adjust, field_of_four] {
+    let sited = super::sites::flight();
+    for flight in [adjust, field_of_four, sited] {
         let block = flight.block(3).unwrap();
         let mut good = 0;
         for _ in 0..20_000 {

@@ -18,7 +18,7 @@ fn scenario() -> Scenario {
     Scenario::parse("flight.toml", &TOML.replace("-47", "47")).unwrap()
 }
 
-fn flight() -> Flight {
+pub(super) fn flight() -> Flight {
     Flight::new(&scenario(), 5, 1e-4, 7).unwrap()
 }
 
@@ -38,7 +38,7 @@ fn sites_stand_where_the_table_says() {
     bytes.extend(7.5_f32.to_le_bytes());
     assert_eq!(block[288..316], bytes);
     let without = Scenario {
-        sites: None,
+        line: None,
         ..scenario()
     };
     let without = Flight::new(&without, 5, 1e-4, 7).unwrap();
@@ -54,7 +54,7 @@ fn the_line_is_that_of_the_scenario() {
     let sites = config.sites.unwrap();
     assert_eq!(sites.ends, ENDS);
     let found = course(&sites, &config.mission).unwrap();
-    assert_eq!(Some(found.axis), scenario().axis);
+    assert_eq!(found.axis, scenario().line.unwrap().axis);
     assert_eq!(found.pace.speed_m_s, 5.0, "unless told otherwise");
     for speed_m_s in [0.1, 7.5, 20.0] {
         let found = course(&Sites { speed_m_s, ..sites }, &config.mission).unwrap();

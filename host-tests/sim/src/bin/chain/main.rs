@@ -60,7 +60,8 @@ fn run(options: &Options) -> Result<(), Failure> {
         }
     };
     let mut setup = setup(options, mission)?;
-    options.hostile.flight.prepare(&mut setup, scenario.axis)?;
+    let axis = scenario.line.map(|line| line.axis);
+    options.hostile.flight.prepare(&mut setup, axis)?;
     setup.profiles = profiles;
     setup.held = mission::held(&scenario, options.uavs);
     let outcome = fly(options, &scenario, setup.clone())?;

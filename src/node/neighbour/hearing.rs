@@ -1,0 +1,78 @@
+//! Which nodes on one side were heard lately, and what was so of each of them in a row.
+
+use crate::settings::Settings;
+use crate::time::Instant;
+
+/// Nodes on one side that are sent a hello.
+pub(crate) const CANDIDATES: u16 = 4;
+
+/// How often something was so for each of the nearest nodes, in a row; the nearest first.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct InRow([u8; CANDIDATES as usize]);
+
+impl InRow {
+    /// It was so once more, of the node `distance` nodes away, or it was not; whether it has been so `most` times just now.
+    pub(super) fn count(&mut self, distance: u16, so: bool, most: u8) -> bool {
+        let at = usize::from(distance).wrapping_sub(1);
+        let Some(times) = self.0.get_mut(at) else {
+            return false;
+        };
+        if !so {
+            *times = 0;
+            return false;
+        }
+        let reached = *times + 1 == most;
+        *times = times.saturating_add(1).min(most);
+        reached
+    }
+}
+
+/// Which nodes on one side can be heard.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hearing {
+    since: Instant,
+    now: u8,
+    before: u8,
+}
+
+/// The bit of the node `distance` places away.
+pub(super) const fn mask(distance: u16) -> u8 {
+    if distance >= 1 && distance <= CANDIDATES {
+        1 << (distance - 1)
+    } else {
+        0
+    }
+}
+
+impl Hearing {
+    pub(super) const fn new(now: Instant) -> Self {
+        Self {
+            since: now,
+            now: 0,
+            before: 0,
+        }
+    }
+
+    pub(super) fn add(&mut self, distance: u16, now: Instant, settings: &Settings) {
+        self.age(now, settings);
+        self.now |= mask(distance);
+    }
+
+    /// Those of the last two spans.
+    pub(super) fn recent(mut self, now: Instant, settings: &Settings) -> u8 {
+        self.age(now, settings);
+        self.now | self.before
+    }
+
+    /// Forgets who was not heard for two spans of `probe_after`.
+    fn age(&mut self, now: Instant, settings: &Settings) {
+        let span = now.since(self.since);
+        if span < settings.probe_after {
+            return;
+        }
+        let old = span >= settings.probe_after.times(2);
+        self.before = if old { 0 } else { self.now };
+        self.now = 0;
+        self.since = now;
+    }
+}

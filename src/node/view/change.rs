@@ -1,0 +1,391 @@
+//! The states of the view change on one relay: a proposal comes, is handed on, and is decided.
+//!
+//! | state | a newer proposal comes | the same again | the decision comes | nobody is after it any more, and nobody was handed it |
+//! | --- | --- | --- | --- | --- |
+//! | `Settled` | hand on: `Proposed` | - | stale | - |
+//! | `Proposed` | hand on | say busy | hand back: `Decided` | decide: `Decided` |
+//! | `Decided` | hand on: `Proposed` | hand back again | stale | - |
+//!
+//! While a view is proposed no pass goes on. One that was refused leaves the places where they are; its leader proposes again every
+//! `probe_after`. A proposal that was handed on stays with the node that it was handed to: once another one, or nobody, is there, a
+//! later one is asked for.
+
+use super::asking::Asking;
+use super::electorate::{self, Electorate, Outcome};
+use super::proposed::{Proposed, Verdict, ViewDue};
+use super::record::{RecordError, ViewRecord};
+use crate::node::context::{Context, Decided, Effects, Member, Proposer};
+use crate::node::numbering::Stragglers;
+use crate::node::retransmit::Retransmit;
+use crate::node::timing::PAUSE;
+use crate::time::Instant;
+use crate::view::{View, ViewId};
+use crate::wire::digest::MissionId;
+use crate::wire::message::{Decision, Message, Poll, Proposal};
+
+/// How far ahead of all it has heard of a view may be that a relay hears of.
+const LEAP: u32 = 256;
+
+/// Where the view change is.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(super) enum ViewState {
+    Settled,
+    Proposed,
+    Decided,
+}
+
+/// The view change, as one relay takes part in it.
+#[derive(Clone, Debug)]
+pub(crate) struct ViewChange {
+    pub(super) state: ViewState,
+    pub(super) proposed: Option<Proposed>,
+    pub(super) electorate: Electorate,
+    /// The latest view heard of.
+    pub(super) newest: ViewId,
+    pub(crate) asking: Asking,
+    /// Whether the last decision was that too few are there.
+    pub(super) refused: bool,
+    pub(super) stragglers: Stragglers,
+    pub(super) retransmit: Retransmit,
+    pub(super) due: ViewDue,
+}
+
+impl ViewChange {
+    /// Of a chain of so many relays, led by node `elder`.
+    pub(crate) const fn new(relays: u16, elder: u16, seed: u32) -> Self {
+        Self {
+            electorate: Electorate::new(relays, elder),
+            state: ViewState::Settled,
+            proposed: None,
+            newest: ViewId::LOADED,
+            asking: Asking::new(seed),
+            refused: false,
+            stragglers: Stragglers::NONE,
+            retransmit: Retransmit::new(seed),
+            due: ViewDue {
+                proposal: false,
+                decision: false,
+                busy: false,
+            },
+        }
+    }
+
+    /// What it has said, as a relay of the mission with digest `base`.
+    pub(crate) const fn record(&self, base: u16) -> ViewRecord {
+        ViewRecord::new(base, self.electorate)
+    }
+
+    /// Whether nothing was said or heard of a view since this relay was switched on.
+    pub(crate) fn is_untouched(&self) -> bool {
+        self.proposed.is_none() && self.newest == self.electorate.promised()
+    }
+
+    /// A relay that has just been switched on, `untouched` or not, has said what is in `record`. It asks for a view.
+    pub(crate) fn resume(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        record: &ViewRecord,
+        untouched: bool,
+    ) -> Result<(), RecordError> {
+        let elder = self.electorate.elder;
+        let electorate = record
+            .electorate(member.digest, member.all, elder)
+            .ok_or(RecordError::Base)?;
+        let new = self.electorate == Electorate::new(member.all, elder);
+        if !(new && untouched && self.is_untouched()) {
+            return Err(RecordError::Begun);
+        }
+        self.electorate = electorate;
+        self.newest = electorate.promised();
+        if self.newest > ViewId::LOADED {
+            self.asking.ask_anew(now);
+        }
+        Ok(())
+    }
+
+    /// The latest view heard of.
+    pub(crate) const fn newest(&self) -> ViewId {
+        self.newest
+    }
+
+    /// Somebody knows that view. One too far ahead is not believed: it could be the last there can be.
+    pub(crate) fn heard_of(&mut self, view: ViewId) {
+        let near = view.number() <= self.newest.number().saturating_add(LEAP);
+        if view > self.newest && near {
+            self.newest = view;
+        }
+    }
+
+    /// What was agreed on in `view`, the one accepted last, has come: all have accepted it.
+    pub(crate) fn commit(&mut self, view: ViewId) {
+        if self.electorate.awaits(view) {
+            self.electorate.commit();
+        }
+    }
+
+    /// The proposal whose decision is awaited.
+    pub(crate) fn awaited(&self) -> Option<Proposed> {
+        self.proposed.filter(|_| self.state == ViewState::Proposed)
+    }
+
+    /// The last proposal that was taken part in.
+    pub(crate) const fn proposed(&self) -> Option<Proposed> {
+        self.proposed
+    }
+
+    /// This relay's place from the leader on, from 1, and how many there are, as it was counted last.
+    pub(crate) fn counted(&self) -> Option<(u16, u16)> {
+        let proposed = self.proposed?;
+        Some((proposed.place, proposed.there.max(proposed.place)))
+    }
+
+    /// Whether this relay is in a part of the chain that is too small.
+    pub(crate) const fn has_no_quorum(&self) -> bool {
+        self.refused
+    }
+
+    /// The relay that the proposal was handed on to is not there any more: what comes of it can not be known. A later one can be.
+    pub(super) fn abandon(&mut self, context: &Context<'_>, proposal: ViewId) {
+        if self.newest <= proposal
+            && let Some(later) = proposal.next_by(context.member.node)
+        {
+            self.heard_of(later);
+        }
+        self.asking.ask_anew(context.now);
+    }
+
+    /// A proposal or a decision from the neighbour before or after, of a mission that this relay holds.
+    pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
+        let all = context.member.all;
+        match message {
+            // A chain has no more relays than its mission.
+            Message::Proposal(proposal) if proposal.place < all => {
+                self.on_proposal(context, proposal)
+            }
+            Message::Decision(decision) if decision.view.is_none_or(|view| view.relays <= all) => {
+                self.on_decision(context, decision)
+            }
+            _ => Effects::STALE,
+        }
+    }
+
+    fn on_proposal(&mut self, context: &Context<'_>, proposal: &Proposal) -> Effects {
+        self.heard_of(proposal.view);
+        let again = self.proposed.is_some_and(|known| {
+            known.view == proposal.view
+                && known.mission_id == proposal.mission_id
+                && known.place == proposal.place.saturating_add(1)
+        });
+        let from = Effects {
+            proposed_by: Some(Proposer::Neighbour),
+            ..Effects::NONE
+        };
+        if again {
+            if self.state == ViewState::Proposed {
+                self.due.busy = true;
+                let hop_time = context.settings().hop_time;
+                self.retransmit.came_again(context.now, hop_time);
+            } else {
+                self.due.decision = true;
+                let way = context.way(proposal.place);
+                self.retransmit.asked(context.now, way);
+            }
+            return Effects {
+                repeated: true,
+                ..from
+            };
+        }
+        let told = Some(proposal.poll);
+        let effects = self.propose(
+            context,
+            proposal.view,
+            proposal.mission_id,
+            proposal.place,
+            told,
+        );
+        if let Some(effects) = effects {
+            return Effects {
+                proposed_by: from.proposed_by,
+                ..effects
+            };
+        }
+        // Late, or from a leader that has missed something.
+        if self.stragglers.one_more() {
+            // Whoever proposes has to take a later one.
+            if let Some(later) = self.newest.next_by(context.member.node) {
+                self.heard_of(later);
+            }
+            return Effects {
+                proposed_by: from.proposed_by,
+                ..Effects::FOREIGN
+            };
+        }
+        Effects {
+            stale: true,
+            ..from
+        }
+    }
+
+    /// A proposal has come through `place` relays before this one; `None` if a later one has.
+    pub(super) fn propose(
+        &mut self,
+        context: &Context<'_>,
+        view: ViewId,
+        mission_id: MissionId,
+        place: u16,
+        told: Option<Poll>,
+    ) -> Option<Effects> {
+        let node = context.member.node;
+        let poll = self.electorate.vote(node, view, told, context.held)?;
+        // However far ahead it is, this relay has had part in it.
+        self.newest = self.newest.max(view);
+        self.state = ViewState::Proposed;
+        self.stragglers = Stragglers::NONE;
+        self.proposed = Some(Proposed {
+            view,
+            mission_id,
+            place: place.saturating_add(1),
+            poll,
+            handed_to: None,
+            base: poll.agreed,
+            there: 0,
+            decided: None,
+            lease_left: 0,
+        });
+        self.retransmit.begin();
+        self.due = ViewDue::default();
+        let effects = if context.end {
+            self.decide(context)
+        } else {
+            self.due.proposal = true;
+            Effects::NONE
+        };
+        Some(Effects {
+            view_proposed: true,
+            ..effects
+        })
+    }
+
+    /// The chain ends here: if a proposal has come so far, everybody is counted.
+    pub(crate) fn decide(&mut self, context: &Context<'_>) -> Effects {
+        let Some(proposed) = self.awaited() else {
+            return Effects::NONE;
+        };
+        if proposed.handed_to.is_some() {
+            self.abandon(context, proposed.view);
+            return Effects::NONE;
+        }
+        let Proposed {
+            view, place, poll, ..
+        } = proposed;
+        let outcome = if context.member.settings.quorum {
+            electorate::decide(&poll, view, place, context.member.all)
+        } else {
+            Outcome::View(View {
+                id: view,
+                relays: place,
+            })
+        };
+        let lease_left = if place == context.member.all {
+            0
+        } else {
+            electorate::rest(&poll, context.longest_lease())
+        };
+        let decided = match outcome {
+            Outcome::Refused => None,
+            Outcome::View(view) => Some(view),
+        };
+        let verdict = Verdict {
+            there: place,
+            base: poll.agreed,
+            view: decided,
+            lease_left,
+        };
+        self.conclude(context, verdict)
+    }
+
+    fn on_decision(&mut self, context: &Context<'_>, decision: &Decision) -> Effects {
+        match self.awaited() {
+            Some(proposed)
+                if proposed.view == decision.proposal
+                    && proposed.mission_id == decision.mission_id
+                    && proposed.place.saturating_add(1) == decision.place
+                    && decision.there > proposed.place
+                    && decision.view.is_none_or(|view| {
+                        view.id != proposed.view || view.relays > proposed.place
+                    }) =>
+            {
+                let verdict = Verdict {
+                    there: decision.there,
+                    base: decision.base,
+                    view: decision.view,
+                    lease_left: decision.lease_left,
+                };
+                self.conclude(context, verdict)
+            }
+            _ => Effects::STALE,
+        }
+    }
+
+    fn conclude(&mut self, context: &Context<'_>, verdict: Verdict) -> Effects {
+        let Verdict {
+            there,
+            base,
+            view: decided,
+            lease_left,
+        } = verdict;
+        let Some(proposed) = &mut self.proposed else {
+            return Effects::NONE;
+        };
+        let holds = [context.latest, context.member.active].contains(&proposed.mission_id);
+        if !holds {
+            // A newer mission has taken its place since: the others come to hold that one, too.
+            return Effects::FOREIGN;
+        }
+        let proposal = proposed.view;
+        if !self.electorate.accept(proposal, base, decided) {
+            return Effects::STALE;
+        }
+        let taught = base.id > proposed.poll.agreed.id;
+        proposed.base = base;
+        proposed.there = there;
+        proposed.decided = decided;
+        proposed.lease_left = lease_left;
+        let leads = proposed.place == 1;
+        if leads && decided.is_some() {
+            // So have all the others.
+            self.electorate.commit();
+        }
+        self.state = ViewState::Decided;
+        self.refused = decided.is_none();
+        let way = context.way(proposed.place.saturating_sub(1));
+        self.retransmit.answered(context.now, way);
+        self.due = ViewDue {
+            decision: !leads,
+            ..ViewDue::default()
+        };
+        self.asking.stop();
+        if leads && decided.is_none() {
+            // Somebody may be back who could not be heard. Who has heard of a newer view only now has a voice at once.
+            let wait = if taught {
+                PAUSE
+            } else {
+                context.member.settings.probe_after
+            };
+            self.asking.ask_after(context.now, wait);
+        }
+        let came = match decided {
+            Some(view) if view.id == proposal => Decided::Granted {
+                relays: view.relays,
+                lease_left,
+            },
+            Some(_) => Decided::Earlier,
+            None => Decided::Refused,
+        };
+        Effects {
+            decided: Some(came),
+            ..Effects::NONE
+        }
+    }
+}

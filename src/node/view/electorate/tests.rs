@@ -1,0 +1,333 @@
+//! Who may decide, in whichever order proposals and decisions come.
+
+extern crate std;
+
+use std::vec::Vec;
+
+use super::{Electorate, Held, Outcome, VOTES, decide};
+use crate::time::Duration;
+use crate::view::{View, ViewId};
+use crate::wire::message::{Poll, Successor};
+
+const fn left(lease_left: u16) -> Held {
+    Held {
+        lease_left: Duration::from_millis(100 * lease_left as u64),
+        ..Held::NONE
+    }
+}
+
+fn id(number: u32, node: u32) -> ViewId {
+    ViewId::from_bits(number << 10 | node)
+}
+
+fn count(nodes: &[u16]) -> u16 {
+    u16::try_from(nodes.len()).unwrap()
+}
+
+/// A chain of relays, nodes 1 to as many.
+struct Chain(Vec<Electorate>);
+
+impl Chain {
+    fn of(relays: u16) -> Self {
+        Self((0..relays).map(|_| Electorate::new(relays, 1)).collect())
+    }
+
+    /// Whether the one of that place from 0 accepts `view`.
+    fn accept(&mut self, at: usize, view: View) -> bool {
+        let base = self.0[at].agreed();
+        self.0[at].accept(view.id, base, Some(view))
+    }
+
+    /// What a proposal gathers of `nodes`.
+    fn poll(&mut self, nodes: &[u16], proposal: ViewId) -> Poll {
+        let mut told = None;
+        for &node in nodes {
+            let electorate = &mut self.0[usize::from(node) - 1];
+            told = electorate.vote(node, proposal, told, left(0));
+            assert!(told.is_some(), "node {node}");
+        }
+        told.unwrap()
+    }
+
+    /// What is decided on a proposal to `nodes`; the last `accept` of them hear of it.
+    fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Outcome {
+        let poll = self.poll(nodes, proposal);
+        let outcome = decide(
+            &poll,
+            proposal,
+            count(nodes),
+            u16::try_from(self.0.len()).unwrap(),
+        );
+        if let Outcome::View(view) = outcome {
+            for &node in nodes.iter().rev().take(accept) {
+                assert!(self.0[usize::from(node) - 1].accept(proposal, poll.agreed, Some(view)));
+            }
+            if accept == nodes.len() {
+                self.0[usize::from(nodes[0]) - 1].commit();
+            }
+        }
+        outcome
+    }
+
+    fn knows(&self, node: u16) -> (View, bool) {
+        let electorate = self.0[usize::from(node) - 1];
+        (electorate.agreed(), electorate.member)
+    }
+}
+
+const fn granted(id: ViewId, relays: u16) -> Outcome {
+    Outcome::View(View { id, relays })
+}
+
+/// For all parts of all chains up to seven, as they were loaded.
+#[test]
+fn more_than_half_decide_or_half_with_the_elder() {
+    for relays in 1..=7_u16 {
+        for part in 1..1_u32 << relays {
+            let nodes: Vec<u16> = (1..=relays)
+                .filter(|node| part >> (node - 1) & 1 == 1)
+                .collect();
+            let outcome = Chain::of(relays).propose(&nodes, id(1, 1), 0);
+            let there = count(&nodes);
+            let most = 2 * there > relays || 2 * there == relays && nodes[0] == 1;
+            assert_eq!(outcome != Outcome::Refused, most, "{nodes:?} of {relays}");
+            if most {
+                assert_eq!(outcome, granted(id(1, 1), there));
+            }
+            // Never two parts of one chain.
+            let rest = ((1 << relays) - 1) & !part;
+            let rest: Vec<u16> = (1..=relays)
+                .filter(|node| rest >> (node - 1) & 1 == 1)
+                .collect();
+            if most && !rest.is_empty() {
+                let other = Chain::of(relays).propose(&rest, id(1, 2), 0);
+                assert_eq!(other, Outcome::Refused);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_members_of_the_view_decide_and_not_those_who_are_there() {
+    let mut chain = Chain::of(5);
+    let first = chain.propose(&[1, 2, 3], id(1, 1), 3);
+    assert_eq!(first, granted(id(1, 1), 3));
+    // Three of five, but one of three that are in the view.
+    let others = chain.propose(&[3, 4, 5], id(2, 3), 3);
+    assert_eq!(others, granted(id(1, 1), 3), "it may be agreed on");
+    let next = chain.propose(&[3, 4, 5], id(3, 3), 3);
+    assert_eq!(next, Outcome::Refused);
+    assert_eq!(
+        [3, 4, 5].map(|node| chain.knows(node).1),
+        [true, false, false]
+    );
+    // Two of its three.
+    let members = chain.propose(&[1, 2], id(4, 1), 2);
+    assert_eq!(members, granted(id(4, 1), 2));
+}
+
+#[test]
+fn of_a_split_view_the_half_of_its_proposer_goes_on() {
+    for (part, goes_on) in [(&[3, 4][..], true), (&[1, 2], false), (&[2, 3], true)] {
+        let mut chain = Chain::of(4);
+        // Node 3 proposes, and the others hear of it in two ways.
+        let view = View {
+            id: id(1, 3),
+            relays: 4,
+        };
+        for (electorate, node) in chain.0.iter_mut().zip(1..) {
+            electorate.vote(node, view.id, None, left(0)).unwrap();
+            assert!(electorate.accept(view.id, electorate.agreed(), Some(view)));
+            electorate.commit();
+        }
+        let outcome = chain.propose(part, id(2, 1), 0);
+        assert_eq!(outcome != Outcome::Refused, goes_on, "{part:?}");
+    }
+}
+
+#[test]
+fn what_may_be_agreed_on_is_decided_on_again() {
+    let mut chain = Chain::of(3);
+    // The last one alone has heard of it.
+    assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 1), granted(id(1, 1), 3));
+    assert_eq!(chain.propose(&[2, 3], id(2, 2), 2), granted(id(1, 1), 3));
+    assert_eq!(
+        chain.knows(2).0.id,
+        id(1, 1),
+        "all there have accepted it now"
+    );
+    // Who has voted for it is in it, heard or not.
+    assert_eq!(chain.propose(&[2, 3], id(3, 2), 2), granted(id(3, 2), 2));
+}
+
+/// Were they refused, a chain of which most were switched off and on again would never fly any more.
+#[test]
+fn all_of_the_mission_are_a_view_whatever_they_remember() {
+    let mut chain = Chain::of(3);
+    assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 1), granted(id(1, 1), 3));
+    for at in [0, 1] {
+        chain.0[at] = Electorate::new(3, 1);
+    }
+    assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 3), granted(id(2, 1), 3));
+    assert_eq!(chain.propose(&[1, 2], id(3, 1), 2), granted(id(3, 1), 2));
+}
+
+#[test]
+fn of_two_that_were_accepted_the_later_proposal_is_decided_on_again() {
+    for accepted_first in [1, 3] {
+        let mut chain = Chain::of(4);
+        let early = Successor {
+            proposal: id(1, 1),
+            view: View {
+                id: id(1, 1),
+                relays: 3,
+            },
+        };
+        let late = Successor {
+            proposal: id(2, 2),
+            view: View {
+                id: id(2, 2),
+                relays: 2,
+            },
+        };
+        chain.0[0].promised = late.proposal;
+        let (first, last) = if accepted_first == 1 {
+            (early, late)
+        } else {
+            (late, early)
+        };
+        chain.0[0].accepted = Some(first);
+        chain.0[2].accepted = Some(last);
+        assert_eq!(
+            chain.propose(&[1, 2, 3], id(3, 1), 0),
+            Outcome::View(late.view)
+        );
+    }
+}
+
+#[test]
+fn a_promise_keeps_what_was_decided_before_from_being_accepted() {
+    let mut chain = Chain::of(3);
+    assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 0), granted(id(2, 1), 3));
+    // The second one has promised more in the meantime, and takes part in nothing that is older.
+    chain.poll(&[2], id(3, 2));
+    let view = View {
+        id: id(2, 1),
+        relays: 3,
+    };
+    assert!(!chain.accept(1, view));
+    assert!(chain.accept(2, view));
+    for old in [id(1, 3), id(2, 1), id(3, 1), id(3, 2)] {
+        assert_eq!(chain.0[1].vote(2, old, None, left(0)), None, "{old:?}");
+    }
+    assert!(chain.0[1].vote(2, id(3, 3), None, left(0)).is_some());
+}
+
+#[test]
+fn all_know_by_the_next_proposal_what_one_knows_to_be_agreed_on() {
+    let mut chain = Chain::of(4);
+    chain.propose(&[1, 2, 3], id(1, 1), 3);
+    let poll = chain.poll(&[1, 2, 3, 4], id(2, 1));
+    assert_eq!(
+        (poll.agreed.id, poll.votes, poll.proposer),
+        (id(1, 1), 3, true)
+    );
+    assert_eq!(
+        [1, 2, 3, 4].map(|node| chain.knows(node).1),
+        [true, true, true, false]
+    );
+    assert_eq!(chain.knows(4).0, poll.agreed);
+}
+
+/// They come before those who know: their voices are those of an older view, and do not count.
+#[test]
+fn who_does_not_know_the_view_has_no_voice_in_it_yet() {
+    let mut chain = Chain::of(3);
+    chain.propose(&[1, 2, 3], id(1, 1), 3);
+    chain.0[2].commit();
+    let poll = chain.poll(&[2, 3], id(2, 2));
+    assert_eq!((poll.agreed.id, poll.votes), (id(1, 1), 1));
+    assert_eq!(decide(&poll, id(2, 2), 2, 4), Outcome::Refused);
+}
+
+#[test]
+fn commit_is_of_what_was_accepted_last() {
+    let mut chain = Chain::of(3);
+    assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 2), granted(id(1, 1), 3));
+    assert!(chain.0[1].awaits(id(1, 1)) && !chain.0[0].awaits(id(1, 1)));
+    chain.0[0].commit();
+    assert_eq!(
+        chain.knows(1).0.id,
+        ViewId::LOADED,
+        "it has accepted nothing"
+    );
+    chain.0[1].commit();
+    assert_eq!(chain.knows(2).0.id, id(1, 1));
+    assert!(!chain.0[1].awaits(id(1, 1)));
+}
+
+#[test]
+fn others_may_rely_on_members_alone() {
+    let mut chain = Chain::of(3);
+    let poll = chain.0[1].vote(2, id(1, 1), None, left(70)).unwrap();
+    let poll = chain.0[2].vote(3, id(1, 1), Some(poll), left(40)).unwrap();
+    assert_eq!(poll.lease_left, 40);
+    chain.0[0].member = false;
+    let poll = chain.0[0].vote(1, id(1, 1), Some(poll), left(10)).unwrap();
+    assert_eq!((poll.lease_left, poll.votes), (40, 2));
+}
+
+/// Proposals that came to nothing take no room; of those that nothing is heard of so many are remembered.
+#[test]
+fn votes_are_remembered_until_what_came_of_them_is_known() {
+    let mut relay = Electorate::new(3, 1);
+    let view = View {
+        id: id(1, 1),
+        relays: 3,
+    };
+    relay.vote(2, view.id, None, left(0)).unwrap();
+    for number in 2..100 {
+        relay.vote(2, id(number, 2), None, left(0)).unwrap();
+        let base = relay.agreed();
+        assert!(relay.accept(id(number, 2), base, None));
+    }
+    assert!(relay.has_voted(view.id));
+    for number in (100..).take(VOTES - 1) {
+        relay.vote(2, id(number, 2), None, left(0)).unwrap();
+    }
+    assert!(relay.has_voted(view.id));
+    let mut more = relay;
+    for number in 200..300 {
+        more.vote(2, id(number, 2), None, left(0)).unwrap();
+    }
+    assert!(more.has_voted(id(102, 2)) && more.has_voted(id(296, 2)));
+    assert!(!more.has_voted(id(103, 2)), "one too many");
+    let mut more = relay;
+    let told = Poll::of(view);
+    assert_eq!(
+        relay
+            .vote(2, id(200, 3), Some(told), left(0))
+            .map(|poll| poll.votes),
+        Some(1),
+        "the earliest stays"
+    );
+    more.learn(view);
+    assert!(more.member);
+    assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
+}
+
+/// The bound that is stated above: node 2 is in the view that goes on, forgets it, and is counted in the chain as it was loaded.
+#[test]
+fn one_that_forgets_what_it_said_may_decide_beside_the_view() {
+    let mut chain = Chain::of(5);
+    assert_eq!(chain.propose(&[3, 4, 5], id(1, 3), 3), granted(id(1, 3), 3));
+    chain.0[2] = Electorate::new(5, 1);
+    assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 3), granted(id(2, 1), 3));
+    // The others are two of its three.
+    chain.0[3].commit();
+    assert_eq!(chain.propose(&[4, 5], id(3, 4), 2), granted(id(3, 4), 2));
+    // With what it had stored it would have told of that.
+    let mut kept = Chain::of(5);
+    assert_eq!(kept.propose(&[3, 4, 5], id(1, 3), 3), granted(id(1, 3), 3));
+    assert_eq!(kept.propose(&[1, 2, 3], id(2, 1), 3), Outcome::Refused);
+}

@@ -1,0 +1,124 @@
+//! A state: each relay, the parts that they are in, the frames in the air, and what has been decided on.
+
+extern crate std;
+
+use std::vec::Vec;
+
+use crate::node::view::change::ViewChange;
+use crate::view::ViewId;
+
+/// A view and its size, as it can be sorted.
+pub(super) type Sized = (ViewId, u16);
+
+/// What is sent.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub(super) enum Body {
+    Proposal {
+        view: ViewId,
+        place: u16,
+        agreed: Sized,
+        votes: u16,
+        proposer: bool,
+        successor: Option<(ViewId, Sized)>,
+    },
+    Decision {
+        proposal: ViewId,
+        place: u16,
+        there: u16,
+        base: Sized,
+        view: Option<Sized>,
+    },
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub(super) struct Frame {
+    pub(super) from: usize,
+    pub(super) to: usize,
+    pub(super) body: Body,
+}
+
+/// One relay.
+#[derive(Clone, Debug)]
+pub(super) struct Unit {
+    pub(super) change: ViewChange,
+    /// The view that it accepted last, its place in that, and how many are in it.
+    pub(super) flies: (ViewId, u16, u16),
+}
+
+impl Unit {
+    fn key(&self) -> impl Eq + core::hash::Hash + use<> {
+        let change = &self.change;
+        (change.state, change.proposed, change.electorate, self.flies)
+    }
+}
+
+impl PartialEq for Unit {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+
+impl Eq for Unit {}
+
+impl core::hash::Hash for Unit {
+    fn hash<H: core::hash::Hasher>(&self, hasher: &mut H) {
+        self.key().hash(hasher);
+    }
+}
+
+/// A view that was decided on first: what it follows, and how many are in it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub(super) struct Decree {
+    pub(super) view: Sized,
+    pub(super) follows: ViewId,
+    /// Relays that it was proposed to, bit 0 for the first one.
+    pub(super) members: u8,
+}
+
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub(super) struct Chain {
+    pub(super) units: Vec<Unit>,
+    /// The part of each relay.
+    pub(super) parts: Vec<u8>,
+    /// In order, each once.
+    pub(super) air: Vec<Frame>,
+    /// What has been decided on, and what has been agreed on, ever.
+    pub(super) decrees: Vec<Decree>,
+    pub(super) agreed: Vec<Sized>,
+    pub(super) cuts: u8,
+    pub(super) proposals: u8,
+    pub(super) reboots: u8,
+    pub(super) losses: u8,
+}
+
+/// What happens.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Happens {
+    Part(usize),
+    Arrives(Frame),
+    Proposes(usize),
+    EndsAt(usize),
+    Repeats(usize),
+    Passes(usize),
+    Reboots(usize),
+    Forgets(usize),
+}
+
+/// Puts it where it belongs, once.
+pub(super) fn put<T: Ord>(all: &mut Vec<T>, one: T) {
+    if let Err(at) = all.binary_search(&one) {
+        all.insert(at, one);
+    }
+}
+
+impl Chain {
+    pub(super) fn before(&self, at: usize) -> Option<usize> {
+        (0..at)
+            .rev()
+            .find(|&other| self.parts[other] == self.parts[at])
+    }
+
+    pub(super) fn after(&self, at: usize) -> Option<usize> {
+        (at + 1..self.parts.len()).find(|&other| self.parts[other] == self.parts[at])
+    }
+}
