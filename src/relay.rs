@@ -207,7 +207,8 @@ impl Relay {
         self.node.handle_control(now, flown);
     }
 
-    /// Relays that fell silent at `side` have landed, or were taken away: the guard need not keep clear of them any more.
+    /// Relays at `side` that fell silent, or are not flown ([`handle_control`](Self::handle_control)), have landed, or were taken away: the
+    /// guard need not keep clear of them any more.
     ///
     /// Constant work.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {

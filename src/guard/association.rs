@@ -8,10 +8,19 @@
 use super::fence::Fence;
 use super::own::Own;
 use crate::jitter::Jitter;
+use crate::place::CrossSection;
 use crate::side::Side;
 
 /// So many messages of another association in a row are of a new one, not late ones of an old.
 const STRAYS: u8 = 3;
+
+/// An association that this relay has left, until the neighbour has begun anew.
+#[derive(Clone, Copy, Debug)]
+struct Parting {
+    own: u16,
+    heard: u16,
+    due: bool,
+}
 
 /// An association with the neighbour on one side.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +38,10 @@ pub(super) struct Association {
     /// Whether the neighbour passed on that the chain is to open, and whether it was last told so.
     pub(super) opens: bool,
     pub(super) told_open: bool,
+    /// The neighbour's number of the association that it has left, 0 for none: it is counted as absent.
+    absent: u16,
+    /// What this relay still has to say of the one that it has left itself.
+    parting: Option<Parting>,
 }
 
 impl Association {
@@ -42,7 +55,96 @@ impl Association {
             due: true,
             opens: false,
             told_open: false,
+            absent: 0,
+            parting: None,
         }
+    }
+
+    /// Whether nobody is there that this relay could agree with: the chain ends, or the neighbour is not flown.
+    pub(super) const fn is_none(&self) -> bool {
+        self.node == 0 || self.is_absent()
+    }
+
+    /// Whether the neighbour is not flown.
+    pub(super) const fn is_absent(&self) -> bool {
+        self.absent != 0
+    }
+
+    /// The neighbour has left the association of that number, and may be anywhere.
+    pub(super) const fn miss(&mut self, association: u16) {
+        self.absent = association;
+    }
+
+    /// From now on the neighbour's number is that one: whoever was absent is back.
+    pub(super) const fn meet(&mut self, association: u16) {
+        self.heard = association;
+        self.absent = 0;
+    }
+
+    /// Whether a message says that the neighbour has left this association. The number it echoes is not used after that, so what is said of it
+    /// again is of an earlier one.
+    pub(super) const fn is_left(&self, fence: &Fence) -> bool {
+        fence.says(Fence::RELEASED) && fence.echo == self.own
+    }
+
+    /// Leaves it: the next one, which has to say so where the neighbour may count on this one.
+    pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
+        let left = Parting {
+            own: self.own,
+            heard: self.heard,
+            due: true,
+        };
+        Self {
+            parting: if self.heard == 0 {
+                self.parting
+            } else {
+                Some(left)
+            },
+            ..Self::new(self.node, jitter)
+        }
+    }
+
+    /// Whether a message is of an association that this relay, or the neighbour, has left. The neighbour is told again until it has begun
+    /// anew.
+    pub(super) fn is_over(&mut self, fence: &Fence) -> bool {
+        if let Some(parting) = &mut self.parting {
+            let left = fence.association == parting.heard;
+            let is_new = fence.echo == 0 || fence.echo == self.own;
+            if left && fence.says(Fence::RELEASED) || !left && is_new {
+                self.parting = None;
+            } else {
+                // It still counts on that one, or on an earlier one.
+                parting.heard = fence.association;
+                parting.due = true;
+            }
+            if left || !is_new {
+                return true;
+            }
+        }
+        fence.association == self.absent
+    }
+
+    /// Whether the neighbour has still to be told that this relay has left; it is told again.
+    pub(super) const fn remind(&mut self) -> bool {
+        if let Some(parting) = &mut self.parting {
+            parting.due = true;
+        }
+        self.parting.is_some()
+    }
+
+    /// What there is to tell of the association that this relay has left.
+    pub(super) fn part(&mut self) -> Option<Fence> {
+        let parting = self.parting.as_mut()?;
+        core::mem::take(&mut parting.due).then_some(Fence {
+            association: parting.own,
+            echo: parting.heard,
+            number: 0,
+            x_m: 0.0,
+            target_m: 0.0,
+            across: CrossSection::on_line(0.0),
+            apart_m: 0.0,
+            flags: Fence::RELEASED,
+        })
     }
 
     /// Whether a message is of this association.

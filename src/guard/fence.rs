@@ -22,7 +22,7 @@ pub struct Fence {
     /// From the owner: how far before the fence it stays, m along x, 0 to 1e5. Where that is less than the separation, the
     /// follower stays where it is across the line.
     pub apart_m: f32,
-    /// What else it says: the sum of those of [`STILL`](Self::STILL) to [`ECHO_OPENS`](Self::ECHO_OPENS) that hold.
+    /// What else it says: the sum of those of [`STILL`](Self::STILL) to [`RELEASED`](Self::RELEASED) that hold.
     pub flags: u8,
 }
 
@@ -38,6 +38,9 @@ impl Fence {
     pub const OPENS: u8 = 4;
     /// The same as the sender has last heard it from the receiver.
     pub const ECHO_OPENS: u8 = 8;
+    /// The sender has left this association: it does not fly to its setpoints any more, or did not for a time. Places and the number of
+    /// the fence mean nothing.
+    pub const RELEASED: u8 = 16;
 
     pub(super) const fn says(&self, flag: u8) -> bool {
         self.flags & flag != 0
@@ -50,7 +53,7 @@ impl Fence {
         self.association != 0
             && places.into_iter().all(is_place)
             && (0.0..=1e5).contains(&self.apart_m)
-            && self.flags < 2 * Self::ECHO_OPENS
+            && self.flags < 2 * Self::RELEASED
     }
 }
 

@@ -55,7 +55,7 @@ impl FenceFollower {
     /// never heard.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
-        if self.association.node != 0 {
+        if !self.association.is_none() {
             // As far as this relay has come, not as far as it was asked to.
             let limit_m = self.least(own).min(own.reachable.at_m);
             let separation_m = own.config.separation_m;
@@ -76,9 +76,40 @@ impl FenceFollower {
         };
     }
 
+    /// This relay is not flown any more: it begins anew, and tells the neighbour so. What it had to keep to says nothing of where it is from
+    /// now on.
+    pub(super) fn leave(&mut self, jitter: &mut Jitter) {
+        *self = Self {
+            keep_out: self.keep_out,
+            association: self.association.leave(jitter),
+            ..Self::new(self.association.node, jitter)
+        };
+    }
+
+    /// The neighbour is not flown any more: this relay stays where it is toward it. It is otherwise free if the two were known to be in
+    /// order.
+    fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
+        let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
+        self.renew(own, jitter);
+        if !was_absent {
+            let (node, at_m) = (self.association.node, own.reachable.at_m);
+            self.keep_out.raise(Side::Upstream, node, at_m);
+        }
+        if is_ordered {
+            self.association.miss(association);
+        }
+    }
+
     pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
+        if self.association.is_over(fence) || fence.says(Fence::RELEASED) {
+            if self.association.is_left(fence) {
+                self.release(fence.association, own, jitter);
+            }
+            self.association.due = true;
+            return;
+        }
         if self.association.heard == 0 {
-            self.association.heard = fence.association;
+            self.association.meet(fence.association);
         } else if fence.association != self.association.heard && self.association.stray() {
             self.renew(own, jitter);
             self.association.heard = fence.association;
@@ -105,17 +136,17 @@ impl FenceFollower {
     /// How far back this relay may go, m; above where it is, it is asked to go there.
     #[inline(never)] // called from several places
     pub(super) fn least(&self, own: &Own) -> f32 {
-        let granted = match (self.association.node, self.number) {
-            (0, _) => f32::NEG_INFINITY,
-            (_, 0) => own.reachable.at_m,
-            _ => self.fence_m,
+        let granted = match (self.association.is_none(), self.number) {
+            (true, _) => f32::NEG_INFINITY,
+            (false, 0) => own.reachable.at_m,
+            (false, _) => self.fence_m,
         };
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
     /// Whether this relay may move across the line as far as this side is concerned.
     pub(super) fn is_clear(&self, own: &Own) -> bool {
-        (self.association.node == 0 || self.clear) && !self.is_held(own) && !self.keep_out.is_near()
+        (self.association.is_none() || self.clear) && !self.is_held(own) && !self.keep_out.is_near()
     }
 
     /// Whether this relay has to stay where it is across the line, since that may keep the two apart.
@@ -153,7 +184,7 @@ impl FenceFollower {
 
     /// Whether nobody is there, or whoever is has found this relay beyond it: before, it announces no fence.
     pub(super) const fn is_ordered(&self) -> bool {
-        self.association.node == 0 || self.is_agreed()
+        self.association.is_none() || self.is_agreed()
     }
 
     /// Whether a fence was heard of.
@@ -192,7 +223,7 @@ impl FenceFollower {
         {
             return Some(HoldReason::Lost);
         }
-        if self.association.node == 0 {
+        if self.association.is_none() {
             return None;
         }
         if !self.is_agreed() {

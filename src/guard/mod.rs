@@ -39,6 +39,8 @@
 //! | 13 | A relay that has to move across the line and may not by rule 10, or that started too close to a neighbour that is to be close, has the chain *open*: it says so to both sides, and everybody passes that on. Then all go to places in the same order that are the separation apart along x, and steps are the separation. | there is room to move across the line |
 //! | 14 | From a neighbour that fell silent within the separation along x this relay goes off to the separation, and does not move across the line before; nor where it never heard the neighbour, or had not cleared the first fence, before it has gone as far. | where the silent one hovers across the line still counts |
 //!
+//! | 15 | A relay that is not flown to its setpoints, since a pilot has it or it is on the ground, has none. It leaves both associations and says so until the neighbour has begun anew; flown again it begins as after a start. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 off to the separation); if the two were in order it is otherwise free, until it hears of a new association. | nobody counts on a drone that is flown by hand, and nobody comes nearer to it |
+//!
 //! # Why everybody arrives
 //!
 //! Let the places agreed on be the separation apart; then so are the fences' goals. A fence that has to be lowered waits for
@@ -57,6 +59,10 @@
 //!   much again each time that one is rebooted before a fence has opened what is missing. What a relay hovers off across the line counts
 //!   where the two are within the separation along x.
 //! - A relay says nothing before it has both a place to go to and a report of where it is: until then nobody moves toward it.
+//! - Where a pilot takes a drone by hand is the pilot's affair: others only come no nearer. Given back it has to stand between its
+//!   neighbours, the separation from them.
+//! - A relay that starts, or is flown again, beside one that is not flown has not heard it, and stays where it is until that one is
+//!   flown or is linked around.
 //! - A relay that is rebooted has forgotten whom it was linked to: it has to begin with the neighbours of the mission and be
 //!   linked around those that are silent, so that rule 9 holds it back.
 //! - The numbers of the associations are random: `seed` has to differ from one start to the next.
@@ -97,6 +103,8 @@ pub struct Guard {
     born: Instant,
     /// Before the first setpoint: where the relay was reported last.
     found: Option<Placement>,
+    /// Whether the relay flies to its setpoints.
+    flown: bool,
     follower: FenceFollower,
     owner: FenceOwner,
     refused: u32,
@@ -116,6 +124,7 @@ impl Guard {
             jitter,
             born: now,
             found: None,
+            flown: true,
             refused: 0,
         }
     }
@@ -146,15 +155,27 @@ impl Guard {
         if own.setpoint.is_some() {
             own.reachable.report(at, place.x_m, &own.config);
             own.report(at, place);
-        } else if at >= self.born && own.config.holds(place.x_m) {
+        } else if self.flown && at >= self.born && own.config.holds(place.x_m) {
             self.found = Some(own.config.cut(place));
         }
     }
 
-    /// Whether the relay flies to the setpoints from `now` on; whether that is news.
+    /// Whether the relay flies to its setpoints from `now` on; whether that is news. Until this says otherwise it does.
+    ///
+    /// While it does not there is no setpoint, and both neighbours are told that it may be anywhere. Flown again it begins as after a
+    /// start: with the next place that is reported.
     pub fn control(&mut self, now: Instant, flown: bool) -> bool {
-        let _ = (now, flown);
-        false
+        if flown == self.flown {
+            return false;
+        }
+        self.flown = flown;
+        (self.born, self.found) = (now, None);
+        if self.own.setpoint.is_some() {
+            self.own.release(now);
+            self.follower.leave(&mut self.jitter);
+            self.owner.leave(&mut self.jitter);
+        }
+        true
     }
 
     /// What node `from` at `side` says. What is out of range is counted, what is of an earlier association or of another node ignored.
@@ -269,13 +290,19 @@ impl Guard {
 
     /// The next thing to tell a neighbour: on which side, to which node, what.
     pub fn poll(&mut self) -> Option<(Side, u16, Fence)> {
+        let (up, down) = (&mut self.follower.association, &mut self.owner.association);
+        for (side, association) in [(Side::Upstream, up), (Side::Downstream, down)] {
+            if let Some(fence) = association.part() {
+                return Some((side, association.node, fence));
+            }
+        }
         let own = &self.own;
         if own.target.is_none() || !own.reachable.is_known() {
             return None;
         }
         if self.owner.is_ordered(own) {
             let taken_m = self.follower.taken_m();
-            self.follower.agree(own, self.owner.apart(own, taken_m));
+            self.follower.agree(own, self.owner.kept(own, taken_m));
             if let Some(fence) = self.follower.tell(own) {
                 return Some((Side::Upstream, self.follower.association.node, fence));
             }
@@ -290,9 +317,12 @@ impl Guard {
         let there = self.is_there();
         let follower = self.follower.association.node != 0 && !(there && self.follower.is_agreed());
         let owner = self.owner.association.node != 0 && !(there && self.owner.is_agreed());
-        self.follower.association.due |= follower;
-        self.owner.association.due |= owner;
-        follower || owner
+        let (up, down) = (&mut self.follower.association, &mut self.owner.association);
+        // Who is absent asks when it is back.
+        up.due |= follower && !up.is_absent();
+        down.due |= owner && !down.is_absent();
+        let leaves = up.remind() | down.remind();
+        follower || owner || leaves
     }
 
     /// Whether the setpoint is the agreed place, cut to the box, and the relay was reported to be there since.
@@ -312,9 +342,9 @@ impl Guard {
 
     /// What at `side` keeps this relay from its place, by what was heard so far; `None` if nothing does, or no place is agreed.
     ///
-    /// While a new agreement spreads it may tell of places that are not to be.
+    /// While a new agreement spreads it may tell of places that are not to be. Nothing does while the relay is not flown.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
-        self.own.target?;
+        self.own.target.filter(|_| self.flown)?;
         match side {
             Side::Upstream => self.follower.hold_reason(&self.own),
             Side::Downstream => self.owner.hold_reason(&self.own, self.follower.taken_m()),

@@ -46,6 +46,13 @@ impl Own {
         self.setpoint = Some(setpoint);
     }
 
+    /// It is not flown to its setpoints any more, or again: there is none, and it may be anywhere.
+    pub(super) const fn release(&mut self, now: Instant) {
+        self.setpoint = None;
+        self.reachable = ReachableInterval::unknown(now);
+        (self.turned, self.still, self.open) = (now, false, false);
+    }
+
     /// It was at `place` at time `at`: across the line it has arrived if that was long enough after it was told to go there.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.still |= at >= self.turned + self.config.lag

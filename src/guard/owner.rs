@@ -61,7 +61,7 @@ impl FenceOwner {
     /// never heard.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
-        if self.association.node != 0 {
+        if !self.association.is_none() {
             let limit_m = self.most(own, own.config.separation_m);
             keep_out.raise(Side::Downstream, self.association.node, limit_m);
             if !self.is_ordered(own) {
@@ -76,13 +76,37 @@ impl FenceOwner {
         };
     }
 
+    /// This relay is not flown any more: it begins anew, and tells the neighbour so. What it had to keep to says nothing of where it is from
+    /// now on.
+    pub(super) fn leave(&mut self, jitter: &mut Jitter) {
+        *self = Self {
+            keep_out: self.keep_out,
+            association: self.association.leave(jitter),
+            ..Self::new(self.association.node, jitter)
+        };
+    }
+
+    /// The neighbour is not flown any more: this relay stays where it is toward it. It is otherwise free if the two were known to be in
+    /// order.
+    fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
+        let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
+        self.renew(own, jitter);
+        if !was_absent {
+            let (node, at_m) = (self.association.node, own.reachable.at_m);
+            self.keep_out.raise(Side::Downstream, node, at_m);
+        }
+        if is_ordered {
+            self.association.miss(association);
+        }
+    }
+
     const fn is_heard(&self) -> bool {
         self.association.heard != 0
     }
 
     /// Whether nobody is there, or whoever is stands beyond this relay.
     pub(super) fn is_ordered(&self, own: &Own) -> bool {
-        self.association.node == 0 || self.is_heard() && self.is_beyond(own)
+        self.association.is_none() || self.is_heard() && self.is_beyond(own)
     }
 
     /// Whether the neighbour is known to be beyond this relay, but for what the two were reported off: one above the other may both have
@@ -97,14 +121,32 @@ impl FenceOwner {
         self.granted_m.max(separation_m - taken_m).min(separation_m)
     }
 
+    /// How far it is from the one downstream at least, m: nothing is known while one that is lost may be nearer than the separation, or
+    /// before the first fence is cleared.
+    pub(super) fn kept(&self, own: &Own, taken_m: f32) -> f32 {
+        let is_open = self.association.is_none() || self.clear;
+        if self.keep_out.is_near() || !is_open {
+            0.0
+        } else {
+            self.apart(own, taken_m)
+        }
+    }
+
     /// Whether the places across the line have to stay, since they may keep the two apart.
     pub(super) fn holds(&self, own: &Own) -> bool {
         self.asked_m.min(self.granted_m) < own.config.separation_m
     }
 
     pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
+        if self.association.is_over(fence) || fence.says(Fence::RELEASED) {
+            if self.association.is_left(fence) {
+                self.release(fence.association, own, jitter);
+            }
+            self.association.due = true;
+            return;
+        }
         if !self.is_heard() && fence.echo == self.association.own {
-            self.association.heard = fence.association;
+            self.association.meet(fence.association);
             self.association.due = true;
             self.keep_out
                 .spoken(Side::Downstream, self.association.node);
@@ -113,6 +155,8 @@ impl FenceOwner {
             if self.is_heard() && self.association.stray() {
                 self.renew(own, jitter);
             }
+            // Nobody is reminded who is absent: who is back asks.
+            self.association.due |= self.association.is_absent();
             return;
         }
         self.association.hear_open(fence);
@@ -134,17 +178,17 @@ impl FenceOwner {
     /// How far this relay may go, m, if it is to stay `apart` from the neighbour.
     #[inline(never)] // called from several places
     pub(super) fn most(&self, own: &Own, apart: f32) -> f32 {
-        let granted = match (self.association.node, self.is_beyond(own)) {
-            (0, _) => f32::INFINITY,
-            (_, true) => self.counted_m - apart,
-            (_, false) => own.reachable.at_m,
+        let granted = match (self.association.is_none(), self.is_beyond(own)) {
+            (true, _) => f32::INFINITY,
+            (false, true) => self.counted_m - apart,
+            (false, false) => own.reachable.at_m,
         };
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
     /// Whether this relay may move across the line as far as this side is concerned.
     pub(super) fn is_clear(&self, own: &Own) -> bool {
-        (self.association.node == 0 || self.clear) && !self.holds(own) && !self.keep_out.is_near()
+        (self.association.is_none() || self.clear) && !self.holds(own) && !self.keep_out.is_near()
     }
 
     /// Whether the neighbour may have been too near since it was switched on.
@@ -253,7 +297,7 @@ impl FenceOwner {
         {
             return Some(HoldReason::Lost);
         }
-        if self.association.node == 0 {
+        if self.association.is_none() {
             return None;
         }
         if !self.is_heard() {

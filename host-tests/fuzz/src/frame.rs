@@ -282,7 +282,7 @@ fn look_at(message: &Message) {
             let across = fence.across;
             let places = [fence.x_m, fence.target_m, across.y_m, across.altitude_m];
             assert!(fence.association != 0 && places.iter().all(|place| place.abs() <= 1e7));
-            assert!((0.0..=1e5).contains(&fence.apart_m) && fence.flags < 16);
+            assert!((0.0..=1e5).contains(&fence.apart_m) && fence.flags < 32);
         }
         Message::Offer { upload, .. } => {
             let same = Mission::try_new(*upload.config()).is_ok();

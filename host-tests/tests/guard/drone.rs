@@ -52,6 +52,15 @@ pub(crate) struct Drone {
     pub(crate) flies: bool,
     /// Whether its radio works.
     pub(crate) speaks: bool,
+    /// Whether its pilot has it: what the guard says is ignored.
+    pub(crate) taken: bool,
+    /// Whether the neighbours toward Tx and Rx have heard so.
+    pub(crate) told: [bool; 2],
+    /// Where those beyond may be since, along x.
+    pub(crate) clear: (f64, f64),
+    taken_s: f64,
+    /// The numbers of the associations in which it has spoken last.
+    pub(crate) said: [u16; 2],
     next_report_s: f64,
     next_reminder_s: f64,
     pub(crate) messages: u64,
@@ -81,6 +90,11 @@ impl Drone {
             links,
             flies: true,
             speaks: true,
+            taken: false,
+            told: [false; 2],
+            clear: (f64::NEG_INFINITY, f64::INFINITY),
+            taken_s: 0.0,
+            said: [0; 2],
             next_report_s: 0.0,
             next_reminder_s: 0.0,
             messages: 0,
@@ -107,7 +121,56 @@ impl Drone {
         {
             guard.link(side, link.map(node));
         }
+        guard.control(instant(now_s), !self.taken);
         self.guard = Some(guard);
+    }
+
+    /// Its pilot takes it: it brakes, and hovers where it stops.
+    pub(crate) fn take(&mut self, now_s: f64) {
+        self.taken = true;
+        self.taken_s = now_s;
+        self.clear = (f64::NEG_INFINITY, f64::INFINITY);
+        self.told = self.links.map(|link| link.is_none());
+        self.orders.clear();
+        self.goal = self.body.stops_at(self.acceleration);
+    }
+
+    /// The neighbour at that side has heard, by a message of that time, that it is not flown: from then on it goes no farther than
+    /// `(low, high)`.
+    pub(crate) fn is_known(&mut self, side: usize, sent_s: f64, (low, high): (f64, f64)) {
+        if sent_s >= self.taken_s && !self.told[side] {
+            self.told[side] = true;
+            match side {
+                0 => self.clear.0 = high,
+                _ => self.clear.1 = low,
+            }
+        }
+    }
+
+    /// Where it hovers, or will.
+    pub(crate) const fn stopped(&self) -> Point {
+        self.goal
+    }
+
+    /// Its pilot moves it by `way_m` along the axis `part`.
+    pub(crate) fn aside(&mut self, part: usize, way_m: f64) {
+        self.goal[part] += way_m;
+    }
+
+    /// Its pilot gives it back: it hovers where it stops, and flies to its setpoints from then on.
+    pub(crate) fn give(&mut self, now_s: f64) {
+        if core::mem::take(&mut self.taken) {
+            self.goal = self.body.stops_at(self.acceleration);
+            self.is_flown(now_s);
+        }
+    }
+
+    /// Its guard hears who flies it.
+    pub(crate) fn is_flown(&mut self, now_s: f64) {
+        if let Some(guard) = &mut self.guard {
+            guard.control(instant(now_s), !self.taken);
+            assert!(!self.taken || guard.setpoint().is_none());
+        }
     }
 
     /// Flies on for a step.
@@ -145,7 +208,7 @@ impl Drone {
         let before = guard.setpoint();
         let after = guard.steer(instant(now_s));
         assert_eq!(after, guard.setpoint());
-        let Some(setpoint) = after.filter(|_| after != before) else {
+        let Some(setpoint) = after.filter(|_| after != before && !self.taken) else {
             return;
         };
         let fence = confines.fence;

@@ -29,13 +29,15 @@ fn nobody_comes_too_close_and_everybody_arrives() {
         .collect();
     let sum = |of: fn(&Report) -> u64| reports.iter().map(of).sum::<u64>();
     println!(
-        "{} schedules, {} drone-steps, {} agreements heard, {} reboots, {} relays silent, {} gone, {} neighbours that end closer along x",
+        "{} schedules, {} drone-steps, {} agreements heard, {} reboots, {} relays silent, {} gone, {} taken by pilots and {} moved along the line, {} neighbours that end closer along x",
         reports.len(),
         sum(|report| report.steps),
         sum(|report| report.heard),
         sum(|report| report.reboots),
         sum(|report| report.silences),
         sum(|report| report.gone),
+        sum(|report| report.taken),
+        sum(|report| report.along),
         sum(|report| report.close),
     );
     let closest = reports
@@ -61,6 +63,7 @@ fn nobody_comes_too_close_and_everybody_arrives() {
         sum(|report| report.reboots) > 0
             && sum(|report| report.silences) > 0
             && sum(|report| report.gone) > 0
+            && sum(|report| report.along) > 0
             && sum(|report| report.close) > 0
     );
 }

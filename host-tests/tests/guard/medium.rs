@@ -19,6 +19,7 @@ pub(crate) struct Faults {
 /// One message under way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Letter {
+    pub(crate) sent_s: f64,
     due_s: f64,
     pub(crate) to: usize,
     pub(crate) from: usize,
@@ -50,6 +51,7 @@ impl Medium {
             // Most come soon, some very late: the square keeps the long delays rare.
             let delay = faults.delay_s * rng.random_range(0.0..=1.0_f64).powi(3);
             self.letters.push(Letter {
+                sent_s: now_s,
                 due_s: now_s + 0.01 + delay,
                 to,
                 from,

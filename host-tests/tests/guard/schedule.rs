@@ -15,6 +15,7 @@
 //! | medium | loses 0 to 50 %, duplicates 0 to 30 %, delays up to 0.1 s to 8 s |
 //! | reports | every 0.1 s to 10 s, up to 0 to 5 s old |
 //! | happens to some | rebooted for up to 15 s; unheard of for up to 60 s, and linked around; taken away for good |
+//! | pilots | in half of the schedules each takes its drone with 30 %, up to twice: for 5 s to 60 s, or until the end; it brakes and hovers, its guard hears of it up to 1.5 s later; in half of the cases the pilot then moves it up to 30 m across the line, away from the others, and in half, once both neighbours have heard of it, along the line to anywhere the separation from where others may be |
 //!
 //! In the end the medium loses up to 30 %, everybody flies, and everybody hears of the same places.
 
@@ -37,6 +38,10 @@ pub(crate) struct Report {
     pub(crate) reboots: u64,
     pub(crate) silences: u64,
     pub(crate) gone: u64,
+    /// Drones that their pilots took.
+    pub(crate) taken: u64,
+    /// Those that they moved along the line.
+    pub(crate) along: u64,
     /// Neighbours that end closer along x than the separation.
     pub(crate) close: u64,
     pub(crate) closest_m: f64,
@@ -58,6 +63,12 @@ enum What {
     Back(usize, Side, usize),
     Forget(usize, Side),
     Speed(usize, f64),
+    /// Its pilot takes it, its guard hears of that, the pilot moves it aside, and gives it back.
+    Take(usize),
+    Hears(usize),
+    Aside(usize, (usize, bool, f64)),
+    Along(usize, f64),
+    Give(usize),
 }
 
 const ROUGH_S: f64 = 200.0;
@@ -237,7 +248,9 @@ fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
             plan.push((at_s + rng.random_range(0.0..=5.0), What::Hear(k, after)));
         }
     }
+    let pilots = pilots(rng, world.drones.len(), &troubles);
     plan.extend(troubles);
+    plan.extend(pilots);
     plan.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut plan = plan.into_iter().peekable();
     while world.now_s < ROUGH_S {
@@ -314,6 +327,47 @@ fn troubles(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
     plan
 }
 
+/// Pilots who take their drones. Not beside one that is gone: an operator says that nobody is there any more.
+fn pilots(rng: &mut ChaCha8Rng, relays: usize, troubles: &[(f64, What)]) -> Vec<(f64, What)> {
+    let mut plan = Vec::new();
+    if rng.random_bool(0.5) {
+        return plan;
+    }
+    for k in 0..relays {
+        let beside_gone = troubles
+            .iter()
+            .any(|(_, what)| matches!(what, What::Vanish(gone) if gone.abs_diff(k) <= 1));
+        if beside_gone || rng.random_bool(0.7) {
+            continue;
+        }
+        let mut at_s = rng.random_range(1.0..ROUGH_S - 20.0);
+        for _ in 0..rng.random_range(1..=2) {
+            plan.push((at_s, What::Take(k)));
+            let told_s = at_s + rng.random_range(0.0..=1.5);
+            plan.push((told_s, What::Hears(k)));
+            if rng.random_bool(0.5) {
+                let most_m = rng.random_range(1.0..=30.0);
+                let way = (rng.random_range(1..=2), rng.random(), most_m);
+                plan.push((told_s, What::Aside(k, way)));
+            }
+            let is_alone = troubles.iter().all(|(_, what)| {
+                !matches!(what, What::Mute(other) | What::Vanish(other) if other.abs_diff(k) <= 3)
+            });
+            if is_alone && rng.random_bool(0.5) {
+                let later_s = told_s + rng.random_range(0.5..=15.0);
+                plan.push((later_s, What::Along(k, rng.random_range(0.0..=1.0))));
+            }
+            if rng.random_bool(0.2) {
+                break;
+            }
+            let back_s = at_s + rng.random_range(5.0..=60.0);
+            plan.push((back_s, What::Give(k)));
+            at_s = back_s + 20.0 * rng.random_range(0.01..=1.0_f64).powi(2);
+        }
+    }
+    plan
+}
+
 /// Relay `k` falls silent, its neighbours link to each other, and it is back some time later; or it is gone.
 fn around(
     rng: &mut ChaCha8Rng,
@@ -384,6 +438,14 @@ fn happen(world: &mut World, what: What, report: &mut Report) {
             }
         }
         What::Speed(k, speed) => world.drones[k].speed = speed,
+        What::Take(k) => {
+            report.taken += 1;
+            world.drones[k].take(world.now_s);
+        }
+        What::Hears(k) => world.drones[k].is_flown(world.now_s),
+        What::Aside(k, way) => world.aside(k, way),
+        What::Along(k, share) => report.along += u64::from(world.along(k, share)),
+        What::Give(k) => world.drones[k].give(world.now_s),
     }
 }
 
@@ -407,6 +469,9 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
         let apart_m = f64::from(world.confines.separation_m);
         let steps = targets.windows(2).map(|pair| pair[1][0] - pair[0][0]);
         report.close += steps.filter(|step| *step < 0.99 * apart_m).count() as u64;
+    }
+    for drone in &mut world.drones {
+        drone.give(world.now_s);
     }
     let relays = world.drones.len();
     let gone: Vec<bool> = world.drones.iter().map(|drone| !drone.flies).collect();

@@ -3,6 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Side;
+use uav_relay::guard::Fence;
 use uav_relay::guard::config::GuardConfig;
 
 use uav_relay_sim::simulator::drones::Point;
@@ -93,15 +94,26 @@ impl World {
                 now_s,
             );
         }
+        let mut tell = Vec::new();
         for letter in self.medium.arrived(now_s) {
             let drone = &mut self.drones[letter.to];
             if let Some(guard) = drone.guard.as_mut().filter(|_| drone.speaks && drone.flies) {
                 guard.hear(letter.side, node(letter.from), &letter.fence);
+                let side = usize::from(letter.side == Side::Downstream);
+                // Of the association that it is in.
+                let told = letter.fence.flags & Fence::RELEASED != 0
+                    && letter.fence.echo == drone.said[side];
+                tell.extend(told.then_some((letter, drone.stretch()[0])));
                 // Nobody need look at the setpoint between two messages, but somebody may.
                 if self.rng.random_bool(0.5) {
                     drone.steer(&mut self.rng, &self.confines, now_s);
                 }
             }
+        }
+        for (letter, stretch) in tell {
+            // On whose downstream side the sender is, that is upstream of it.
+            let side = usize::from(letter.side == Side::Upstream);
+            self.drones[letter.from].is_known(side, letter.sent_s, stretch);
         }
         for k in 0..self.drones.len() {
             let drone = &mut self.drones[k];
@@ -122,12 +134,15 @@ impl World {
             return;
         };
         for round in 0.. {
-            assert!(round < 3, "it never stops talking");
+            assert!(round < 5, "it never stops talking");
             let Some((side, to, fence)) = guard.poll() else {
                 return;
             };
             assert!(fence.is_valid(), "{fence:?}");
             drone.messages += 1;
+            if fence.flags & Fence::RELEASED == 0 {
+                drone.said[usize::from(side == Side::Downstream)] = fence.association;
+            }
             let heard_from = match side {
                 Side::Upstream => Side::Downstream,
                 Side::Downstream => Side::Upstream,
@@ -138,6 +153,46 @@ impl World {
                     .send(&mut self.rng, self.faults, self.now_s, way, fence);
             }
         }
+    }
+
+    /// The pilot of drone `k` moves it up to `most_m` along one axis across the line, away from the others near it, if there is such a way.
+    pub(crate) fn aside(&mut self, k: usize, (part, up, most_m): (usize, bool, f64)) {
+        let (low, high) = self.drones[k].stretch()[part];
+        let near = k.saturating_sub(3)..(k + 4).min(self.drones.len());
+        let is_away = near
+            .filter(|other| *other != k && self.drones[*other].flies)
+            .all(|other| {
+                let (least, most) = self.drones[other].stretch()[part];
+                if up { low >= most } else { high <= least }
+            });
+        if is_away {
+            self.drones[k].aside(part, if up { most_m } else { -most_m });
+        }
+    }
+
+    /// The pilot of drone `k`, whose neighbours have both heard so, moves it along the line, the separation from where they may be.
+    pub(crate) fn along(&mut self, k: usize, share: f64) -> bool {
+        if !self.drones[k].taken || self.drones[k].told != [true; 2] {
+            return false;
+        }
+        let apart_m = f64::from(self.confines.separation_m) + self.allowed_m();
+        let flying = |part: &[Drone]| -> Vec<(f64, f64)> {
+            let flying = part.iter().filter(|drone| drone.flies);
+            flying.map(|drone| drone.stretch()[0]).collect()
+        };
+        let below = flying(&self.drones[..k]);
+        let above = flying(&self.drones[k + 1..]);
+        let (before, after) = self.drones[k].clear;
+        let least = below.iter().map(|(_, high)| *high).fold(before, f64::max);
+        let least = (least + apart_m).max(0.0);
+        let most = above.iter().map(|(low, _)| *low).fold(after, f64::min);
+        let most = (most - apart_m).min(f64::from(self.confines.fence.most_x_m));
+        let to = least + share * (most - least);
+        if least < most {
+            let [stop, ..] = self.drones[k].stopped();
+            self.drones[k].aside(0, to - stop);
+        }
+        least < most
     }
 
     /// Nobody can come too close to another one from where they are, wherever they stop, and nobody has in this step.

@@ -130,7 +130,7 @@ impl Fenced {
     fn in_range(&self) -> bool {
         let [places @ .., apart_m] = self.places;
         let within = places.iter().all(|place| place.abs() <= 1e7);
-        self.number != 0 && within && (0.0..=1e5).contains(&apart_m) && self.flags < 16
+        self.number != 0 && within && (0.0..=1e5).contains(&apart_m) && self.flags < 32
     }
 }
 

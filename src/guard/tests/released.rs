@@ -1,0 +1,228 @@
+//! A relay that is not flown to its setpoints.
+
+use super::{APART, One, at, config};
+use crate::guard::{Fence, Guard, HoldReason};
+use crate::place::Placement;
+use crate::side::Side;
+use crate::time::Instant;
+
+/// Three relays in a row, 100 m apart; the middle one is taken.
+struct Row {
+    all: [One; 3],
+}
+
+impl Row {
+    fn new() -> Self {
+        let neighbours = |k: u16| [(k > 1).then(|| k - 1), (k < 3).then(|| k + 1)];
+        let mut row = Self {
+            all: [1_u16, 2, 3].map(|k| {
+                let x_m = 100.0 * f32::from(k);
+                let mut one = One::new([None, None], x_m, x_m);
+                let seed = 7 + u32::from(k);
+                one.guard = Guard::new(config(), neighbours(k), seed, Instant::ZERO);
+                one.guard.commit(at(x_m));
+                one.is_at(x_m);
+                one.is_at(x_m);
+                one
+            }),
+        };
+        row.talk();
+        assert!(row.all.iter().all(|one| one.guard.is_there()));
+        row
+    }
+
+    /// All that there is to say is heard, until there is nothing.
+    fn talk(&mut self) {
+        for _ in 0..8 {
+            for k in 0..3 {
+                self.all[k].guard.remind();
+                while self.speak(k).is_some() {}
+            }
+        }
+    }
+
+    /// One message of relay `k` from 0, which its neighbour hears.
+    fn speak(&mut self, k: usize) -> Option<Fence> {
+        let (side, to, fence) = self.all[k].guard.poll()?;
+        let from = u16::try_from(k).unwrap_or(0) + 1;
+        self.all[usize::from(to) - 1].hears(side.other(), from, fence);
+        Some(fence)
+    }
+
+    fn take(&mut self) {
+        let one = &mut self.all[1];
+        assert!(one.guard.control(one.now, false));
+        assert!(!one.guard.control(one.now, false), "that is no news");
+    }
+
+    fn give(&mut self) {
+        let one = &mut self.all[1];
+        assert!(one.guard.control(one.now, true));
+    }
+
+    fn setpoint(&mut self, k: usize) -> Option<f32> {
+        let one = &mut self.all[k];
+        one.guard.steer(one.now).map(|place| place.x_m)
+    }
+}
+
+/// Rule 15.
+#[test]
+fn nobody_comes_nearer_to_a_relay_that_its_pilot_has() {
+    let mut row = Row::new();
+    row.take();
+    assert_eq!(row.setpoint(1), None);
+    row.all[1].is_at(200.0);
+    assert_eq!(row.setpoint(1), None, "a report changes nothing");
+    row.talk();
+    assert_eq!(row.all[1].guard.poll(), None);
+    for (k, toward, away) in [(0, 180.0, 50.0), (2, 220.0, 350.0)] {
+        let x_m = row.setpoint(k);
+        row.all[k].guard.commit(at(toward));
+        assert_eq!(row.setpoint(k), x_m);
+        let side = if k == 0 {
+            Side::Downstream
+        } else {
+            Side::Upstream
+        };
+        let reason = row.all[k].guard.hold_reason(side);
+        assert_eq!(reason, Some(HoldReason::Lost));
+        let high = Placement {
+            altitude_m: 90.0,
+            ..at(away)
+        };
+        row.all[k].guard.commit(high);
+        row.all[k].guard.steer(row.all[k].now);
+        assert_eq!(
+            row.all[k].guard.setpoint(),
+            Some(high),
+            "it is otherwise free"
+        );
+    }
+    assert_eq!(row.all[1].guard.hold_reason(Side::Upstream), None);
+    // What both may do once somebody has looked.
+    row.all[0].guard.commit(at(180.0));
+    row.all[0].guard.forget(Side::Downstream);
+    assert_eq!(row.setpoint(0), Some(180.0));
+}
+
+#[test]
+fn given_back_it_begins_as_after_a_start() {
+    let mut row = Row::new();
+    row.take();
+    row.talk();
+    row.all[0].guard.commit(at(150.0));
+    row.all[1].guard.commit(at(260.0));
+    let before = row.all[1].now;
+    row.all[1].now = before + crate::time::Duration::from_millis(1);
+    row.give();
+    row.all[1].guard.position(before, at(200.0));
+    assert_eq!(row.setpoint(1), None, "that was before");
+    row.all[1].is_at(195.0);
+    assert_eq!(row.setpoint(1), Some(195.0));
+    assert_eq!(row.setpoint(0), Some(100.0), "it has not been heard yet");
+    row.all[1].is_at(195.0);
+    row.talk();
+    assert_eq!(row.setpoint(0), Some(150.0));
+    assert_eq!(row.setpoint(1), Some(260.0));
+    assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
+}
+
+/// It is told until the neighbour has begun anew, even if the pilot has given it back by then.
+#[test]
+fn what_is_lost_is_told_again() {
+    let mut row = Row::new();
+    row.take();
+    let mut said = 0;
+    for _ in 0..3 {
+        row.all[1].guard.remind();
+        while let Some((_, _, fence)) = row.all[1].guard.poll() {
+            assert_eq!(fence.flags, Fence::RELEASED);
+            assert!(fence.is_valid());
+            said += 1;
+        }
+    }
+    assert_eq!(said, 6);
+    row.give();
+    row.all[1].is_at(200.0);
+    row.all[1].is_at(200.0);
+    row.all[1].guard.remind();
+    let first = row.speak(1).map(|fence| fence.flags);
+    assert_eq!(first, Some(Fence::RELEASED));
+    row.talk();
+    assert!(row.all.iter().all(|one| one.guard.is_there()));
+}
+
+/// What was said before the pilot took it, and comes late, does not bring it back; nor does what it says of its leaving send it away again.
+#[test]
+fn late_messages_say_nothing_of_who_flies() {
+    let mut row = Row::new();
+    let old = [Side::Upstream, Side::Downstream].map(|side| row.all[1].says(side));
+    row.take();
+    let mut left = [None; 2];
+    while let Some((side, _, fence)) = row.all[1].guard.poll() {
+        left[usize::from(side == Side::Downstream)] = Some(fence);
+    }
+    let left = left.map(|fence| fence.expect("both are told"));
+    for _ in 0..5 {
+        row.all[0].hears(Side::Downstream, 2, left[0]);
+        row.all[2].hears(Side::Upstream, 2, left[1]);
+        row.all[0].hears(Side::Downstream, 2, old[0]);
+        row.all[2].hears(Side::Upstream, 2, old[1]);
+    }
+    row.all[0].guard.commit(at(80.0));
+    row.all[2].guard.commit(at(320.0));
+    assert_eq!(row.setpoint(0), Some(80.0), "it is free to go");
+    assert_eq!(row.setpoint(2), Some(320.0), "it is free to go");
+    row.talk();
+    row.give();
+    row.all[1].is_at(200.0);
+    row.all[1].is_at(200.0);
+    row.talk();
+    for _ in 0..5 {
+        row.all[0].hears(Side::Downstream, 2, left[0]);
+        row.all[2].hears(Side::Upstream, 2, left[1]);
+    }
+    row.all[0].guard.commit(at(200.0 - APART));
+    row.all[0].guard.steer(row.all[0].now);
+    while row.speak(0).is_some() || row.speak(1).is_some() {}
+    assert_eq!(row.setpoint(0), Some(200.0 - APART));
+}
+
+/// A pilot has both: each tells the other one, and both find each other again.
+#[test]
+fn two_in_a_row_are_taken_and_given_back() {
+    let mut row = Row::new();
+    row.take();
+    let now = row.all[2].now;
+    row.all[2].guard.control(now, false);
+    row.talk();
+    assert!(row.all[1].guard.poll().is_none() && row.all[2].guard.poll().is_none());
+    row.give();
+    row.all[1].is_at(200.0);
+    row.all[1].is_at(200.0);
+    row.talk();
+    row.all[1].guard.commit(at(240.0));
+    assert_eq!(row.setpoint(1), Some(200.0), "relay 3 has not been heard");
+    row.all[2].guard.control(now, true);
+    row.all[2].is_at(300.0);
+    row.all[2].is_at(300.0);
+    row.talk();
+    assert_eq!(row.setpoint(1), Some(240.0));
+}
+
+#[test]
+fn nobody_flies_before_the_pilot_lends_it() {
+    let mut guard = Guard::new(config(), [None, None], 7, Instant::ZERO);
+    assert!(!guard.control(Instant::ZERO, true), "it is flown at first");
+    assert!(guard.control(Instant::ZERO, false));
+    guard.commit(at(300.0));
+    let ms = Instant::from_millis;
+    guard.position(ms(1_000), at(100.0));
+    assert_eq!(guard.steer(ms(1_000)), None);
+    assert!(guard.control(ms(2_000), true));
+    assert_eq!(guard.steer(ms(2_000)), None);
+    guard.position(ms(2_100), at(100.0));
+    assert_eq!(guard.steer(ms(2_100)), Some(at(100.0)));
+    assert_eq!(guard.steer(ms(2_100)), Some(at(300.0)));
+}
