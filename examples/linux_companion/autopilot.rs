@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use rustix::event::PollFlags;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
-use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent};
+use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
 use uav_relay::flight::axis::Axis;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Duration, Event, Instant, Relay};
@@ -129,17 +129,7 @@ impl Companion {
 
     /// Has the operator's ground station show what happened.
     pub(crate) fn tell(&mut self, event: Event) {
-        let text = match event {
-            Event::Converged => "relay: the chain has agreed on places",
-            Event::Infeasible => "relay: no places meet any target",
-            Event::NeighbourLost { .. } => "relay: a neighbour is lost",
-            Event::Reformed => "relay: the chain formed anew",
-            Event::NoQuorum => "relay: too few others, holds its place",
-            Event::LeaseLapsed => "relay: not certain of the others, holds",
-            Event::IndexTaken { .. } => "relay: its number is used twice",
-            _ => return,
-        };
-        self.link.say(text);
+        self.link.handle_event(event);
     }
 
     /// When to come back at the latest.
@@ -227,7 +217,7 @@ impl Companion {
 
 fn said(now: Instant, event: AutopilotEvent) -> Result<(), String> {
     match event {
-        AutopilotEvent::Found(kind) => line(now, format_args!("autopilot: found a {kind:?}")),
+        AutopilotEvent::Found(kind) => line(now, format_args!("autopilot: found {}", called(kind))),
         AutopilotEvent::Restarted => line(now, format_args!("autopilot: was switched off and on")),
         AutopilotEvent::Refused => line(
             now,
@@ -246,6 +236,13 @@ fn said(now: Instant, event: AutopilotEvent) -> Result<(), String> {
             line(now, format_args!("autopilot: {what}"))
         }
         other => line(now, format_args!("autopilot: {other:?}")),
+    }
+}
+
+const fn called(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Px4 => "a PX4",
+        Kind::ArduCopter => "an ArduCopter",
     }
 }
 

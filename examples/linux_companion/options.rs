@@ -231,7 +231,7 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
         return Ok(None);
     };
     let place = match name.strip_prefix("udp:") {
-        Some(address) => Where::Udp(address.to_owned()),
+        Some(address) => Where::Udp(udp(address)?),
         None => Where::Tty(PathBuf::from(name), options.autopilot_baud),
     };
     Ok(Some(AutopilotPlan {
@@ -242,6 +242,20 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
             ..Pace::default()
         },
     }))
+}
+
+/// A host and its port.
+fn udp(address: &str) -> Result<String, String> {
+    let port = address
+        .rsplit_once(':')
+        .filter(|(host, _)| !host.is_empty())
+        .and_then(|(_, port)| port.parse::<u16>().ok());
+    match port {
+        Some(1..) => Ok(address.to_owned()),
+        _ => Err(format!(
+            "--autopilot udp:{address}: must be udp:HOST:PORT, PORT within 1 to 65535"
+        )),
+    }
 }
 
 /// How long a frame takes on a channel that all relays share, which has to carry them.

@@ -32,7 +32,7 @@ impl Tty {
         let fd = configured(path, baud).map_err(|error| match error {
             Errno::WOULDBLOCK => format!("{name}: is in use already"),
             Errno::NOTTY => format!("{name}: is no tty"),
-            Errno::INVAL => format!("{name}: does not do --baud {baud}"),
+            Errno::INVAL => format!("{name}: does not do {baud} bit/s"),
             error => format!("{name}: {error}"),
         })?;
         Ok(Self {

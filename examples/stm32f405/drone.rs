@@ -1,22 +1,22 @@
 //! The drone, whatever its links are: it reads its configuration, runs its relay, and flies where that says.
 
 use embedded_hal::digital::OutputPin;
+#[cfg(feature = "upload")]
+use uav_relay::Event;
 use uav_relay::guard::config::GuardConfig;
 use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
 use uav_relay::wire::auth::Auth;
 #[cfg(feature = "auth")]
 use uav_relay::wire::auth::Key;
-use uav_relay::{Duration, Event, Instant, Placement, Relay, Sample, Settings, Wiring};
+use uav_relay::{Instant, Relay, Sample, Settings, Wiring};
 
+use super::autopilot::{Autopilot, Uart};
 use super::clock::Clock;
 #[cfg(feature = "auth")]
 use super::journal::Journal;
 use super::{board, config, kept, log};
 #[cfg(feature = "auth")]
 use super::{epoch, flash};
-
-/// How often the autopilot is asked where the drone is, at least.
-const POSITION_PERIOD: Duration = Duration::from_millis(200);
 
 /// What the links of both variants have in common.
 pub(crate) trait Links {
@@ -30,7 +30,7 @@ pub(crate) trait Links {
 
 impl<U: SerialPort, D: SerialPort> Links for Pair<U, D> {
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant> {
-        let Drone { relay, views } = drone;
+        let Drone { relay, views, .. } = drone;
         self.poll_keeping(now, relay, &mut |relay| views.keep(relay))
     }
 
@@ -42,7 +42,7 @@ impl<U: SerialPort, D: SerialPort> Links for Pair<U, D> {
 
 impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant> {
-        let Drone { relay, views } = drone;
+        let Drone { relay, views, .. } = drone;
         self.poll_keeping(now, relay, &mut |relay| views.keep(relay))
     }
 
@@ -51,31 +51,37 @@ impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
     }
 }
 
-/// The relay, and what it has said; both in places of their own in RAM, since the stack would have to hold them.
+/// The relay, what it has said, and the autopilot, if it is told where to fly; in places of their own in RAM, since the stack would
+/// have to hold them.
 pub(crate) struct Drone {
     relay: &'static mut Relay,
     views: &'static mut kept::Views,
+    autopilot: Option<&'static mut Autopilot>,
 }
 
 /// Flies for good.
 pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -> ! {
-    let mut autopilot = Autopilot;
     loop {
+        let now = clock.now();
         let relay = &mut *drone.relay;
         while let Some(sample) = measured() {
             relay.handle_sample(sample);
         }
-        if let Some((at, place)) = autopilot.position() {
-            relay.handle_position(clock.now(), at, place);
+        if let Some(autopilot) = &mut drone.autopilot {
+            autopilot.listen(now, relay);
         }
         let wake = links.poll(clock.now(), &mut drone);
         let relay = &mut *drone.relay;
         while let Some(event) = relay.poll_event() {
             log::event(event, relay);
-            if event == Event::SetpointChanged
-                && let Some(place) = relay.setpoint()
-            {
-                autopilot.fly_to(place);
+            // The control of the proof that no panic is reachable: with this one the image must not link.
+            #[cfg(panic_on_purpose)]
+            assert!(
+                relay.setpoint().is_none_or(|place| place.x_m < 1e6),
+                "put there on purpose"
+            );
+            if let Some(autopilot) = &mut drone.autopilot {
+                autopilot.tell(event);
             }
             #[cfg(feature = "upload")]
             if event == Event::Uploaded {
@@ -86,8 +92,9 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
             log::counters(relay);
             links.log_counters();
         }
-        // Ports wake it up; the autopilot may not.
-        let soon = Autopilot::KNOWS_POSITION.then(|| clock.now() + POSITION_PERIOD);
+        // With what the neighbours have just changed.
+        let soon = drone.autopilot.as_mut();
+        let soon = soon.map(|autopilot| autopilot.fly(now, relay));
         clock.sleep(wake.into_iter().chain(soon).min());
     }
 }
@@ -96,22 +103,29 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
 ///
 /// This and [`switch_on`] are functions of their own so that the stack they need is given back.
 #[inline(never)]
-pub(crate) fn begin(wiring: Wiring, now: Instant) -> Option<Drone> {
+pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
     let field = cortex_m::singleton!(FIELD: config::Room = config::EMPTY)?;
     match config::read(board::block(), field) {
         Ok(config) => {
             log::begins(&config);
             let auth = sign().ok()?;
-            if !Autopilot::KNOWS_POSITION {
+            let autopilot = if let Some(sites) = &config.sites {
+                Some(Autopilot::begin(uart, sites, &config.mission, now)?)
+            } else {
                 log::unguarded();
-            }
+                None
+            };
             let relay = switch_on(&config, auth, wiring, now)?;
             #[cfg(feature = "upload")]
             if auth.is_some() {
                 kept::resume_upload(relay);
             }
             let views = cortex_m::singleton!(VIEWS: kept::Views = kept::Views::resume(relay, now))?;
-            Some(Drone { relay, views })
+            Some(Drone {
+                relay,
+                views,
+                autopilot,
+            })
         }
         Err(error) => {
             log::refused(error);
@@ -139,7 +153,7 @@ fn switch_on(
         method: config.method,
         measure: config.measure,
         wiring,
-        guard: Autopilot::KNOWS_POSITION.then(|| GuardConfig {
+        guard: (Autopilot::FLIES && config.sites.is_some()).then(|| GuardConfig {
             hover_m: Autopilot::POSITION_ERROR_M,
             ..GuardConfig::of(&config.mission, config.profile)
         }),
@@ -194,34 +208,6 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
     }
     log::cannot_sign();
     Err(CannotSign)
-}
-
-/// Replace this by your autopilot: what it wants to hear, and what it knows.
-struct Autopilot;
-
-impl Autopilot {
-    /// Whether [`position`](Self::position) gives what it knows: then setpoints keep drones apart on their way.
-    const KNOWS_POSITION: bool = false;
-
-    /// How far off its place a hovering drone may be reported, m.
-    const POSITION_ERROR_M: f32 = 1.0;
-
-    /// It is to fly to `place.x_m` metres from the transmitter toward the receiver, `place.y_m` to the right of that line as seen from
-    /// above, at `place.altitude_m` above the ground.
-    #[expect(clippy::unused_self, reason = "an autopilot of yours is somewhere")]
-    fn fly_to(&mut self, place: Placement) {
-        core::hint::black_box(place);
-        // The control of the proof that no panic is reachable: with this one the image must not link.
-        #[cfg(panic_on_purpose)]
-        assert!(place.x_m < 1e6, "put there on purpose");
-    }
-
-    /// Where the drone was, and when by the relay's clock, if it has said so since it was asked last; it is asked five times a second
-    /// or more often.
-    #[expect(clippy::unused_self, reason = "an autopilot of yours is somewhere")]
-    const fn position(&mut self) -> Option<(Instant, Placement)> {
-        None
-    }
 }
 
 /// Replace this by what your receiver has measured since it was asked last, if the configuration has the relay measure.

@@ -2,11 +2,17 @@
 //! `--features rtt`.
 
 use uav_relay::SetupError;
+#[cfg(feature = "flight")]
+use uav_relay::flight::autopilot::AutopilotEvent;
+#[cfg(feature = "flight")]
+use uav_relay::flight::autopilot::state::State;
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
 
 use super::clock;
 use super::config::{Config, ConfigError};
+#[cfg(feature = "flight")]
+use super::course::{Course, CourseError};
 
 #[cfg_attr(feature = "rtt", path = "sink_rtt.rs")]
 #[cfg_attr(not(feature = "rtt"), path = "sink_uart.rs")]
@@ -26,7 +32,63 @@ pub(crate) fn begins(config: &Config) {
 }
 
 pub(crate) fn unguarded() {
-    defmt::warn!("no position is known: nothing keeps drones apart on their way");
+    defmt::warn!(
+        "no sites: no autopilot is told where to fly, and nothing keeps drones apart on their way"
+    );
+}
+
+/// Where the autopilot is told to fly.
+#[cfg(feature = "flight")]
+pub(crate) fn flies(course: &Course) {
+    defmt::info!(
+        "the autopilot flies along {=f64} m at {=f32} m/s or less",
+        course.axis.distance_m(),
+        course.pace.speed_m_s
+    );
+}
+
+#[cfg(feature = "flight")]
+pub(crate) fn off_course(error: CourseError) {
+    match error {
+        CourseError::Axis(error) => defmt::error!("configuration refused: sites, {}", error),
+        CourseError::Distance(along) => defmt::error!(
+            "configuration refused: the sites are {=f64} m apart, the mission's distance is another",
+            along
+        ),
+    }
+}
+
+#[cfg(not(feature = "flight"))]
+pub(crate) fn no_flight() {
+    defmt::error!("configuration refused: it has sites, and this image was built without flight");
+}
+
+/// What the link to the autopilot says.
+#[cfg(feature = "flight")]
+pub(crate) fn autopilot(event: AutopilotEvent) {
+    match event {
+        AutopilotEvent::Found(kind) => defmt::info!("autopilot: found, {}", kind),
+        AutopilotEvent::Restarted => defmt::warn!("autopilot: was switched off and on"),
+        AutopilotEvent::Refused => defmt::warn!(
+            "autopilot: does not fly where it is told to; is the place outside its fence?"
+        ),
+        AutopilotEvent::State(State::Silent) => {
+            defmt::warn!("autopilot: silent; look at the cable, the baud rate and MAVLink 2");
+        }
+        AutopilotEvent::State(State::Grounded) => {
+            defmt::info!("autopilot: on the ground, or not armed");
+        }
+        AutopilotEvent::State(State::Standby) => {
+            defmt::info!("autopilot: in the air, flown by its pilot");
+        }
+        AutopilotEvent::State(State::Engaged) => {
+            defmt::info!("autopilot: flies to the relay's setpoints");
+        }
+        AutopilotEvent::State(State::Blind) => {
+            defmt::warn!("autopilot: no position; keeps its last target");
+        }
+        other => defmt::info!("autopilot: {}", other),
+    }
 }
 
 pub(crate) fn refused(error: ConfigError) {
@@ -56,6 +118,9 @@ pub(crate) fn refused(error: ConfigError) {
         }
         ConfigError::Secret => {
             defmt::error!("configuration refused: key or epoch, without the other or out of range");
+        }
+        ConfigError::Speed => {
+            defmt::error!("configuration refused: greatest speed out of range, or without sites");
         }
         ConfigError::Field(error) => defmt::error!("configuration refused: field, {}", error),
         ConfigError::Channel(error) => defmt::error!("configuration refused: channel, {}", error),

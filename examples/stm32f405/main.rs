@@ -16,8 +16,10 @@
 //! | --- | --- |
 //! | `main.rs` | this variant, put together |
 //! | `wires.rs` | its pins and interrupts |
-//! | `drone.rs` | what a drone does, whatever its links are; `Autopilot` is where yours comes in |
-//! | `config.rs` | the configuration, byte by byte |
+//! | `drone.rs` | what a drone does, whatever its links are |
+//! | `autopilot.rs`, `grounded.rs` | the autopilot with the feature `flight`, and without |
+//! | `config/` | the configuration, byte by byte |
+//! | `course.rs` | the line on earth that it flies along |
 //! | `epoch.rs` | with the feature `auth`, the number that rises at every start |
 //! | `uploads.rs` | with the feature `upload`, the missions that were uploaded in flight |
 //! | `views.rs` | what the relay has said in the votes on views |
@@ -32,12 +34,18 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
+#[cfg_attr(not(feature = "flight"), path = "grounded.rs")]
+mod autopilot;
+#[cfg(target_os = "none")]
 mod board;
 #[cfg(target_os = "none")]
 mod clock;
 #[cfg(target_os = "none")]
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
 mod config;
+#[cfg(all(target_os = "none", feature = "flight"))]
+#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
+mod course;
 #[cfg(target_os = "none")]
 mod drone;
 #[cfg(all(target_os = "none", feature = "auth"))]
@@ -69,11 +77,11 @@ mod wires;
 fn main() -> ! {
     use uav_relay::Wiring;
 
-    let Some((mut clock, links)) = connect() else {
+    let Some((mut clock, links, uart)) = connect() else {
         board::stop()
     };
     // Without a configuration to fly by a drone sleeps for good.
-    let Some(drone) = drone::begin(Wiring::Pair, clock.now()) else {
+    let Some(drone) = drone::begin(Wiring::Pair, uart, clock.now()) else {
         board::stop()
     };
     drone::fly(clock, links, drone)
@@ -82,16 +90,16 @@ fn main() -> ! {
 /// The links, in a place of their own in RAM; a function of its own, so that the stack it needs is given back.
 #[cfg(target_os = "none")]
 #[inline(never)]
-fn connect() -> Option<(clock::Clock, &'static mut Links)> {
+fn connect() -> Option<(clock::Clock, &'static mut Links, autopilot::Uart)> {
     use uav_relay::serial::{Pair, SerialLink, byte_time};
 
-    let (clock, upstream, downstream) = wires::start()?;
+    let (clock, upstream, downstream, uart) = wires::start()?;
     let byte_time = byte_time(port::BAUD);
     let links = cortex_m::singleton!(
         LINKS: Links =
             Pair::new(SerialLink::new(upstream, byte_time), SerialLink::new(downstream, byte_time))
     )?;
-    Some((clock, links))
+    Some((clock, links, uart))
 }
 
 /// A port to each neighbour.

@@ -22,16 +22,16 @@ const RECEIVED: usize = 128;
 /// Bytes that can wait to leave: the longest frame, so that the main loop can sleep meanwhile.
 pub(crate) const OUTGOING: usize = 256;
 
-/// Bytes between the interrupt and the main loop, and room for `OUT` on their way out.
-pub(crate) struct Queues<const OUT: usize> {
+/// Bytes between the interrupt and the main loop: room for `OUT` on their way out, and for `IN` on their way in.
+pub(crate) struct Queues<const OUT: usize, const IN: usize = RECEIVED> {
     /// Received bytes, or what went wrong instead.
-    received: Deque<Result<u8, Fault>, RECEIVED>,
+    received: Deque<Result<u8, Fault>, IN>,
     outgoing: Deque<u8, OUT>,
     /// Whether something was lost for want of room and the main loop has not been told.
     lost: bool,
 }
 
-impl<const OUT: usize> Queues<OUT> {
+impl<const OUT: usize, const IN: usize> Queues<OUT, IN> {
     pub(crate) const fn new() -> Mutex<RefCell<Self>> {
         Mutex::new(RefCell::new(Self {
             received: Deque::new(),
@@ -45,7 +45,10 @@ impl<const OUT: usize> Queues<OUT> {
 pub(crate) type Slot<U> = Mutex<RefCell<Option<Serial<U>>>>;
 
 /// Moves bytes both ways until the port has none and takes none.
-fn exchange<U: Instance, const OUT: usize>(uart: &mut Serial<U>, queues: &mut Queues<OUT>) {
+fn exchange<U: Instance, const OUT: usize, const IN: usize>(
+    uart: &mut Serial<U>,
+    queues: &mut Queues<OUT, IN>,
+) {
     loop {
         let item = match uart.read() {
             Ok(byte) => Ok(byte),
@@ -68,13 +71,13 @@ fn exchange<U: Instance, const OUT: usize>(uart: &mut Serial<U>, queues: &mut Qu
 }
 
 /// The main loop's end of a port. Interrupts are off for a byte at a time, so that none is overrun.
-pub(crate) struct Port<const OUT: usize = OUTGOING> {
-    queues: &'static Mutex<RefCell<Queues<OUT>>>,
+pub(crate) struct Port<const OUT: usize = OUTGOING, const IN: usize = RECEIVED> {
+    queues: &'static Mutex<RefCell<Queues<OUT, IN>>>,
     interrupt: Interrupt,
 }
 
-impl<const OUT: usize> Port<OUT> {
-    fn with<R>(&self, work: impl FnOnce(&mut Queues<OUT>) -> R) -> Option<R> {
+impl<const OUT: usize, const IN: usize> Port<OUT, IN> {
+    fn with<R>(&self, work: impl FnOnce(&mut Queues<OUT, IN>) -> R) -> Option<R> {
         free(|cs| {
             let mut queues = self.queues.borrow(cs).try_borrow_mut().ok()?;
             Some(work(&mut queues))
@@ -82,14 +85,14 @@ impl<const OUT: usize> Port<OUT> {
     }
 
     /// How many bytes `write` would take now.
-    #[cfg(all(feature = "defmt", not(feature = "rtt")))]
+    #[cfg(any(feature = "flight", all(feature = "defmt", not(feature = "rtt"))))]
     pub(crate) fn room(&self) -> usize {
         self.with(|queues| OUT.saturating_sub(queues.outgoing.len()))
             .unwrap_or(0)
     }
 }
 
-impl<const OUT: usize> SerialPort for Port<OUT> {
+impl<const OUT: usize, const IN: usize> SerialPort for Port<OUT, IN> {
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
         let mut count = 0;
         for place in into {
@@ -132,12 +135,12 @@ pub(crate) fn config() -> Config {
 }
 
 /// Gives the UART to its interrupt, and the other end of the queues to the caller.
-pub(crate) fn open<U: Instance, const OUT: usize>(
+pub(crate) fn open<U: Instance, const OUT: usize, const IN: usize>(
     mut uart: Serial<U>,
     interrupt: Interrupt,
     slot: &'static Slot<U>,
-    queues: &'static Mutex<RefCell<Queues<OUT>>>,
-) -> Port<OUT> {
+    queues: &'static Mutex<RefCell<Queues<OUT, IN>>>,
+) -> Port<OUT, IN> {
     uart.listen(Event::RxNotEmpty);
     free(|cs| {
         if let Ok(mut place) = slot.borrow(cs).try_borrow_mut() {
@@ -149,9 +152,9 @@ pub(crate) fn open<U: Instance, const OUT: usize>(
 }
 
 /// What the interrupt of a port does.
-pub(crate) fn serve<U: Instance, const OUT: usize>(
+pub(crate) fn serve<U: Instance, const OUT: usize, const IN: usize>(
     slot: &Slot<U>,
-    queues: &Mutex<RefCell<Queues<OUT>>>,
+    queues: &Mutex<RefCell<Queues<OUT, IN>>>,
 ) {
     free(|cs| {
         if let Ok(mut uart) = slot.borrow(cs).try_borrow_mut()

@@ -1,10 +1,14 @@
 //! What `log.rs` is without `--features defmt`: nothing.
 
 use uav_relay::SetupError;
+#[cfg(feature = "flight")]
+use uav_relay::flight::autopilot::AutopilotEvent;
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
 
 use super::config::{Config, ConfigError};
+#[cfg(feature = "flight")]
+use super::course::{Course, CourseError};
 
 pub(crate) const fn asked() -> bool {
     false
@@ -13,6 +17,18 @@ pub(crate) const fn asked() -> bool {
 pub(crate) const fn begins(_: &Config) {}
 
 pub(crate) const fn unguarded() {}
+
+#[cfg(feature = "flight")]
+pub(crate) const fn flies(_: &Course) {}
+
+#[cfg(feature = "flight")]
+pub(crate) const fn off_course(_: CourseError) {}
+
+#[cfg(not(feature = "flight"))]
+pub(crate) const fn no_flight() {}
+
+#[cfg(feature = "flight")]
+pub(crate) const fn autopilot(_: AutopilotEvent) {}
 
 pub(crate) const fn refused(_: ConfigError) {}
 

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | toward the transmitter | USART2: TX PA2, RX PA3 |
 //! | toward the receiver | USART3: TX PB10, RX PB11 |
+//! | the autopilot, of a drone with sites | USART1: TX PA9, RX PA10 |
 //! | log, with `--features defmt` | UART4: TX PC10, RX PC11 |
 //! | clock | HSI, 16 MHz, no PLL; `SysTick` every millisecond |
 
@@ -15,6 +16,7 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::serial::Serial;
 
+use super::autopilot::{self, Uart};
 use super::clock::Clock;
 use super::port::{self, OUTGOING, Port, Queues, Slot};
 
@@ -23,8 +25,8 @@ static DOWNSTREAM: Slot<USART3> = Mutex::new(RefCell::new(None));
 static UPSTREAM_QUEUES: Mutex<RefCell<Queues<OUTGOING>>> = Queues::new();
 static DOWNSTREAM_QUEUES: Mutex<RefCell<Queues<OUTGOING>>> = Queues::new();
 
-/// Sets the board up, once only: its clock, and the ports toward transmitter and receiver.
-pub(crate) fn start() -> Option<(Clock, Port, Port)> {
+/// Sets the board up, once only: its clock, the ports toward transmitter and receiver, and the one of the autopilot.
+pub(crate) fn start() -> Option<(Clock, Port, Port, Uart)> {
     let chip = pac::Peripherals::take()?;
     let core = cortex_m::Peripherals::take()?;
     let mut rcc = chip.RCC.freeze(Config::hsi());
@@ -37,6 +39,7 @@ pub(crate) fn start() -> Option<(Clock, Port, Port)> {
         let uart = Serial::new(chip.UART4, (c.pc10, c.pc11), port::config(), &mut rcc);
         super::log::start(uart.ok()?);
     }
+    let autopilot = autopilot::uart(chip.USART1, a.pa9, a.pa10, &mut rcc)?;
     let upstream = Serial::new(chip.USART2, (a.pa2, a.pa3), port::config(), &mut rcc).ok()?;
     let downstream = Serial::new(chip.USART3, (b.pb10, b.pb11), port::config(), &mut rcc).ok()?;
     let upstream = port::open(upstream, Interrupt::USART2, &UPSTREAM, &UPSTREAM_QUEUES);
@@ -46,7 +49,7 @@ pub(crate) fn start() -> Option<(Clock, Port, Port)> {
         &DOWNSTREAM,
         &DOWNSTREAM_QUEUES,
     );
-    Some((clock, upstream, downstream))
+    Some((clock, upstream, downstream, autopilot))
 }
 
 #[interrupt]

@@ -7,15 +7,23 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
+#[cfg_attr(feature = "flight", path = "../stm32f405/autopilot.rs")]
+#[cfg_attr(not(feature = "flight"), path = "../stm32f405/grounded.rs")]
+mod autopilot;
+#[cfg(target_os = "none")]
 #[path = "../stm32f405/board.rs"]
 mod board;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/clock.rs"]
 mod clock;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/config.rs"]
+#[path = "../stm32f405/config/mod.rs"]
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
 mod config;
+#[cfg(all(target_os = "none", feature = "flight"))]
+#[path = "../stm32f405/course.rs"]
+#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
+mod course;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/drone.rs"]
 mod drone;
@@ -56,11 +64,11 @@ mod views;
 fn main() -> ! {
     use uav_relay::Wiring;
 
-    let Some((mut clock, channel)) = connect() else {
+    let Some((mut clock, channel, uart)) = connect() else {
         board::stop()
     };
     // Without a configuration to fly by a drone sleeps for good.
-    let Some(drone) = drone::begin(Wiring::Shared, clock.now()) else {
+    let Some(drone) = drone::begin(Wiring::Shared, uart, clock.now()) else {
         board::stop()
     };
     drone::fly(clock, channel, drone)
@@ -69,15 +77,15 @@ fn main() -> ! {
 /// The link, in a place of its own in RAM; a function of its own, so that the stack it needs is given back.
 #[cfg(target_os = "none")]
 #[inline(never)]
-fn connect() -> Option<(clock::Clock, &'static mut Channel)> {
+fn connect() -> Option<(clock::Clock, &'static mut Channel, autopilot::Uart)> {
     use uav_relay::serial::{SerialLink, Shared, byte_time};
 
-    let (clock, channel, driver_enable) = radio::start()?;
+    let (clock, channel, driver_enable, uart) = radio::start()?;
     let byte_time = byte_time(port::BAUD);
     let channel = cortex_m::singleton!(
         CHANNEL: Channel = Shared::new(SerialLink::half_duplex(channel, byte_time, driver_enable))
     )?;
-    Some((clock, channel))
+    Some((clock, channel, uart))
 }
 
 /// One port to a radio, with its driver-enable pin.

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | radio, or transceiver of a bus | USART2: TX PA2, RX PA3 |
 //! | its driver-enable pin, if it has one | PA1: high while this relay sends |
+//! | the autopilot, of a drone with sites | USART1: TX PA9, RX PA10 |
 //! | log, with `--features defmt` | UART4: TX PC10, RX PC11 |
 //! | clock | HSI, 16 MHz, no PLL; `SysTick` every millisecond |
 
@@ -16,6 +17,7 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::serial::Serial;
 
+use super::autopilot::{self, Uart};
 use super::clock::Clock;
 use super::port::{self, OUTGOING, Port, Queues, Slot};
 
@@ -25,8 +27,8 @@ static RADIO_QUEUES: Mutex<RefCell<Queues<OUTGOING>>> = Queues::new();
 /// High while this relay sends.
 pub(crate) type DriverEnable = PA1<Output>;
 
-/// Sets the board up, once only: its clock, the port to the radio, and the pin that is high while it sends.
-pub(crate) fn start() -> Option<(Clock, Port, DriverEnable)> {
+/// Sets the board up, once only: its clock, the port to the radio, the pin that is high while it sends, and the port of the autopilot.
+pub(crate) fn start() -> Option<(Clock, Port, DriverEnable, Uart)> {
     let chip = pac::Peripherals::take()?;
     let core = cortex_m::Peripherals::take()?;
     let mut rcc = chip.RCC.freeze(Config::hsi());
@@ -38,9 +40,10 @@ pub(crate) fn start() -> Option<(Clock, Port, DriverEnable)> {
         let uart = Serial::new(chip.UART4, (c.pc10, c.pc11), port::config(), &mut rcc);
         super::log::start(uart.ok()?);
     }
+    let autopilot = autopilot::uart(chip.USART1, a.pa9, a.pa10, &mut rcc)?;
     let radio = Serial::new(chip.USART2, (a.pa2, a.pa3), port::config(), &mut rcc).ok()?;
     let radio = port::open(radio, Interrupt::USART2, &RADIO, &RADIO_QUEUES);
-    Some((clock, radio, a.pa1.into_push_pull_output()))
+    Some((clock, radio, a.pa1.into_push_pull_output(), autopilot))
 }
 
 #[interrupt]

@@ -7,6 +7,7 @@
 //! | [`relay()`] | one relay under anything that may come |
 //! | [`chain()`] | a chain on bad links: safe at any time, and in agreement once they are good |
 //! | [`scenario()`] | any text as a scenario file |
+//! | [`mavlink()`] | any bytes from an autopilot, and any orders to the link to it |
 //! | [`watch`] | what a relay promises, looked at after every input |
 //! | [`message`] | frames of mad neighbours |
 //! | [`member`] | the same, signed with the network's key |
@@ -24,6 +25,7 @@ pub mod deframe;
 pub mod frame;
 pub mod heap;
 pub mod input;
+pub mod mavlink;
 pub mod member;
 pub mod message;
 pub mod relay;
@@ -34,6 +36,7 @@ pub mod watch;
 pub use chain::chain;
 pub use deframe::deframe;
 pub use frame::frame;
+pub use mavlink::mavlink;
 pub use relay::relay;
 pub use scenario::scenario;
 
@@ -41,10 +44,11 @@ pub use scenario::scenario;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// Every target.
-pub const TARGETS: [Target; 5] = [
+pub const TARGETS: [Target; 6] = [
     ("deframe", deframe),
     ("frame", frame),
     ("relay", relay),
     ("chain", chain),
     ("scenario", scenario),
+    ("mavlink", mavlink),
 ];

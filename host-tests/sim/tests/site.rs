@@ -26,6 +26,7 @@ fn the_distance_follows_from_the_sites() {
         scenario.distance_m
     );
     let rx = Geodetic::from_degrees(47.41, 8.55, 431.0).unwrap();
+    assert_eq!(scenario.sites.unwrap()[1], rx);
     assert!((f64::from(axis.place(rx).unwrap().x_m) - scenario.distance_m).abs() < 1e-3);
     assert!(parse("distance_m = 1343.8", SITES).is_ok(), "the same one");
 }

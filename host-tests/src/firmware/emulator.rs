@@ -22,6 +22,8 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// A serial port of the chip, by its place in QEMU's list.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Uart {
+    /// USART1: the autopilot.
+    Usart1,
     /// USART2: upstream, or the radio.
     Usart2,
     /// USART3: downstream.
@@ -30,8 +32,8 @@ pub enum Uart {
     Uart4,
 }
 
-/// QEMU's list begins with USART1, which nothing is connected to.
-const UARTS: [Uart; 3] = [Uart::Usart2, Uart::Usart3, Uart::Uart4];
+/// As QEMU lists them.
+const UARTS: [Uart; 4] = [Uart::Usart1, Uart::Usart2, Uart::Usart3, Uart::Uart4];
 
 /// Bytes in the flash, and the address of the first.
 pub type Kept = (u32, Vec<u8>);
@@ -43,8 +45,8 @@ pub struct Emulator {
     folder: PathBuf,
 }
 
-/// The three serial ports of a drone, in the order of [`Uart`].
-pub type Sockets = [UnixStream; 3];
+/// The serial ports of a drone, in the order of [`Uart`].
+pub type Sockets = [UnixStream; 4];
 
 impl Emulator {
     /// Switches a drone on with `image`, `block` at the place of its configuration, and what else stands in its flash: `kept`, each from
@@ -68,7 +70,7 @@ impl Emulator {
         let mut command = Command::new(QEMU);
         command
             .args(["-machine", "netduinoplus2", "-display", "none"])
-            .args(["-monitor", "none", "-serial", "null"])
+            .args(["-monitor", "none"])
             .arg("-kernel")
             .arg(image)
             .args(loaded(&file, config::ADDRESS))

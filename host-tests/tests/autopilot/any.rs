@@ -44,7 +44,7 @@ fn no_target_leaves_that_is_not_finite_and_near() {
                 }
                 2 => {
                     vehicle.mode =
-                        [Mode::Position, Mode::Hold, Mode::Companion][rng.random_range(0..3)]
+                        [Mode::Position, Mode::Hold, Mode::Companion][rng.random_range(0..3)];
                 }
                 3 => vehicle.mute = rng.random_bool(0.2),
                 4 => vehicle.position_every_ms = [200, 1_000, u64::MAX][rng.random_range(0..3)],

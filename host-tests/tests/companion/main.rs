@@ -3,13 +3,17 @@
 
 mod binary;
 mod ending;
+mod flying;
 mod idle;
+mod mavsdk;
 mod medium;
 mod options;
+mod peer;
 mod positions;
 mod process;
 mod pty;
 mod signed;
+mod unplugged;
 mod upload;
 mod views;
 

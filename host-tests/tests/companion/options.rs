@@ -145,8 +145,118 @@ const WRONG: &[(&[&str], &[&str])] = &[
         &["--method joint", "align with --field"],
     ),
     (&["--upload-file", "x"], &["--key-file", "not provided"]),
+    (
+        &["--site-tx", "91,8,400", "--site-rx", "47,8,400"],
+        &["--site-tx", "'91,8,400'", "LAT,LON,AMSL", "-90 to 90"],
+    ),
+    (
+        &["--site-tx", "47,8", "--site-rx", "47,8,400"],
+        &["--site-tx", "'47,8'", "LAT,LON,AMSL"],
+    ),
+    (
+        &["--site-tx", "47,NaN,400", "--site-rx", "47,8,400"],
+        &["--site-tx", "'47,NaN,400'", "-180 to 180"],
+    ),
+    (
+        &["--site-tx", "47,8,10001", "--site-rx", "47,8,400"],
+        &["--site-tx", "'47,8,10001'", "-1000 to 10000"],
+    ),
+    (&["--site-tx", "47,8,400"], &["--site-rx", "not provided"]),
+    (&["--site-rx", "47,8,400"], &["--site-tx", "not provided"]),
+    (
+        &["--site-tx", "47,8,400", "--site-rx", "47,8,420"],
+        &["--site-rx", "0.00 m apart", "10 to 100000 m"],
+    ),
+    (
+        &["--site-tx", "47,8,400", "--site-rx", "49,8,420"],
+        &["--site-rx", "m apart", "10 to 100000 m"],
+    ),
+    (
+        &["--site-tx", "47.4,8.54,420", "--site-rx", "47.41,8.55,431"],
+        &["--distance 1000", "must be 1343.795 m", "--site-rx"],
+    ),
+    (&["--autopilot", "a"], &["--site-tx", "not provided"]),
     (&["--nonsense"], &["--nonsense"]),
 ];
+
+/// The same, added to a relay that is given its autopilot's sites.
+const WRONG_AUTOPILOT: &[(&[&str], &[&str])] = &[
+    (
+        &["--autopilot", "a", "--positions", "b"],
+        &["--autopilot", "--positions", "cannot be used"],
+    ),
+    (
+        &["--autopilot", "udp:localhost"],
+        &["--autopilot udp:localhost:", "must be udp:HOST:PORT"],
+    ),
+    (
+        &["--autopilot", "udp::14540"],
+        &["--autopilot udp::14540:", "udp:HOST:PORT"],
+    ),
+    (
+        &["--autopilot", "udp:localhost:0"],
+        &["udp:localhost:0:", "1 to 65535"],
+    ),
+    (
+        &["--autopilot", "udp:localhost:65536"],
+        &["udp:localhost:65536:", "1 to 65535"],
+    ),
+    (
+        &["--autopilot", "a", "--autopilot-baud", "57"],
+        &["--autopilot-baud", "'57'", "1200..=4000000"],
+    ),
+    (
+        &["--autopilot-baud", "57600"],
+        &["--autopilot", "not provided"],
+    ),
+    (
+        &["--autopilot", "a", "--speed", "21"],
+        &["--speed", "'21'", "0.1 to 20.0"],
+    ),
+    (
+        &["--autopilot", "a", "--speed", "NaN"],
+        &["--speed", "'NaN'", "0.1 to 20.0"],
+    ),
+    (&["--speed", "5"], &["--autopilot", "not provided"]),
+];
+
+/// Sites, and their distance.
+const SITES: &[&str] = &[
+    "--site-tx",
+    "47.4,8.54,420",
+    "--site-rx",
+    "47.41,8.55,431",
+    "--distance",
+    "1343.795",
+];
+
+#[test]
+fn wrong_options_of_an_autopilot_are_named_with_their_value_and_range() {
+    for &(arguments, parts) in WRONG_AUTOPILOT {
+        is_refused(&[GOOD, SITES, arguments].concat(), parts);
+    }
+}
+
+/// What cannot be opened ends it too, with its name.
+#[test]
+fn an_autopilot_that_is_not_there_at_the_start_is_a_mistake() {
+    for (autopilot, why) in [
+        ("/nowhere/tty", "--autopilot /nowhere/tty: No such file"),
+        ("/dev/null", "--autopilot /dev/null: is no tty"),
+        (
+            "udp:nowhere.invalid:14540",
+            "--autopilot udp:nowhere.invalid:14540: ",
+        ),
+    ] {
+        let alone = ["--index", "1", "--of", "1", "--autopilot", autopilot];
+        let Ended { status, stderr, .. } = Relay::start(&[&alone, SITES].concat()).end();
+        assert_eq!(status, Some(1), "{stderr:?}");
+        assert!(
+            stderr.len() == 1 && stderr[0].starts_with(why),
+            "{stderr:?}"
+        );
+    }
+}
 
 #[test]
 fn wrong_options_are_named_with_their_value_and_range() {
@@ -157,22 +267,27 @@ fn wrong_options_are_named_with_their_value_and_range() {
         } else {
             [GOOD, arguments].concat()
         };
-        let Ended {
-            status,
-            stdout,
-            stderr,
-        } = Relay::start(&all).end();
-        assert_eq!(status, Some(2), "{all:?}: {stderr:?}");
+        is_refused(&all, parts);
+    }
+}
+
+/// Refused with one line that has those parts in it.
+fn is_refused(options: &[&str], parts: &[&str]) {
+    let Ended {
+        status,
+        stdout,
+        stderr,
+    } = Relay::start(options).end();
+    assert_eq!(status, Some(2), "{options:?}: {stderr:?}");
+    assert!(
+        stdout.is_empty() && stderr.len() == 1,
+        "{options:?}: {stderr:?}"
+    );
+    for part in parts {
         assert!(
-            stdout.is_empty() && stderr.len() == 1,
-            "{all:?}: {stderr:?}"
+            stderr[0].contains(part),
+            "{options:?}: {part} not in {}",
+            stderr[0]
         );
-        for part in parts {
-            assert!(
-                stderr[0].contains(part),
-                "{all:?}: {part} not in {}",
-                stderr[0]
-            );
-        }
     }
 }

@@ -300,6 +300,62 @@ fn exchange(relays: &mut [Relay], now: Instant, own: usize, seed: &mut Vec<u8>) 
     heard
 }
 
+/// Streams of frames with noise between, and flights with a PX4 and an ArduCopter.
+fn mavlink() -> Vec<Vec<u8>> {
+    let heartbeat = [1, 0, 7, 1, 0, 9, 0, 0, 6, 0, 2, 12, 129, 4, 3];
+    let noise = [0, 12, 253, 9, 0, 0, 0, 1, 1, 0, 0, 0, 253, 255];
+    let false_start = [0, 10, 253, 255, 0, 0, 0, 1, 1, 110, 0, 0];
+    let whole = [
+        &[0][..],
+        &heartbeat,
+        &noise,
+        &heartbeat,
+        &false_start,
+        &heartbeat,
+    ]
+    .concat();
+    let tunnel = [0, 1, 5, 7, 1, 1, 8, 253, 9, 0, 0, 0, 1, 1, 0];
+    let hurt = [
+        0, 2, 1, 7, 1, 0, 3, 1, 2, 3, 20, 16, 3, 2, 7, 1, 0, 3, 9, 9, 9, 30,
+    ];
+    let flight = |autopilot: u8| {
+        let begins = [1, 255, 63, 255, 63, 100, 0];
+        let heartbeat = [1, autopilot, 0, 0, 0];
+        let position = [4, 0, 128, 0, 128, 0, 64, 1];
+        let in_air = [3, 2];
+        let setpoint = [10, 1, 0, 0, 64, 0, 0, 128, 0, 0, 32];
+        let passes = [8, 40];
+        let waits = [7, 200, 0];
+        let look = [11, 1, 0, 0, 64];
+        let taken = [6, 0];
+        let other_mode = [1, autopilot, 5, 3, 0, 0];
+        let parts: [&[u8]; 20] = [
+            &begins,
+            &heartbeat,
+            &position,
+            &in_air,
+            &heartbeat,
+            &position,
+            &setpoint,
+            &passes,
+            &position,
+            &look,
+            &heartbeat,
+            &passes,
+            &taken,
+            &waits,
+            &position,
+            &passes,
+            &heartbeat,
+            &position,
+            &other_mode,
+            &passes,
+        ];
+        parts.concat()
+    };
+    vec![whole, tunnel.to_vec(), hurt.to_vec(), flight(0), flight(4)]
+}
+
 #[test]
 #[ignore = "writes into the corpora"]
 fn write_the_seeds() {
@@ -309,6 +365,7 @@ fn write_the_seeds() {
             "frame" => frame(),
             "relay" => relay(),
             "chain" => chain(),
+            "mavlink" => mavlink(),
             _ => scenario(),
         };
         fs::create_dir_all(folder(name)).unwrap();

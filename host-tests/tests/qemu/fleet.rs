@@ -70,6 +70,8 @@ pub(crate) struct Fleet {
     drones: Vec<Emulator>,
     network: Network,
     consoles: Vec<UnixStream>,
+    /// Where each drone looks for its autopilot.
+    pub(crate) autopilots: Vec<UnixStream>,
     new: Receiver<Line>,
     pub(crate) lines: Vec<Line>,
     _folder: tempfile::TempDir,
@@ -115,13 +117,15 @@ impl Fleet {
         let folder = tempfile::Builder::new().prefix("fleet").tempdir().unwrap();
         let (lines, new) = channel();
         let (mut drones, mut consoles, mut ports) = (Vec::new(), Vec::new(), Vec::new());
+        let mut autopilots = Vec::new();
         for (drone, block) in (1..).zip(blocks) {
             let kept = kept.get(drones.len()).map_or(&[][..], Vec::as_slice);
             let name = format!("drone{drone}");
-            let (emulator, [usart2, usart3, console]) =
+            let (emulator, [usart1, usart2, usart3, console]) =
                 Emulator::start(&file, block, kept, folder.path(), &name)
                     .unwrap_or_else(|error| panic!("{error}"));
             drones.push(emulator);
+            autopilots.push(usart1);
             ports.push(usart2);
             if which != Image::Radio {
                 ports.push(usart3);
@@ -152,6 +156,7 @@ impl Fleet {
             drones,
             network: Network::connect(ports, hearers, medium).unwrap(),
             consoles,
+            autopilots,
             new,
             lines: Vec::new(),
             _folder: folder,

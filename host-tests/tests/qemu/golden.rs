@@ -75,7 +75,7 @@ fn the_target_makes_of_every_vector_what_this_machine_does() {
     }
 
     let folder = tempfile::Builder::new().prefix("golden").tempdir().unwrap();
-    let (_drone, [mut port, _, _]) =
+    let (_drone, [_, mut port, _, _]) =
         Emulator::start(&image("golden"), &[0; LEN], &[], folder.path(), "golden")
             .unwrap_or_else(|error| panic!("{error}"));
     port.set_read_timeout(Some(PATIENCE)).unwrap();

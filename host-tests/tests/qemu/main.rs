@@ -7,6 +7,7 @@
 
 mod chain;
 mod fleet;
+mod flight;
 mod golden;
 mod log;
 mod methods;
@@ -14,4 +15,5 @@ mod radio;
 mod signed;
 mod silence;
 mod upload;
+mod vehicle;
 mod views;

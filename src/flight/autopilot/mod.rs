@@ -23,6 +23,7 @@ use super::geodetic::Geodetic;
 use super::mavlink::frame::Address;
 use super::mavlink::outgoing::{FrameBytes, Outgoing, severity};
 use super::mavlink::parser::{Counters, Parser};
+use crate::event::Event;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::time::{Duration, Instant};
@@ -197,6 +198,13 @@ impl Autopilot {
     /// A line for the operator to read, of at most 50 bytes; whether there was room for it, which there is for three.
     pub fn say(&mut self, text: &str) -> bool {
         self.report.say(severity::INFO, text)
+    }
+
+    /// An event of the relay: the operator reads of those that matter in flight.
+    pub fn handle_event(&mut self, event: Event) {
+        if let Some(text) = report::line_of(event) {
+            self.report.say(severity::INFO, text);
+        }
     }
 
     /// Does what is due at `now`. Constant work.

@@ -2,6 +2,7 @@
 
 use heapless::{Deque, String};
 
+use crate::event::Event;
 use crate::flight::mavlink::outgoing::Outgoing;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
@@ -16,6 +17,20 @@ const LINES: usize = 3;
 const PERIOD: Duration = Duration::from_millis(1_000);
 
 const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
+
+/// What the operator reads of an event of the relay.
+pub(super) const fn line_of(event: Event) -> Option<&'static str> {
+    Some(match event {
+        Event::Converged => "relay: the chain has agreed on places",
+        Event::Infeasible => "relay: no places meet any target",
+        Event::NeighbourLost { .. } => "relay: a neighbour is lost",
+        Event::Reformed => "relay: the chain formed anew",
+        Event::NoQuorum => "relay: too few others, holds its place",
+        Event::LeaseLapsed => "relay: not certain of the others, holds",
+        Event::IndexTaken { .. } => "relay: its number is used twice",
+        _ => return None,
+    })
+}
 
 /// Lines and numbers that have not been sent yet.
 #[derive(Clone, Debug, Default)]

@@ -7,6 +7,7 @@ use uav_relay::{Interference, Mission};
 
 use super::air::AirReport;
 use super::attack::AttackReport;
+use super::drones::{DroneReport, drones};
 use super::failure::error;
 use super::flown::version;
 use super::hops::{self, RelayReport, db, hop_sirs};
@@ -100,6 +101,9 @@ pub struct ChainReport {
     /// The relays that are not, where they were last.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<LostReport>,
+    /// Where the drones are, where they were flown by autopilots.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub drones: Vec<DroneReport>,
     /// What happened when, if anything did but that the chain converged.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub timeline: Vec<MomentReport>,
@@ -184,6 +188,7 @@ impl ChainReport {
             left: (!timeline.is_empty()).then_some(flown),
             lost: lost(outcome, &chain),
             recovery: recoveries(&outcome.moments, mission.relays()),
+            drones: drones(outcome),
             timeline,
             attack: None,
             seed,
@@ -224,6 +229,7 @@ impl ChainReport {
             watched: WatchedReport::default(),
             left: None,
             lost: Vec::new(),
+            drones: Vec::new(),
             timeline: Vec::new(),
             recovery: Vec::new(),
             attack: None,

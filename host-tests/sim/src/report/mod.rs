@@ -3,6 +3,7 @@
 pub mod air;
 pub mod attack;
 pub mod chain;
+mod drones;
 mod failure;
 pub mod flown;
 pub mod hops;

@@ -198,6 +198,9 @@ impl Group {
             "other key" => format!("{}: another key", one.other.unwrap_or_default()),
             "old epoch" => format!("{}: an old epoch", one.other.unwrap_or_default()),
             "namesake" => format!("{} used twice", one.other.unwrap_or_default()),
+            "engaged" | "released" if self.relays.len() > 1 => {
+                format!("{} {}", self.relays.len(), one.what)
+            }
             "engaged" | "released" | "blind" => format!("{who} {}", one.what),
             "restarted" => format!("{who}: autopilot restarted"),
             "offered" | "held" | "adopted" => {

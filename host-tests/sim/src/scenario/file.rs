@@ -138,9 +138,10 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
     if altitude_max_m < altitude_m {
         return band("geometry.altitude_max_m", altitude_max_m, "least");
     }
-    let (axis, distance_m) = site::line(file, raw.site, geometry.distance_m)?;
+    let (line, distance_m) = site::line(file, raw.site, geometry.distance_m)?;
     Ok(Scenario {
-        axis,
+        axis: line.map(|line| line.axis),
+        sites: line.map(|line| line.sites),
         distance_m,
         altitude_m,
         altitude_min_m,

@@ -23,12 +23,19 @@ struct RawSite {
     amsl_m: f64,
 }
 
+/// The line on earth, and what it was made from.
+#[derive(Clone, Copy)]
+pub(super) struct Line {
+    pub(super) axis: Axis,
+    pub(super) sites: [Geodetic; 2],
+}
+
 /// The line between the two sites, if there are sites, and the distance from Tx to Rx: the one given, or that of the sites.
 pub(super) fn line(
     file: &str,
     sites: Option<RawSites>,
     distance_m: Option<f64>,
-) -> Result<(Option<Axis>, f64), ScenarioError> {
+) -> Result<(Option<Line>, f64), ScenarioError> {
     let Some(sites) = sites else {
         let missing = || {
             let allowed = "a number, 1 to 1e6 m, or [site]".to_owned();
@@ -36,11 +43,11 @@ pub(super) fn line(
         };
         return distance_m.map(|given| (None, given)).ok_or_else(missing);
     };
-    let axis = axis(file, &sites)?;
-    let along = axis.distance_m();
+    let line = on_earth(file, &sites)?;
+    let along = line.axis.distance_m();
     match distance_m {
         #[expect(clippy::cast_possible_truncation, reason = "as a mission has it")]
-        Some(given) if !axis.is_of(given as f32) => {
+        Some(given) if !line.axis.is_of(given as f32) => {
             let allowed = format!("{along:.3} m, as [site] has it, or none");
             Err(mistake(
                 file,
@@ -50,16 +57,16 @@ pub(super) fn line(
                 allowed,
             ))
         }
-        _ => Ok((Some(axis), along)),
+        _ => Ok((Some(line), along)),
     }
 }
 
-fn axis(file: &str, sites: &RawSites) -> Result<Axis, ScenarioError> {
-    let [tx, rx] = [&sites.tx, &sites.rx].map(|site| {
+fn on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
+    let sites @ [tx, rx] = [&sites.tx, &sites.rx].map(|site| {
         // Their ranges have been checked.
         Geodetic::from_degrees(site.lat_deg, site.lon_deg, site.amsl_m).unwrap_or_default()
     });
-    Axis::try_new(tx, rx).map_err(|error| {
+    let axis = Axis::try_new(tx, rx).map_err(|error| {
         let value = match error {
             AxisError::TooShort { distance_m } | AxisError::TooLong { distance_m } => {
                 format!("{distance_m:.2} m from tx to rx")
@@ -68,5 +75,6 @@ fn axis(file: &str, sites: &RawSites) -> Result<Axis, ScenarioError> {
         };
         let allowed = "10 to 1e5 m".to_owned();
         mistake(file, "site", Some(value), Problem::OutOfRange, allowed)
-    })
+    })?;
+    Ok(Line { axis, sites })
 }

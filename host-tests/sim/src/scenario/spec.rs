@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use uav_relay::flight::axis::Axis;
+use uav_relay::flight::geodetic::Geodetic;
 
 /// Everything a host tool has to know about a flight, in SI units, with x along the line from Tx (x = 0) to Rx and y to the
 /// right of it as seen from above.
@@ -12,6 +13,8 @@ use uav_relay::flight::axis::Axis;
 pub struct Scenario {
     /// The line from Tx to Rx on earth, where the scenario says where the two are.
     pub axis: Option<Axis>,
+    /// Tx and Rx themselves, from which that line is made.
+    pub sites: Option<[Geodetic; 2]>,
     /// Distance D from Tx to Rx, in metres, 1 to 1e6.
     pub distance_m: f64,
     /// Common altitude of the relays, in metres, 0.1 to 1e5.
@@ -128,6 +131,7 @@ impl Default for Scenario {
     fn default() -> Self {
         Self {
             axis: None,
+            sites: None,
             distance_m: 1000.0,
             altitude_m: 20.0,
             altitude_min_m: 20.0,

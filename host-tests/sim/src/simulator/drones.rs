@@ -235,7 +235,7 @@ pub(super) fn sum(one: Point, other: Point) -> Point {
 }
 
 /// How far apart two places are, m.
-pub(super) fn apart(one: Point, other: Point) -> f64 {
+pub fn apart(one: Point, other: Point) -> f64 {
     let [x, y, h] = one;
     let [other_x, other_y, other_h] = other;
     (x - other_x).hypot(y - other_y).hypot(h - other_h)

@@ -64,6 +64,9 @@ struct Options {
     /// The relays have a wire between neighbours and share no channel
     #[arg(long, conflicts_with_all = ["baud", "in_range"])]
     wires: bool,
+    /// The drone's greatest speed, m/s, 0.1 to 20, where the scenario has a [site]; without it 5
+    #[arg(long, value_name = "M/S", value_parser = speed)]
+    speed: Option<f32>,
     /// File to write the block to
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -81,10 +84,18 @@ enum Method {
 }
 
 fn explore(text: &str) -> Result<f32, String> {
+    within(text, 0.0, 1e5)
+}
+
+fn speed(text: &str) -> Result<f32, String> {
+    within(text, 0.1, 20.0)
+}
+
+fn within(text: &str, least: f32, most: f32) -> Result<f32, String> {
     let value: Option<f32> = text.parse().ok();
     value
-        .filter(|value| (0.0..=1e5).contains(value))
-        .ok_or_else(|| "must be a number within 0.0 to 100000.0".to_owned())
+        .filter(|value| (least..=most).contains(value))
+        .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
 }
 
 fn main() -> ExitCode {
@@ -127,6 +138,13 @@ fn run(options: &Options) -> Result<String, String> {
     let flight = Flight::new(&scenario, uavs, options.tolerance, network)
         .map_err(|error| format!("{name}: {error}"))?;
     carried(options)?;
+    let flight = match options.speed {
+        Some(_) if !flight.has_sites() => {
+            return Err("--speed: is for a scenario with a [site]".to_owned());
+        }
+        Some(speed) => flight.no_faster_than(speed),
+        None => flight,
+    };
     let secret = secret(options)?;
     let block = flight
         .by(method)

@@ -5,13 +5,15 @@ use std::fmt;
 use uav_relay::{Identity, Interference, Measure, Method, Mission, Profile};
 
 use super::config::{
-    Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, Secret, read, secret, write,
+    Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, Secret, Sites, read, secret,
+    write,
 };
+use super::course::{CourseError, course};
 use uav_relay_sim::mission::{self, Refusal};
 use uav_relay_sim::scenario::{AirGround, ChannelSpec, Scenario};
 
 /// Why there is no block.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum BlockError {
     /// The scenario is no mission.
@@ -20,6 +22,8 @@ pub enum BlockError {
     Points(usize),
     /// The drone would refuse the block.
     Config(ConfigError),
+    /// The drone would refuse its sites.
+    Course(CourseError),
     /// The drone would read another mission than was meant.
     Changed,
 }
@@ -48,6 +52,16 @@ impl fmt::Display for BlockError {
             Self::Config(ConfigError::Secret) => {
                 f.write_str("the key must not be all 0, the epoch within 1 to 4294967294")
             }
+            Self::Config(ConfigError::Speed) => {
+                f.write_str("the greatest speed must be within 0.1 to 20, of a drone with sites")
+            }
+            Self::Course(CourseError::Axis(error)) => error.fmt(f),
+            Self::Course(CourseError::Distance(along)) => {
+                write!(
+                    f,
+                    "the sites are {along:.3} m apart, and the mission's distance is another"
+                )
+            }
             Self::Config(ConfigError::Mission(error)) => error.fmt(f),
             Self::Config(ConfigError::Channel(error)) => error.fmt(f),
             Self::Config(_) | Self::Changed => f.write_str("the block does not say the mission"),
@@ -67,6 +81,7 @@ pub struct Flight {
     method: Method,
     measure: Option<Measure>,
     secret: Option<Secret>,
+    sites: Option<Sites>,
     network: u16,
 }
 
@@ -96,6 +111,10 @@ impl Flight {
             method: Method::Align,
             measure: None,
             secret: None,
+            sites: scenario.sites.map(|ends| Sites {
+                ends: ends.map(|at| [at.lat_e7, at.lon_e7, at.amsl_mm]),
+                speed_m_s: 0.0,
+            }),
             network,
         })
     }
@@ -113,6 +132,19 @@ impl Flight {
     /// The same, with frames that are signed.
     pub fn signed(self, secret: Option<Secret>) -> Self {
         Self { secret, ..self }
+    }
+
+    /// The same, with drones that fly at most that fast, m/s, where they have sites.
+    pub fn no_faster_than(mut self, speed_m_s: f32) -> Self {
+        if let Some(sites) = &mut self.sites {
+            sites.speed_m_s = speed_m_s;
+        }
+        self
+    }
+
+    /// Whether the drones have sites, by which they tell an autopilot where to fly.
+    pub const fn has_sites(&self) -> bool {
+        self.sites.is_some()
     }
 
     /// The mission.
@@ -151,9 +183,13 @@ impl Flight {
             hold_altitude: self.held.contains(&index),
             method: self.method,
             measure: self.measure,
+            sites: self.sites,
         };
         let block = write(&config, &self.numbers, self.secret);
         let read = read(&block, Box::leak(Box::new(EMPTY))).map_err(BlockError::Config)?;
+        if let Some(sites) = &read.sites {
+            course(sites, &read.mission).map_err(BlockError::Course)?;
+        }
         let secret = secret(&block).map_err(BlockError::Config)?;
         if (read, secret) == (config, self.secret) {
             Ok(block)

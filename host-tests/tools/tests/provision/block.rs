@@ -1,4 +1,4 @@
-//! What stands in a block: the table of `config.rs`, byte by byte, and what a drone reads of it.
+//! What stands in a block: the table of `config/mod.rs`, byte by byte, and what a drone reads of it.
 
 use uav_relay::{Adjust, Local, Measure, Method};
 use uav_relay_sim::scenario::Scenario;
@@ -11,7 +11,7 @@ use super::{example, field, in_a_field, paper, reads};
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;
-    let mut bytes: Vec<u8> = b"UAVR\x04\0\x24\x01\x03\0\x07\0\x05\0".to_vec();
+    let mut bytes: Vec<u8> = b"UAVR\x05\0\x40\x01\x03\0\x07\0\x05\0".to_vec();
     bytes.extend([method, u8::from(hold)]);
     for number in [1000.0_f32, 4.0, 80.0, 20.0, 1.0, 20.0, 1.0] {
         bytes.extend(number.to_le_bytes());
@@ -27,7 +27,7 @@ fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8]
     }
     bytes.extend(rounds.to_le_bytes());
     bytes.extend(rest);
-    bytes.resize(288, 0);
+    bytes.resize(316, 0);
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
     bytes.extend(crc.to_le_bytes());
     bytes
@@ -35,7 +35,7 @@ fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8]
 
 const PAPER: ([f32; 3], &[u8]) = ([80.0, 500.0, 400.0], &[]);
 
-/// The table in `config.rs`, byte by byte.
+/// The table in `config/mod.rs`, byte by byte.
 #[test]
 fn a_block_is_what_the_table_says() {
     assert_eq!(by_hand((0, false, 0.0, 0), [20.0; 2], PAPER), paper());

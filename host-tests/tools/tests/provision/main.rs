@@ -12,6 +12,7 @@ mod block;
 mod command;
 mod ranges;
 mod secret;
+mod sites;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -9,6 +9,7 @@ use uav_relay::{Adjust, Instant, Local, Measure, Method, Relay, Settings};
 use uav_relay_sim::scenario::Scenario;
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::{Config, ConfigError, LEN};
+use uav_relay_tools::provision::course::course;
 
 use super::{changed, field, in_a_field, reads, with};
 
@@ -84,6 +85,9 @@ fn a_number_out_of_range_is_named() {
         (120, &[100, 0], ConfigError::Measure),
         (124, &[1], ConfigError::Unused),
         (251, &[0x80], ConfigError::Unused),
+        // There are no sites.
+        (312, &1.0_f32.to_le_bytes(), ConfigError::Speed),
+        (312, &(-0.0_f32).to_le_bytes(), ConfigError::Speed),
     ] {
         assert_eq!(reads(&with(at, bytes)), Err(error), "byte {at}");
     }
@@ -183,6 +187,9 @@ fn flies(config: &Config) {
         ..Settings::default()
     };
     Relay::new(config.mission, config.identity, settings, 1, Instant::ZERO).unwrap();
+    if let Some(Ok(course)) = config.sites.map(|sites| course(&sites, &config.mission)) {
+        assert!(course.pace.is_valid());
+    }
 }
 
 /// Whatever is in the flash, with a good CRC: a configuration in range, or an error.

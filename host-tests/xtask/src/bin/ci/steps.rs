@@ -13,9 +13,10 @@ pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 pub(crate) const OLDEST: &str = env!("CARGO_PKG_RUST_VERSION");
 
 /// Sets of features that the library is tested with and a chain flies with, beside the full one of all other tests.
-const SETS: [&str; 5] = [
+const SETS: [&str; 6] = [
     "",
     "guard",
+    "guard,flight",
     "altitude,adjust",
     "field,guard,auth",
     "guard,upload",

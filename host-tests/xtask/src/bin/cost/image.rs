@@ -53,6 +53,11 @@ const IMAGES: &[Image] = &[
         [78 * 1024, 6 * 1024, 4 * 1024],
     ),
     (
+        "flash of that with `guard` and `flight`",
+        &["--no-default-features", "--features", "guard,flight"],
+        [92 * 1024, 8 * 1024, 4 * 1024],
+    ),
+    (
         "flash of the relay image, everything",
         &[],
         [116 * 1024, 10 * 1024, 4864],
@@ -68,7 +73,8 @@ fn of(
 ) -> Result<[Row; 3], String> {
     let image = build(RELAY, features)?;
     let (flash_taken, ram_taken) = sizes(&image)?;
-    let (thread, handler) = deepest_stack(&image)?;
+    let flies = features.is_empty() || features.iter().any(|of| of.contains("flight"));
+    let (thread, handler) = deepest_stack(&image, flies)?;
     Ok([
         row(what, "bytes", flash_taken, Some(flash)),
         row("its static RAM", "bytes", ram_taken, Some(ram)),
@@ -135,7 +141,7 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
 }
 
 /// The deepest stack of the thread, from the entry that `Reset` calls, and of an interrupt on top of it: its frame with the FPU's registers is 104 bytes.
-pub(crate) fn deepest_stack(elf: &Path) -> Result<(u64, u64), String> {
+pub(crate) fn deepest_stack(elf: &Path, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
     let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
     let objdump = llvm_tool("llvm-objdump").ok_or(missing)?;
@@ -165,7 +171,9 @@ pub(crate) fn deepest_stack(elf: &Path) -> Result<(u64, u64), String> {
     let (thread, path) = deepest("main")?;
     println!("deepest stack: {thread} bytes by {}", path.join(" > "));
     let mut handler = 0;
-    for name in ["USART2", "USART3", "SysTick"] {
+    // Without the feature `flight` nobody serves the autopilot's port.
+    let autopilot = flies.then_some("USART1");
+    for name in ["USART2", "USART3", "SysTick"].into_iter().chain(autopilot) {
         handler = deepest(name)?.0.max(handler);
     }
     Ok((thread, EXCEPTION_FRAME + handler))

@@ -1,0 +1,146 @@
+//! The drone's autopilot, a PX4 or ArduCopter, at USART1: TX PA9, RX PA10, 115 200 baud, MAVLink 2.
+//!
+//! It is told where to fly by a drone whose block has sites; without them the port is never opened.
+
+use core::cell::RefCell;
+
+use cortex_m::interrupt::Mutex;
+use stm32f4xx_hal::gpio::{PA9, PA10};
+use stm32f4xx_hal::pac::{Interrupt, USART1, interrupt};
+use stm32f4xx_hal::rcc::Rcc;
+use stm32f4xx_hal::serial::Serial;
+use uav_relay::flight::autopilot::Autopilot as Link;
+use uav_relay::flight::mavlink::outgoing::FrameBytes;
+use uav_relay::serial::SerialPort as _;
+use uav_relay::{Duration, Event, Instant, Mission, Relay};
+
+use super::config::Sites;
+use super::course::course;
+use super::log;
+use super::port::{self, OUTGOING, Port, Queues, Slot};
+
+/// Received bytes that can wait for the main loop: 44 ms of them. An autopilot sends bursts, and the main loop may be in a sweep.
+const RECEIVED: usize = 512;
+
+/// The longest frame that is sent.
+const LONGEST: usize = size_of::<FrameBytes>();
+
+/// So long a full port is left alone; 115 bytes leave meanwhile.
+const PAUSE: Duration = Duration::from_millis(10);
+
+static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
+static AUTOPILOT_QUEUES: Mutex<RefCell<Queues<OUTGOING, RECEIVED>>> = Queues::new();
+
+/// The port that nobody serves yet.
+pub(crate) type Uart = Serial<USART1>;
+
+/// Sets the port up.
+pub(crate) fn uart(usart: USART1, tx: PA9, rx: PA10, rcc: &mut Rcc) -> Option<Uart> {
+    Serial::new(usart, (tx, rx), port::config(), rcc).ok()
+}
+
+/// The link, and what it goes over.
+pub(crate) struct Autopilot {
+    link: Link,
+    port: Port<OUTGOING, RECEIVED>,
+    /// What the relay was told last of whether its setpoint is flown.
+    flown: Option<bool>,
+    /// The SIR that the hop to this relay is to reach, as a factor and in decibels.
+    target: Option<(f32, f32)>,
+}
+
+impl Autopilot {
+    /// Whether this image can tell it where to fly.
+    pub(crate) const FLIES: bool = true;
+
+    /// How far off its place a hovering drone may be reported, m.
+    pub(crate) const POSITION_ERROR_M: f32 = 1.5;
+
+    /// The link along the line between `sites`, in a place of its own in RAM; `None` where the mission is not flown there.
+    #[inline(never)] // its stack is given back
+    pub(crate) fn begin(
+        uart: Uart,
+        sites: &Sites,
+        mission: &Mission,
+        now: Instant,
+    ) -> Option<&'static mut Self> {
+        let course = course(sites, mission).map_err(log::off_course).ok()?;
+        log::flies(&course);
+        let port = port::open(uart, Interrupt::USART1, &AUTOPILOT, &AUTOPILOT_QUEUES);
+        cortex_m::singleton!(LINK: Autopilot = Autopilot {
+            link: Link::new(course.axis, course.pace, now),
+            port,
+            flown: None,
+            target: None,
+        })
+    }
+
+    /// Takes what has come, and hands the relay what follows from it.
+    pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
+        let mut bytes = [0; 64];
+        // What comes meanwhile wakes the main loop again.
+        for _ in 0..RECEIVED / bytes.len() {
+            match self.port.read(&mut bytes) {
+                Ok(0) => break,
+                Ok(count) => {
+                    let bytes = bytes.get(..count).unwrap_or_default();
+                    self.link.handle_bytes(now, bytes);
+                }
+                // The checksum tells of a byte that is lost.
+                Err(_) => {}
+            }
+        }
+        self.link.handle_timeout(now);
+        let flown = Some(self.link.is_flown());
+        if self.flown != flown {
+            self.flown = flown;
+            relay.handle_control(now, self.link.is_flown());
+        }
+        while let Some(position) = self.link.poll_position() {
+            relay.handle_position(now, position.at, position.place);
+        }
+    }
+
+    /// Has the operator's ground station show what happened.
+    pub(crate) fn tell(&mut self, event: Event) {
+        self.link.handle_event(event);
+    }
+
+    /// Sends what the relay wants and says when to be called again, at the latest; `now` is that of [`listen`](Self::listen).
+    pub(crate) fn fly(&mut self, now: Instant, relay: &Relay) -> Instant {
+        let setpoint = relay.setpoint();
+        self.link.handle_setpoint(now, setpoint);
+        let sir_db = relay.target().map(|target| self.decibels(target));
+        self.link.handle_values(now, sir_db, setpoint);
+        while let Some(event) = self.link.poll_event() {
+            log::autopilot(event);
+        }
+        loop {
+            if self.port.room() < LONGEST {
+                return now + PAUSE;
+            }
+            let Some(frame) = self.link.poll_transmit(now) else {
+                return self.link.poll_timeout(now);
+            };
+            // There is room for it.
+            let _ = self.port.write(&frame);
+        }
+    }
+
+    /// The SIR in decibels, computed anew where it has changed.
+    fn decibels(&mut self, target: f32) -> f32 {
+        match self.target {
+            Some((of, db)) if of.to_bits() == target.to_bits() => db,
+            _ => {
+                let db = 10.0 * libm::log10f(target);
+                self.target = Some((target, db));
+                db
+            }
+        }
+    }
+}
+
+#[interrupt]
+fn USART1() {
+    port::serve(&AUTOPILOT, &AUTOPILOT_QUEUES);
+}

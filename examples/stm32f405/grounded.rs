@@ -1,0 +1,46 @@
+//! What `autopilot.rs` is without the feature `flight`: nothing. A drone whose block has sites does not fly with such an image.
+
+use stm32f4xx_hal::gpio::{PA9, PA10};
+use stm32f4xx_hal::pac::USART1;
+use stm32f4xx_hal::rcc::Rcc;
+use uav_relay::{Event, Instant, Mission, Relay};
+
+use super::config::Sites;
+use super::log;
+
+/// No port.
+pub(crate) struct Uart;
+
+#[expect(
+    clippy::unnecessary_wraps,
+    reason = "as the port of an autopilot is set up"
+)]
+pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: &mut Rcc) -> Option<Uart> {
+    Some(Uart)
+}
+
+/// There is none.
+pub(crate) enum Autopilot {}
+
+impl Autopilot {
+    pub(crate) const FLIES: bool = false;
+
+    pub(crate) const POSITION_ERROR_M: f32 = 0.0;
+
+    pub(crate) fn begin(_: Uart, _: &Sites, _: &Mission, _: Instant) -> Option<&'static mut Self> {
+        log::no_flight();
+        None
+    }
+
+    pub(crate) const fn listen(&mut self, _: Instant, _: &mut Relay) {
+        match *self {}
+    }
+
+    pub(crate) const fn tell(&mut self, _: Event) {
+        match *self {}
+    }
+
+    pub(crate) const fn fly(&mut self, _: Instant, _: &Relay) -> Instant {
+        match *self {}
+    }
+}

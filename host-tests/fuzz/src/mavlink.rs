@@ -1,0 +1,66 @@
+//! Any bytes as what comes from an autopilot, and any orders to the link to it.
+
+mod link;
+mod reference;
+mod wire;
+
+use uav_relay::flight::mavlink::parser::{Counters, Parser, Received};
+
+use super::heap::without;
+use super::input::Input;
+use reference::Reference;
+use wire::{Placed, stream};
+
+/// Reads `data` as a stream of noise, frames and damaged frames, and then as what happens to the link to an autopilot.
+///
+/// # Panics
+/// Where the parser finds anything else than frames by their definition, misses one that is whole, or does more work than
+/// promised; where the link sends what is not finite, not near the line or not of its state, differs by how its bytes are cut,
+/// asks for memory, or wants to be called for nothing.
+pub fn mavlink(data: &[u8]) {
+    let mut input = Input::new(data);
+    if input.flag() {
+        link::operate(&mut input);
+    } else {
+        let (bytes, placed) = stream(&mut input);
+        frames_by_definition(&bytes, &placed);
+    }
+}
+
+/// What a parser makes of bytes, one by one.
+fn parsed(bytes: &[u8]) -> (Vec<Received>, Counters) {
+    let mut parser = Parser::new();
+    let mut all = Vec::new();
+    for &byte in bytes {
+        parser.push(byte);
+        while let Some(received) = without(|| parser.next_message()) {
+            all.push(received);
+        }
+    }
+    (all, parser.counters())
+}
+
+fn frames_by_definition(bytes: &[u8], placed: &[Placed]) {
+    let reference = Reference::read(bytes);
+    let (found, counters) = parsed(bytes);
+    assert_eq!(found.len(), reference.frames.len());
+    for (received, frame) in found.iter().zip(&reference.frames) {
+        let from = (received.from.system, received.from.component);
+        assert_eq!((received.id, from), (frame.id, frame.from));
+        assert_eq!(received.is_signed, frame.is_signed);
+    }
+    let begun = reference.frames.len() + reference.broken;
+    let counted = u64::from(counters.frames) + u64::from(counters.broken);
+    assert_eq!(u64::try_from(begun), Ok(counted));
+    assert!(
+        3 * reference.checksums <= bytes.len() + 3,
+        "{} checksums in {} bytes",
+        reference.checksums,
+        bytes.len()
+    );
+    for &Placed { at, .. } in placed {
+        // It may stand where another frame that holds has its payload; else it is found.
+        let is_in = |frame: &reference::Frame| (frame.at..frame.end).contains(&at);
+        assert!(reference.frames.iter().any(is_in), "lost at {at}");
+    }
+}

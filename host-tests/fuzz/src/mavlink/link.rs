@@ -1,0 +1,327 @@
+//! The link to an autopilot that says anything, of a relay that wants anything.
+
+use uav_relay::flight::autopilot::carrot::Pace;
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
+use uav_relay::flight::axis::Axis;
+use uav_relay::flight::geodetic::Geodetic;
+use uav_relay::pointing::Bearing;
+use uav_relay::{Duration, Instant, Placement};
+
+use super::wire::{
+    EXTENDED_STATE, GLOBAL_POSITION, HEARTBEAT, POSITION_TARGET, SENT, SET_POSITION, VALUE,
+    checksum, frame,
+};
+use crate::heap::without;
+use crate::input::Input;
+
+/// Operations in one run.
+const MOST_OPERATIONS: usize = 256;
+
+/// Frames that may be due at once: a heartbeat, three requests, a target, three lines, four numbers, and as many again.
+const MOST_FRAMES: usize = 24;
+
+/// How far from the line a target may be, m: 5 km, and what a flat earth is off there.
+const AROUND_M: f64 = 5_040.0;
+
+/// The transmitter's site and the receiver's: degrees, and m above the sea.
+const TX: [f64; 3] = [47.40, 8.54, 420.0];
+const RX: [f64; 3] = [47.41, 8.55, 431.0];
+
+/// A degree of latitude and one of longitude there, m.
+const DEGREE_M: [f64; 2] = [111_180.0, 75_470.0];
+
+struct Link {
+    autopilot: Autopilot,
+    axis: Axis,
+    now: Instant,
+    /// When the autopilot was switched on.
+    began: Instant,
+    kind: Option<Kind>,
+    /// The last target that was sent.
+    told: [i32; 2],
+}
+
+/// Reads what is left as what is said to a link.
+pub(super) fn operate(input: &mut Input<'_>) {
+    let Some(mut link) = Link::new(input) else {
+        return;
+    };
+    link.settle();
+    for _ in 0..MOST_OPERATIONS {
+        if input.is_empty() {
+            return;
+        }
+        link.operate(input);
+        link.settle();
+    }
+}
+
+impl Link {
+    fn new(input: &mut Input<'_>) -> Option<Self> {
+        let site = |[lat, lon, amsl]: [f64; 3]| Geodetic::from_degrees(lat, lon, amsl);
+        let axis = Axis::try_new(site(TX)?, site(RX)?).ok()?;
+        let pace = Pace {
+            speed_m_s: input.even(0.1, 20.0),
+            acceleration_m_s2: input.even(0.1, 5.0),
+        };
+        let now = Instant::from_millis(u64::from(input.word()));
+        Some(Self {
+            autopilot: Autopilot::new(axis, pace, now),
+            axis,
+            now,
+            began: now,
+            kind: None,
+            told: [0; 2],
+        })
+    }
+
+    fn operate(&mut self, input: &mut Input<'_>) {
+        match input.below(14) {
+            0 => {
+                let lengths = input.word();
+                self.hear(input.piece(), lengths);
+            }
+            1 | 2 => self.heartbeat(input),
+            3 => {
+                let landed = input.below(6);
+                self.hear(&frame(EXTENDED_STATE, [1, 1], &[0, landed], 0), 0);
+            }
+            4 => {
+                let place = near(input);
+                self.position(place, input.byte());
+            }
+            5 => {
+                let raw = input.piece().to_vec();
+                self.hear(&frame(GLOBAL_POSITION, [1, 1], &sized(raw, 28), 0), 0);
+            }
+            6 => {
+                let mut payload = vec![0; 4];
+                let [lat, lon] = self.told;
+                let off = i32::from(input.byte() / 8);
+                payload.extend(lat.wrapping_add(off).to_le_bytes());
+                payload.extend(lon.to_le_bytes());
+                self.hear(&frame(POSITION_TARGET, [1, 1], &sized(payload, 51), 0), 0);
+            }
+            7 => self.now = self.now + Duration::from_millis(u64::from(input.word())),
+            8 | 9 => {
+                for _ in 0..input.below(64) {
+                    self.now = self.now.max(self.autopilot.poll_timeout(self.now));
+                    self.settle();
+                }
+            }
+            10 => {
+                let setpoint = input.flag().then(|| any(input));
+                without(|| self.autopilot.handle_setpoint(self.now, setpoint));
+            }
+            11 => {
+                let look = input.flag().then(|| Bearing {
+                    azimuth_rad: input.mostly(|input| input.even(-3.2, 3.2)),
+                    elevation_rad: 0.0,
+                    distance_m: 1.0,
+                });
+                self.autopilot.handle_bearing(look);
+            }
+            12 => {
+                let (sir, place) = (input.any_number(), any(input));
+                without(|| {
+                    self.autopilot
+                        .handle_values(self.now, Some(sir), Some(place));
+                });
+            }
+            _ => {
+                let text = String::from_utf8_lossy(input.piece()).into_owned();
+                without(|| self.autopilot.say(&text));
+            }
+        }
+    }
+
+    /// Bytes in one piece, and in pieces of two lengths in turn: the link is the same after either.
+    fn hear(&mut self, bytes: &[u8], lengths: u16) {
+        let mut other = self.autopilot.clone();
+        without(|| self.autopilot.handle_bytes(self.now, bytes));
+        let mut rest = bytes;
+        for len in lengths.to_le_bytes().into_iter().cycle() {
+            if rest.is_empty() {
+                break;
+            }
+            let len = (usize::from(len) + 1).min(rest.len());
+            let (piece, after) = rest.split_at_checked(len).unwrap_or((rest, &[]));
+            other.handle_bytes(self.now, piece);
+            rest = after;
+        }
+        let mut both = [self.autopilot.clone(), other];
+        let [one, other] = both.each_mut().map(|link| {
+            let sent: Vec<_> = core::iter::from_fn(|| link.poll_transmit(self.now)).collect();
+            (sent, link.poll_position(), link.state(), link.counters())
+        });
+        assert_eq!(one, other, "by how the bytes are cut");
+    }
+
+    /// Of a PX4, an ArduCopter or something else, in any mode.
+    fn heartbeat(&mut self, input: &mut Input<'_>) {
+        let autopilot = match input.below(8) {
+            0..=3 => 12,
+            4..=6 => 3,
+            _ => input.byte(),
+        };
+        let mode: u32 = match input.below(8) {
+            0..=3 if autopilot == 12 => 6 << 16,
+            0..=3 => 4,
+            4 => u32::from(input.byte()) << 16,
+            _ => u32::from(input.byte()),
+        };
+        let component = if input.below(8) == 7 { input.byte() } else { 1 };
+        let armed = if input.below(4) == 3 { 0 } else { 128 };
+        let mut payload = mode.to_le_bytes().to_vec();
+        payload.extend([2, autopilot, armed | 1, 4, 3]);
+        self.hear(&frame(HEARTBEAT, [1, component], &payload, 0), 0);
+    }
+
+    /// Where the drone is, said late or by a clock that is off.
+    fn position(&mut self, place: Placement, clock: u8) {
+        let Some(point) = self.axis.point(place) else {
+            return;
+        };
+        if clock == 255 {
+            self.began = self.now;
+        }
+        let ms = self.now.since(self.began).as_micros() / 1_000;
+        let boot = ms.saturating_sub(u64::from(clock % 16) * 100);
+        let boot = u32::try_from(boot % (1 << 32)).unwrap_or(0);
+        let mut payload = boot.to_le_bytes().to_vec();
+        for number in [point.lat_e7, point.lon_e7, point.amsl_mm] {
+            payload.extend(number.to_le_bytes());
+        }
+        self.hear(&frame(GLOBAL_POSITION, [1, 1], &sized(payload, 28), 0), 0);
+    }
+
+    /// What a firmware's loop does, and a look at all that comes of it.
+    fn settle(&mut self) {
+        without(|| self.autopilot.handle_timeout(self.now));
+        let mut frames = 0;
+        while let Some(frame) = without(|| self.autopilot.poll_transmit(self.now)) {
+            self.look_at(&frame);
+            frames += 1;
+            assert!(frames <= MOST_FRAMES, "it never ends");
+        }
+        while let Some(position) = self.autopilot.poll_position() {
+            let Placement {
+                x_m,
+                y_m,
+                altitude_m,
+            } = position.place;
+            assert!([x_m, y_m, altitude_m].iter().all(|part| part.is_finite()));
+            assert!(position.at <= self.now, "it comes from the future");
+        }
+        let mut events = 0;
+        while let Some(event) = self.autopilot.poll_event() {
+            if let AutopilotEvent::Found(kind) = event {
+                assert_eq!(self.kind.replace(kind), None, "found twice");
+            }
+            events += 1;
+            assert!(events <= 4, "it never ends");
+        }
+        assert_eq!(
+            self.autopilot.is_flown(),
+            self.autopilot.state() == State::Engaged
+        );
+        let wakes = self.autopilot.poll_timeout(self.now);
+        assert!(wakes > self.now, "it wants to be called for nothing");
+    }
+
+    fn look_at(&mut self, frame: &[u8]) {
+        let Some((&[magic, length, flags, _, _, _, component, a, b, c], rest)) =
+            frame.split_first_chunk()
+        else {
+            unreachable!("{frame:?}");
+        };
+        let id = u32::from_le_bytes([a, b, c, 0]);
+        let Some((_, extra, longest)) = SENT.into_iter().find(|(number, ..)| *number == id) else {
+            unreachable!("it sends message {id}");
+        };
+        assert_eq!((magic, flags, component), (0xFD, 0, 191));
+        let Some((payload, sum)) = rest.split_at_checked(usize::from(length)) else {
+            unreachable!("{frame:?}");
+        };
+        let covered = frame.get(1..10 + payload.len()).unwrap_or_default();
+        assert_eq!(sum, checksum(covered, extra).to_le_bytes());
+        let payload = sized(payload.to_vec(), longest);
+        if id == SET_POSITION.0 {
+            self.look_at_target(&payload);
+        } else if id == VALUE.0 {
+            assert!(float(&payload, 4).is_finite(), "{payload:?}");
+        }
+    }
+
+    /// Finite, near the line, no faster than allowed, and of a state that sends one.
+    fn look_at_target(&mut self, payload: &[u8]) {
+        let state = self.autopilot.state();
+        let may = matches!(state, State::Engaged | State::Blind)
+            || state == State::Standby && self.kind != Some(Kind::ArduCopter);
+        assert!(may, "a target in {state:?}");
+        self.told = [long(payload, 4), long(payload, 8)];
+        let [lat, lon] = self.told.map(|units| f64::from(units) / 1e7);
+        let amsl = f64::from(float(payload, 12));
+        let velocity = [16, 20, 24].map(|at| float(payload, at));
+        let yaw = float(payload, 40);
+        let finite = velocity.iter().all(|part| part.is_finite()) && amsl.is_finite();
+        assert!(finite, "{payload:?}");
+        assert!(yaw.abs() <= 3.2, "yaw {yaw}");
+        assert!(
+            velocity.iter().all(|part| part.abs() <= 20.5),
+            "{velocity:?}"
+        );
+        // On a flat earth.
+        let [north_m, east_m] = DEGREE_M;
+        let toward =
+            |[to_lat, to_lon, _]: [f64; 3]| [(to_lat - TX[0]) * north_m, (to_lon - TX[1]) * east_m];
+        let ([n, e], [rn, re]) = (toward([lat, lon, 0.0]), toward(RX));
+        let length = rn.hypot(re);
+        let along = (n * rn + e * re) / length;
+        let aside = (e * rn - n * re) / length;
+        assert!(aside.abs() <= AROUND_M, "{aside} m aside");
+        assert!(
+            (-AROUND_M..=length + AROUND_M).contains(&along),
+            "{along} m along"
+        );
+        let datum = TX[2] + (RX[2] - TX[2]) * along / length;
+        assert!((amsl - datum).abs() <= AROUND_M, "{amsl} m high");
+    }
+}
+
+fn sized(mut payload: Vec<u8>, length: usize) -> Vec<u8> {
+    payload.resize(length, 0);
+    payload
+}
+
+fn four(payload: &[u8], at: usize) -> [u8; 4] {
+    let bytes = payload.get(at..).and_then(<[u8]>::first_chunk);
+    bytes.copied().unwrap_or_default()
+}
+
+fn long(payload: &[u8], at: usize) -> i32 {
+    i32::from_le_bytes(four(payload, at))
+}
+
+fn float(payload: &[u8], at: usize) -> f32 {
+    f32::from_le_bytes(four(payload, at))
+}
+
+/// A place near the line.
+fn near(input: &mut Input<'_>) -> Placement {
+    Placement {
+        x_m: input.even(-5_100.0, 6_500.0),
+        y_m: input.even(-5_100.0, 5_100.0),
+        altitude_m: input.even(-100.0, 500.0),
+    }
+}
+
+/// A place near the line, and now and then one that is none.
+fn any(input: &mut Input<'_>) -> Placement {
+    Placement {
+        x_m: input.mostly(|input| input.even(0.0, 1_400.0)),
+        y_m: input.mostly(|input| input.even(-100.0, 100.0)),
+        altitude_m: input.mostly(|input| input.even(0.0, 200.0)),
+    }
+}

@@ -1,0 +1,107 @@
+//! Frames and streams of them, written without the crate's codec.
+
+use crate::input::Input;
+
+/// CRC-16/MCRF4XX bit by bit, over `covered` and one byte more.
+pub(super) fn checksum(covered: &[u8], extra: u8) -> u16 {
+    covered.iter().chain([&extra]).fold(0xFFFF, |crc, &byte| {
+        (0..8).fold(crc ^ u16::from(byte), |crc, _| {
+            crc >> 1 ^ if crc & 1 == 1 { 0x8408 } else { 0 }
+        })
+    })
+}
+
+/// A message: its number, the byte that is added to its checksum, and its length.
+pub(super) type Kind = (u32, u8, usize);
+
+pub(super) const HEARTBEAT: Kind = (0, 50, 9);
+pub(super) const GLOBAL_POSITION: Kind = (33, 104, 28);
+pub(super) const POSITION_TARGET: Kind = (87, 150, 51);
+pub(super) const EXTENDED_STATE: Kind = (245, 130, 2);
+pub(super) const ACK: Kind = (77, 143, 10);
+pub(super) const TUNNEL: Kind = (385, 147, 133);
+pub(super) const SET_POSITION: Kind = (86, 5, 53);
+pub(super) const COMMAND: Kind = (76, 152, 33);
+pub(super) const TEXT: Kind = (253, 83, 54);
+pub(super) const VALUE: Kind = (251, 170, 18);
+
+/// What the link may send.
+pub(super) const SENT: [Kind; 5] = [HEARTBEAT, COMMAND, SET_POSITION, TEXT, VALUE];
+
+/// A frame; zeros at the end of its payload are left out, but for the first byte.
+pub(super) fn frame(kind: Kind, from: [u8; 2], payload: &[u8], flags: u8) -> Vec<u8> {
+    let (id, extra, _) = kind;
+    let zeros = payload.iter().rev().take_while(|byte| **byte == 0).count();
+    let kept = (payload.len() - zeros).max(1).min(payload.len());
+    let payload = payload.get(..kept).unwrap_or_default();
+    let [a, b, c, _] = id.to_le_bytes();
+    let length = u8::try_from(payload.len()).unwrap_or(u8::MAX);
+    let [system, component] = from;
+    let mut frame = vec![0xFD, length, flags, 0, 0, system, component, a, b, c];
+    frame.extend(payload);
+    let sum = checksum(frame.get(1..).unwrap_or_default(), extra);
+    frame.extend(sum.to_le_bytes());
+    if flags & 1 == 1 {
+        frame.extend([0x5A; 13]);
+    }
+    frame
+}
+
+/// Where a whole frame was put.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed {
+    pub(super) at: usize,
+}
+
+/// Parts of a stream, at most: it is read a byte at a time, twice.
+const MOST_PARTS: usize = 64;
+
+/// Noise, whole frames, frames with a byte changed or cut off, and in the end as many zeros as a false start waits for.
+pub(super) fn stream(input: &mut Input<'_>) -> (Vec<u8>, Vec<Placed>) {
+    let (mut bytes, mut placed) = (Vec::new(), Vec::new());
+    for _ in 0..MOST_PARTS {
+        if input.is_empty() {
+            break;
+        }
+        match input.below(4) {
+            0 => bytes.extend(input.piece()),
+            1 => {
+                placed.push(Placed { at: bytes.len() });
+                bytes.extend(any_frame(input));
+            }
+            2 => {
+                let mut frame = any_frame(input);
+                let at = usize::from(input.byte()) % frame.len().max(1);
+                if let Some(byte) = frame.get_mut(at) {
+                    *byte ^= input.byte();
+                }
+                bytes.extend(frame);
+            }
+            _ => {
+                let frame = any_frame(input);
+                let kept = usize::from(input.byte()) % frame.len().max(1);
+                bytes.extend(frame.get(..kept).unwrap_or_default());
+            }
+        }
+    }
+    bytes.extend([0; 300]);
+    (bytes, placed)
+}
+
+fn any_frame(input: &mut Input<'_>) -> Vec<u8> {
+    let kinds = [
+        HEARTBEAT,
+        GLOBAL_POSITION,
+        POSITION_TARGET,
+        EXTENDED_STATE,
+        ACK,
+        TUNNEL,
+    ];
+    let chosen = usize::from(input.below(6));
+    let kind = kinds.get(chosen).copied().unwrap_or(HEARTBEAT);
+    let from = [input.byte(), input.byte()];
+    let flags = input.below(2);
+    let mut payload = input.piece().to_vec();
+    payload.resize(kind.2, 0);
+    frame(kind, from, &payload, flags)
+}

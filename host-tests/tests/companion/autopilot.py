@@ -1,0 +1,211 @@
+"""pymavlink as the autopilot of a drone, an ArduCopter or a PX4, on a pseudo-terminal.
+
+    autopilot.py arducopter|px4 LINK LAT LON AMSL
+
+LINK becomes a symbolic link to the tty. The drone stands at LAT, LON, AMSL, on the ground. What it hears goes to standard output, a
+JSON object a line, with the drone's own place and mode; standard input has an order a line:
+
+    arm, takeoff                 armed; off the ground, and in the air a second later
+    mode pilot|hold|rtl|companion
+    sticks NORTH EAST            m/s, in the mode `pilot`
+    refuse, accept               targets, as outside a fence
+    reboot, mute, speak          begins anew on the ground; says nothing; says something
+    unplug, plug                 the tty vanishes; another one is there
+"""
+
+import json
+import math
+import os
+import pty
+import select
+import sys
+import time
+import tty
+
+from pymavlink.dialects.v20 import common
+
+SYSTEM, SPEED, STEP = 7, 8.0, 0.02
+MODES = {
+    "arducopter": {"pilot": 16, "hold": 5, "rtl": 6, "companion": 4},
+    "px4": {"pilot": 3 << 16, "hold": 4 << 16 | 3 << 24, "rtl": 4 << 16 | 5 << 24, "companion": 6 << 16},
+}
+ON_GROUND, IN_AIR, TAKEOFF = 1, 2, 3
+# SET_POSITION_TARGET_GLOBAL_INT: position is given, acceleration is not; above the mean sea level.
+POSITION, ACCELERATION, AMSL = 0b111, 0b1_1100_0000, 5
+DEGREE_M = 111_200.0
+
+
+class Drone:
+    def __init__(self, kind, link, at):
+        self.kind, self.link, self.home = kind, link, at
+        self.at, self.sticks, self.silent, self.refuses = list(at), (0.0, 0.0), False, False
+        self.tty = None
+        self.start()
+        self.plug()
+
+    def start(self):
+        self.began = time.monotonic()
+        self.armed, self.landed, self.mode, self.by_itself = False, ON_GROUND, "pilot", False
+        self.goal, self.told_at, self.took_off_at = None, -math.inf, 0.0
+        self.at[2] = self.home[2]
+        # Seconds between two, and when the next is due, by number.
+        self.streams = {0: [1.0, 0.0]}
+        if self.kind == "px4":
+            self.streams[245] = [0.2, 0.0]
+
+    def plug(self):
+        self.tty, self.side = pty.openpty()
+        tty.setraw(self.side)
+        os.set_blocking(self.tty, False)
+        os.symlink(os.ttyname(self.side), self.link)
+        self.codec, self.reader = common.MAVLink(None, SYSTEM, 1), common.MAVLink(None)
+        self.reader.robust_parsing = True
+
+    def unplug(self):
+        os.remove(self.link)
+        os.close(self.tty)
+        os.close(self.side)
+        self.tty = None
+
+    def order(self, words):
+        match words:
+            case ["arm"]:
+                self.armed = True
+            case ["takeoff"]:
+                self.landed, self.took_off_at = TAKEOFF, time.monotonic()
+            case ["mode", mode]:
+                # A PX4 refuses its mode to a companion that does not stream.
+                if not (self.kind == "px4" and mode == "companion" and time.monotonic() - self.told_at > 1.0):
+                    self.mode, self.by_itself, self.goal = mode, False, None
+            case ["sticks", north, east]:
+                self.sticks = float(north), float(east)
+            case ["refuse" | "accept" as word]:
+                self.refuses = word == "refuse"
+            case ["reboot"]:
+                self.start()
+            case ["mute" | "speak" as word]:
+                self.silent = word == "mute"
+            case ["unplug"]:
+                self.unplug()
+            case ["plug"]:
+                self.plug()
+            case _:
+                raise ValueError(words)
+
+    def step(self):
+        now = time.monotonic()
+        if self.landed == TAKEOFF:
+            self.at[2] += 10.0 * STEP
+            if now - self.took_off_at > 1.0:
+                self.landed = IN_AIR
+        if self.landed != IN_AIR:
+            return
+        lost = self.kind == "px4" and self.mode == "companion" and now - self.told_at > 1.0
+        if lost:
+            self.mode, self.by_itself, self.goal = "hold", True, None
+        if self.mode == "companion" and self.goal:
+            self.fly(self.goal)
+        elif self.mode == "rtl":
+            self.fly((self.home[0], self.home[1], self.at[2]))
+        elif self.mode == "pilot":
+            self.at[0] += self.sticks[0] * STEP / DEGREE_M
+            self.at[1] += self.sticks[1] * STEP / self.east_m()
+
+    def east_m(self):
+        return DEGREE_M * math.cos(math.radians(self.at[0]))
+
+    def fly(self, goal):
+        scales = DEGREE_M, self.east_m(), 1.0
+        way = [(to - at) * scale for to, at, scale in zip(goal, self.at, scales)]
+        length = math.hypot(*way)
+        part = min(1.0, SPEED * STEP / length) if length > 0 else 1.0
+        self.at = [at + (to - at) * part for to, at in zip(goal, self.at)]
+
+    def hear(self):
+        try:
+            data = os.read(self.tty, 4096)
+        except (BlockingIOError, OSError):
+            return
+        for message in self.reader.parse_buffer(data) or []:
+            name = message.get_type()
+            if name == "COMMAND_LONG" and message.command == 511:
+                self.streams[int(message.param1)] = [message.param2 / 1e6, 0.0]
+                self.say(common.MAVLink_command_ack_message(511, 0))
+            elif name == "SET_POSITION_TARGET_GLOBAL_INT":
+                self.take(message)
+            fields = message.to_dict()
+            fields["from"] = [message.get_srcSystem(), message.get_srcComponent()]
+            fields["own"] = {"at": self.at, "mode": self.mode, "landed": self.landed, "by_itself": self.by_itself}
+            print(json.dumps(fields), flush=True)
+
+    def take(self, message):
+        is_position = message.coordinate_frame == AMSL and message.type_mask & POSITION == 0
+        is_mine = (message.target_system, message.target_component) == (SYSTEM, 1)
+        if not is_position or message.type_mask & ACCELERATION != ACCELERATION or not is_mine or self.refuses:
+            return
+        self.told_at = time.monotonic()
+        # A PX4 goes back to the companion by itself once it streams again.
+        if self.kind == "px4" and self.mode == "hold" and self.by_itself:
+            self.mode, self.by_itself = "companion", False
+        if self.mode == "companion":
+            self.goal = message.lat_int / 1e7, message.lon_int / 1e7, message.alt
+
+    def say(self, message):
+        if not self.silent:
+            try:
+                os.write(self.tty, message.pack(self.codec))
+            except BlockingIOError:
+                pass
+
+    def say_what_is_due(self):
+        now = time.monotonic()
+        for number, stream in self.streams.items():
+            if stream[0] > 0 and stream[1] <= now:
+                stream[1] = now + stream[0]
+                if message := self.message(number, int((now - self.began) * 1e3)):
+                    self.say(message)
+
+    def message(self, number, boot_ms):
+        lat, lon = (round(degrees * 1e7) for degrees in self.at[:2])
+        if number == 0:
+            base = 1 | (128 if self.armed else 0)
+            autopilot = 12 if self.kind == "px4" else 3
+            return common.MAVLink_heartbeat_message(2, autopilot, base, MODES[self.kind][self.mode], 4, 3)
+        if number == 33:
+            above = self.at[2] - self.home[2]
+            return common.MAVLink_global_position_int_message(
+                boot_ms, lat, lon, round(self.at[2] * 1e3), round(above * 1e3), 0, 0, 0, 0
+            )
+        if number == 245:
+            return common.MAVLink_extended_sys_state_message(0, self.landed)
+        # A PX4 does not say it in its mode.
+        if number == 87 and self.kind == "arducopter" and self.mode == "companion" and self.goal:
+            lat, lon, amsl = self.goal
+            return common.MAVLink_position_target_global_int_message(
+                boot_ms, AMSL, 0xDF8, round(lat * 1e7), round(lon * 1e7), amsl, 0, 0, 0, 0, 0, 0, 0, 0
+            )
+        return None
+
+
+drone = Drone(sys.argv[1], sys.argv[2], tuple(map(float, sys.argv[3:6])))
+print(json.dumps({"mavpackettype": "READY"}), flush=True)
+os.set_blocking(0, False)
+orders = b""
+next_step = time.monotonic()
+while True:
+    wait = [0] if drone.tty is None else [0, drone.tty]
+    ready, _, _ = select.select(wait, [], [], max(0.0, next_step - time.monotonic()))
+    if 0 in ready:
+        data = os.read(0, 4096)
+        if not data:
+            break
+        *lines, orders = (orders + data).split(b"\n")
+        for line in lines:
+            drone.order(line.decode().split())
+    if drone.tty is not None:
+        drone.hear()
+    if time.monotonic() >= next_step:
+        next_step += STEP
+        drone.step()
+        if drone.tty is not None:
+            drone.say_what_is_due()

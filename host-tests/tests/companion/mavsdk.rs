@@ -1,0 +1,50 @@
+//! MAVSDK as the autopilot, over UDP: its own server of telemetry, modes and requests.
+
+use std::net::UdpSocket;
+
+use rustix::process::Signal;
+
+use crate::flying::ASKED;
+use crate::peer::{Heard, Peer, agreed, apart_m, on_earth, relay};
+use crate::process::bits;
+
+/// A port that nobody has.
+fn free_port() -> u16 {
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.local_addr().unwrap().port()
+}
+
+#[test]
+fn mavsdk_is_led_to_its_place_and_let_go() {
+    let place = agreed();
+    let port = free_port().to_string();
+    let at = on_earth(370.0, 15.0).map(|number| number.to_string());
+    let [lat, lon, amsl] = &at;
+    let mut drone = Peer::start("mavsdk_autopilot.py", &[&port, lat, lon, amsl]);
+    let mut relay = relay(&format!("udp:127.0.0.1:{port}"));
+    let heartbeat = drone.hears(|heard| heard.is("HEARTBEAT"));
+    assert_eq!(heartbeat.0["type"], 18);
+    assert!(!relay.has_said("autopilot: found"), "a generic one");
+    drone.order("px4");
+    relay.line("autopilot: found a PX4");
+    relay.line("autopilot: on the ground, or not armed");
+    drone.is_asked_for(&ASKED[..2]);
+    // Its position has come: the guard has the drone begin there.
+    let begins = relay.line("setpoint: ");
+    let x_m = f32::from_bits(bits(&begins)[0]);
+    assert!((x_m - 370.0).abs() < 0.02, "{begins}");
+    drone.order("arm");
+    drone.order("air");
+    relay.line("autopilot: in the air, flown by its pilot");
+    drone.hears(Heard::is_target);
+    drone.order("mode offboard");
+    relay.line("autopilot: flies to the relay's setpoints");
+    drone.hears(|heard| heard.says("relay: flies to its place"));
+    let there = drone.hears(|heard| heard.is_target() && apart_m(heard.to(), place) < 0.05);
+    assert_eq!(there.0["from"], serde_json::json!([1, 191]));
+    drone.order("mode hold");
+    relay.line("autopilot: in the air, flown by its pilot");
+    drone.hears(|heard| heard.says("relay: released"));
+    relay.signal(Signal::TERM);
+    assert_eq!(relay.end().status, Some(0));
+}

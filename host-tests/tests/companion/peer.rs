@@ -1,0 +1,224 @@
+//! An autopilot that nobody here wrote, as a process of its own: what it hears, and orders to it.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
+use host_tests::python;
+use serde_json::Value;
+use uav_relay::flight::axis::Axis;
+use uav_relay::flight::geodetic::Geodetic;
+
+use crate::process::{LIMIT, Relay, lines_of};
+
+/// Latitude, longitude, and the ground's height above the mean sea level.
+pub(crate) type Site = [f64; 3];
+
+pub(crate) const TX: Site = [47.40, 8.54, 420.0];
+pub(crate) const RX: Site = [47.41, 8.55, 431.0];
+
+/// The distance of the two, by the library, m.
+pub(crate) fn distance_m() -> f64 {
+    let [tx, rx] = [TX, RX].map(|[lat, lon, amsl]| Geodetic::from_degrees(lat, lon, amsl).unwrap());
+    Axis::try_new(tx, rx).unwrap().distance_m()
+}
+
+/// A place along the line on earth, by geodesics.
+pub(crate) fn on_earth(x_m: f64, altitude_m: f64) -> Site {
+    let earth = Geodesic::wgs84();
+    let (length, azimuth, _, _): (f64, f64, f64, f64) = earth.inverse(TX[0], TX[1], RX[0], RX[1]);
+    let (lat, lon): (f64, f64) = earth.direct(TX[0], TX[1], azimuth, x_m);
+    [
+        lat,
+        lon,
+        TX[2] + (RX[2] - TX[2]) * x_m / length + altitude_m,
+    ]
+}
+
+/// How far two places are from each other, m.
+pub(crate) fn apart_m(a: Site, b: Site) -> f64 {
+    let level: f64 = Geodesic::wgs84().inverse(a[0], a[1], b[0], b[1]);
+    level.hypot(a[2] - b[2])
+}
+
+/// The options that a relay that flies alone is given.
+pub(crate) fn options(autopilot: &str) -> Vec<String> {
+    let site = |site: Site| site.map(|number| number.to_string()).join(",");
+    let distance = distance_m().to_string();
+    let (tx, rx) = (site(TX), site(RX));
+    [
+        ["--index", "1"],
+        ["--of", "1"],
+        ["--distance", &distance],
+        ["--site-tx", &tx],
+        ["--site-rx", &rx],
+        ["--autopilot", autopilot],
+    ]
+    .concat()
+    .into_iter()
+    .map(ToOwned::to_owned)
+    .collect()
+}
+
+pub(crate) fn relay(autopilot: &str) -> Relay {
+    let options = options(autopilot);
+    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    Relay::start(&options)
+}
+
+/// Where a relay that flies alone has its place, as one without an autopilot has it.
+pub(crate) fn agreed() -> Site {
+    let distance = distance_m().to_string();
+    let mut relay = Relay::start(&["--index", "1", "--of", "1", "--distance", &distance]);
+    let [x_m, y_m, altitude_m, _] = relay.settled().map(f32::from_bits);
+    assert_eq!(y_m, 0.0, "it is on the line");
+    on_earth(x_m.into(), altitude_m.into())
+}
+
+/// The autopilot.
+#[derive(Debug)]
+pub(crate) struct Peer {
+    child: Child,
+    orders: Option<ChildStdin>,
+    lines: Receiver<String>,
+}
+
+/// A message that it has heard, with its fields.
+#[derive(Clone, Debug)]
+pub(crate) struct Heard(pub(crate) Value);
+
+impl Heard {
+    pub(crate) fn is(&self, name: &str) -> bool {
+        self.0["mavpackettype"] == name
+    }
+
+    pub(crate) fn is_target(&self) -> bool {
+        self.is("SET_POSITION_TARGET_GLOBAL_INT")
+    }
+
+    /// Whether it says that to the operator.
+    pub(crate) fn says(&self, text: &str) -> bool {
+        self.is("STATUSTEXT") && self.0["text"] == text
+    }
+
+    /// The message that it asks for, and µs from one to the next.
+    pub(crate) fn asks_for(&self) -> Option<(u64, u64)> {
+        let asks = self.is("COMMAND_LONG") && self.0["command"] == 511;
+        let number = |name: &str| self.0[name].as_f64().unwrap() as u64;
+        asks.then(|| (number("param1"), number("param2")))
+    }
+
+    /// Whether a target moves.
+    pub(crate) fn has_velocity(&self) -> bool {
+        self.0["type_mask"].as_u64().unwrap() & 0b11_1000 == 0
+    }
+
+    /// Where a target is.
+    pub(crate) fn to(&self) -> Site {
+        let number = |name: &str| self.0[name].as_f64().unwrap();
+        [
+            number("lat_int") / 1e7,
+            number("lon_int") / 1e7,
+            number("alt"),
+        ]
+    }
+
+    /// Where the drone was then.
+    pub(crate) fn own(&self) -> Site {
+        let at = &self.0["own"]["at"];
+        [0, 1, 2].map(|part| at[part].as_f64().unwrap())
+    }
+
+    pub(crate) fn mode(&self) -> &str {
+        self.0["own"]["mode"].as_str().unwrap()
+    }
+}
+
+impl Peer {
+    /// Runs a script; it is ready when this returns.
+    pub(crate) fn start(script: &str, arguments: &[&str]) -> Self {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/companion");
+        let mut child = Command::new(python::interpreter())
+            .arg(folder.join(script))
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let peer = Self {
+            orders: child.stdin.take(),
+            lines: lines_of(child.stdout.take().unwrap()),
+            child,
+        };
+        peer.hears(|heard| heard.is("READY"));
+        peer
+    }
+
+    pub(crate) fn order(&mut self, order: &str) {
+        writeln!(self.orders.as_mut().unwrap(), "{order}").unwrap();
+    }
+
+    /// The next message that is `wanted`; those before it are passed over.
+    pub(crate) fn hears(&self, wanted: impl Fn(&Heard) -> bool) -> Heard {
+        self.hears_until(wanted).pop().unwrap()
+    }
+
+    /// All up to the next message that is `wanted`.
+    pub(crate) fn hears_until(&self, wanted: impl Fn(&Heard) -> bool) -> Vec<Heard> {
+        let end = Instant::now() + LIMIT;
+        let mut all = Vec::new();
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            let Ok(line) = self.lines.recv_timeout(left) else {
+                let from = all.len().saturating_sub(10);
+                panic!("it was not heard; the last: {:#?}", &all[from..]);
+            };
+            let heard = Heard(serde_json::from_str(&line).unwrap());
+            let is_wanted = wanted(&heard);
+            all.push(heard);
+            if is_wanted {
+                return all;
+            }
+        }
+    }
+
+    /// All that it hears in that time, after what it has heard before.
+    pub(crate) fn hears_for(&self, span: Duration) -> Vec<Heard> {
+        self.forget();
+        std::thread::sleep(span);
+        self.so_far()
+    }
+
+    /// What it has heard that nobody asked for.
+    pub(crate) fn so_far(&self) -> Vec<Heard> {
+        let lines = self.lines.try_iter();
+        lines
+            .map(|line| Heard(serde_json::from_str(&line).unwrap()))
+            .collect()
+    }
+
+    pub(crate) fn forget(&self) {
+        drop(self.so_far());
+    }
+
+    /// Waits until it was asked for those messages, in any order.
+    pub(crate) fn is_asked_for(&self, wanted: &[(u64, u64)]) {
+        let mut left = wanted.to_vec();
+        while !left.is_empty() {
+            let heard = self.hears(|heard| heard.asks_for().is_some());
+            left.retain(|asked| heard.asks_for() != Some(*asked));
+        }
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        // It ends when there are no orders any more; one that hangs is killed.
+        self.orders = None;
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,44 @@
+//! An autopilot whose port vanishes in flight and comes back under the same name.
+
+use std::time::Duration;
+
+use crate::flying::{ASKED, Flight};
+use crate::peer::{Heard, agreed};
+
+#[test]
+fn a_port_that_vanishes_is_opened_again() {
+    let place = agreed();
+    let mut flight = Flight::found("arducopter", 370.0);
+    flight.takes_off();
+    flight.is_engaged();
+    flight.drone.hears(Heard::is_target);
+    for _ in 0..2 {
+        let (_, sleeps) = flight.relay.cost();
+        flight.drone.order("unplug");
+        let line = flight.relay.line("is gone; tried again every second");
+        assert!(line.contains("autopilot: --autopilot /"), "{line}");
+        flight.relay.line("autopilot: silent");
+        std::thread::sleep(Duration::from_millis(1_500));
+        let (_, after) = flight.relay.cost();
+        assert!(after - sleeps < 500, "{} wake-ups", after - sleeps);
+        assert!(flight.relay.lines_with("is back").is_empty(), "it is not");
+        flight.drone.order("plug");
+        flight.relay.line("is back");
+        flight
+            .relay
+            .line("autopilot: flies to the relay's setpoints");
+        flight.drone.hears(Heard::is_target);
+    }
+    flight.arrives(place);
+    let gone = flight.relay.lines_with("is gone");
+    assert!(gone.is_empty(), "once each: {gone:?}");
+
+    // An autopilot that was switched off with its port is asked again for what it is to say.
+    flight.drone.order("unplug");
+    flight.relay.line("is gone; tried again every second");
+    flight.drone.order("reboot");
+    flight.drone.forget();
+    flight.drone.order("plug");
+    flight.relay.line("is back");
+    flight.drone.is_asked_for(&ASKED);
+}

@@ -1,0 +1,159 @@
+//! Emulated drones with an autopilot at USART1: they fly where the relay agreed to be, and only while the pilot lets them.
+
+use std::io::{ErrorKind, Read as _};
+
+use mavlink::dialects::common::MavLandedState;
+use uav_relay::Placement;
+use uav_relay::flight::autopilot::Kind;
+use uav_relay_sim::scenario::Scenario;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_tools::provision::block::Flight;
+
+use crate::chain::{paper, simulated};
+use crate::fleet::{Fleet, Image};
+use crate::vehicle::{Vehicle, apart};
+
+const SITES: &str = "[geometry]\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n\
+    [[interferer]]\npower_w = 80\nx_m = 500\ny_m = 400\n\
+    [site]\ntx = { lat_deg = 47.40, lon_deg = 8.54, amsl_m = 420.0 }\n\
+    rx = { lat_deg = 47.41, lon_deg = 8.55, amsl_m = 431.0 }\n";
+
+fn scenario() -> Scenario {
+    Scenario::parse("sites.toml", SITES).unwrap()
+}
+
+/// One relay between two sites.
+fn flight() -> Flight {
+    Flight::new(&scenario(), 1, 1e-4, 7).unwrap()
+}
+
+/// Where it agrees to be.
+fn agreed() -> Placement {
+    let [x_m, y_m, altitude_m] = simulated(&flight())[0].map(f32::from_bits);
+    Placement {
+        x_m,
+        y_m,
+        altitude_m,
+    }
+}
+
+fn said(fleet: &mut Fleet, text: &str) {
+    fleet.wait(text, |lines| lines.iter().any(|line| line.text == text));
+}
+
+/// From the start to the pilot's hands again.
+fn flies_to_its_place(image: Image, kind: Kind) {
+    let to = agreed();
+    let mut fleet = Fleet::of(image, &flight(), Faults::default(), 1);
+    fleet.wait("line to fly along", |lines| {
+        lines
+            .iter()
+            .any(|line| line.text.starts_with("the autopilot flies along 1343.79"))
+    });
+    let from = Placement {
+        x_m: to.x_m - 80.0,
+        y_m: 0.4,
+        altitude_m: 19.7,
+    };
+    let socket = fleet.autopilots.remove(0);
+    let mut vehicle = Vehicle::new(kind, socket, scenario().axis.unwrap(), from);
+
+    // On the ground it is found, and asked for what it says; nothing is to move.
+    vehicle.until("requests for messages", |vehicle| {
+        vehicle.heartbeats > 1 && [33, 87, 245].iter().all(|id| vehicle.asked.contains(id))
+    });
+    let name = match kind {
+        Kind::Px4 => "autopilot: found, Px4",
+        Kind::ArduCopter => "autopilot: found, ArduCopter",
+    };
+    said(&mut fleet, name);
+    vehicle.run(2_000);
+    vehicle.armed = true;
+    vehicle.landed = MavLandedState::MAV_LANDED_STATE_TAKEOFF;
+    vehicle.run(3_000);
+    assert_eq!(vehicle.told, [], "on the ground, and in its take-off");
+
+    // In the air, in the pilot's hands: a PX4 is told where it is, an ArduCopter nothing.
+    vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+    vehicle.run(4_000);
+    said(&mut fleet, "autopilot: in the air, flown by its pilot");
+    assert_eq!(vehicle.told.is_empty(), kind == Kind::ArduCopter);
+    for told in &vehicle.told {
+        assert!(apart(told.place, from) < 0.1, "{told:?}");
+    }
+
+    // The pilot hands it over.
+    vehicle.granted = true;
+    vehicle.until("flight to the agreed place", |vehicle| {
+        let ends = vehicle
+            .told
+            .last()
+            .is_some_and(|told| apart(told.place, to) < 0.05);
+        ends && apart(vehicle.place, to) < 1.0
+    });
+    vehicle.run(2_000);
+    assert!(apart(vehicle.place, to) < 1.0, "{:?}", vehicle.place);
+    said(&mut fleet, "autopilot: flies to the relay's setpoints");
+    for pair in vehicle.told.windows(2) {
+        // 5 m/s, and no step is longer than half a second.
+        let step = apart(pair[0].place, pair[1].place);
+        assert!(step <= 2.6, "{pair:?}");
+    }
+    let flies = |text: &String| text == "relay: flies to its place";
+    assert!(vehicle.texts.iter().any(flies), "{:?}", vehicle.texts);
+
+    // And takes it again.
+    vehicle.granted = false;
+    vehicle.until("release", |vehicle| {
+        vehicle.texts.iter().any(|text| text == "relay: released")
+    });
+    vehicle.place.x_m -= 30.0;
+    vehicle.run(1_000);
+    let taken = vehicle.now();
+    vehicle.run(3_000);
+    match kind {
+        Kind::ArduCopter => assert!(!vehicle.was_told_since(taken)),
+        Kind::Px4 => {
+            let all = vehicle.told.iter().filter(|told| told.at > taken);
+            for told in all {
+                assert!(apart(told.place, vehicle.place) < 0.1, "{told:?}");
+            }
+        }
+    }
+    assert!(apart(vehicle.place, to) > 29.0, "nobody moves it");
+}
+
+#[test]
+fn a_px4_flies_to_the_agreed_place() {
+    flies_to_its_place(Image::Wires, Kind::Px4);
+}
+
+#[test]
+fn an_arducopter_flies_to_the_agreed_place() {
+    flies_to_its_place(Image::Radio, Kind::ArduCopter);
+}
+
+/// Without sites nothing is said to an autopilot.
+#[test]
+fn a_drone_without_sites_tells_nobody() {
+    let mut fleet = Fleet::of(Image::Wires, &paper(1), Faults::default(), 1);
+    said(
+        &mut fleet,
+        "no sites: no autopilot is told where to fly, and nothing keeps drones apart on their way",
+    );
+    fleet.places();
+    let mut port = &fleet.autopilots[0];
+    port.set_nonblocking(true).unwrap();
+    let error = port.read(&mut [0]).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::WouldBlock);
+}
+
+/// With sites, an image that cannot tell an autopilot does not take part.
+#[test]
+fn the_smallest_image_refuses_sites() {
+    let mut fleet = Fleet::of(Image::Smallest, &flight(), Faults::default(), 1);
+    said(
+        &mut fleet,
+        "configuration refused: it has sites, and this image was built without flight",
+    );
+}
