@@ -21,8 +21,7 @@ pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u
     Ok((body, rest))
 }
 
-/// What has been written of a body. As postcard's own, but for a function that is called for every byte in place of its code: there are
-/// some hundred bytes in all bodies.
+/// What has been written of a body. As postcard's own, but a function is called for every byte: there are some hundred bytes in all bodies.
 #[derive(Debug)]
 struct Written<'a> {
     buffer: &'a mut [u8],
@@ -67,7 +66,8 @@ impl<'a> de_flavors::Flavor<'a> for Unread<'a> {
         Some(self.0.len())
     }
 
-    #[inline(never)]
+    // Inlined: where the length is known nothing has to be checked again, and no panic can be reached.
+    #[inline]
     fn try_take_n(&mut self, count: usize) -> postcard::Result<&'a [u8]> {
         let (taken, rest) = self
             .0
