@@ -146,6 +146,7 @@ pub(crate) struct Pending {
 }
 
 impl Pending {
+    #[inline(never)] // a search, in every place where an event is raised
     fn bit(event: Event) -> u8 {
         FIRST
             .iter()

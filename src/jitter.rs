@@ -7,6 +7,9 @@ use crate::time::Duration;
 pub(crate) struct Jitter(u32);
 
 impl Jitter {
+    /// Before it has a seed.
+    pub(crate) const NONE: Self = Self(0);
+
     /// Distinct seeds give distinct numbers.
     pub(crate) const fn new(seed: u32) -> Self {
         // Any odd multiplier keeps distinct seeds distinct; the generator must not start at zero.

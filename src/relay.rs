@@ -101,17 +101,54 @@ impl Relay {
         now: Instant,
     ) -> Result<Self, SetupError> {
         check(&mission, identity, &settings)?;
-        #[cfg(feature = "auth")]
-        let session = settings.auth.map(Session::new);
-        Ok(Self {
+        let mut relay = Self::unbegun(&mission, identity, &settings, seed, now);
+        relay.begin(identity, seed, now);
+        Ok(relay)
+    }
+
+    /// As [`new`](Self::new), in `slot`, which stands in a place of its own: the stack need not hold a relay.
+    ///
+    /// # Errors
+    /// As there; `slot` is left as it was.
+    pub fn new_in<'a>(
+        slot: &'a mut Option<Self>,
+        mission: &Mission,
+        identity: Identity,
+        settings: &Settings,
+        seed: u32,
+        now: Instant,
+    ) -> Result<&'a mut Self, SetupError> {
+        check(mission, identity, settings)?;
+        let relay = slot.insert(Self::unbegun(mission, identity, settings, seed, now));
+        relay.begin(identity, seed, now);
+        Ok(relay)
+    }
+
+    fn unbegun(
+        mission: &Mission,
+        identity: Identity,
+        settings: &Settings,
+        seed: u32,
+        now: Instant,
+    ) -> Self {
+        Self {
             node: Node::new(mission, identity, settings, seed, now),
             network: identity.network,
             wiring: settings.wiring,
             deframers: [Deframer::new(), Deframer::new()],
             counter: 0,
             #[cfg(feature = "auth")]
-            session,
-        })
+            session: None,
+        }
+    }
+
+    #[inline(never)] // a session is built on the stack
+    fn begin(&mut self, identity: Identity, seed: u32, now: Instant) {
+        #[cfg(feature = "auth")]
+        {
+            self.session = self.node.member().settings.auth.map(Session::new);
+        }
+        self.node.begin(identity, seed, now);
     }
 
     /// Takes in bytes received at `port`, however they are cut. Bytes at a port that `Settings::wiring` does not have are dropped.

@@ -40,6 +40,7 @@ impl Instant {
     }
 
     /// The span from `earlier` to `self`; zero when `earlier` is the later one.
+    #[inline(never)] // as `add`
     pub const fn since(self, earlier: Self) -> Duration {
         Duration {
             micros: self.micros.saturating_sub(earlier.micros),
@@ -66,6 +67,7 @@ impl Duration {
     }
 
     /// `times` as long, saturating.
+    #[inline(never)] // 70 bytes of flash where it stands
     pub const fn times(self, times: u32) -> Self {
         Self {
             micros: self.micros.saturating_mul(times as u64),
@@ -76,6 +78,7 @@ impl Duration {
 impl Add<Duration> for Instant {
     type Output = Self;
 
+    #[inline(never)] // it stands in a hundred places
     fn add(self, span: Duration) -> Self {
         Self {
             micros: self.micros.saturating_add(span.micros),

@@ -3,7 +3,6 @@
 use embedded_hal::digital::OutputPin;
 #[cfg(feature = "upload")]
 use uav_relay::Event;
-use uav_relay::SetupError;
 use uav_relay::guard::config::GuardConfig;
 use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
 use uav_relay::wire::auth::Auth;
@@ -135,9 +134,8 @@ pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
     }
 }
 
-/// The relay, unless this image was built without what it is asked for. It has a place of its own in RAM: the stack would have to
-/// hold it, and the copy it is made from. What [`Relay::new`] gives is kept whole, since to take it apart on the way would be
-/// one more copy.
+/// The relay, unless this image was built without what it is asked for. It is made in a place of its own in RAM: the stack would have to
+/// hold it.
 #[inline(never)]
 fn switch_on(
     config: &config::Config,
@@ -162,16 +160,11 @@ fn switch_on(
         ..Settings::default()
     };
     // All else has been checked with the configuration.
-    cortex_m::singleton!(RELAY: Result<Relay, SetupError> = Relay::new(
-        config.mission,
-        config.identity,
-        settings,
-        board::seed(),
-        now,
-    ))?
-    .as_mut()
-    .map_err(|error| log::cannot_fly(*error))
-    .ok()
+    let slot = cortex_m::singleton!(RELAY: Option<Relay> = None)?;
+    let seed = board::seed();
+    Relay::new_in(slot, &config.mission, config.identity, &settings, seed, now)
+        .map_err(|error| log::cannot_fly(error))
+        .ok()
 }
 
 /// Frames are to be signed, and cannot be.

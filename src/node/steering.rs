@@ -23,19 +23,24 @@ pub(crate) struct Steering {
 }
 
 impl Steering {
+    /// Before it has begun.
+    pub(crate) const NONE: Self = Self {
+        guard: None,
+        remind_at: None,
+        told: None,
+    };
+
     /// With the guard that `settings` ask for, of a relay with these neighbours.
-    pub(crate) fn new(
+    #[inline(never)] // a guard is built on the stack
+    pub(crate) fn begin(
+        &mut self,
         settings: &Settings,
         neighbours: [Option<u16>; 2],
         seed: u32,
         now: Instant,
-    ) -> Self {
+    ) {
         let config = settings.guard.filter(|_| GUARD);
-        Self {
-            guard: config.map(|config| Guard::new(config, neighbours, seed, now)),
-            remind_at: None,
-            told: None,
-        }
+        self.guard = config.map(|config| Guard::new(config, neighbours, seed, now));
     }
 
     fn guard(&mut self) -> Option<&mut Guard> {

@@ -167,9 +167,9 @@ impl Node {
         if !due || to == 0 {
             return None;
         }
-        let settings = self.member.settings;
-        self.layers.update.offered(side, now, &settings);
-        let message = if self.layers.update.has_asked(side, now, &settings) {
+        let settings = &self.member.settings;
+        self.layers.update.offered(side, now, settings);
+        let message = if self.layers.update.has_asked(side, now, settings) {
             Message::Offer { upload, answer }
         } else {
             let nonce = self.ask_number(now);

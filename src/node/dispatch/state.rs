@@ -30,48 +30,63 @@ pub(crate) struct Node {
     pub(super) telemetry: Telemetry,
 }
 
+/// The relay's own seed.
+fn seed_of(identity: Identity, seed: u32) -> u32 {
+    seed.wrapping_add(u32::from(identity.index))
+}
+
 impl Node {
-    /// A relay that has just been switched on. `identity` and `settings` have been checked.
+    /// A relay before it has [begun](Self::begin). `identity` and `settings` have been checked.
+    ///
+    /// Plain numbers alone, which are written where the relay is to stand.
     pub(crate) fn new(
-        mission: Mission,
+        mission: &Mission,
         identity: Identity,
-        settings: Settings,
+        settings: &Settings,
         seed: u32,
         now: Instant,
     ) -> Self {
         let leads = identity.index == mission.leader();
         let profile = settings.profile.unwrap_or(mission.config().common);
-        let seed = seed.wrapping_add(u32::from(identity.index));
+        let seed = seed_of(identity, seed);
         let [a, b, ..] = seed.wrapping_mul(0x9E37_79B1).to_le_bytes();
         let number = u16::from_le_bytes([a, b]);
-        let member = Member::new(mission, settings, identity.index);
-        let neighbours = Neighbours::new(
-            identity.index,
-            member.all,
-            seed.rotate_left(8),
-            now,
-            &settings,
-        );
-        let mut node = Self {
-            steering: Steering::new(&settings, neighbours.nodes(), seed, now),
+        let member = Member::new(*mission, *settings, identity.index);
+        Self {
             layers: Layers {
-                neighbours,
+                neighbours: Neighbours::NONE,
                 view: ViewChange::new(member.all, mission.leader(), !seed),
-                lease: Lease::new(!seed.rotate_left(16), now, &settings),
+                lease: Lease::new(!seed.rotate_left(16), now, settings),
                 update: MissionUpdate::new(member.active, seed.rotate_left(4), now),
                 round: Round::new(leads, number, profile, settings.measure, seed),
             },
+            steering: Steering::NONE,
             namesake: Namesake::new(seed.rotate_left(24)),
             telemetry: Telemetry::default(),
             member,
-        };
+        }
+    }
+
+    /// It is switched on at `now`, with the seed that it was made with.
+    #[inline(never)] // as `Steering::begin`
+    pub(crate) fn begin(&mut self, identity: Identity, seed: u32, now: Instant) {
+        let Member {
+            settings,
+            mission,
+            all,
+            ..
+        } = &self.member;
+        let seed = seed_of(identity, seed);
+        let neighbours = &mut self.layers.neighbours;
+        neighbours.begin(identity.index, *all, seed.rotate_left(8), now, settings);
+        self.steering.begin(settings, neighbours.nodes(), seed, now);
+        let leads = identity.index == mission.leader();
         if leads || settings.method == Method::Joint {
-            node.layers.round.work_soon(now);
+            self.layers.round.work_soon(now);
         }
         if !leads {
-            node.await_first(now);
+            self.await_first(now);
         }
-        node
     }
 
     pub(super) fn raise(&mut self, event: Event) {

@@ -7,10 +7,12 @@ use crate::time::Instant;
 pub(crate) const CANDIDATES: u16 = 4;
 
 /// How often something was so for each of the nearest nodes, in a row; the nearest first.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct InRow([u8; CANDIDATES as usize]);
 
 impl InRow {
+    pub(super) const NONE: Self = Self([0; CANDIDATES as usize]);
+
     /// It was so once more, of the node `distance` nodes away, or it was not; whether it has been so `most` times just now.
     pub(super) fn count(&mut self, distance: u16, so: bool, most: u8) -> bool {
         let at = usize::from(distance).wrapping_sub(1);

@@ -77,6 +77,12 @@ pub(crate) struct Silence {
 }
 
 impl Liveness {
+    /// Before anything was taken: zeros.
+    pub(super) const NONE: Self = Self {
+        longest: 0,
+        ..Self::new(Instant::ZERO)
+    };
+
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             heard: now,

@@ -38,17 +38,29 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// Of node `node` of a chain of `all`.
-    pub(crate) fn new(node: u16, all: u16, seed: u32, now: Instant, settings: &Settings) -> Self {
+    /// Before they have begun.
+    pub(crate) const NONE: Self = Self {
+        upstream: Neighbour::NONE,
+        downstream: Neighbour::NONE,
+    };
+
+    /// Of node `node` of a chain of `all`, from now on.
+    pub(crate) fn begin(
+        &mut self,
+        node: u16,
+        all: u16,
+        seed: u32,
+        now: Instant,
+        settings: &Settings,
+    ) {
+        let before = node.saturating_sub(1);
         let after = if node < all {
             node.saturating_add(1)
         } else {
             0
         };
-        Self {
-            upstream: Neighbour::new(node.saturating_sub(1), all, seed, now, settings),
-            downstream: Neighbour::new(after, all, !seed, now, settings),
-        }
+        self.upstream.begin(before, all, seed, now, settings);
+        self.downstream.begin(after, all, !seed, now, settings);
     }
 
     pub(crate) const fn at(&self, side: Side) -> &Neighbour {

@@ -8,3 +8,10 @@ pub(super) struct Signs {
     /// The answer to its question of that number, 0 for none.
     pub(super) answer: u16,
 }
+
+impl Signs {
+    pub(super) const NONE: Self = Self {
+        ask: false,
+        answer: 0,
+    };
+}

@@ -38,6 +38,7 @@ use crate::wire::digest::MissionId;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
+    NoPeer,
     /// The other node has taken this one, too, as far as it has said.
     Linked,
     /// It has not, or not any more.
@@ -47,7 +48,6 @@ enum NeighbourState {
     Searching {
         since: Instant,
     },
-    NoPeer,
 }
 
 /// One side.
@@ -99,53 +99,70 @@ pub(crate) struct Neighbour {
 }
 
 impl Neighbour {
-    /// The side where `node` is taken to be, 0 for none.
-    pub(crate) fn new(node: u16, all: u16, seed: u32, now: Instant, settings: &Settings) -> Self {
-        let look_at = if node == 0 {
-            None
-        } else {
-            // Where others may have closed up since, it makes itself known soon.
-            let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
-            let wait = match settings.wiring {
-                // The first pass comes without being asked for.
-                Wiring::Pair => patience(settings, all).max(first_pass(settings, all)),
-                Wiring::Shared => soon,
-            };
-            Some(now + wait)
-        };
-        Self {
-            look_at,
-            node,
-            agreed: Agreed::on(node),
-            grace: now,
-            state: if node == 0 {
-                NeighbourState::NoPeer
-            } else {
-                NeighbourState::Linked
-            },
-            liveness: Liveness::new(now),
-            damping: Damping::new(now),
-            distance: 1,
-            both_ways: Hearing::new(now),
-            taken_by: [0; CANDIDATES as usize],
-            near: None,
-            hearing: Hearing::new(now),
-            unheard: InRow::default(),
-            #[cfg(feature = "auth")]
-            forged: InRow::default(),
-            tick: tick(settings, all),
-            patience: patience(settings, all),
-            jitter: Jitter::new(seed),
-            signs: Signs::default(),
-            holds: None,
-            #[cfg(feature = "upload")]
-            asked: 0,
-            #[cfg(feature = "upload")]
-            offer: false,
-            #[cfg(feature = "upload")]
-            ground: false,
-            hellos: Hellos::NONE,
+    /// Before it has begun. All of it is zeros: nothing else could be made without a copy in flash.
+    pub(super) const NONE: Self = Self {
+        node: 0,
+        agreed: Agreed::on(0),
+        grace: Instant::ZERO,
+        state: NeighbourState::NoPeer,
+        liveness: Liveness::NONE,
+        damping: Damping::new(Instant::ZERO),
+        distance: 0,
+        both_ways: Hearing::new(Instant::ZERO),
+        taken_by: [0; CANDIDATES as usize],
+        near: None,
+        hearing: Hearing::new(Instant::ZERO),
+        unheard: InRow::NONE,
+        #[cfg(feature = "auth")]
+        forged: InRow::NONE,
+        tick: Duration::from_micros(0),
+        patience: Duration::from_micros(0),
+        jitter: Jitter::NONE,
+        signs: Signs::NONE,
+        holds: None,
+        #[cfg(feature = "upload")]
+        asked: 0,
+        #[cfg(feature = "upload")]
+        offer: false,
+        #[cfg(feature = "upload")]
+        ground: false,
+        look_at: None,
+        hellos: Hellos::NONE,
+    };
+
+    /// The side where `node` is taken to be, 0 for none, from now on.
+    #[inline(never)] // a relay has two of them
+    pub(super) fn begin(
+        &mut self,
+        node: u16,
+        all: u16,
+        seed: u32,
+        now: Instant,
+        settings: &Settings,
+    ) {
+        self.liveness = Liveness::new(now);
+        self.damping = Damping::new(now);
+        self.both_ways = Hearing::new(now);
+        self.hearing = Hearing::new(now);
+        self.jitter = Jitter::new(seed);
+        self.distance = 1;
+        self.grace = now;
+        self.tick = tick(settings, all);
+        self.patience = patience(settings, all);
+        if node == 0 {
+            return;
         }
+        self.node = node;
+        self.agreed = Agreed::on(node);
+        self.state = NeighbourState::Linked;
+        // Where others may have closed up since, it makes itself known soon.
+        let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
+        let wait = match settings.wiring {
+            // The first pass comes without being asked for.
+            Wiring::Pair => self.patience.max(first_pass(settings, all)),
+            Wiring::Shared => soon,
+        };
+        self.look_at = Some(now + wait);
     }
 
     /// The node taken, 0 for none.
@@ -375,7 +392,7 @@ impl Neighbour {
         if !matches!(self.state, NeighbourState::Searching { .. }) {
             self.grace = now + settings.probe_after;
         }
-        self.signs = Signs::default();
+        self.signs = Signs::NONE;
         self.node = node;
         self.distance = candidate.distance;
         self.state = NeighbourState::Pairing { since: now };

@@ -139,9 +139,14 @@ impl Message {
 }
 
 impl Message {
-    /// Writes the body into `buffer` and returns how many bytes it takes, at most [`MAX_BODY`]; `None` if it does not fit.
+    /// Writes the body into `buffer` and returns how many bytes it takes, at most [`MAX_BODY`]; `None` if it does not fit, or is of a method
+    /// that this relay was built without.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         match self {
+            // What it was built without it never says.
+            Self::Gather(_) | Self::Gathered(_) if !cfg!(feature = "altitude") => None,
+            Self::Token(_) | Self::Moved(_) if !cfg!(feature = "adjust") => None,
+            Self::Fence { .. } if !cfg!(feature = "guard") => None,
             Self::Sweep(sweep) => sweep.encode(buffer),
             Self::Verdict(answer) => answer.encode(buffer),
             Self::Busy { sweep } => write(&(tag::BUSY, sweep.to_le_bytes()), buffer),

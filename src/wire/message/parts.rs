@@ -1,6 +1,7 @@
 //! What bodies of several kinds have in common, and the ranges of their numbers. A type of its own costs no byte, and saves
 //! the code to read it once more.
 
+use postcard::{Deserializer, de_flavors, ser_flavors};
 use serde::{Deserialize, Serialize};
 
 use crate::mission::Profile;
@@ -9,14 +10,76 @@ use crate::place::Placement;
 
 /// Writes `body` to the start of `buffer`, and how many bytes it takes; `None` if it does not fit.
 pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
-    postcard::to_slice(body, buffer)
-        .ok()
-        .map(|written| written.len())
+    postcard::serialize_with_flavor(body, Written { buffer, at: 0 }).ok()
 }
 
 /// Reads what the start of `bytes` is, and gives the rest.
 pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), MessageError> {
-    postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)
+    let mut from = Deserializer::from_flavor(Unread(bytes));
+    let body = T::deserialize(&mut from).map_err(|_| MessageError::Encoding)?;
+    let rest = from.finalize().map_err(|_| MessageError::Encoding)?;
+    Ok((body, rest))
+}
+
+/// What has been written of a body. As postcard's own, but a function is called for every byte: there are some hundred bytes in all bodies.
+#[derive(Debug)]
+struct Written<'a> {
+    buffer: &'a mut [u8],
+    at: usize,
+}
+
+impl ser_flavors::Flavor for Written<'_> {
+    type Output = usize;
+
+    #[inline(never)]
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        let place = self.buffer.get_mut(self.at);
+        *place.ok_or(postcard::Error::SerializeBufferFull)? = byte;
+        self.at += 1;
+        Ok(())
+    }
+
+    fn finalize(self) -> postcard::Result<usize> {
+        Ok(self.at)
+    }
+}
+
+/// What has not been read of a body, in the same way.
+#[derive(Debug)]
+struct Unread<'a>(&'a [u8]);
+
+impl<'a> de_flavors::Flavor<'a> for Unread<'a> {
+    type Remainder = &'a [u8];
+    type Source = &'a [u8];
+
+    #[inline(never)]
+    fn pop(&mut self) -> postcard::Result<u8> {
+        let (byte, rest) = self
+            .0
+            .split_first()
+            .ok_or(postcard::Error::DeserializeUnexpectedEnd)?;
+        self.0 = rest;
+        Ok(*byte)
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        Some(self.0.len())
+    }
+
+    // Inlined: where the length is known nothing has to be checked again, and no panic can be reached.
+    #[inline]
+    fn try_take_n(&mut self, count: usize) -> postcard::Result<&'a [u8]> {
+        let (taken, rest) = self
+            .0
+            .split_at_checked(count)
+            .ok_or(postcard::Error::DeserializeUnexpectedEnd)?;
+        self.0 = rest;
+        Ok(taken)
+    }
+
+    fn finalize(self) -> postcard::Result<&'a [u8]> {
+        Ok(self.0)
+    }
 }
 
 /// Reads what `bytes` are, with nothing left over.

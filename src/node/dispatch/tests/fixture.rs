@@ -49,7 +49,8 @@ pub(super) fn relay_of(mission: Mission, index: u16, signs: bool) -> Node {
         ..Settings::default()
     };
     let identity = Identity { network: 1, index };
-    let mut node = Node::new(mission, identity, settings, 1, Instant::ZERO);
+    let mut node = Node::new(&mission, identity, &settings, 1, Instant::ZERO);
+    node.begin(identity, 1, Instant::ZERO);
     // What it says by itself after so long.
     node.handle_timeout(NOW);
     said(&mut node);
