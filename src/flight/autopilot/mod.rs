@@ -172,8 +172,9 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Where to fly: what `Relay::setpoint` says; `None` to hold the place.
+    /// Where to fly: what `Relay::setpoint` says; `None` to hold the place, and so is one that is not finite or not near the line.
     pub fn handle_setpoint(&mut self, now: Instant, setpoint: Option<Placement>) {
+        let setpoint = setpoint.filter(|place| self.axis.is_around(*place));
         if self.setpoint != setpoint {
             self.setpoint = setpoint;
             if let Some(target) = &mut self.target {
@@ -184,9 +185,9 @@ impl Autopilot {
         }
     }
 
-    /// Which way to look, as a directional antenna needs it; `None` leaves that to the autopilot.
-    pub const fn handle_bearing(&mut self, look: Option<Bearing>) {
-        self.look = look;
+    /// Which way to look, as a directional antenna needs it; `None` leaves that to the autopilot, and so does an azimuth that is none.
+    pub fn handle_bearing(&mut self, look: Option<Bearing>) {
+        self.look = look.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
     }
 
     /// The numbers that an operator may plot once a second: the SIR of the hop to this relay in decibels, and its place in the chain.
