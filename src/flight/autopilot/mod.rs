@@ -255,9 +255,10 @@ impl Autopilot {
         })
     }
 
-    /// The autopilot says that it flies there.
+    /// The autopilot says that it flies there. While the target moves that says nothing: it still has to be told to stop.
     fn compare(&mut self, lat_e7: i32, lon_e7: i32) {
         if let Some(target) = &mut self.target
+            && target.told > 0
             && let Some(point) = self.axis.point(target.carrot.place)
         {
             let near = |a: i32, b: i32| a.abs_diff(b) <= TAKEN_WITHIN;
