@@ -236,7 +236,7 @@ impl Axis {
     }
 
     /// Whether a place is finite and near the line. NaN is not.
-    fn is_around(&self, place: Placement) -> bool {
+    pub(super) fn is_around(&self, place: Placement) -> bool {
         let Placement {
             x_m,
             y_m,

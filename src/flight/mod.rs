@@ -6,6 +6,24 @@
 //! | [`axis`] | the line from transmitter to receiver on earth, and places along it |
 //! | [`mavlink`] | the bytes that autopilots speak |
 //! | [`autopilot`] | where to fly, who flies, and where the drone is |
+//!
+//! ```
+//! use uav_relay::Placement;
+//! use uav_relay::flight::axis::Axis;
+//! use uav_relay::flight::geodetic::Geodetic;
+//!
+//! let tx = Geodetic::from_degrees(47.40, 8.54, 420.0).ok_or("not on earth")?;
+//! let rx = Geodetic::from_degrees(47.41, 8.55, 431.0).ok_or("not on earth")?;
+//! let axis = Axis::try_new(tx, rx)?;
+//! assert!(axis.is_of(1343.795));
+//!
+//! // 20 m above the straight line between the two grounds, 300 m from the transmitter.
+//! let point = axis.point(Placement::on_line(300.0, 20.0)).ok_or("far off")?;
+//! assert_eq!(point.amsl_mm, 442_456);
+//! let back = axis.place(point).ok_or("far off")?;
+//! assert!((back.x_m - 300.0).abs() < 0.02 && back.y_m.abs() < 0.02);
+//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! ```
 
 pub mod autopilot;
 pub mod axis;

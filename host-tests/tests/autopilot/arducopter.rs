@@ -72,3 +72,17 @@ fn back_in_its_mode_the_target_is_told_anew() {
     );
     assert!((vehicle.place.x_m - 120.0).abs() < 0.05);
 }
+
+/// Whenever it says what it flies to: it is told to stop, and not left with the velocity of the last target that moved.
+#[test]
+fn the_last_target_stands_whenever_it_is_confirmed() {
+    for late in 0..100_u16 {
+        let mut vehicle = flying();
+        vehicle.engage();
+        vehicle.run(20 * u64::from(late % 25));
+        vehicle.setpoint = Some(place(110.0 + f32::from(late) * 0.013));
+        vehicle.run(20_000);
+        let last = vehicle.targets().last().unwrap().1;
+        assert!(!last.has_velocity(), "{late}: {last:?}");
+    }
+}

@@ -242,3 +242,52 @@ fn the_setpoint_of_before_is_forgotten_on_none() {
     );
     assert!(last.0 > stopped.0);
 }
+
+/// A relay never wants such a place. Were it taken, the target would be lost for good, and with it the mode of a PX4.
+#[test]
+fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        let mut vehicle = Vehicle::new(kind);
+        vehicle.fly_off();
+        vehicle.setpoint = Some(place(110.0));
+        vehicle.engage();
+        for wrong in [f32::NAN, f32::INFINITY, 1e9] {
+            vehicle.setpoint = Some(place(wrong));
+            vehicle.run(3_000);
+            vehicle.setpoint = Some(place(120.0));
+            vehicle.run(10_000);
+            let at = vehicle.targets().last().unwrap().1.place();
+            assert!((at.x_m - 120.0).abs() < 0.1, "{kind:?} {wrong}: {at:?}");
+            vehicle.setpoint = Some(place(110.0));
+            vehicle.run(10_000);
+        }
+    }
+}
+
+/// Which way to look is an angle, or is left to the autopilot.
+#[test]
+fn a_bearing_that_is_none_is_left_out() {
+    use uav_relay::pointing::Bearing;
+
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.fly_off();
+    vehicle.setpoint = Some(place(110.0));
+    vehicle.engage();
+    for (azimuth_rad, leaves_out) in [(1.0, false), (f32::NAN, true), (1e9, true)] {
+        let from = vehicle.now;
+        vehicle.link.handle_bearing(Some(Bearing {
+            azimuth_rad,
+            elevation_rad: 0.0,
+            distance_m: 1.0,
+        }));
+        vehicle.run(1_000);
+        let targets = vehicle.targets_since(from);
+        assert!(targets.len() > 3);
+        let yaw = 1 << 10;
+        let all = targets.iter().skip(1);
+        assert!(
+            all.map(|(_, target)| target.type_mask & yaw != 0)
+                .all(|out| out == leaves_out)
+        );
+    }
+}

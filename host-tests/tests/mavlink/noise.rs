@@ -89,3 +89,22 @@ fn an_unknown_message_costs_nothing_but_its_bytes() {
     assert_eq!(read[0].message, Some(expected));
     assert_eq!(parser.counters().broken, 0);
 }
+
+/// The most work that was found: three long false starts in sixteen bytes, each of which costs a checksum of some 260 bytes.
+#[test]
+fn bytes_that_are_made_for_it_cost_a_checksum_for_five_of_them() {
+    let made = [
+        0xFD, 0xFF, 0, 0xFD, 0xFF, 0, 0xFD, 248, 0, 0, 11, 1, 0, 11, 1, 0,
+    ];
+    let line = made.repeat(1_000);
+    let mut parser = Parser::new();
+    assert!(parse(&mut parser, &line).is_empty());
+    let checksums = parser.counters().broken as usize;
+    println!("{checksums} checksums in {} bytes", line.len());
+    assert!((line.len() / 6..=line.len() / 5).contains(&checksums));
+    // And what follows is found.
+    let (message, expected) = said(&mut rng(7));
+    let after = [by_the_crate(&message, 1), vec![0; 300]].concat();
+    let read = parse(&mut parser, &after);
+    assert_eq!(read.last().unwrap().message, Some(expected));
+}

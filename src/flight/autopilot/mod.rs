@@ -173,8 +173,9 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Where to fly: what `Relay::setpoint` says; `None` to hold the place.
+    /// Where to fly: what `Relay::setpoint` says; `None` to hold the place, and so is one that is not finite or not near the line.
     pub fn handle_setpoint(&mut self, now: Instant, setpoint: Option<Placement>) {
+        let setpoint = setpoint.filter(|place| self.axis.is_around(*place));
         if self.setpoint != setpoint {
             self.setpoint = setpoint;
             if let Some(target) = &mut self.target {
@@ -185,9 +186,9 @@ impl Autopilot {
         }
     }
 
-    /// Which way to look, as a directional antenna needs it; `None` leaves that to the autopilot.
-    pub const fn handle_bearing(&mut self, look: Option<Bearing>) {
-        self.look = look;
+    /// Which way to look, as a directional antenna needs it; `None` leaves that to the autopilot, and so does an azimuth that is none.
+    pub fn handle_bearing(&mut self, look: Option<Bearing>) {
+        self.look = look.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
     }
 
     /// The numbers that an operator may plot once a second: the SIR of the hop to this relay in decibels, and its place in the chain.
@@ -262,9 +263,10 @@ impl Autopilot {
         })
     }
 
-    /// The autopilot says that it flies there.
+    /// The autopilot says that it flies there. While the target moves that says nothing: it still has to be told to stop.
     fn compare(&mut self, lat_e7: i32, lon_e7: i32) {
         if let Some(target) = &mut self.target
+            && target.told > 0
             && let Some(point) = self.axis.point(target.carrot.place)
         {
             let near = |a: i32, b: i32| a.abs_diff(b) <= TAKEN_WITHIN;

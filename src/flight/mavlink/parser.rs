@@ -76,7 +76,8 @@ impl Parser {
         }
     }
 
-    /// The next message of the bytes so far. Each byte begins at most one checksum, of at most 266 bytes, and at most one byte in ten can.
+    /// The next message of the bytes so far. Each byte begins at most one checksum, of at most 266 bytes. In frames one byte in ten or fewer
+    /// does; of bytes that somebody has chosen for it one in three may.
     pub fn next_message(&mut self) -> Option<Received> {
         while !self.bytes.is_empty() {
             match first(&self.bytes) {
