@@ -13,7 +13,7 @@ pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 /// What rounding may take from a step between two places, as a part of the distance.
 pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
-/// The parameters of a mission, as plain numbers; [`Mission::try_new`] checks them.
+/// The parameters of a mission, as plain numbers; [`Mission::try_new`](crate::Mission::try_new) checks them.
 ///
 /// Frame: x runs along the ground from the transmitter (0) to the receiver (`distance_m`), y to its right as seen from above,
 /// altitude is height above the ground.

@@ -1,11 +1,11 @@
 //! Which parameter of a mission was refused.
 
-/// Which parameter of a [`MissionConfig`] was refused, and its range.
+/// Which parameter of a [`MissionConfig`](crate::MissionConfig) was refused, and its range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MissionError {
-    /// `relays` is not within 1 to [`MAX_RELAYS`].
+    /// `relays` is not within 1 to [`MAX_RELAYS`](crate::mission::MAX_RELAYS).
     Relays,
     /// `distance_m` is not within 1 to 1e6.
     Distance,

@@ -1,7 +1,7 @@
 //! Frames out of a stream of bytes.
 //!
 //! Where a frame seems to begin and does not hold, reading goes on with the byte after its first: nothing that is whole behind it gets
-//! lost. What begins like a frame has one of the numbers of the [table](super::table), so in noise and in other messages few do.
+//! lost. What begins like a frame has one of the numbers of the [table], so in noise and in other messages few do.
 
 use heapless::Vec;
 
