@@ -1,7 +1,7 @@
 //! What bodies of several kinds have in common, and the ranges of their numbers. A type of its own costs no byte, and saves
 //! the code to read it once more.
 
-use postcard::{Deserializer, de_flavors, ser_flavors};
+use postcard::ser_flavors;
 use serde::{Deserialize, Serialize};
 
 use crate::mission::Profile;
@@ -15,10 +15,7 @@ pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> 
 
 /// Reads what the start of `bytes` is, and gives the rest.
 pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), MessageError> {
-    let mut from = Deserializer::from_flavor(Unread(bytes));
-    let body = T::deserialize(&mut from).map_err(|_| MessageError::Encoding)?;
-    let rest = from.finalize().map_err(|_| MessageError::Encoding)?;
-    Ok((body, rest))
+    postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)
 }
 
 /// What has been written of a body. As postcard's own, but a function is called for every byte: there are some hundred bytes in all bodies.
@@ -39,46 +36,21 @@ impl ser_flavors::Flavor for Written<'_> {
         Ok(())
     }
 
+    // A float at a time: sixteen of them are most of a sweep.
+    #[inline]
+    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
+        let place = self.buffer.get_mut(self.at..);
+        let place = place.and_then(|place| place.get_mut(..bytes.len()));
+        let place = place.ok_or(postcard::Error::SerializeBufferFull)?;
+        for (to, from) in place.iter_mut().zip(bytes) {
+            *to = *from;
+        }
+        self.at += bytes.len();
+        Ok(())
+    }
+
     fn finalize(self) -> postcard::Result<usize> {
         Ok(self.at)
-    }
-}
-
-/// What has not been read of a body, in the same way.
-#[derive(Debug)]
-struct Unread<'a>(&'a [u8]);
-
-impl<'a> de_flavors::Flavor<'a> for Unread<'a> {
-    type Remainder = &'a [u8];
-    type Source = &'a [u8];
-
-    #[inline(never)]
-    fn pop(&mut self) -> postcard::Result<u8> {
-        let (byte, rest) = self
-            .0
-            .split_first()
-            .ok_or(postcard::Error::DeserializeUnexpectedEnd)?;
-        self.0 = rest;
-        Ok(*byte)
-    }
-
-    fn size_hint(&self) -> Option<usize> {
-        Some(self.0.len())
-    }
-
-    // Inlined: where the length is known nothing has to be checked again, and no panic can be reached.
-    #[inline]
-    fn try_take_n(&mut self, count: usize) -> postcard::Result<&'a [u8]> {
-        let (taken, rest) = self
-            .0
-            .split_at_checked(count)
-            .ok_or(postcard::Error::DeserializeUnexpectedEnd)?;
-        self.0 = rest;
-        Ok(taken)
-    }
-
-    fn finalize(self) -> postcard::Result<&'a [u8]> {
-        Ok(self.0)
     }
 }
 

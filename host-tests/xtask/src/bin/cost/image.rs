@@ -35,22 +35,22 @@ const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",
         &["--no-default-features"],
-        [64 * 1024, 4864, 2816],
+        [60 * 1024, 4864, 2560],
     ),
     (
         "flash of that with `guard`",
         &["--no-default-features", "--features", "guard"],
-        [68 * 1024, 4864, 3072],
+        [67 * 1024, 4864, 2560],
     ),
     (
         "flash of that with `auth`",
         &["--no-default-features", "--features", "auth"],
-        [70 * 1024, 5376, 3328],
+        [65 * 1024, 5632, 3072],
     ),
     (
         "flash of that with `guard` and `upload`",
         &["--no-default-features", "--features", "guard,upload"],
-        [78 * 1024, 6 * 1024, 4 * 1024],
+        [77 * 1024, 6 * 1024, 3584],
     ),
     (
         "flash of that with `guard` and `flight`",
