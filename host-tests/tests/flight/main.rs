@@ -5,6 +5,7 @@
 mod between;
 mod closer;
 mod cuts;
+mod fleet;
 mod leave;
 mod storms;
 

@@ -178,6 +178,10 @@ pub struct Outcome {
     pub moments: Vec<Moment>,
     /// When two drones were nearest to each other, where their flight was simulated.
     pub nearest: Option<Nearest>,
+    /// The same of drones with an autopilot that no pilot had.
+    pub nearest_lent: Option<Nearest>,
+    /// Targets that an autopilot was told for more than a second after it had said that none may be sent. Anything but 0 is a bug.
+    pub stray_targets: u64,
     /// Where the drones with an autopilot are in the end, and whether their relays fly them.
     pub fleet: Vec<(Point, bool)>,
     /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.

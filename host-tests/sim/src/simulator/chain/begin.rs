@@ -15,6 +15,7 @@ use super::super::optima::Run;
 use super::super::outcome::{Ending, Outcome};
 use super::super::queue::{Happening, Queue};
 use super::super::setup::Setup;
+use super::fleet::LANDS_AFTER;
 use super::judge::Touched;
 use super::start::{Start, switched_on};
 use super::state::{Chain, Member};
@@ -70,8 +71,16 @@ impl Chain {
         for &(index, at) in restarts.clone() {
             queue.put(at, usize::from(index.saturating_sub(1)), Happening::Restart);
         }
+        // A pilot who does not give a drone back lands it, and its relay is switched off.
+        let takeovers = setup.fleet.iter().flat_map(|fleet| &fleet.takeovers);
+        let mut taken = 0;
+        for takeover in takeovers.filter(|takeover| takeover.until.is_none()) {
+            let index = usize::from(takeover.relay.saturating_sub(1));
+            queue.put(takeover.from + LANDS_AFTER, index, Happening::Kill);
+            taken += 1;
+        }
         let mut ahead =
-            restarts.count() + setup.kills.len() + setup.boots.len() + setup.uploads.len();
+            taken + restarts.count() + setup.kills.len() + setup.boots.len() + setup.uploads.len();
         let parts = setup.partitions.iter().map(|part| (part.from, part.until));
         let deaf = setup.deaf.iter().map(|deaf| (deaf.from, deaf.until));
         for (from, until) in parts.chain(deaf) {
@@ -99,6 +108,8 @@ impl Chain {
                 struck: Struck::default(),
                 moments: Vec::new(),
                 nearest: None,
+                nearest_lent: None,
+                stray_targets: 0,
                 fleet: Vec::new(),
                 unsafe_setpoints: 0,
                 air: AirCounts::default(),

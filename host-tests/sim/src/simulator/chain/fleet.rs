@@ -18,8 +18,11 @@ const STEP: Duration = Duration::from_millis(50);
 /// A drone is at its place if it is no farther from it than that, m.
 const THERE_M: f64 = 1.0;
 
-/// The pilot of a drone whose relay is silent lands it after so long.
-const LANDS_AFTER: Duration = Duration::from_millis(30_000);
+/// So often an operator looks at the fleet.
+const LOOKS: Duration = Duration::from_millis(5_000);
+
+/// The pilot of a drone whose relay is silent, or who has taken it for good, lands it after so long.
+pub(super) const LANDS_AFTER: Duration = Duration::from_millis(30_000);
 
 impl Chain {
     /// Puts the drones on the ground, where there are any.
@@ -41,6 +44,20 @@ impl Chain {
         let flying = self.fleet.iter().filter(|vehicle| vehicle.flies());
         let places: Vec<Point> = flying.map(Vehicle::at).collect();
         self.keep(Nearest::of(&places, self.now));
+        let lent = self
+            .fleet
+            .iter()
+            .filter(|vehicle| vehicle.is_in_its_hands(self.now));
+        let places: Vec<Point> = lent.map(Vehicle::at).collect();
+        let nearest = Nearest::of(&places, self.now);
+        let least = |known: Option<Nearest>| known.map_or(f64::INFINITY, |it| it.apart_m);
+        if least(nearest) < least(self.outcome.nearest_lent) {
+            self.outcome.nearest_lent = nearest;
+        }
+        self.outcome.stray_targets = self.fleet.iter().map(|vehicle| vehicle.strays).sum();
+        if self.now.as_micros().is_multiple_of(LOOKS.as_micros()) {
+            self.look_around();
+        }
         self.queue.put(self.now + STEP, 0, Happening::Fly);
     }
 
@@ -54,23 +71,22 @@ impl Chain {
         else {
             return;
         };
-        let flew = vehicle.flies();
         vehicle.go_on(now, step_s);
         if let Some(at) = member.killed {
-            if now.since(at) >= LANDS_AFTER {
+            if now.since(at) >= LANDS_AFTER || !vehicle.is_lent(now) {
                 vehicle.land();
-            }
-            if flew && !vehicle.flies() {
-                self.clear_lost();
             }
             return;
         }
-        vehicle.link.handle_setpoint(now, member.relay.setpoint());
         vehicle.link.handle_timeout(now);
+        // Before it hears where the drone is: flown again it begins with the next place.
+        let is_flown = vehicle.link.is_flown();
+        member.relay.handle_control(now, is_flown);
+        vehicle.link.handle_setpoint(now, member.relay.setpoint());
         while let Some(frame) = vehicle.link.poll_transmit(now) {
             vehicle.hear(now, &frame);
         }
-        let mut has_said = false;
+        let mut has_said = is_flown != member.lent;
         while let Some(position) = vehicle.link.poll_position() {
             member
                 .relay
@@ -89,7 +105,7 @@ impl Chain {
                 _ => {}
             }
         }
-        member.lent = vehicle.link.is_flown();
+        member.lent = is_flown;
         for turning in turnings {
             self.tell(index, turning, None);
         }
@@ -98,18 +114,53 @@ impl Chain {
         }
     }
 
-    /// The drone of a silent relay has landed: an operator tells those that keep away from where it was.
-    fn clear_lost(&mut self) {
+    /// An operator looks: where the drones of silent relays have landed, those beside them are told that keep away from where they were,
+    /// unless that may be because of another one that a pilot has, or had a moment ago.
+    fn look_around(&mut self) {
         for index in 0..self.members.len() {
+            if !self.is_lent_long(index) {
+                continue;
+            }
             for side in [Side::Upstream, Side::Downstream] {
-                if let Some(member) = self.members.get_mut(index)
+                let is_up = |at: &usize| self.fleet.get(*at).is_some_and(Vehicle::flies);
+                let beside = match side {
+                    Side::Upstream => (0..index).rev().find(is_up),
+                    Side::Downstream => (index + 1..self.members.len()).find(is_up),
+                };
+                // Nobody is looked for who was not lost: the one beside may not have been heard yet.
+                let is_lost = match (side, beside) {
+                    (Side::Upstream, at) => at.map_or(index > 0, |at| at + 1 < index),
+                    (Side::Downstream, at) => at.unwrap_or(self.members.len()) > index + 1,
+                };
+                let is_free = is_lost && beside.is_none_or(|at| self.is_lent_long(at));
+                let now = self.now;
+                if is_free
+                    && let Some(member) = self.members.get_mut(index)
+                    && member.killed.is_none()
                     && member.relay.hold_reason(side) == Some(HoldReason::Lost)
                 {
-                    member.relay.clear_lost(self.now, side);
+                    member.relay.clear_lost(now, side);
+                    self.drain(index);
                 }
             }
-            self.drain(index);
         }
+    }
+
+    /// Whether the relay flies its drone, and did all the last half minute.
+    fn is_lent_long(&self, index: usize) -> bool {
+        let Some(member) = self
+            .members
+            .get(index)
+            .filter(|it| it.lent && it.killed.is_none())
+        else {
+            return false;
+        };
+        let engaged = self.outcome.moments.iter().rev();
+        engaged
+            .filter(|moment| moment.relay == member.node && moment.what == Turning::Engaged)
+            .map(|moment| moment.at)
+            .next()
+            .is_some_and(|at| self.now.since(at) >= LANDS_AFTER)
     }
 
     pub(super) fn restart_autopilot(&mut self, index: usize) {

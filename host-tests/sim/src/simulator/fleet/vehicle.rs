@@ -27,6 +27,9 @@ const LOST: Duration = Duration::from_millis(1_000);
 /// An autopilot that is switched off and on is away for so long.
 const AWAY: Duration = Duration::from_millis(3_000);
 
+/// The link has heard of another mode or state after so long: it is said once a second.
+const TOLD_WITHIN: Duration = Duration::from_millis(1_500);
+
 /// How high a pilot who takes over climbs, m: away from the chain.
 const ASIDE_M: f64 = 15.0;
 
@@ -64,6 +67,9 @@ pub(in crate::simulator) struct Vehicle {
     away_until: Option<Instant>,
     rates: [Rate; 4],
     sequence: u8,
+    /// Until then the link may not know yet that nothing may be sent.
+    unknown_until: Instant,
+    pub(in crate::simulator) strays: u64,
     rng: ChaCha8Rng,
 }
 
@@ -91,6 +97,8 @@ impl Vehicle {
             away_until: None,
             rates: Self::rates(Instant::ZERO),
             sequence: 0,
+            unknown_until: Instant::ZERO,
+            strays: 0,
             rng,
             spec: spec.clone(),
         }
@@ -125,6 +133,11 @@ impl Vehicle {
     /// Whether the relay is to fly it: its pilot has not taken it.
     pub(in crate::simulator) fn is_lent(&self, now: Instant) -> bool {
         !self.pilot.has_sticks(now)
+    }
+
+    /// Whether it is in the air, and neither taking off nor in its pilot's hands.
+    pub(in crate::simulator) fn is_in_its_hands(&self, now: Instant) -> bool {
+        self.landed == IN_AIR && self.mode != Mode::Sticks && self.is_lent(now)
     }
 
     /// Its autopilot is switched off, and comes back.
@@ -174,8 +187,25 @@ impl Vehicle {
         }
     }
 
-    /// The pilot's choices, and the autopilot's own.
+    /// The choices of this step; the link hears of them within a second or so.
     fn choose(&mut self, now: Instant) {
+        let before = (self.landed, self.mode);
+        self.decide(now);
+        if before != (self.landed, self.mode) {
+            self.unknown_until = now + TOLD_WITHIN;
+        }
+    }
+
+    /// Whether a target may come now: a PX4 hears one in any mode while it flies.
+    fn may_be_told(&self) -> bool {
+        match self.landed {
+            IN_AIR | LANDING => self.kind == Kind::Px4 || self.mode == Mode::Companion,
+            _ => false,
+        }
+    }
+
+    /// The pilot's choices, and the autopilot's own.
+    fn decide(&mut self, now: Instant) {
         if !self.armed && self.pilot.has_armed(now) {
             self.armed = true;
             self.landed = TAKING_OFF;
@@ -285,6 +315,8 @@ impl Vehicle {
                 }
             }
             Some(Heard::Target(at)) => {
+                let is_stray = !self.may_be_told() && now > self.unknown_until;
+                self.strays += u64::from(is_stray);
                 self.told_at = Some(now);
                 if self.mode == Mode::Companion
                     && let Some(place) = self.spec.axis.place(at)
