@@ -1,7 +1,6 @@
 //! What bodies of several kinds have in common, and the ranges of their numbers. A type of its own costs no byte, and saves
 //! the code to read it once more.
 
-use postcard::ser_flavors;
 use serde::{Deserialize, Serialize};
 
 use crate::mission::Profile;
@@ -10,48 +9,14 @@ use crate::place::Placement;
 
 /// Writes `body` to the start of `buffer`, and how many bytes it takes; `None` if it does not fit.
 pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
-    postcard::serialize_with_flavor(body, Written { buffer, at: 0 }).ok()
+    postcard::to_slice(body, buffer)
+        .ok()
+        .map(|written| written.len())
 }
 
 /// Reads what the start of `bytes` is, and gives the rest.
 pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), MessageError> {
     postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)
-}
-
-/// What has been written of a body. As postcard's own, but a function is called for every byte: there are some hundred bytes in all bodies.
-#[derive(Debug)]
-struct Written<'a> {
-    buffer: &'a mut [u8],
-    at: usize,
-}
-
-impl ser_flavors::Flavor for Written<'_> {
-    type Output = usize;
-
-    #[inline(never)]
-    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
-        let place = self.buffer.get_mut(self.at);
-        *place.ok_or(postcard::Error::SerializeBufferFull)? = byte;
-        self.at += 1;
-        Ok(())
-    }
-
-    // A float at a time: sixteen of them are most of a sweep.
-    #[inline]
-    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
-        let place = self.buffer.get_mut(self.at..);
-        let place = place.and_then(|place| place.get_mut(..bytes.len()));
-        let place = place.ok_or(postcard::Error::SerializeBufferFull)?;
-        for (to, from) in place.iter_mut().zip(bytes) {
-            *to = *from;
-        }
-        self.at += bytes.len();
-        Ok(())
-    }
-
-    fn finalize(self) -> postcard::Result<usize> {
-        Ok(self.at)
-    }
 }
 
 /// Reads what `bytes` are, with nothing left over.

@@ -131,7 +131,7 @@ const COUNTED: &[Counted] = &[
         "a full sweep, message in to message out",
         "instructions",
         &["sweep"],
-        Some(13_000),
+        Some(13_400),
     ),
     ("its frame", "bytes", &["sweep_bytes"], Some(100)),
     (

@@ -35,12 +35,12 @@ const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",
         &["--no-default-features"],
-        [60 * 1024, 4864, 2560],
+        [60 * 1024, 5120, 2560],
     ),
     (
         "flash of that with `guard`",
         &["--no-default-features", "--features", "guard"],
-        [67 * 1024, 4864, 2560],
+        [67 * 1024, 5120, 2560],
     ),
     (
         "flash of that with `auth`",
