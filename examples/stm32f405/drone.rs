@@ -163,7 +163,7 @@ fn switch_on(
     let slot = cortex_m::singleton!(RELAY: Option<Relay> = None)?;
     let seed = board::seed();
     Relay::new_in(slot, &config.mission, config.identity, &settings, seed, now)
-        .map_err(|error| log::cannot_fly(error))
+        .map_err(log::cannot_fly)
         .ok()
 }
 
