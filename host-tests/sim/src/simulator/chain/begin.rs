@@ -71,14 +71,7 @@ impl Chain {
         for &(index, at) in restarts.clone() {
             queue.put(at, usize::from(index.saturating_sub(1)), Happening::Restart);
         }
-        // A pilot who does not give a drone back lands it, and its relay is switched off.
-        let takeovers = setup.fleet.iter().flat_map(|fleet| &fleet.takeovers);
-        let mut taken = 0;
-        for takeover in takeovers.filter(|takeover| takeover.until.is_none()) {
-            let index = usize::from(takeover.relay.saturating_sub(1));
-            queue.put(takeover.from + LANDS_AFTER, index, Happening::Kill);
-            taken += 1;
-        }
+        let taken = put_landings(&setup, &mut queue);
         let mut ahead =
             taken + restarts.count() + setup.kills.len() + setup.boots.len() + setup.uploads.len();
         let parts = setup.partitions.iter().map(|part| (part.from, part.until));
@@ -137,4 +130,15 @@ impl Chain {
         chain.look(Touched::All);
         Ok(chain)
     }
+}
+
+/// A pilot who does not give a drone back lands it, and its relay is switched off; how many do.
+fn put_landings(setup: &Setup, queue: &mut Queue) -> usize {
+    let takeovers = setup.fleet.iter().flat_map(|fleet| &fleet.takeovers);
+    let kept = takeovers.filter(|takeover| takeover.until.is_none());
+    kept.map(|takeover| {
+        let index = usize::from(takeover.relay.saturating_sub(1));
+        queue.put(takeover.from + LANDS_AFTER, index, Happening::Kill);
+    })
+    .count()
 }
