@@ -67,20 +67,10 @@ impl Chain {
         for (which, spec) in setup.uploads.iter().enumerate() {
             queue.put(spec.at, which, Happening::Upload);
         }
-        let restarts = setup.fleet.iter().flat_map(|fleet| &fleet.restarts);
-        for &(index, at) in restarts.clone() {
-            queue.put(at, usize::from(index.saturating_sub(1)), Happening::Restart);
-        }
-        // A pilot who does not give a drone back lands it, and its relay is switched off.
-        let takeovers = setup.fleet.iter().flat_map(|fleet| &fleet.takeovers);
-        let mut taken = 0;
-        for takeover in takeovers.filter(|takeover| takeover.until.is_none()) {
-            let index = usize::from(takeover.relay.saturating_sub(1));
-            queue.put(takeover.from + LANDS_AFTER, index, Happening::Kill);
-            taken += 1;
-        }
-        let mut ahead =
-            taken + restarts.count() + setup.kills.len() + setup.boots.len() + setup.uploads.len();
+        let mut ahead = put_fleet(&setup, &mut queue)
+            + setup.kills.len()
+            + setup.boots.len()
+            + setup.uploads.len();
         let parts = setup.partitions.iter().map(|part| (part.from, part.until));
         let deaf = setup.deaf.iter().map(|deaf| (deaf.from, deaf.until));
         for (from, until) in parts.chain(deaf) {
@@ -137,4 +127,23 @@ impl Chain {
         chain.look(Touched::All);
         Ok(chain)
     }
+}
+
+/// What happens to drones with autopilots; how often something does.
+fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
+    let Some(fleet) = &setup.fleet else {
+        return 0;
+    };
+    let mut put = |at, relay: u16, happening| {
+        queue.put(at, usize::from(relay.saturating_sub(1)), happening);
+    };
+    for &(relay, at) in &fleet.restarts {
+        put(at, relay, Happening::Restart);
+    }
+    // A pilot who does not give a drone back lands it, and its relay is switched off.
+    let kept = fleet.takeovers.iter().filter(|it| it.until.is_none());
+    for takeover in kept.clone() {
+        put(takeover.from + LANDS_AFTER, takeover.relay, Happening::Kill);
+    }
+    fleet.restarts.len() + kept.count()
 }

@@ -50,7 +50,9 @@ impl Pilot {
 
     /// The drone hovers where it climbed to.
     pub(super) fn is_up(&mut self, now: Instant) {
-        self.hands_over_at = Some(now + uav_relay::Duration::from_millis(1_000 * LOOKS_S));
+        // Not earlier where the autopilot was switched off and on during the climb.
+        let looked = now + uav_relay::Duration::from_millis(1_000 * LOOKS_S);
+        self.hands_over_at = self.hands_over_at.max(Some(looked));
     }
 
     /// The autopilot was switched off and on.

@@ -144,7 +144,10 @@ impl Vehicle {
     pub(in crate::simulator) fn restart(&mut self, now: Instant) {
         self.away_until = Some(now + AWAY);
         self.mode = Mode::Hold;
-        self.goal = self.taken();
+        // A climb is finished: nobody would hand over a drone that stopped on its way up.
+        if self.landed == IN_AIR {
+            self.goal = self.taken();
+        }
         self.told_at = None;
         self.pilot.has_seen_a_restart(now);
     }
