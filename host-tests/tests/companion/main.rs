@@ -301,7 +301,8 @@ fn a_killed_process_is_noticed_by_both_neighbours_and_so_is_its_return() {
         first.as_millis(),
         took.as_millis()
     );
-    assert!(took < Duration::from_secs(5), "{took:?}");
+    // By the rule at the latest after eight times `dead_after`, however long a busy machine has let the processes wait before.
+    assert!(took < Duration::from_secs(10), "{took:?}");
 
     let mut again = chain.relay(2);
     chain.relays[0].line("back: relay 2 downstream");

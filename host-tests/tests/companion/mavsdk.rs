@@ -28,8 +28,6 @@ fn mavsdk_is_led_to_its_place_and_let_go() {
     relay.line("autopilot: found a PX4");
     relay.line("autopilot: on the ground, or not armed");
     drone.is_asked_for(&ASKED[..2]);
-    // Its position has come: without one a guarded relay has no setpoint.
-    relay.line("setpoint: ");
     drone.order("arm");
     drone.order("air");
     relay.line("autopilot: in the air, flown by its pilot");
@@ -38,6 +36,8 @@ fn mavsdk_is_led_to_its_place_and_let_go() {
     assert!(off < 0.1, "{off} m off its own place");
     drone.order("mode offboard");
     relay.line("autopilot: flies to the relay's setpoints");
+    // Not before: a guarded relay that is not flown has no setpoint.
+    relay.line("setpoint: ");
     drone.hears(|heard| heard.says("relay: flies to its place"));
     let there = drone.hears(|heard| heard.is_target() && apart_m(heard.to(), place) < 0.05);
     assert_eq!(there.0["from"], serde_json::json!([1, 191]));

@@ -64,7 +64,7 @@ struct Options {
     /// The relays have a wire between neighbours and share no channel
     #[arg(long, conflicts_with_all = ["baud", "in_range"])]
     wires: bool,
-    /// The drone's greatest speed, m/s, 0.1 to 20, where the scenario has a [site]; without it 5
+    /// The drone's greatest speed, m/s, 0.1 to 20, where the scenario has sites; without it 5
     #[arg(long, value_name = "M/S", value_parser = speed)]
     speed: Option<f32>,
     /// File to write the block to
