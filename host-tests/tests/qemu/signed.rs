@@ -84,6 +84,6 @@ fn a_drone_without_the_key_takes_no_part() {
     );
     assert_eq!(
         fleet.of_drone(4).nth(2).unwrap().text,
-        "no position is known: nothing keeps drones apart on their way"
+        "no sites: no autopilot is told where to fly, and nothing keeps drones apart on their way"
     );
 }
