@@ -1,7 +1,7 @@
 //! When a neighbour counts as lost.
 //!
 //! A sign of life answers something that this relay said: a heartbeat with the number of its question, what comes back of a pulse or of a
-//! pass, or the next one. It counts from when that was said, so what was recorded and is played later is none. After `Settings::probe_after` without one, or twice the time that a
+//! pass, or the next one. It counts from when that was said, so what was recorded and is played later is none. After `Settings::probe_after` without one, or the time that a
 //! message takes through the whole chain and back where that is longer, the neighbour is asked again and again. It is lost once all of this holds:
 //!
 //! | | lost not before | because |
@@ -41,11 +41,11 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     )
 }
 
-/// How long a sign of life is waited for until one is asked for: `Settings::probe_after`, or until what is sent onward can have gone twice
-/// through a chain of `all` relays and come back: else a long chain asks more than it agrees.
+/// How long a sign of life is waited for until one is asked for: `Settings::probe_after`, or until what is sent onward can have gone through a
+/// chain of `all` relays and come back.
 pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
-    let twice = settings.hop_time.times(4 * u32::from(all) + 4);
-    twice.min(longest_lease(settings)).max(settings.probe_after)
+    let round = settings.hop_time.times(2 * u32::from(all) + 2);
+    round.min(longest_lease(settings)).max(settings.probe_after)
 }
 
 /// Questions that may still be answered.
