@@ -7,7 +7,7 @@ use super::report::{Report, line_of};
 use super::state::State;
 use super::streams::Streams;
 use super::target::Target;
-use super::vehicle::{Heard, Kind, Position, Vehicle};
+use super::vehicle::{Kind, Position, Vehicle, VehicleUpdate};
 use crate::event::Event;
 use crate::flight::axis::Axis;
 use crate::flight::geodetic::Geodetic;
@@ -84,7 +84,7 @@ impl Autopilot {
             self.parser.push(*byte);
             while let Some(received) = self.parser.next_message() {
                 let heard = self.vehicle.hear(now, &received, &self.axis);
-                if heard != Heard::Nothing {
+                if heard != VehicleUpdate::Nothing {
                     self.streams.hear(received.id);
                 }
                 self.take(now, heard);
@@ -92,19 +92,19 @@ impl Autopilot {
         }
     }
 
-    fn take(&mut self, now: Instant, heard: Heard) {
+    fn take(&mut self, now: Instant, heard: VehicleUpdate) {
         match heard {
-            Heard::Nothing | Heard::News => {}
-            Heard::Found => {
+            VehicleUpdate::Nothing | VehicleUpdate::News => {}
+            VehicleUpdate::Found => {
                 self.events.found = self.vehicle.kind();
                 self.streams = Streams::new(now);
             }
-            Heard::Restarted => {
+            VehicleUpdate::Restarted => {
                 self.events.restarted = true;
                 self.streams = Streams::new(now);
             }
-            Heard::Position(position) => self.position = Some(position),
-            Heard::Target(lat_e7, lon_e7) => {
+            VehicleUpdate::Position(position) => self.position = Some(position),
+            VehicleUpdate::Target(lat_e7, lon_e7) => {
                 if let Some(target) = &mut self.target {
                     target.compare(&self.axis, lat_e7, lon_e7);
                 }

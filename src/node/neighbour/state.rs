@@ -22,7 +22,7 @@
 //! `dead_after` without another. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be
 //! about to take it, too.
 
-use super::agreed::Agreed;
+use super::agreed::AgreedNodes;
 use super::candidate::Candidate;
 use super::damping::Damping;
 use super::hearing::{CANDIDATES, Hearing, InRow};
@@ -54,7 +54,7 @@ enum NeighbourState {
 pub(crate) struct Neighbour {
     /// The node taken, 0 for none.
     pub(super) node: u16,
-    pub(super) agreed: Agreed,
+    pub(super) agreed: AgreedNodes,
     /// A node that has come back is not counted before: the other side may be about to take it, too.
     grace: Instant,
     state: NeighbourState,
@@ -101,7 +101,7 @@ impl Neighbour {
     /// Before it has begun. All of it is zeros: nothing else could be made without a copy in flash.
     pub(super) const NONE: Self = Self {
         node: 0,
-        agreed: Agreed::on(0),
+        agreed: AgreedNodes::on(0),
         grace: Instant::ZERO,
         state: NeighbourState::NoPeer,
         liveness: Liveness::NONE,
@@ -152,7 +152,7 @@ impl Neighbour {
             return;
         }
         self.node = node;
-        self.agreed = Agreed::on(node);
+        self.agreed = AgreedNodes::on(node);
         self.state = NeighbourState::Linked;
         // Where others may have closed up since, it makes itself known soon.
         let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
