@@ -209,7 +209,7 @@ impl Relay {
 
     /// Takes one measurement of the interference, W or linear SIR, where `Settings::measure` asks for them.
     ///
-    /// Constant work. What is no use is counted as [`Stats::samples_refused`].
+    /// Constant work. What is no use is counted as [`Stats::samples_refused`](crate::Stats::samples_refused).
     pub fn handle_sample(&mut self, sample: Sample) {
         self.node.handle_sample(sample);
     }
