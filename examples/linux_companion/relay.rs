@@ -96,6 +96,9 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
             if let Some(positions) = &positions {
                 positions.stopped(now(clock))?;
             }
+            if let Some(autopilot) = &autopilot {
+                autopilot.stopped(now(clock))?;
+            }
             return report.stopped(now(clock), relay.stats());
         }
     }

@@ -128,7 +128,7 @@ fn plan(options: Options) -> Result<Plan, String> {
             Wiring::Pair
         },
         network: options.network,
-        key: key::load(&options.key_file)?,
+        key: key::load("--key-file", &options.key_file)?,
         timeout: Duration::from_millis(1_000 * options.timeout),
         baud: options.baud,
         tty: options.tty,

@@ -8,6 +8,7 @@
 //! | `streams` | the messages that it is asked for |
 //! | [`carrot`] | the target on its way to the setpoint |
 //! | `report` | what the operator reads |
+//! | [`trust`] | whom it believes: signatures |
 //!
 //! It never arms, takes off, lands or changes the mode. What it sends as a target is finite and near the mission's line.
 
@@ -16,6 +17,7 @@ mod clock;
 mod report;
 pub mod state;
 mod streams;
+pub mod trust;
 mod vehicle;
 
 use super::axis::Axis;
@@ -31,6 +33,7 @@ use carrot::{Carrot, Pace};
 use report::Report;
 use state::State;
 use streams::Streams;
+use trust::{Mistrust, Trust};
 use vehicle::{Heard, Vehicle};
 
 pub use vehicle::{Kind, Position};
@@ -69,6 +72,8 @@ pub enum AutopilotEvent {
     State(State),
     /// It was told five times where to fly and flies elsewhere: the place is outside its own fence, or another companion talks to it.
     Refused,
+    /// The two do not believe each other's signatures.
+    Mistrusted(Mistrust),
 }
 
 /// The link to one autopilot.
@@ -85,6 +90,7 @@ pub struct Autopilot {
     pace: Pace,
     began: Instant,
     parser: Parser,
+    trust: Trust,
     vehicle: Vehicle,
     streams: Streams,
     state: State,
@@ -127,6 +133,7 @@ impl Autopilot {
             pace,
             began: now,
             parser: Parser::new(),
+            trust: Trust::default(),
             vehicle: Vehicle::default(),
             streams: Streams::new(now),
             state: State::Silent,
@@ -146,7 +153,10 @@ impl Autopilot {
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         for byte in bytes {
             self.parser.push(*byte);
-            while let Some(received) = self.parser.next_message() {
+            while let Some(received) = self.next_received(now) {
+                let Some(received) = received else {
+                    continue;
+                };
                 let heard = self.vehicle.hear(now, &received, &self.axis);
                 if heard != Heard::Nothing {
                     self.streams.hear(received.id);
@@ -274,8 +284,8 @@ impl Autopilot {
         }
     }
 
-    /// The next frame to send. Call until there is none.
-    pub fn poll_transmit(&mut self, now: Instant) -> Option<FrameBytes> {
+    /// The next frame to send, as it is without a signature.
+    fn next_frame(&mut self, now: Instant) -> Option<FrameBytes> {
         if self.heartbeat_at <= now {
             self.heartbeat_at = now + HEARTBEAT;
             return Some(self.frame(Outgoing::Heartbeat));
@@ -402,7 +412,10 @@ impl Autopilot {
         if let Some(state) = events.state.take() {
             return Some(AutopilotEvent::State(state));
         }
-        core::mem::take(&mut events.refused).then_some(AutopilotEvent::Refused)
+        if core::mem::take(&mut events.refused) {
+            return Some(AutopilotEvent::Refused);
+        }
+        self.trust.take_event().map(AutopilotEvent::Mistrusted)
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout) at the latest.
