@@ -207,6 +207,7 @@ fn plan(options: &Options) -> Result<Plan, String> {
             Method::Adjust => uav_relay::Method::Adjust(Adjust::default()),
         },
         wiring,
+        sited: options.autopilot.is_some(),
         hop_time: Duration::from_micros(turns.as_micros() + LATENCY.as_micros()),
         probe_after: Duration::from_millis(options.probe_after_ms),
         dead_after: Duration::from_millis(options.dead_after_ms),

@@ -63,9 +63,10 @@ pub(crate) fn options(autopilot: &str) -> Vec<String> {
     .collect()
 }
 
-pub(crate) fn relay(autopilot: &str) -> Relay {
+pub(crate) fn relay(autopilot: &str, more: &[&str]) -> Relay {
     let options = options(autopilot);
-    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    let mut options: Vec<&str> = options.iter().map(String::as_str).collect();
+    options.extend(more);
     Relay::start(&options)
 }
 
