@@ -1,4 +1,4 @@
-//! Who hears whom: a thread for each serial port that listens, and one that carries bytes through the medium.
+//! Who hears whom: two threads for each serial port, one that listens and one that writes, and one that carries bytes through the medium.
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -63,14 +63,19 @@ impl Network {
         medium: Medium,
     ) -> std::io::Result<Self> {
         let (stop, heard) = channel();
-        for (sender, port) in ports.iter().enumerate() {
+        // Each is written to by a thread of its own: one that nobody reads holds up none of the others.
+        let mut outs = Vec::new();
+        for (sender, port) in ports.into_iter().enumerate() {
             port.set_write_timeout(Some(PATIENCE))?;
-            let (port, out) = (port.try_clone()?, stop.clone());
-            std::thread::spawn(move || listen(port, sender, &out));
+            let (read, out) = (port.try_clone()?, stop.clone());
+            std::thread::spawn(move || listen(read, sender, &out));
+            let (out, bytes) = channel();
+            std::thread::spawn(move || write(port, &bytes));
+            outs.push(out);
         }
         let injected = Arc::new(Mutex::new(Injected::default()));
         let counted = Arc::clone(&injected);
-        let carrier = std::thread::spawn(move || carry(&heard, ports, &hearers, medium, &counted));
+        let carrier = std::thread::spawn(move || carry(&heard, &outs, &hearers, medium, &counted));
         Ok(Self {
             carrier: Some(carrier),
             stop,
@@ -107,9 +112,17 @@ fn listen(mut port: UnixStream, sender: usize, out: &Sender<Heard>) {
     }
 }
 
+/// Until there is nothing more to come.
+fn write(mut port: UnixStream, bytes: &Receiver<Vec<u8>>) {
+    while let Ok(bytes) = bytes.recv() {
+        // A drone that is switched off hears nothing, and that is all.
+        _ = port.write_all(&bytes);
+    }
+}
+
 fn carry(
     heard: &Receiver<Heard>,
-    mut ports: Vec<UnixStream>,
+    outs: &[Sender<Vec<u8>>],
     hearers: &Hearers,
     mut medium: Medium,
     injected: &Mutex<Injected>,
@@ -117,9 +130,8 @@ fn carry(
     loop {
         let now = Instant::now();
         while let Some((receiver, bytes)) = medium.receive(now) {
-            if let Some(port) = ports.get_mut(receiver) {
-                // A drone that is switched off hears nothing, and that is all.
-                _ = port.write_all(&bytes);
+            if let Some(out) = outs.get(receiver) {
+                _ = out.send(bytes);
             }
         }
         *injected.lock().unwrap_or_else(PoisonError::into_inner) = medium.injected();
@@ -134,6 +146,43 @@ fn carry(
             }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Read as _, Write as _};
+    use std::os::unix::net::UnixStream;
+    use std::time::{Duration, Instant};
+
+    use super::{Network, radio};
+    use crate::firmware::medium::Medium;
+    use uav_relay_sim::simulator::faults::Faults;
+    use uav_relay_sim::simulator::link::LinkSpec;
+
+    #[test]
+    fn a_port_that_nobody_reads_holds_up_no_other() {
+        let (mut drones, mut ports) = (Vec::new(), Vec::new());
+        for _ in 0..3 {
+            let (drone, port) = UnixStream::pair().unwrap();
+            drone
+                .set_read_timeout(Some(Duration::from_millis(500)))
+                .unwrap();
+            drones.push(drone);
+            ports.push(port);
+        }
+        let medium = Medium::new(3, LinkSpec::default(), Faults::default(), 1, Instant::now());
+        let _network = Network::connect(ports, radio(3, 2), medium).unwrap();
+        // More than a socket holds, and nobody reads the third.
+        let frame = [[1; 60].as_slice(), &[0]].concat();
+        for sent in 0..2_000 {
+            drones[0].write_all(&frame).unwrap();
+            let mut heard = vec![0; frame.len()];
+            drones[1]
+                .read_exact(&mut heard)
+                .unwrap_or_else(|error| panic!("after {sent} frames: {error}"));
+            assert_eq!(heard, frame);
         }
     }
 }

@@ -19,7 +19,7 @@ use uav_relay_tools::provision::block::Flight;
 use crate::log::{self, Line};
 
 /// How long anything may take before a test gives up.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
 
 /// And for each drone of the fleet, since all share this machine.
 const PATIENCE_A_DRONE: Duration = Duration::from_secs(10);
