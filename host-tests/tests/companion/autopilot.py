@@ -13,6 +13,7 @@ JSON object a line, with the drone's own place and mode; standard input has an o
     unplug, plug                 the tty vanishes; another one is there
 """
 
+import collections
 import json
 import math
 import os
@@ -49,6 +50,8 @@ class Drone:
         self.began = time.monotonic()
         self.armed, self.landed, self.mode, self.by_itself = False, ON_GROUND, "pilot", False
         self.goal, self.told_at, self.took_off_at = None, -math.inf, 0.0
+        # Where it has said to be, the last few seconds.
+        self.said = collections.deque(maxlen=20)
         self.at[2] = self.home[2]
         # Seconds between two, and when the next is due, by number.
         self.streams = {0: [1.0, 0.0]}
@@ -147,7 +150,7 @@ class Drone:
                 self.take(message)
             fields = message.to_dict()
             fields["from"] = [message.get_srcSystem(), message.get_srcComponent()]
-            fields["own"] = {"at": self.at, "mode": self.mode, "landed": self.landed, "by_itself": self.by_itself}
+            fields["own"] = {"at": self.at, "mode": self.mode, "landed": self.landed, "by_itself": self.by_itself, "said": list(self.said)}
             print(json.dumps(fields), flush=True)
 
     def take(self, message):
@@ -185,6 +188,7 @@ class Drone:
             autopilot = 12 if self.kind == "px4" else 3
             return common.MAVLink_heartbeat_message(2, autopilot, base, MODES[self.kind][self.mode], 4, 3)
         if number == 33:
+            self.said.append(list(self.at))
             above = self.at[2] - self.home[2]
             return common.MAVLink_global_position_int_message(
                 boot_ms, lat, lon, round(self.at[2] * 1e3), round(above * 1e3), 0, 0, 0, 0

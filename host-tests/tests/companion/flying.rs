@@ -268,12 +268,7 @@ fn a_px4(key: Option<&str>) {
     flight.drone.order("sticks 4 0");
     let own = flight.targets_for(2 * MOMENT);
     assert!(own.len() > 10, "{own:?}");
-    // A position is 0.2 s old at most, and a target goes out every 0.2 s.
-    assert!(
-        own.iter()
-            .all(|target| apart_m(target.to(), target.own()) < 2.5),
-        "{own:?}"
-    );
+    assert!(own.iter().all(Heard::is_to_own_place), "{own:?}");
     let flown = apart_m(own[own.len() - 1].own(), place);
     assert!(flown > 8.0, "{flown} m from its place");
     flight.is_engaged();
@@ -281,10 +276,7 @@ fn a_px4(key: Option<&str>) {
 
     flight.is_released_by("rtl");
     let own = flight.targets_for(MOMENT);
-    assert!(
-        own.iter()
-            .all(|target| apart_m(target.to(), target.own()) < 4.5)
-    );
+    assert!(own.iter().all(Heard::is_to_own_place), "{own:?}");
     flight.is_engaged();
     flight.arrives(place);
 

@@ -133,6 +133,13 @@ impl Heard {
         [0, 1, 2].map(|part| at[part].as_f64().unwrap())
     }
 
+    /// Whether a target is a place where the drone has said to be, not long before.
+    pub(crate) fn is_to_own_place(&self) -> bool {
+        let said = self.0["own"]["said"].as_array().unwrap().iter();
+        let mut said = said.map(|at| [0, 1, 2].map(|part| at[part].as_f64().unwrap()));
+        said.any(|at| apart_m(self.to(), at) < 0.05)
+    }
+
     pub(crate) fn mode(&self) -> &str {
         self.0["own"]["mode"].as_str().unwrap()
     }
