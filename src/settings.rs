@@ -77,6 +77,7 @@ pub struct Measure {
 }
 
 /// What a firmware may choose.
+#[expect(clippy::struct_excessive_bools, reason = "settings, each for itself")]
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {

@@ -422,7 +422,7 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
 
 #[test]
 fn in_a_field_nothing_is_held() {
-    let mission = uav_relay::MissionConfig {
+    let mission = MissionConfig {
         interference: Interference::Field(FIELD),
         ..paper(8)
     };

@@ -154,9 +154,6 @@ impl Autopilot {
         for byte in bytes {
             self.parser.push(*byte);
             while let Some(received) = self.next_received(now) {
-                let Some(received) = received else {
-                    continue;
-                };
                 let heard = self.vehicle.hear(now, &received, &self.axis);
                 if heard != Heard::Nothing {
                     self.streams.hear(received.id);

@@ -153,10 +153,16 @@ impl Autopilot {
         Some(frame)
     }
 
-    /// The next message of what has come; `None` in it for one that is refused.
-    pub(super) fn next_received(&mut self, now: Instant) -> Option<Option<Received>> {
+    /// The next message of what has come that is to be taken.
+    pub(super) fn next_received(&mut self, now: Instant) -> Option<Received> {
         let trust = &mut self.trust;
-        self.parser
-            .next_frame(|received, frame| trust.takes(now, &received, frame).then_some(received))
+        loop {
+            let taken = self.parser.next_frame(|received, frame| {
+                trust.takes(now, &received, frame).then_some(received)
+            })?;
+            if taken.is_some() {
+                return taken;
+            }
+        }
     }
 }
