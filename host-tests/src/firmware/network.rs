@@ -1,4 +1,6 @@
-//! Who hears whom: two threads for each serial port, one that listens and one that writes, and one that carries bytes through the medium.
+//! Who hears whom: a thread for each serial port that listens, and one that carries bytes through the medium.
+//!
+//! As at a serial port, what nobody reads in time is lost: a drone that falls behind hears less, not later and later.
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -7,11 +9,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::net::sockopt::set_socket_send_buffer_size;
+
 use super::medium::Medium;
 use uav_relay_sim::simulator::faults::Injected;
 
-/// How long a socket may take nothing before its bytes are dropped: nobody reads at the other end.
+/// How long a frame may take once there is room for its beginning.
 const PATIENCE: Duration = Duration::from_secs(2);
+
+/// What the kernel may use for frames that wait at a port, in bytes: some four, with what it needs for each.
+const WAITING: usize = 16_384;
 
 /// Drones connected to each other. Ends when every drone's sockets have been closed, or when it is dropped.
 #[derive(Debug)]
@@ -63,19 +71,15 @@ impl Network {
         medium: Medium,
     ) -> std::io::Result<Self> {
         let (stop, heard) = channel();
-        // Each is written to by a thread of its own: one that nobody reads holds up none of the others.
-        let mut outs = Vec::new();
-        for (sender, port) in ports.into_iter().enumerate() {
+        for (sender, port) in ports.iter().enumerate() {
             port.set_write_timeout(Some(PATIENCE))?;
-            let (read, out) = (port.try_clone()?, stop.clone());
-            std::thread::spawn(move || listen(read, sender, &out));
-            let (out, bytes) = channel();
-            std::thread::spawn(move || write(port, &bytes));
-            outs.push(out);
+            set_socket_send_buffer_size(port, WAITING)?;
+            let (port, out) = (port.try_clone()?, stop.clone());
+            std::thread::spawn(move || listen(port, sender, &out));
         }
         let injected = Arc::new(Mutex::new(Injected::default()));
         let counted = Arc::clone(&injected);
-        let carrier = std::thread::spawn(move || carry(&heard, &outs, &hearers, medium, &counted));
+        let carrier = std::thread::spawn(move || carry(&heard, ports, &hearers, medium, &counted));
         Ok(Self {
             carrier: Some(carrier),
             stop,
@@ -112,17 +116,15 @@ fn listen(mut port: UnixStream, sender: usize, out: &Sender<Heard>) {
     }
 }
 
-/// Until there is nothing more to come.
-fn write(mut port: UnixStream, bytes: &Receiver<Vec<u8>>) {
-    while let Ok(bytes) = bytes.recv() {
-        // A drone that is switched off hears nothing, and that is all.
-        _ = port.write_all(&bytes);
-    }
+/// Whether a frame can be written without waiting.
+fn has_room(port: &UnixStream) -> bool {
+    let mut asked = [PollFd::new(port, PollFlags::OUT)];
+    poll(&mut asked, Some(&Timespec::default())).is_ok_and(|ready| ready > 0)
 }
 
 fn carry(
     heard: &Receiver<Heard>,
-    outs: &[Sender<Vec<u8>>],
+    mut ports: Vec<UnixStream>,
     hearers: &Hearers,
     mut medium: Medium,
     injected: &Mutex<Injected>,
@@ -130,8 +132,9 @@ fn carry(
     loop {
         let now = Instant::now();
         while let Some((receiver, bytes)) = medium.receive(now) {
-            if let Some(out) = outs.get(receiver) {
-                _ = out.send(bytes);
+            if let Some(port) = ports.get_mut(receiver).filter(|port| has_room(port)) {
+                // A drone that is switched off hears nothing, and that is all.
+                _ = port.write_all(&bytes);
             }
         }
         *injected.lock().unwrap_or_else(PoisonError::into_inner) = medium.injected();

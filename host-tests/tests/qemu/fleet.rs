@@ -3,8 +3,8 @@
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
-use std::sync::OnceLock;
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use defmt_decoder::Table;
@@ -70,6 +70,9 @@ fn blocks(flight: &Flight) -> Vec<Vec<u8>> {
         .collect()
 }
 
+/// One fleet flies at a time: the drones' clocks keep up with the wall's, or what they say comes late.
+static AIR: Mutex<()> = Mutex::new(());
+
 /// The drones of a flight, switched on.
 pub(crate) struct Fleet {
     // Dropped in this order: without drones the threads of the network and of the logs come to their ends.
@@ -81,6 +84,7 @@ pub(crate) struct Fleet {
     new: Receiver<Line>,
     pub(crate) lines: Vec<Line>,
     _folder: tempfile::TempDir,
+    _air: MutexGuard<'static, ()>,
 }
 
 impl Fleet {
@@ -120,6 +124,7 @@ impl Fleet {
         seed: u64,
         life: Life,
     ) -> Self {
+        let air = AIR.lock().unwrap_or_else(PoisonError::into_inner);
         let (file, table) = (image(which.name()), table(which));
         let folder = tempfile::Builder::new().prefix("fleet").tempdir().unwrap();
         let (lines, new) = channel();
@@ -167,6 +172,7 @@ impl Fleet {
             new,
             lines: Vec::new(),
             _folder: folder,
+            _air: air,
         }
     }
 

@@ -4,7 +4,6 @@
 //! cannot sign. An autopilot with a key ignores whoever has none, in silence, so the firmware is told of what does not fit, each kind
 //! once: three heartbeats of an autopilot in a row tell that it is no accident.
 
-use super::Autopilot;
 use super::vehicle::{AUTOPILOT, Kind};
 use crate::flight::mavlink::incoming::Incoming;
 use crate::flight::mavlink::outgoing::FrameBytes;
@@ -66,7 +65,7 @@ pub(super) struct Trust {
 
 impl Trust {
     /// Whether a frame counts.
-    fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
+    pub(super) fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         let (takes, wrong) = self.judge(now, received, frame);
         if !takes {
             self.refused = self.refused.saturating_add(1);
@@ -110,6 +109,28 @@ impl Trust {
         (true, no_key(received))
     }
 
+    /// With a key from now on.
+    #[cfg(feature = "mavlink-signing")]
+    pub(super) const fn sign_with(&mut self, signing: Signing) {
+        self.signing = Some(signing);
+    }
+
+    /// How many frames were not taken.
+    pub(super) const fn refused(&self) -> u32 {
+        self.refused
+    }
+
+    /// The frame as it is to be sent.
+    pub(super) fn sign(&mut self, now: Instant, frame: FrameBytes) -> FrameBytes {
+        #[cfg(feature = "mavlink-signing")]
+        if let Some(signing) = &mut self.signing {
+            return signing.sign(now, frame);
+        }
+        #[cfg(not(feature = "mavlink-signing"))]
+        let _ = (self, now);
+        frame
+    }
+
     /// What the firmware is to be told next.
     pub(super) fn take_event(&mut self) -> Option<Mistrust> {
         let mistrust = Mistrust::ALL
@@ -128,41 +149,4 @@ fn no_key(received: &Received) -> Option<Mistrust> {
 fn is_heartbeat(received: &Received) -> bool {
     let of_autopilot = |message| matches!(message, Incoming::Heartbeat { kind, autopilot, .. } if Kind::of(autopilot, kind).is_some());
     received.from.component == AUTOPILOT && received.message.is_some_and(of_autopilot)
-}
-
-impl Autopilot {
-    /// Has the link sign what it says, and take nothing but what is signed with that key; RADIO_STATUS apart. The autopilot's is set by a
-    /// ground station (SETUP_SIGNING).
-    #[cfg(feature = "mavlink-signing")]
-    pub const fn sign(&mut self, signing: Signing) {
-        self.trust.signing = Some(signing);
-    }
-
-    /// Whole frames that were not taken, because of their signatures.
-    pub const fn refused(&self) -> u32 {
-        self.trust.refused
-    }
-
-    /// The next frame to send. Call until there is none.
-    pub fn poll_transmit(&mut self, now: Instant) -> Option<FrameBytes> {
-        let frame = self.next_frame(now)?;
-        #[cfg(feature = "mavlink-signing")]
-        if let Some(signing) = &mut self.trust.signing {
-            return Some(signing.sign(now, frame));
-        }
-        Some(frame)
-    }
-
-    /// The next message of what has come that is to be taken.
-    pub(super) fn next_received(&mut self, now: Instant) -> Option<Received> {
-        let trust = &mut self.trust;
-        loop {
-            let taken = self.parser.next_frame(|received, frame| {
-                trust.takes(now, &received, frame).then_some(received)
-            })?;
-            if taken.is_some() {
-                return taken;
-            }
-        }
-    }
 }
