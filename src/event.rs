@@ -79,16 +79,21 @@ pub enum Event {
     NoQuorum,
     /// A newer mission has come: `Relay::upload`. Store it, and hand it to `Relay::resume` when the relay is next switched on.
     Uploaded,
+    /// A newer mission was refused: it is over another distance than the one loaded, and this relay's line on earth is that of the sites it
+    /// was loaded with (`Settings::sited`). It flies on as before. Raised once for each such mission. An operator uploads one that keeps
+    /// the distance, or loads all relays anew for other sites.
+    UploadRefused,
     /// The chain has agreed to fly it: `Relay::mission` and `Relay::version` have new values, and new places follow.
     Adopted,
 }
 
 /// Events about nobody in particular, in the order in which they are told: these first, those about a node, and the others.
 const FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
-const LAST: [Event; 5] = [
+const LAST: [Event; 6] = [
     Event::Reformed,
     Event::LeaseLapsed,
     Event::NoQuorum,
+    Event::UploadRefused,
     Event::Uploaded,
     Event::Adopted,
 ];
@@ -139,7 +144,7 @@ impl About {
 /// Events that have been raised and not yet taken: one bit each, and the node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
-    plain: u8,
+    plain: u16,
     /// By side; bit i is of `About::ALL[i]`.
     about: [u8; 2],
     nodes: [[u16; 8]; 2],
@@ -147,11 +152,11 @@ pub(crate) struct Pending {
 
 impl Pending {
     #[inline(never)] // a search, in every place where an event is raised
-    fn bit(event: Event) -> u8 {
+    fn bit(event: Event) -> u16 {
         FIRST
             .iter()
             .chain(&LAST)
-            .zip(0..8)
+            .zip(0..16)
             .find(|(known, _)| **known == event)
             .map_or(0, |(_, bit)| 1 << bit)
     }

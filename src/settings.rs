@@ -77,6 +77,7 @@ pub struct Measure {
 }
 
 /// What a firmware may choose.
+#[expect(clippy::struct_excessive_bools, reason = "settings, each for itself")]
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
@@ -113,6 +114,9 @@ pub struct Settings {
     /// Whether setpoints lead to the agreed place only as far as the neighbours have made room, and inside which box. The relay
     /// then has to be told where it is: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
+    /// Whether the firmware turns places into latitudes and longitudes, along the line between sites that it was loaded with: then an
+    /// upload over another distance is refused, as there would be no line for it. So are all relays of a chain set, or none is.
+    pub sited: bool,
 }
 
 impl Default for Settings {
@@ -133,6 +137,7 @@ impl Default for Settings {
             quorum: true,
             without_quorum: WithoutQuorum::Hold,
             guard: None,
+            sited: false,
         }
     }
 }

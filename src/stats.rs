@@ -41,7 +41,8 @@ pub struct Stats {
     pub misaddressed: u32,
     /// Messages from the wrong side: a pass or a proposal from where it should go, what comes back of it from where it came from.
     pub misdirected: u32,
-    /// Messages of another mission, which raise [`Event::MissionMismatch`](crate::Event::MissionMismatch).
+    /// Messages of another mission, which raise [`Event::MissionMismatch`](crate::Event::MissionMismatch), and offers of one for other sites,
+    /// which raise [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
     /// Messages of a round or of a view change that are of another view of the chain, or of a mission that is not flown in it.
     pub view: u32,

@@ -4,12 +4,15 @@ use std::fmt;
 use std::net::{ToSocketAddrs as _, UdpSocket};
 use std::os::fd::{AsFd as _, BorrowedFd};
 use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use rustix::event::PollFlags;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
+use uav_relay::flight::autopilot::trust::Mistrust;
 use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
 use uav_relay::flight::axis::Axis;
+use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Duration, Event, Instant, Relay};
 
@@ -21,6 +24,9 @@ const AGAIN: Duration = Duration::from_millis(1_000);
 
 /// What waits for a tty that is slow, at most, bytes: some seconds of what is said.
 const WAITING: usize = 4_096;
+
+/// The number of this link in what is signed.
+const LINK: u8 = 0;
 
 /// Where it is.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -40,12 +46,23 @@ impl fmt::Display for Where {
     }
 }
 
+/// What the autopilot signs with.
+#[derive(Clone, Copy)]
+pub(crate) struct SigningKey(pub(crate) [u8; 32]);
+
+impl fmt::Debug for SigningKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("SigningKey(..)")
+    }
+}
+
 /// What to reach, and along which line it flies.
 #[derive(Clone, Debug)]
 pub(crate) struct AutopilotPlan {
     pub(crate) place: Where,
     pub(crate) axis: Axis,
     pub(crate) pace: Pace,
+    pub(crate) key: Option<SigningKey>,
 }
 
 #[derive(Debug)]
@@ -73,8 +90,12 @@ impl Companion {
     /// One line that says what does not work.
     pub(crate) fn open(plan: &AutopilotPlan, now: Instant) -> Result<Self, String> {
         let port = port(&plan.place)?;
+        let mut link = Autopilot::new(plan.axis, plan.pace, now);
+        if let Some(SigningKey(key)) = plan.key {
+            link.sign(Signing::new(key, LINK, stamp(), now));
+        }
         Ok(Self {
-            link: Autopilot::new(plan.axis, plan.pace, now),
+            link,
             plan: plan.clone(),
             port: Some(port),
             open_at: now,
@@ -95,7 +116,26 @@ impl Companion {
                 "autopilot: by {place}, {} m/s at most; flies once its pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
                 pace.speed_m_s
             ),
-        )
+        )?;
+        if self.plan.key.is_some() {
+            let what = "autopilot: frames are signed, and only what is signed with its key counts";
+            line(Instant::ZERO, format_args!("{what}"))?;
+        }
+        Ok(())
+    }
+
+    /// Says what was not believed.
+    ///
+    /// # Errors
+    /// As every line: where standard output takes it no more.
+    pub(crate) fn stopped(&self, now: Instant) -> Result<(), String> {
+        match self.link.refused() {
+            0 => Ok(()),
+            refused => line(
+                now,
+                format_args!("autopilot: {refused} frames refused by their signatures"),
+            ),
+        }
     }
 
     /// Moves bytes either way; hands the relay where the drone is and whether its setpoints are flown, and the autopilot the setpoint.
@@ -235,8 +275,34 @@ fn said(now: Instant, event: AutopilotEvent) -> Result<(), String> {
             };
             line(now, format_args!("autopilot: {what}"))
         }
+        AutopilotEvent::Mistrusted(why) => {
+            line(now, format_args!("autopilot: {}", mistrusted(why)))
+        }
         other => line(now, format_args!("autopilot: {other:?}")),
     }
+}
+
+const fn mistrusted(why: Mistrust) -> &'static str {
+    match why {
+        Mistrust::NoKey => {
+            "signs its frames, and ignores what is not signed: give --autopilot-key-file"
+        }
+        Mistrust::Unsigned => {
+            "does not sign, and is not heard: set its key, or leave out --autopilot-key-file"
+        }
+        Mistrust::OtherKey => {
+            "signs with another key than that of --autopilot-key-file, and is not heard"
+        }
+        Mistrust::Old => "signs with a time of the past, and is not heard: look at its clock",
+        _ => "is not believed",
+    }
+}
+
+/// The stamp of this machine's clock. One that is behind the autopilot's takes that of what it hears.
+fn stamp() -> Stamp {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    let micros = since.map_or(0, |since| since.as_micros());
+    Stamp::of_unix_micros(u64::try_from(micros).unwrap_or(u64::MAX))
 }
 
 const fn called(kind: Kind) -> &'static str {

@@ -1,13 +1,13 @@
-//! The network's key, from a file: 64 hexadecimal digits, as `openssl rand -hex 32` writes them.
+//! A key from a file, the network's or the autopilot's: 64 hexadecimal digits, as `openssl rand -hex 32` writes them.
 
 use std::path::Path;
 
-/// Reads the key in `file`.
+/// Reads the key in `file`, which `option` named.
 ///
 /// # Errors
-/// One line that names the file and what is wrong with it; never what is in it.
-pub fn load(file: &Path) -> Result<[u8; 32], String> {
-    let named = |error: &str| format!("--key-file {}: {error}", file.display());
+/// One line that names both and what is wrong with it; never what is in it.
+pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
+    let named = |error: &str| format!("{option} {}: {error}", file.display());
     let text = std::fs::read_to_string(file)
         .map_err(|error| named(&format!("cannot be read: {error}")))?;
     parse(&text).map_err(named)

@@ -13,7 +13,7 @@ use uav_relay::{
     Wiring,
 };
 
-use crate::autopilot::{AutopilotPlan, Where};
+use crate::autopilot::{AutopilotPlan, SigningKey, Where};
 use crate::command::{self, named};
 use crate::key;
 use crate::mission::{self, MissionOptions};
@@ -86,6 +86,10 @@ struct Options {
     /// Bit/s on its tty, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1_200..=4_000_000))]
     autopilot_baud: u32,
+    /// File with the key that the autopilot signs with, 64 hexadecimal digits: then only what is signed with it counts, and what is said
+    /// to the autopilot is signed
+    #[arg(long, value_name = "FILE", requires = "autopilot")]
+    autopilot_key_file: Option<PathBuf>,
     /// The drone's greatest speed, m/s, 0.1 to 20
     #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = |text: &str| command::number(text, 0.1, 20.0))]
     speed: f32,
@@ -203,6 +207,7 @@ fn plan(options: &Options) -> Result<Plan, String> {
             Method::Adjust => uav_relay::Method::Adjust(Adjust::default()),
         },
         wiring,
+        sited: options.autopilot.is_some(),
         hop_time: Duration::from_micros(turns.as_micros() + LATENCY.as_micros()),
         probe_after: Duration::from_millis(options.probe_after_ms),
         dead_after: Duration::from_millis(options.dead_after_ms),
@@ -241,6 +246,12 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
             speed_m_s: options.speed,
             ..Pace::default()
         },
+        key: options
+            .autopilot_key_file
+            .as_deref()
+            .map(|file| key::load("--autopilot-key-file", file))
+            .transpose()?
+            .map(SigningKey),
     }))
 }
 
@@ -283,7 +294,7 @@ fn secret(options: &Options) -> Result<Option<Secret>, String> {
         return Ok(None);
     };
     Ok(Some(Secret {
-        key: key::load(key_file)?,
+        key: key::load("--key-file", key_file)?,
         epoch_file: epoch_file.clone(),
         upload_file: options.upload_file.clone(),
     }))

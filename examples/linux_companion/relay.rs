@@ -35,12 +35,13 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
         auth,
         ..plan.settings
     };
-    let held = held(plan);
+    let mut held = held(plan);
     let mut views = Views::load(plan.view_file.as_deref())?;
     let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), now(clock))
         .map_err(|error| error.to_string())?;
-    if let Some(held) = &held {
-        relay.resume(held).map_err(|error| error.to_string())?;
+    if let Some(Err(error)) = held.as_ref().map(|held| relay.resume(held)) {
+        eprintln!("--upload-file: {error}; not used");
+        held = None;
     }
     if let Some(record) = views.stored() {
         relay
@@ -95,6 +96,9 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
         if woken == Woken::Stop {
             if let Some(positions) = &positions {
                 positions.stopped(now(clock))?;
+            }
+            if let Some(autopilot) = &autopilot {
+                autopilot.stopped(now(clock))?;
             }
             return report.stopped(now(clock), relay.stats());
         }

@@ -173,6 +173,12 @@ impl Report {
                     "no quorum: too few relays can be reached; bring the missing ones into reach, or land these"
                 ),
             ),
+            Event::UploadRefused => line(
+                now,
+                format_args!(
+                    "refused: an upload over another distance than that between --site-tx and --site-rx"
+                ),
+            ),
             Event::Uploaded => {
                 let version = relay.upload().map_or(0, Upload::version);
                 line(

@@ -45,6 +45,9 @@ mod mission;
 #[cfg(unix)]
 mod options;
 #[cfg(unix)]
+#[path = "../linux_companion/site.rs"]
+mod site;
+#[cfg(unix)]
 mod station;
 #[cfg(unix)]
 #[path = "../linux_companion/system.rs"]

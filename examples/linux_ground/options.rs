@@ -13,6 +13,7 @@ use crate::key;
 use crate::mission::{
     MissionOptions, altitude, band, distance, interferer, left, mission, power, right, separation,
 };
+use crate::site::SiteOptions;
 
 /// Uploads a new mission to a chain of relays in flight. The options up to --min-separation say what the relays were loaded with; those
 /// that begin with --new- what is different from now on, and without any of them it is what they were loaded with. The number of
@@ -52,6 +53,8 @@ struct Options {
     of: u16,
     #[command(flatten)]
     loaded: MissionOptions,
+    #[command(flatten)]
+    sites: SiteOptions,
     /// New distance from transmitter to receiver, m, 1 to 1e6
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = distance)]
     new_distance: Option<f32>,
@@ -112,6 +115,13 @@ fn plan(options: Options) -> Result<Plan, String> {
     let interference = Interference::Source(options.loaded.interferer);
     let loaded = mission(options.loaded.config(options.of, interference)?, "--")?;
     let config = changed(&options, loaded.config());
+    let axis = options.sites.axis(options.loaded.distance)?;
+    if axis.is_some() && config.distance_m.to_bits() != loaded.config().distance_m.to_bits() {
+        return Err(format!(
+            "--new-distance {}: must be that of --distance, since the relays keep their sites",
+            config.distance_m
+        ));
+    }
     mission(config, "--new-")?;
     let upload =
         Upload::new(&loaded, options.version, config).map_err(|error| error.to_string())?;
@@ -128,7 +138,7 @@ fn plan(options: Options) -> Result<Plan, String> {
             Wiring::Pair
         },
         network: options.network,
-        key: key::load(&options.key_file)?,
+        key: key::load("--key-file", &options.key_file)?,
         timeout: Duration::from_millis(1_000 * options.timeout),
         baud: options.baud,
         tty: options.tty,

@@ -11,13 +11,15 @@ use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::Serial;
 use uav_relay::flight::autopilot::Autopilot as Link;
 use uav_relay::flight::mavlink::outgoing::FrameBytes;
+#[cfg(feature = "mavlink-signing")]
+use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Duration, Event, Instant, Mission, Relay};
 
-use super::config::Sites;
+use super::config::{self, Sites};
 use super::course::course;
-use super::log;
 use super::port::{self, OUTGOING, Port, Queues, Slot};
+use super::{board, log};
 
 /// Received bytes that can wait for the main loop: 44 ms of them. An autopilot sends bursts, and the main loop may be in a sweep.
 const RECEIVED: usize = 512;
@@ -66,9 +68,11 @@ impl Autopilot {
     ) -> Option<&'static mut Self> {
         let course = course(sites, mission).map_err(log::off_course).ok()?;
         log::flies(&course);
+        let mut link = Link::new(course.axis, course.pace, now);
+        sign(&mut link, now).ok()?;
         let port = port::open(uart, Interrupt::USART1, &AUTOPILOT, &AUTOPILOT_QUEUES);
         cortex_m::singleton!(LINK: Autopilot = Autopilot {
-            link: Link::new(course.axis, course.pace, now),
+            link,
             port,
             flown: None,
             target: None,
@@ -138,6 +142,30 @@ impl Autopilot {
             }
         }
     }
+}
+
+/// It is to sign, and cannot.
+struct CannotSign;
+
+/// Has the link sign, where the block has a key. Without a clock it takes the time from what it hears.
+#[cfg(feature = "mavlink-signing")]
+#[expect(clippy::unnecessary_wraps, reason = "as where it cannot")]
+fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {
+    if let Some(key) = config::autopilot_key(board::block()) {
+        link.sign(Signing::new(key, 0, Stamp::UNKNOWN, now));
+        log::signs_to_autopilot();
+    }
+    Ok(())
+}
+
+/// An image built without that does not fly where it is to sign.
+#[cfg(not(feature = "mavlink-signing"))]
+fn sign(_: &mut Link, _: Instant) -> Result<(), CannotSign> {
+    if config::autopilot_key(board::block()).is_none() {
+        return Ok(());
+    }
+    log::cannot_sign_to_autopilot();
+    Err(CannotSign)
 }
 
 #[interrupt]

@@ -157,6 +157,7 @@ fn switch_on(
             hover_m: Autopilot::POSITION_ERROR_M,
             ..GuardConfig::of(&config.mission, config.profile)
         }),
+        sited: config.sites.is_some(),
         ..Settings::default()
     };
     // All else has been checked with the configuration.

@@ -6,6 +6,8 @@ use uav_relay::SetupError;
 use uav_relay::flight::autopilot::AutopilotEvent;
 #[cfg(feature = "flight")]
 use uav_relay::flight::autopilot::state::State;
+#[cfg(feature = "flight")]
+use uav_relay::flight::autopilot::trust::Mistrust;
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
 
@@ -63,6 +65,18 @@ pub(crate) fn no_flight() {
     defmt::error!("configuration refused: it has sites, and this image was built without flight");
 }
 
+#[cfg(feature = "mavlink-signing")]
+pub(crate) fn signs_to_autopilot() {
+    defmt::info!("frames to the autopilot are signed, and only what is signed with its key counts");
+}
+
+#[cfg(all(feature = "flight", not(feature = "mavlink-signing")))]
+pub(crate) fn cannot_sign_to_autopilot() {
+    defmt::error!(
+        "configuration refused: it has an autopilot's key, and this image was built without mavlink-signing"
+    );
+}
+
 /// What the link to the autopilot says.
 #[cfg(feature = "flight")]
 pub(crate) fn autopilot(event: AutopilotEvent) {
@@ -86,6 +100,18 @@ pub(crate) fn autopilot(event: AutopilotEvent) {
         }
         AutopilotEvent::State(State::Blind) => {
             defmt::warn!("autopilot: no position; keeps its last target");
+        }
+        AutopilotEvent::Mistrusted(Mistrust::NoKey) => {
+            defmt::error!("autopilot: signs, and ignores what is not signed; no key in the block");
+        }
+        AutopilotEvent::Mistrusted(Mistrust::Unsigned) => {
+            defmt::error!("autopilot: does not sign, and is not heard; a key in the block");
+        }
+        AutopilotEvent::Mistrusted(Mistrust::OtherKey) => {
+            defmt::error!("autopilot: signs with another key than the block's, and is not heard");
+        }
+        AutopilotEvent::Mistrusted(Mistrust::Old) => {
+            defmt::error!("autopilot: signs with a time of the past, and is not heard");
         }
         other => defmt::info!("autopilot: {}", other),
     }
@@ -121,6 +147,9 @@ pub(crate) fn refused(error: ConfigError) {
         }
         ConfigError::Speed => {
             defmt::error!("configuration refused: greatest speed out of range, or without sites");
+        }
+        ConfigError::AutopilotKey => {
+            defmt::error!("configuration refused: an autopilot's key without sites");
         }
         ConfigError::Field(error) => defmt::error!("configuration refused: field, {}", error),
         ConfigError::Channel(error) => defmt::error!("configuration refused: channel, {}", error),

@@ -24,6 +24,12 @@ pub(crate) const fn flies(_: &Course) {}
 #[cfg(feature = "flight")]
 pub(crate) const fn off_course(_: CourseError) {}
 
+#[cfg(feature = "mavlink-signing")]
+pub(crate) const fn signs_to_autopilot() {}
+
+#[cfg(all(feature = "flight", not(feature = "mavlink-signing")))]
+pub(crate) const fn cannot_sign_to_autopilot() {}
+
 #[cfg(not(feature = "flight"))]
 pub(crate) const fn no_flight() {}
 

@@ -97,6 +97,9 @@ pub(crate) struct MissionUpdate {
     /// The same, if it was uploaded.
     #[cfg(feature = "upload")]
     upload: Option<Upload>,
+    /// What was refused last, for its distance.
+    #[cfg(feature = "upload")]
+    refused: Option<MissionId>,
     /// The number that hellos bear now, and the one before.
     #[cfg(feature = "upload")]
     asked: [Asked; 2],
@@ -127,6 +130,8 @@ impl MissionUpdate {
             latest: loaded,
             #[cfg(feature = "upload")]
             upload: None,
+            #[cfg(feature = "upload")]
+            refused: None,
             #[cfg(feature = "upload")]
             asked: [asked, Asked { number: 0, ..asked }],
             #[cfg(feature = "upload")]
@@ -242,7 +247,7 @@ impl MissionUpdate {
 
     /// Holds `upload` from now on, if it is for this relay and newer than what it holds; whether it is.
     pub(crate) fn hold(&mut self, member: &Member, upload: Upload) -> bool {
-        let newer = upload.id() > self.latest && fits(member, &upload);
+        let newer = upload.id() > self.latest && fits(member, &upload).is_ok();
         if newer {
             self.latest = upload.id();
             self.upload = Some(upload);
@@ -250,14 +255,21 @@ impl MissionUpdate {
         newer
     }
 
+    /// Whether `upload` would be held, were it not for its distance; and whether that is new.
+    pub(crate) fn refuses(&mut self, member: &Member, upload: &Upload) -> Option<bool> {
+        let id = upload.id();
+        if id <= self.latest || fits(member, upload) != Err(UploadError::Distance) {
+            return None;
+        }
+        Some(self.refused.replace(id) != Some(id))
+    }
+
     /// The same by the relay's own firmware.
     pub(crate) fn hand_in(&mut self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
         if !takes_uploads(member) {
             return Err(UploadError::Unsigned);
         }
-        if !fits(member, upload) {
-            return Err(UploadError::Base);
-        }
+        fits(member, upload)?;
         if self.hold(member, *upload) {
             Ok(())
         } else {
@@ -272,9 +284,7 @@ impl MissionUpdate {
         upload: &Upload,
         untouched: bool,
     ) -> Result<Mission, UploadError> {
-        if !fits(member, upload) {
-            return Err(UploadError::Base);
-        }
+        fits(member, upload)?;
         if self.upload.is_some() || !untouched {
             return Err(UploadError::Begun);
         }
@@ -298,8 +308,18 @@ impl MissionUpdate {
 
 /// Whether `upload` is for this relay. None is for relays in a field, even if its base has the digest of their mission.
 #[cfg(feature = "upload")]
-fn fits(member: &Member, upload: &Upload) -> bool {
-    upload.base() == member.digest
-        && upload.config().relays == member.all
-        && member.mission.field().is_none()
+fn fits(member: &Member, upload: &Upload) -> Result<(), UploadError> {
+    let config = upload.config();
+    if upload.base() != member.digest
+        || config.relays != member.all
+        || member.mission.field().is_some()
+    {
+        return Err(UploadError::Base);
+    }
+    // What is flown has the distance of what was loaded, since no other was taken.
+    let loaded_m = member.mission.config().distance_m;
+    if member.settings.sited && config.distance_m.to_bits() != loaded_m.to_bits() {
+        return Err(UploadError::Distance);
+    }
+    Ok(())
 }

@@ -35,6 +35,8 @@ pub enum UploadError {
     Mission(MissionError),
     /// It is for relays that were loaded with another mission.
     Base,
+    /// It is over another distance than the mission loaded, at a relay whose line on earth is that one's: `Settings::sited`.
+    Distance,
     /// A mission as new as that is held already.
     Old,
     /// Frames are not signed: `Settings::auth` is not set.
@@ -53,6 +55,7 @@ impl core::fmt::Display for UploadError {
             }
             Self::Mission(error) => return error.fmt(f),
             Self::Base => "the upload is for relays that were loaded with another mission",
+            Self::Distance => "an upload must keep the distance between the sites that the relays were loaded with",
             Self::Old => "version must be above that of the mission held",
             Self::Unsigned => "uploads need signed frames",
             Self::Begun => "the relay has begun: it can only be handed what is newer",

@@ -48,7 +48,8 @@
 //! | 304 | i32 | its longitude, 1e-7 degrees |
 //! | 308 | i32 | height of the ground there above the mean sea level, mm |
 //! | 312 | f32 | the drone's greatest speed, m/s: 0.1 to 20; 0 is 5 m/s, and is what stands here without sites |
-//! | 316 | u32 | CRC-32C of bytes 0 to 315 |
+//! | 316 | 32 bytes | the key that the autopilot signs with; all 0 where it does not, or there are no sites |
+//! | 348 | u32 | CRC-32C of bytes 0 to 347 |
 //!
 //! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Field` and, by `course.rs`, `Axis`.
 //!
@@ -79,10 +80,10 @@ pub const ADDRESS: u32 = 0x080E_0000;
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// The version of the table above.
-pub const VERSION: u16 = 5;
+pub const VERSION: u16 = 6;
 
 /// Bytes of a block.
-pub const LEN: usize = 320;
+pub const LEN: usize = 352;
 
 /// Points of a field that a block has room for.
 pub const MAX_POINTS: usize = 16;
@@ -96,8 +97,11 @@ const SECRET: usize = 252;
 /// Where the sites begin.
 const SITES: usize = SECRET + 36;
 
+/// Where the autopilot's key begins.
+const AUTOPILOT_KEY: usize = SITES + 28;
+
 /// [`LEN`] as the block states it.
-const LEN_FIELD: u16 = 320;
+const LEN_FIELD: u16 = 352;
 
 /// A block as it is stored.
 pub type Block = [u8; LEN];
@@ -162,6 +166,9 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     let interference = rest.interference(points, interferer, room)?;
     let (_, sites) = block.split_at(SITES);
     let sites = Reader(sites).sites()?;
+    if sites.is_none() && autopilot_key(block).is_some() {
+        return Err(ConfigError::AutopilotKey);
+    }
     let channel = numbers.channel().map_err(ConfigError::Channel)?;
     let mission = Mission::try_new(MissionConfig {
         relays,
@@ -213,6 +220,13 @@ pub fn secret(block: &Block) -> Result<Option<Secret>, ConfigError> {
         (1..=0xFFFF_FFFE, false) => Ok(Some(Secret { key, epoch })),
         _ => Err(ConfigError::Secret),
     }
+}
+
+/// What the autopilot signs with, by a block that [`read`] has taken.
+pub fn autopilot_key(block: &Block) -> Option<[u8; 32]> {
+    let (_, rest) = block.split_at(AUTOPILOT_KEY);
+    let key = Reader(rest).take();
+    key.iter().any(|&byte| byte != 0).then_some(key)
 }
 
 fn crc(bytes: &[u8]) -> u32 {

@@ -110,6 +110,8 @@ pub enum ConfigError {
     Secret,
     /// The greatest speed is out of range, or there is one without sites.
     Speed,
+    /// There is a key for an autopilot, and no sites.
+    AutopilotKey,
     /// This number of the field is out of range.
     Field(FieldError),
     /// This number of the channel is out of range.

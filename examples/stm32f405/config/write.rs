@@ -3,14 +3,19 @@
 use uav_relay::{Interference, Interferer, Method};
 
 use super::{
-    Block, CHECKED, ChannelNumbers, Config, LEN, LEN_FIELD, MAGIC, SECRET, SITES, Secret, Sites,
-    VERSION, crc,
+    AUTOPILOT_KEY, Block, CHECKED, ChannelNumbers, Config, LEN, LEN_FIELD, MAGIC, SECRET, SITES,
+    Secret, Sites, VERSION, crc,
 };
 
-/// Writes the block that says `config` and `secret`; `numbers` are those its channel was made of.
+/// Writes the block that says `config`, `secret` and the autopilot's key; `numbers` are those its channel was made of.
 ///
 /// There is no place in it for a grid in adjust, or for points that are too many: what is read of it is something else then.
-pub fn write(config: &Config, numbers: &ChannelNumbers, secret: Option<Secret>) -> Block {
+pub fn write(
+    config: &Config,
+    numbers: &ChannelNumbers,
+    secret: Option<Secret>,
+    autopilot_key: Option<[u8; 32]>,
+) -> Block {
     let mission = config.mission.config();
     let source = config.mission.interferer().copied().unwrap_or(Interferer {
         power_w: 0.0,
@@ -94,6 +99,8 @@ pub fn write(config: &Config, numbers: &ChannelNumbers, secret: Option<Secret>) 
         }
         bytes.extend(speed_m_s.to_le_bytes());
     }
+    bytes.resize(AUTOPILOT_KEY, 0);
+    bytes.extend(autopilot_key.unwrap_or_default());
     bytes.resize(CHECKED, 0);
     let check = crc(&bytes);
     bytes.extend(check.to_le_bytes());

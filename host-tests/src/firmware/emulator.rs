@@ -13,11 +13,31 @@ use uav_relay_tools::provision::config;
 
 use super::{MISSING, QEMU};
 
-/// How much faster than the wall clock the drone's own clock runs.
+/// How much faster than the wall clock the drone's own clock runs, unless it is slowed down.
 pub const SPEED: f64 = 168.0 / 16.0;
 
 /// How long QEMU may take to connect its serial ports.
 const PATIENCE: Duration = Duration::from_secs(30);
+
+/// How fast a drone lives.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Life {
+    /// [`SPEED`] times as fast as everybody else.
+    #[default]
+    Fast,
+    /// In real time.
+    Real,
+}
+
+impl Life {
+    /// How much faster than the wall clock the drone's own clock runs.
+    pub const fn speed(self) -> f64 {
+        match self {
+            Self::Fast => SPEED,
+            Self::Real => 1.0,
+        }
+    }
+}
 
 /// A serial port of the chip, by its place in QEMU's list.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -52,6 +72,8 @@ impl Emulator {
     /// Switches a drone on with `image`, `block` at the place of its configuration, and what else stands in its flash: `kept`, each from
     /// that address on. `folder` is made, and is its own.
     ///
+    /// It lives as `life` says.
+    ///
     /// # Errors
     /// [`MISSING`] if there is no QEMU; otherwise whatever went wrong, QEMU's own words included.
     pub fn start(
@@ -60,6 +82,7 @@ impl Emulator {
         kept: &[Kept],
         folder: &Path,
         name: &str,
+        life: Life,
     ) -> Result<(Self, Sockets), String> {
         let failed = |error: io::Error| format!("{name}: {error}");
         let folder = folder.join(name);
@@ -77,6 +100,9 @@ impl Emulator {
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(said);
+        if life == Life::Real {
+            command.env("LD_PRELOAD", super::slow::library()?);
+        }
         for (address, bytes) in kept {
             let file = folder.join(format!("{address:#x}.bin"));
             std::fs::write(&file, bytes).map_err(failed)?;

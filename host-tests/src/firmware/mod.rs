@@ -9,6 +9,7 @@
 //! | [`ram`] | two sectors of flash in RAM, to fill them and to spoil them |
 //! | [`image`] | the image, built by cargo |
 //! | [`emulator`] | one emulated drone: a process, and a socket for each serial port |
+//! | [`slow`] | a clock by which emulated drones live in real time |
 //! | [`medium`] | what happens to frames between drones, and when they arrive |
 //! | [`network`] | who hears whom: threads that carry bytes between sockets |
 
@@ -24,6 +25,8 @@ pub mod medium;
 #[cfg(unix)]
 pub mod network;
 pub mod ram;
+#[cfg(unix)]
+pub mod slow;
 #[path = "../../../examples/stm32f405/uploads.rs"]
 pub mod uploads;
 #[path = "../../../examples/stm32f405/views.rs"]

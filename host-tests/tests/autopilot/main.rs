@@ -3,12 +3,13 @@
 mod any;
 mod arducopter;
 mod px4;
+mod signed;
 mod vehicle;
 
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::{AutopilotEvent, Kind};
 use uav_relay::{Instant, Placement};
-use vehicle::{Said, Vehicle, place};
+use vehicle::{Mode, Said, Vehicle, place};
 
 #[test]
 fn an_autopilot_is_found_and_asked_for_its_messages() {

@@ -12,6 +12,8 @@ use uav_relay::flight::geodetic::Geodetic;
 use uav_relay::flight::mavlink::table;
 use uav_relay::{Instant, Placement};
 
+use crate::signed::Key;
+
 pub(crate) const SYSTEM: u8 = 7;
 
 /// From one step to the next, ms.
@@ -92,6 +94,8 @@ pub(crate) struct Vehicle {
     pub(crate) position_every_ms: u64,
     pub(crate) late_ms: u64,
     number: u8,
+    /// With one it signs what it says, and believes nobody else.
+    pub(crate) key: Option<Key>,
     pub(crate) said: Vec<(Instant, Said)>,
     pub(crate) systems: Vec<u8>,
     pub(crate) events: Vec<AutopilotEvent>,
@@ -117,6 +121,7 @@ impl Vehicle {
             position_every_ms: 200,
             late_ms: 0,
             number: 0,
+            key: None,
             said: Vec::new(),
             systems: Vec::new(),
             events: Vec::new(),
@@ -262,7 +267,7 @@ impl Vehicle {
         let mut frame = vec![0xFD];
         frame.extend(covered);
         frame.extend(checksum.to_le_bytes());
-        self.link.handle_bytes(self.now, &frame);
+        self.send(frame);
     }
 
     fn say_position(&mut self) {
@@ -302,10 +307,22 @@ impl Vehicle {
         self.number = self.number.wrapping_add(1);
         let mut raw = MAVLinkV2MessageRaw::new();
         raw.serialize_message(header, message);
-        self.link.handle_bytes(self.now, raw.raw_bytes());
+        self.send(raw.raw_bytes().to_vec());
+    }
+
+    fn send(&mut self, frame: Vec<u8>) {
+        let frame = match &mut self.key {
+            Some(key) => key.sign(self.now, frame),
+            None => frame,
+        };
+        self.link.handle_bytes(self.now, &frame);
     }
 
     fn hear(&mut self, frame: &[u8]) {
+        let key = self.key.as_mut();
+        if key.is_some_and(|key| !key.believes(frame)) {
+            return;
+        }
         let mut reader = MavlinkReader::new(frame);
         let (header, message) = reader
             .read_message::<MavMessage>(MavlinkVersion::V2)

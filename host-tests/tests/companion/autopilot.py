@@ -1,8 +1,8 @@
 """pymavlink as the autopilot of a drone, an ArduCopter or a PX4, on a pseudo-terminal.
 
-    autopilot.py arducopter|px4 LINK LAT LON AMSL
+    autopilot.py arducopter|px4 LINK LAT LON AMSL [KEY]
 
-LINK becomes a symbolic link to the tty. The drone stands at LAT, LON, AMSL, on the ground. What it hears goes to standard output, a
+LINK becomes a symbolic link to the tty. With KEY, a file with 64 hexadecimal digits, it signs, and ignores what is not signed. The drone stands at LAT, LON, AMSL, on the ground. What it hears goes to standard output, a
 JSON object a line, with the drone's own place and mode; standard input has an order a line:
 
     arm, takeoff                 armed; off the ground, and in the air a second later
@@ -13,6 +13,7 @@ JSON object a line, with the drone's own place and mode; standard input has an o
     unplug, plug                 the tty vanishes; another one is there
 """
 
+import collections
 import json
 import math
 import os
@@ -33,11 +34,13 @@ ON_GROUND, IN_AIR, TAKEOFF = 1, 2, 3
 # SET_POSITION_TARGET_GLOBAL_INT: position is given, acceleration is not; above the mean sea level.
 POSITION, ACCELERATION, AMSL = 0b111, 0b1_1100_0000, 5
 DEGREE_M = 111_200.0
+# Where stamps of signatures begin: 2015-01-01, Unix time.
+STAMPS_BEGIN = 1_420_070_400
 
 
 class Drone:
-    def __init__(self, kind, link, at):
-        self.kind, self.link, self.home = kind, link, at
+    def __init__(self, kind, link, at, key):
+        self.kind, self.link, self.home, self.key = kind, link, at, key
         self.at, self.sticks, self.silent, self.refuses = list(at), (0.0, 0.0), False, False
         self.tty = None
         self.start()
@@ -47,6 +50,8 @@ class Drone:
         self.began = time.monotonic()
         self.armed, self.landed, self.mode, self.by_itself = False, ON_GROUND, "pilot", False
         self.goal, self.told_at, self.took_off_at = None, -math.inf, 0.0
+        # Where it has said to be, the last few seconds.
+        self.said = collections.deque(maxlen=20)
         self.at[2] = self.home[2]
         # Seconds between two, and when the next is due, by number.
         self.streams = {0: [1.0, 0.0]}
@@ -60,6 +65,12 @@ class Drone:
         os.symlink(os.ttyname(self.side), self.link)
         self.codec, self.reader = common.MAVLink(None, SYSTEM, 1), common.MAVLink(None)
         self.reader.robust_parsing = True
+        for end in [self.codec, self.reader] if self.key else []:
+            end.signing.secret_key, end.signing.sign_outgoing = self.key, True
+            self.stamp(end)
+
+    def stamp(self, end):
+        end.signing.timestamp = max(end.signing.timestamp, int((time.time() - STAMPS_BEGIN) * 1e5))
 
     def unplug(self):
         os.remove(self.link)
@@ -126,8 +137,12 @@ class Drone:
             data = os.read(self.tty, 4096)
         except (BlockingIOError, OSError):
             return
+        self.stamp(self.reader)
         for message in self.reader.parse_buffer(data) or []:
             name = message.get_type()
+            # What it does not believe, too.
+            if name == "BAD_DATA":
+                continue
             if name == "COMMAND_LONG" and message.command == 511:
                 self.streams[int(message.param1)] = [message.param2 / 1e6, 0.0]
                 self.say(common.MAVLink_command_ack_message(511, 0))
@@ -135,7 +150,7 @@ class Drone:
                 self.take(message)
             fields = message.to_dict()
             fields["from"] = [message.get_srcSystem(), message.get_srcComponent()]
-            fields["own"] = {"at": self.at, "mode": self.mode, "landed": self.landed, "by_itself": self.by_itself}
+            fields["own"] = {"at": self.at, "mode": self.mode, "landed": self.landed, "by_itself": self.by_itself, "said": list(self.said)}
             print(json.dumps(fields), flush=True)
 
     def take(self, message):
@@ -152,6 +167,7 @@ class Drone:
 
     def say(self, message):
         if not self.silent:
+            self.stamp(self.codec)
             try:
                 os.write(self.tty, message.pack(self.codec))
             except BlockingIOError:
@@ -172,6 +188,7 @@ class Drone:
             autopilot = 12 if self.kind == "px4" else 3
             return common.MAVLink_heartbeat_message(2, autopilot, base, MODES[self.kind][self.mode], 4, 3)
         if number == 33:
+            self.said.append(list(self.at))
             above = self.at[2] - self.home[2]
             return common.MAVLink_global_position_int_message(
                 boot_ms, lat, lon, round(self.at[2] * 1e3), round(above * 1e3), 0, 0, 0, 0
@@ -187,7 +204,8 @@ class Drone:
         return None
 
 
-drone = Drone(sys.argv[1], sys.argv[2], tuple(map(float, sys.argv[3:6])))
+key = bytes.fromhex(open(sys.argv[6]).read()) if len(sys.argv) > 6 else None
+drone = Drone(sys.argv[1], sys.argv[2], tuple(map(float, sys.argv[3:6])), key)
 print(json.dumps({"mavpackettype": "READY"}), flush=True)
 os.set_blocking(0, False)
 orders = b""

@@ -1,6 +1,5 @@
 //! A chain of one with a drone of pymavlink's: a flight with an ArduCopter, and one with a PX4.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use tempfile::TempDir;
@@ -28,17 +27,41 @@ pub(crate) struct Flight {
 impl Flight {
     /// A drone on the ground at `x_m` along the line, and a relay that has found it.
     pub(crate) fn found(kind: &str, x_m: f64) -> Self {
+        Self::found_by(kind, x_m, None)
+    }
+
+    /// Of which both sign with that key, where there is one.
+    fn found_by(kind: &str, x_m: f64, key: Option<&str>) -> Self {
+        let mut flight = Self::started(kind, x_m, [key; 2]);
+        if key.is_some() {
+            flight.relay.line("autopilot: frames are signed");
+        }
+        let found = flight.relay.line("autopilot: found a");
+        assert!(found.to_lowercase().contains(kind), "{found}");
+        flight.relay.line("autopilot: on the ground, or not armed");
+        flight
+    }
+
+    /// The two, the drone with the first key and the relay with the second.
+    pub(crate) fn started(kind: &str, x_m: f64, keys: [Option<&str>; 2]) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let link: PathBuf = folder.path().join("tty");
-        let link = link.to_str().unwrap();
+        let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+        let file = |name: &str, key: Option<&str>| {
+            let name = path(name);
+            key.map(|key| std::fs::write(&name, key).unwrap())?;
+            Some(name)
+        };
+        let (link, [theirs, ours]) = (path("tty"), keys);
+        let (theirs, ours) = (file("theirs", theirs), file("ours", ours));
         let at = on_earth(x_m, 0.0).map(|number| number.to_string());
         let [lat, lon, amsl] = &at;
-        let drone = Peer::start("autopilot.py", &[kind, link, lat, lon, amsl]);
-        let mut relay = relay(link);
+        let mut arguments = vec![kind, &link, lat, lon, amsl];
+        arguments.extend(theirs.as_deref());
+        let drone = Peer::start("autopilot.py", &arguments);
+        let more = ours.iter().flat_map(|file| ["--autopilot-key-file", file]);
+        let more: Vec<&str> = more.collect();
+        let mut relay = relay(&link, &more);
         relay.line("autopilot: by --autopilot");
-        let found = relay.line("autopilot: found a");
-        assert!(found.to_lowercase().contains(kind), "{found}");
-        relay.line("autopilot: on the ground, or not armed");
         Self {
             drone,
             relay,
@@ -110,9 +133,9 @@ fn lead_to(targets: &[Heard], place: Site) {
 }
 
 /// Found, off the ground, engaged and led to its place, where the drone then is.
-fn led_to_its_place(kind: &str) -> (Flight, Site) {
+fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     let place = agreed();
-    let mut flight = Flight::found(kind, START_M);
+    let mut flight = Flight::found_by(kind, START_M, key);
     flight.drone.is_asked_for(&ASKED);
     is_an_onboard_computer(&flight.drone);
     assert!(flight.targets_for(MOMENT).is_empty(), "it is on the ground");
@@ -161,9 +184,21 @@ fn falls_silent(flight: &mut Flight) {
     flight.drone.order("speak");
 }
 
+/// What both sign with.
+const KEY: Option<&str> = Some("c0ffee0123456789abcdef00112233445566778899aabbccddeeff0102030405");
+
 #[test]
 fn an_arducopter_is_led_to_its_place_and_let_go() {
-    let (mut flight, place) = led_to_its_place("arducopter");
+    an_arducopter(None);
+}
+
+#[test]
+fn an_arducopter_that_signs_is_led_to_its_place_and_let_go() {
+    an_arducopter(KEY);
+}
+
+fn an_arducopter(key: Option<&str>) {
+    let (mut flight, place) = led_to_its_place("arducopter", key);
     // It has said that it flies there: to repeat it would make it wobble.
     assert!(flight.targets_for(MOMENT).is_empty(), "it is there");
 
@@ -209,7 +244,16 @@ fn an_arducopter_that_refuses_is_told_of() {
 
 #[test]
 fn a_px4_is_led_to_its_place_and_let_go() {
-    let (mut flight, place) = led_to_its_place("px4");
+    a_px4(None);
+}
+
+#[test]
+fn a_px4_that_signs_is_led_to_its_place_and_let_go() {
+    a_px4(KEY);
+}
+
+fn a_px4(key: Option<&str>) {
+    let (mut flight, place) = led_to_its_place("px4", key);
     // It wants to hear of it all the while.
     let there = flight.targets_for(MOMENT);
     assert!(there.len() > 4, "{there:?}");
@@ -224,12 +268,7 @@ fn a_px4_is_led_to_its_place_and_let_go() {
     flight.drone.order("sticks 4 0");
     let own = flight.targets_for(2 * MOMENT);
     assert!(own.len() > 10, "{own:?}");
-    // A position is 0.2 s old at most, and a target goes out every 0.2 s.
-    assert!(
-        own.iter()
-            .all(|target| apart_m(target.to(), target.own()) < 2.5),
-        "{own:?}"
-    );
+    assert!(own.iter().all(Heard::is_to_own_place), "{own:?}");
     let flown = apart_m(own[own.len() - 1].own(), place);
     assert!(flown > 8.0, "{flown} m from its place");
     flight.is_engaged();
@@ -237,10 +276,7 @@ fn a_px4_is_led_to_its_place_and_let_go() {
 
     flight.is_released_by("rtl");
     let own = flight.targets_for(MOMENT);
-    assert!(
-        own.iter()
-            .all(|target| apart_m(target.to(), target.own()) < 4.5)
-    );
+    assert!(own.iter().all(Heard::is_to_own_place), "{own:?}");
     flight.is_engaged();
     flight.arrives(place);
 

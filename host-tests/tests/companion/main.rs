@@ -7,6 +7,7 @@ mod flying;
 mod idle;
 mod mavsdk;
 mod medium;
+mod mistrust;
 mod options;
 mod peer;
 mod positions;

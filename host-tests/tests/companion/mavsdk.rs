@@ -17,10 +17,11 @@ fn free_port() -> u16 {
 fn mavsdk_is_led_to_its_place_and_let_go() {
     let place = agreed();
     let port = free_port().to_string();
+    let address = format!("udpin://127.0.0.1:{port}");
     let at = on_earth(370.0, 15.0).map(|number| number.to_string());
     let [lat, lon, amsl] = &at;
-    let mut drone = Peer::start("mavsdk_autopilot.py", &[&port, lat, lon, amsl]);
-    let mut relay = relay(&format!("udp:127.0.0.1:{port}"));
+    let mut drone = Peer::start("mavsdk_autopilot.py", &[&address, lat, lon, amsl]);
+    let mut relay = relay(&format!("udp:127.0.0.1:{port}"), &[]);
     let heartbeat = drone.hears(|heard| heard.is("HEARTBEAT"));
     assert_eq!(heartbeat.0["type"], 18);
     assert!(!relay.has_said("autopilot: found"), "a generic one");

@@ -1,6 +1,6 @@
-"""MAVSDK as the autopilot of a drone, on a UDP port.
+"""MAVSDK as the autopilot of a drone, on a UDP port or a tty.
 
-    mavsdk_autopilot.py PORT LAT LON AMSL
+    mavsdk_autopilot.py udpin://127.0.0.1:PORT|serial:///dev/TTY:115200 LAT LON AMSL
 
 The drone is where the last target was, from LAT, LON, AMSL on. Arming and modes are those of MAVSDK's action server, its messages those
 of its telemetry server. MAVSDK says of itself that it is a generic autopilot: one heartbeat that says PX4 is sent by hand. What it hears
@@ -43,7 +43,7 @@ def tell(name, fields):
 configuration = Configuration.create_with_component_type(ComponentType.AUTOPILOT)
 configuration.system_id = 1
 mavsdk = Mavsdk(configuration)
-assert mavsdk.add_any_connection(f"udpin://127.0.0.1:{sys.argv[1]}") == 0
+assert mavsdk.add_any_connection(sys.argv[1]) == 0
 tell("READY", {})
 at, landed = [float(number) for number in sys.argv[2:5]], LandedState.ON_GROUND
 

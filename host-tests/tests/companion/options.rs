@@ -202,6 +202,14 @@ const WRONG_AUTOPILOT: &[(&[&str], &[&str])] = &[
         &["udp:localhost:65536:", "1 to 65535"],
     ),
     (
+        &["--autopilot-key-file", "a"],
+        &["--autopilot <TTY", "not provided"],
+    ),
+    (
+        &["--autopilot", "a", "--autopilot-key-file", "nowhere"],
+        &["--autopilot-key-file nowhere", "cannot be read"],
+    ),
+    (
         &["--autopilot", "a", "--autopilot-baud", "57"],
         &["--autopilot-baud", "'57'", "1200..=4000000"],
     ),

@@ -63,9 +63,10 @@ pub(crate) fn options(autopilot: &str) -> Vec<String> {
     .collect()
 }
 
-pub(crate) fn relay(autopilot: &str) -> Relay {
+pub(crate) fn relay(autopilot: &str, more: &[&str]) -> Relay {
     let options = options(autopilot);
-    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    let mut options: Vec<&str> = options.iter().map(String::as_str).collect();
+    options.extend(more);
     Relay::start(&options)
 }
 
@@ -130,6 +131,13 @@ impl Heard {
     pub(crate) fn own(&self) -> Site {
         let at = &self.0["own"]["at"];
         [0, 1, 2].map(|part| at[part].as_f64().unwrap())
+    }
+
+    /// Whether a target is a place where the drone has said to be, not long before.
+    pub(crate) fn is_to_own_place(&self) -> bool {
+        let said = self.0["own"]["said"].as_array().unwrap().iter();
+        let mut said = said.map(|at| [0, 1, 2].map(|part| at[part].as_f64().unwrap()));
+        said.any(|at| apart_m(self.to(), at) < 0.05)
     }
 
     pub(crate) fn mode(&self) -> &str {

@@ -12,7 +12,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use crate::binary::{companion, ground};
 
 /// How long anything may take that should be done in a moment: this machine may be busy.
-pub(crate) const LIMIT: Duration = Duration::from_secs(30);
+pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 
 #[derive(Debug)]
 pub(crate) struct Relay {

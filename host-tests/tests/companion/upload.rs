@@ -247,6 +247,23 @@ const WRONG: &[(&[&str], &[&str])] = &[
         &["--min-separation 501", "--distance 1000"],
     ),
     (
+        &["--site-tx", "47.4,8.54,420", "--site-rx", "47.41,8.55,431"],
+        &["--distance 1000", "must be 1343.795 m"],
+    ),
+    (
+        &[
+            "--site-tx",
+            "47.4,8.54,420",
+            "--site-rx",
+            "47.41,8.55,431",
+            "--distance",
+            "1343.795",
+            "--new-distance",
+            "1343.8",
+        ],
+        &["--new-distance 1343.8", "that of --distance", "sites"],
+    ),
+    (
         &["--key-file", "nowhere"],
         &["--key-file nowhere", "cannot be read"],
     ),

@@ -4,6 +4,7 @@
 
 mod noise;
 mod ours;
+mod signing;
 mod theirs;
 
 use std::fmt::Write as _;

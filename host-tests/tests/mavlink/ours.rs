@@ -49,7 +49,7 @@ fn messages() -> Vec<Outgoing<'static>> {
     all
 }
 
-fn framed() -> Vec<(Outgoing<'static>, u8, Vec<u8>)> {
+pub(super) fn framed() -> Vec<(Outgoing<'static>, u8, Vec<u8>)> {
     let numbered = messages().into_iter().zip((0..=u8::MAX).cycle());
     numbered
         .map(|(message, number)| {

@@ -19,7 +19,7 @@ fn bytes(rng: &mut ChaCha8Rng) -> [u8; 4] {
 }
 
 /// What pymavlink is asked to write, and what is to be read of it. Numbers of enums are any.
-fn written() -> Vec<(String, Option<Incoming>)> {
+pub(super) fn written() -> Vec<(String, Option<Incoming>)> {
     let mut rng = rng(2);
     let mut all = Vec::new();
     for _ in 0..EACH {

@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use defmt_decoder::Table;
-use host_tests::firmware::emulator::{Emulator, Kept};
+use host_tests::firmware::emulator::{Emulator, Kept, Life};
 use host_tests::firmware::image;
 use host_tests::firmware::medium::Medium;
 use host_tests::firmware::network::{self, Network};
@@ -64,6 +64,12 @@ fn table(which: Image) -> &'static Table {
     TABLES[which as usize].get_or_init(|| log::table(&image(which.name())))
 }
 
+fn blocks(flight: &Flight) -> Vec<Vec<u8>> {
+    let all = 1..=flight.mission().relays();
+    all.map(|index| flight.block(index).unwrap().to_vec())
+        .collect()
+}
+
 /// One fleet flies at a time: the drones' clocks keep up with the wall's, or what they say comes late.
 static AIR: Mutex<()> = Mutex::new(());
 
@@ -84,7 +90,7 @@ pub(crate) struct Fleet {
 impl Fleet {
     /// Switches on one drone for each block, on `image`, with a medium of `faults` and `seed`.
     pub(crate) fn start(which: Image, blocks: &[Vec<u8>], faults: Faults, seed: u64) -> Self {
-        Self::begin(which, blocks, &[], None, faults, seed)
+        Self::begin(which, blocks, &[], None, faults, seed, Life::Fast)
     }
 
     /// The same, with what each drone finds in its flash.
@@ -95,7 +101,7 @@ impl Fleet {
         faults: Faults,
         seed: u64,
     ) -> Self {
-        Self::begin(which, blocks, kept, None, faults, seed)
+        Self::begin(which, blocks, kept, None, faults, seed, Life::Fast)
     }
 
     /// The same, with a transmitter at the other end of `socket`.
@@ -106,7 +112,7 @@ impl Fleet {
         faults: Faults,
         seed: u64,
     ) -> Self {
-        Self::begin(which, blocks, &[], Some(socket), faults, seed)
+        Self::begin(which, blocks, &[], Some(socket), faults, seed, Life::Fast)
     }
 
     fn begin(
@@ -116,6 +122,7 @@ impl Fleet {
         transmitter: Option<UnixStream>,
         faults: Faults,
         seed: u64,
+        life: Life,
     ) -> Self {
         let air = AIR.lock().unwrap_or_else(PoisonError::into_inner);
         let (file, table) = (image(which.name()), table(which));
@@ -127,7 +134,7 @@ impl Fleet {
             let kept = kept.get(drones.len()).map_or(&[][..], Vec::as_slice);
             let name = format!("drone{drone}");
             let (emulator, [usart1, usart2, usart3, console]) =
-                Emulator::start(&file, block, kept, folder.path(), &name)
+                Emulator::start(&file, block, kept, folder.path(), &name, life)
                     .unwrap_or_else(|error| panic!("{error}"));
             drones.push(emulator);
             autopilots.push(usart1);
@@ -171,10 +178,19 @@ impl Fleet {
 
     /// Switches on every drone of `flight`.
     pub(crate) fn of(which: Image, flight: &Flight, faults: Faults, seed: u64) -> Self {
-        let blocks: Vec<Vec<u8>> = (1..=flight.mission().relays())
-            .map(|index| flight.block(index).unwrap().to_vec())
-            .collect();
-        Self::start(which, &blocks, faults, seed)
+        Self::start(which, &blocks(flight), faults, seed)
+    }
+
+    /// The same with wires that do nothing to frames; the drones live in real time.
+    pub(crate) fn in_real_time(flight: &Flight) -> Self {
+        let blocks = blocks(flight);
+        let (which, faults) = (Image::Wires, Faults::default());
+        Self::begin(which, &blocks, &[], None, faults, 1, Life::Real)
+    }
+
+    /// Takes note of what was logged so far.
+    pub(crate) fn listen(&mut self) {
+        self.lines.extend(self.new.try_iter());
     }
 
     /// Reads logs until `done` says so of all lines so far; in time, or the test fails with all that was logged.
@@ -194,7 +210,7 @@ impl Fleet {
         }
     }
 
-    fn give_up(&mut self, what: &str) -> ! {
+    pub(crate) fn give_up(&mut self, what: &str) -> ! {
         for line in &self.lines {
             println!("{:2} {:>10} us  {}", line.drone, line.at, line.text);
         }

@@ -2,9 +2,11 @@
 
 use std::io::{ErrorKind, Read as _};
 
+use host_tests::firmware::emulator::Life;
 use mavlink::dialects::common::MavLandedState;
 use uav_relay::Placement;
 use uav_relay::flight::autopilot::Kind;
+use uav_relay::flight::axis::Axis;
 use uav_relay_sim::scenario::Scenario;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_tools::provision::block::Flight;
@@ -18,8 +20,13 @@ const SITES: &str = "[geometry]\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\
     [site]\ntx = { lat_deg = 47.40, lon_deg = 8.54, amsl_m = 420.0 }\n\
     rx = { lat_deg = 47.41, lon_deg = 8.55, amsl_m = 431.0 }\n";
 
-fn scenario() -> Scenario {
+pub(crate) fn scenario() -> Scenario {
     Scenario::parse("sites.toml", SITES).unwrap()
+}
+
+/// The line between the two.
+pub(crate) fn axis() -> Axis {
+    scenario().line.unwrap().axis
 }
 
 /// One relay between two sites.
@@ -56,7 +63,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
         altitude_m: 19.7,
     };
     let socket = fleet.autopilots.remove(0);
-    let mut vehicle = Vehicle::new(kind, socket, scenario().line.unwrap().axis, from);
+    let mut vehicle = Vehicle::new(kind, socket, axis(), from, Life::Fast);
 
     // On the ground it is found, and asked for what it says; nothing is to move.
     vehicle.until("requests for messages", |vehicle| {

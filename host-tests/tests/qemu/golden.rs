@@ -2,7 +2,7 @@
 
 use std::io::{Read as _, Write as _};
 
-use host_tests::firmware::emulator::Emulator;
+use host_tests::firmware::emulator::{Emulator, Life};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
@@ -75,9 +75,15 @@ fn the_target_makes_of_every_vector_what_this_machine_does() {
     }
 
     let folder = tempfile::Builder::new().prefix("golden").tempdir().unwrap();
-    let (_drone, [_, mut port, _, _]) =
-        Emulator::start(&image("golden"), &[0; LEN], &[], folder.path(), "golden")
-            .unwrap_or_else(|error| panic!("{error}"));
+    let (_drone, [_, mut port, _, _]) = Emulator::start(
+        &image("golden"),
+        &[0; LEN],
+        &[],
+        folder.path(),
+        "golden",
+        Life::Fast,
+    )
+    .unwrap_or_else(|error| panic!("{error}"));
     port.set_read_timeout(Some(PATIENCE)).unwrap();
     let mut ready = [0; answer::READY.len()];
     port.read_exact(&mut ready).unwrap();

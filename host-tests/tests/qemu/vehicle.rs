@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
-use host_tests::firmware::emulator::SPEED;
+use host_tests::firmware::emulator::Life;
 use mavlink::dialects::common::{
     EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot,
     MavLandedState, MavMessage, MavModeFlag, MavType, POSITION_TARGET_GLOBAL_INT_DATA,
@@ -49,6 +49,8 @@ pub(crate) struct Vehicle {
     socket: UnixStream,
     axis: Axis,
     began: Instant,
+    /// As its drone lives.
+    life: Life,
     moved_at: u64,
     said_at: [u64; PERIODS.len()],
     number: u8,
@@ -74,13 +76,20 @@ pub(crate) fn apart(a: Placement, b: Placement) -> f32 {
 
 impl Vehicle {
     /// One on the ground.
-    pub(crate) fn new(kind: Kind, socket: UnixStream, axis: Axis, place: Placement) -> Self {
+    pub(crate) fn new(
+        kind: Kind,
+        socket: UnixStream,
+        axis: Axis,
+        place: Placement,
+        life: Life,
+    ) -> Self {
         socket.set_nonblocking(true).unwrap();
         Self {
             kind,
             socket,
             axis,
             began: Instant::now(),
+            life,
             moved_at: 0,
             said_at: [0; PERIODS.len()],
             number: 0,
@@ -99,7 +108,7 @@ impl Vehicle {
 
     /// Milliseconds since it began.
     pub(crate) fn now(&self) -> u64 {
-        let ms = self.began.elapsed().mul_f64(SPEED).as_millis();
+        let ms = self.began.elapsed().mul_f64(self.life.speed()).as_millis();
         u64::try_from(ms).unwrap()
     }
 
@@ -132,7 +141,7 @@ impl Vehicle {
         self.told.last().is_some_and(|told| told.at > at)
     }
 
-    fn step(&mut self) {
+    pub(crate) fn step(&mut self) {
         self.hear();
         let now = self.now();
         self.fly(now);

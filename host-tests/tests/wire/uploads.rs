@@ -3,8 +3,10 @@
 
 use host_tests::fixtures::paper;
 use uav_relay::wire::digest::digest;
+use uav_relay::wire::upload::UploadError;
 use uav_relay::{
-    Duration, Event, Instant, Interference, Mission, Port, Relay, Upload, ViewId, Wiring,
+    Duration, Event, Instant, Interference, Mission, MissionConfig, Port, Relay, Settings, Upload,
+    ViewId, Wiring,
 };
 
 use super::codec::{Greeting, Said};
@@ -160,6 +162,58 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
     assert_eq!(counted(relay.stats()), ["mission", "received"]);
     assert_eq!(said(&mut relay, NOW), []);
     assert_eq!(held(&relay), Some(mission_id(&newer)));
+}
+
+/// There would be no line on earth for it.
+#[test]
+fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
+    let mission = Mission::try_new(paper(8)).unwrap();
+    let (identity, settings) = set(4, Wiring::Pair);
+    let sited = Settings {
+        sited: true,
+        ..settings
+    };
+    let base = digest(&mission);
+    let longer = Offer {
+        distance_m: mission.config().distance_m.next_up(),
+        ..upload(2, base)
+    };
+    let mut relay = Relay::new(mission, identity, sited, 1, NOW).unwrap();
+    let mut peer = Peer::meets(&mut relay, 4, 5, Port::Downstream);
+    said(&mut relay, NOW);
+    events(&mut relay);
+    for (times, told) in [(1, vec![Event::UploadRefused]), (2, vec![])] {
+        peer.says(&mut relay, NOW, &Said::Offer(longer));
+        assert_eq!((events(&mut relay), relay.stats().mission), (told, times));
+        assert_eq!((said(&mut relay, NOW), held(&relay)), (vec![], None));
+    }
+    let next = Offer {
+        version: 3,
+        ..longer
+    };
+    peer.says(&mut relay, NOW, &Said::Offer(next));
+    assert_eq!(events(&mut relay), [Event::UploadRefused]);
+    // By hand, and after a reboot.
+    let by_hand = Upload::new(
+        &mission,
+        4,
+        MissionConfig {
+            distance_m: longer.distance_m,
+            ..*mission.config()
+        },
+    );
+    let by_hand = by_hand.unwrap();
+    let refused = Err(UploadError::Distance);
+    assert_eq!(relay.handle_upload(NOW, &by_hand), refused);
+    let mut begins = Relay::new(mission, identity, sited, 1, NOW).unwrap();
+    assert_eq!(begins.resume(&by_hand), refused);
+    let mut without = Relay::new(mission, identity, settings, 1, NOW).unwrap();
+    assert_eq!(without.resume(&by_hand), Ok(()));
+    // One that keeps the distance is held, and from then on an older one is not looked at.
+    peer.says(&mut relay, NOW, &Said::Offer(upload(5, base)));
+    assert_eq!(events(&mut relay), [Event::Uploaded]);
+    peer.says(&mut relay, NOW, &Said::Offer(longer));
+    assert_eq!((events(&mut relay), relay.stats().mission), (vec![], 3));
 }
 
 #[test]
@@ -368,7 +422,7 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
 
 #[test]
 fn in_a_field_nothing_is_held() {
-    let mission = uav_relay::MissionConfig {
+    let mission = MissionConfig {
         interference: Interference::Field(FIELD),
         ..paper(8)
     };

@@ -1,6 +1,7 @@
 //! What the firmware is told of the autopilot.
 
 use super::state::State;
+use super::trust::Mistrust;
 use super::vehicle::Kind;
 
 /// What the firmware is told.
@@ -16,6 +17,8 @@ pub enum AutopilotEvent {
     State(State),
     /// It was told five times where to fly and flies elsewhere: the place is outside its own fence, or another companion talks to it.
     Refused,
+    /// The two do not believe each other's signatures.
+    Mistrusted(Mistrust),
 }
 
 /// Events that have not been taken.

@@ -7,13 +7,16 @@ use super::report::{Report, line_of};
 use super::state::State;
 use super::streams::Streams;
 use super::target::Target;
+use super::trust::Trust;
 use super::vehicle::{Kind, Position, Vehicle, VehicleUpdate};
 use crate::event::Event;
 use crate::flight::axis::Axis;
 use crate::flight::geodetic::Geodetic;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing, severity};
-use crate::flight::mavlink::parser::{Counters, Parser};
+use crate::flight::mavlink::parser::{Counters, Parser, Received};
+#[cfg(feature = "mavlink-signing")]
+use crate::flight::mavlink::signing::Signing;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::time::{Duration, Instant};
@@ -40,6 +43,7 @@ pub struct Autopilot {
     pace: Pace,
     began: Instant,
     parser: Parser,
+    trust: Trust,
     vehicle: Vehicle,
     streams: Streams,
     state: State,
@@ -63,6 +67,7 @@ impl Autopilot {
             pace,
             began: now,
             parser: Parser::new(),
+            trust: Trust::default(),
             vehicle: Vehicle::default(),
             streams: Streams::new(now),
             state: State::Silent,
@@ -82,12 +87,25 @@ impl Autopilot {
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         for byte in bytes {
             self.parser.push(*byte);
-            while let Some(received) = self.parser.next_message() {
+            while let Some(received) = self.next_received(now) {
                 let heard = self.vehicle.hear(now, &received, &self.axis);
                 if heard != VehicleUpdate::Nothing {
                     self.streams.hear(received.id);
                 }
                 self.take(now, heard);
+            }
+        }
+    }
+
+    /// The next message of what has come that is to be taken.
+    fn next_received(&mut self, now: Instant) -> Option<Received> {
+        let trust = &mut self.trust;
+        loop {
+            let taken = self.parser.next_frame(|received, frame| {
+                trust.takes(now, &received, frame).then_some(received)
+            })?;
+            if taken.is_some() {
+                return taken;
             }
         }
     }
@@ -198,6 +216,12 @@ impl Autopilot {
 
     /// The next frame to send. Call until there is none.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<FrameBytes> {
+        let frame = self.next_frame(now)?;
+        Some(self.trust.sign(now, frame))
+    }
+
+    /// The same without a signature.
+    fn next_frame(&mut self, now: Instant) -> Option<FrameBytes> {
         if self.heartbeat_at <= now {
             self.heartbeat_at = now + HEARTBEAT;
             return Some(self.frame(Outgoing::Heartbeat));
@@ -302,7 +326,8 @@ impl Autopilot {
 
     /// The next event.
     pub fn poll_event(&mut self) -> Option<AutopilotEvent> {
-        self.events.take()
+        let mistrusted = || self.trust.take_event().map(AutopilotEvent::Mistrusted);
+        self.events.take().or_else(mistrusted)
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout) at the latest.
@@ -334,6 +359,18 @@ impl Autopilot {
     /// What came from the autopilot, whole and hurt.
     pub const fn counters(&self) -> Counters {
         self.parser.counters()
+    }
+
+    /// Has the link sign what it says, and take nothing but what is signed with that key; RADIO_STATUS apart. The autopilot's is set by a
+    /// ground station (SETUP_SIGNING).
+    #[cfg(feature = "mavlink-signing")]
+    pub const fn sign(&mut self, signing: Signing) {
+        self.trust.sign_with(signing);
+    }
+
+    /// Whole frames that were not taken, because of their signatures.
+    pub const fn refused(&self) -> u32 {
+        self.trust.refused()
     }
 }
 

@@ -11,6 +11,7 @@
 //! | [`carrot`] | the target on its way to the setpoint |
 //! | `event` | what the firmware is told |
 //! | `report` | what the operator reads |
+//! | [`trust`] | whom it believes: signatures |
 //!
 //! It never arms, takes off, lands or changes the mode. What it sends as a target is finite and near the mission's line.
 
@@ -22,6 +23,7 @@ mod report;
 pub mod state;
 mod streams;
 mod target;
+pub mod trust;
 mod vehicle;
 
 pub use event::AutopilotEvent;

@@ -17,7 +17,7 @@ pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
 /// The component that is the autopilot.
-const AUTOPILOT: u8 = 1;
+pub(super) const AUTOPILOT: u8 = 1;
 
 /// `MAV_MODE_FLAG`.
 const CUSTOM_MODE: u8 = 1;
@@ -42,7 +42,7 @@ pub enum Kind {
 
 impl Kind {
     /// By `MAV_AUTOPILOT` and `MAV_TYPE`.
-    fn of(autopilot: u8, vehicle: u8) -> Option<Self> {
+    pub(super) fn of(autopilot: u8, vehicle: u8) -> Option<Self> {
         match autopilot {
             12 => Some(Self::Px4),
             3 if COPTERS.contains(&vehicle) => Some(Self::ArduCopter),

@@ -7,6 +7,7 @@
 //! | [`parser`] | frames out of a stream of bytes |
 //! | [`incoming`] | what an autopilot says |
 //! | [`outgoing`] | what a companion says |
+//! | `signing` | with the feature `mavlink-signing`, who has the key |
 //!
 //! A number that no enum has, and a message that the table has not, cost nothing but their bytes. MAVLink 1 is not read; an autopilot
 //! that begins with it changes to MAVLink 2 as soon as it has heard a frame of that.
@@ -15,4 +16,6 @@ pub mod frame;
 pub mod incoming;
 pub mod outgoing;
 pub mod parser;
+#[cfg(feature = "mavlink-signing")]
+pub mod signing;
 pub mod table;

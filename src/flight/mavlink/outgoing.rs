@@ -2,15 +2,22 @@
 
 use heapless::Vec;
 
-use super::frame::{Address, CHECKSUM, HEADER, MAGIC, checksum};
+use super::frame::{Address, CHECKSUM, HEADER, MAGIC, SIGNATURE, checksum};
 use super::table::{self, id};
 use crate::flight::geodetic::Geodetic;
 
 /// The longest payload of what is said.
 const LONGEST: usize = 54;
 
-/// A frame to send.
-pub type FrameBytes = Vec<u8, { HEADER + LONGEST + CHECKSUM }>;
+/// Bytes of a signature, where this crate was built to sign.
+const SIGNING: usize = if cfg!(feature = "mavlink-signing") {
+    SIGNATURE
+} else {
+    0
+};
+
+/// A frame to send, with room for its signature.
+pub type FrameBytes = Vec<u8, { HEADER + LONGEST + CHECKSUM + SIGNING }>;
 
 /// Severities of [`Outgoing::StatusText`], `MAV_SEVERITY`.
 pub mod severity {
@@ -86,7 +93,7 @@ impl Outgoing<'_> {
         }
     }
 
-    /// The frame that says it, the `sequence`-th of that sender, to the autopilot `to` where the message names one. Constant work.
+    /// The frame that says it, unsigned, the `sequence`-th of that sender, to the autopilot `to` where the message names one. Constant work.
     pub fn encode(&self, from: Address, to: Address, sequence: u8) -> FrameBytes {
         let mut writer = Writer(FrameBytes::new());
         let [a, b, c, _] = self.id().to_le_bytes();

@@ -26,7 +26,7 @@ impl Node {
             }
             Message::Offer { upload, answer } => {
                 if self.is_asked(now, *answer) {
-                    self.hold(now, *upload);
+                    self.hold(now, upload);
                 }
                 self.layers.neighbours.at_mut(side).ground = true;
             }
@@ -84,15 +84,20 @@ impl Node {
         if neighbour.node() == from {
             neighbour.holds = neighbour.holds.max(Some(id));
         }
-        self.hold(now, *upload);
+        self.hold(now, upload);
         if self.layers.update.latest() >= id {
             self.owe_hello(side, from, false);
         }
     }
 
-    /// Holds `upload` from now on, if it is newer than what is held.
-    fn hold(&mut self, now: Instant, upload: Upload) {
-        if self.layers.update.hold(&self.member, upload) {
+    /// Holds `upload` from now on, if it is newer than what is held. One that is not for the sites of this relay is counted, and told once.
+    fn hold(&mut self, now: Instant, upload: &Upload) {
+        if let Some(is_new) = self.layers.update.refuses(&self.member, upload) {
+            bump(&mut self.telemetry.stats.mission);
+            if is_new {
+                self.raise(Event::UploadRefused);
+            }
+        } else if self.layers.update.hold(&self.member, *upload) {
             self.held(now);
         }
     }

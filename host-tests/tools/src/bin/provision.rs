@@ -67,6 +67,10 @@ struct Options {
     /// The drone's greatest speed, m/s, 0.1 to 20, where the scenario has sites; without it 5
     #[arg(long, value_name = "M/S", value_parser = speed)]
     speed: Option<f32>,
+    /// File with the key that the drone's autopilot signs with, 64 hexadecimal digits, where the scenario has sites; without one what is
+    /// said between the two is not signed
+    #[arg(long, value_name = "FILE")]
+    autopilot_key_file: Option<PathBuf>,
     /// File to write the block to
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -145,10 +149,18 @@ fn run(options: &Options) -> Result<String, String> {
         Some(speed) => flight.no_faster_than(speed),
         None => flight,
     };
+    let autopilot_key = match &options.autopilot_key_file {
+        Some(_) if !flight.has_sites() => {
+            return Err("--autopilot-key-file: is for a scenario with a [site]".to_owned());
+        }
+        Some(file) => Some(key::load("--autopilot-key-file", file)?),
+        None => None,
+    };
     let secret = secret(options)?;
     let block = flight
         .by(method)
         .signed(secret)
+        .signed_to_autopilots(autopilot_key)
         .measuring(measure(options, &scenario)?)
         .block(index)
         .map_err(|error| format!("{name}: {error}"))?;
@@ -189,7 +201,7 @@ fn secret(options: &Options) -> Result<Option<Secret>, String> {
     };
     let epoch = options.epoch.or_else(seconds);
     Ok(Some(Secret {
-        key: key::load(file)?,
+        key: key::load("--key-file", file)?,
         epoch: epoch.ok_or("--epoch: is needed where the clock says no time")?,
     }))
 }

@@ -5,8 +5,8 @@ use std::fmt;
 use uav_relay::{Identity, Interference, Measure, Method, Mission, Profile};
 
 use super::config::{
-    Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, Secret, Sites, read, secret,
-    write,
+    Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, Secret, Sites, autopilot_key,
+    read, secret, write,
 };
 use super::course::{CourseError, course};
 use uav_relay_sim::mission::{self, Refusal};
@@ -55,6 +55,9 @@ impl fmt::Display for BlockError {
             Self::Config(ConfigError::Speed) => {
                 f.write_str("the greatest speed must be within 0.1 to 20, of a drone with sites")
             }
+            Self::Config(ConfigError::AutopilotKey) => {
+                f.write_str("an autopilot's key is for a drone with sites")
+            }
             Self::Course(CourseError::Axis(error)) => error.fmt(f),
             Self::Course(CourseError::Distance(along)) => {
                 write!(
@@ -82,6 +85,7 @@ pub struct Flight {
     measure: Option<Measure>,
     secret: Option<Secret>,
     sites: Option<Sites>,
+    autopilot_key: Option<[u8; 32]>,
     network: u16,
 }
 
@@ -115,6 +119,7 @@ impl Flight {
                 ends: ends.map(|at| [at.lat_e7, at.lon_e7, at.amsl_mm]),
                 speed_m_s: 0.0,
             }),
+            autopilot_key: None,
             network,
         })
     }
@@ -140,6 +145,14 @@ impl Flight {
             sites.speed_m_s = speed_m_s;
         }
         self
+    }
+
+    /// The same, with autopilots that sign with that key.
+    pub fn signed_to_autopilots(self, autopilot_key: Option<[u8; 32]>) -> Self {
+        Self {
+            autopilot_key,
+            ..self
+        }
     }
 
     /// Whether the drones have sites, by which they tell an autopilot where to fly.
@@ -185,13 +198,14 @@ impl Flight {
             measure: self.measure,
             sites: self.sites,
         };
-        let block = write(&config, &self.numbers, self.secret);
+        let block = write(&config, &self.numbers, self.secret, self.autopilot_key);
         let read = read(&block, Box::leak(Box::new(EMPTY))).map_err(BlockError::Config)?;
         if let Some(sites) = &read.sites {
             course(sites, &read.mission).map_err(BlockError::Course)?;
         }
         let secret = secret(&block).map_err(BlockError::Config)?;
-        if (read, secret) == (config, self.secret) {
+        let same = (read, secret) == (config, self.secret);
+        if same && autopilot_key(&block) == self.autopilot_key {
             Ok(block)
         } else {
             Err(BlockError::Changed)

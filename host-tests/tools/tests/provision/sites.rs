@@ -4,7 +4,7 @@ use uav_relay::flight::axis::AxisError;
 use uav_relay::flight::geodetic::Geodetic;
 use uav_relay_sim::scenario::Scenario;
 use uav_relay_tools::provision::block::{BlockError, Flight};
-use uav_relay_tools::provision::config::{Block, ConfigError, Sites};
+use uav_relay_tools::provision::config::{Block, ConfigError, Sites, autopilot_key};
 use uav_relay_tools::provision::course::{CourseError, course};
 
 use super::{changed, of_paper, provision, reads, refusal};
@@ -150,4 +150,40 @@ fn the_command_has_them_from_the_scenario() {
         let text = refusal(&[&plain[..], arguments].concat());
         assert!(text.contains(words), "{text}");
     }
+}
+
+const KEY: [u8; 32] = [0x4B; 32];
+
+#[test]
+fn the_key_of_an_autopilot_stands_behind_the_sites_and_is_none_without_them() {
+    let block = flight().signed_to_autopilots(Some(KEY)).block(3).unwrap();
+    assert_eq!(block[316..348], KEY);
+    assert_eq!(autopilot_key(&block), Some(KEY));
+    let without = flight().block(3).unwrap();
+    assert_eq!(autopilot_key(&without), None);
+    assert_eq!(changed(without, 316, &KEY), block, "nothing else changes");
+    let plain = changed(super::paper(), 316, &KEY);
+    assert_eq!(reads(&plain), Err(ConfigError::AutopilotKey));
+}
+
+#[test]
+fn provision_has_the_key_of_the_autopilot_from_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (out, file, sites) = (path("block.bin"), path("key"), path("sites.toml"));
+    std::fs::write(&sites, TOML.replace("-47", "47")).unwrap();
+    std::fs::write(&file, "4b".repeat(32)).unwrap();
+    let plain = ["--uavs", "5", "--index", "3", "--out", &out];
+    let keyed = [&plain[..], &["--autopilot-key-file", &file]].concat();
+    let text = refusal(&keyed);
+    assert!(text.contains("--autopilot-key-file"), "{text}");
+    assert!(text.contains("[site]"), "{text}");
+    let sited = [&keyed[..], &["--scenario", &sites]].concat();
+    assert!(provision(&sited).status.success());
+    let block: Block = std::fs::read(&out).unwrap().try_into().unwrap();
+    assert_eq!(autopilot_key(&block), Some(KEY));
+    std::fs::write(&file, "4b".repeat(31)).unwrap();
+    let text = refusal(&sited);
+    assert!(text.contains("--autopilot-key-file"), "{text}");
+    assert!(!text.contains("4b4b"), "{text}");
 }

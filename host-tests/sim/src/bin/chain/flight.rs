@@ -71,6 +71,7 @@ impl Flight {
         let mut guard = GuardConfig::of(&setup.mission, config.common);
         guard.hover_m = HOVER_M;
         setup.settings.guard = Some(guard);
+        setup.settings.sited = true;
         setup.fleet = Some(FleetSpec {
             axis,
             start_x_m: (0..config.relays)

@@ -13,10 +13,11 @@ pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 pub(crate) const OLDEST: &str = env!("CARGO_PKG_RUST_VERSION");
 
 /// Sets of features that the library is tested with and a chain flies with, beside the full one of all other tests.
-const SETS: [&str; 6] = [
+const SETS: [&str; 7] = [
     "",
     "guard",
     "guard,flight",
+    "mavlink-signing",
     "altitude,adjust",
     "field,guard,auth",
     "guard,upload",

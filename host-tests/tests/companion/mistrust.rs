@@ -1,0 +1,53 @@
+//! An autopilot and a relay of which one signs and the other does not, or with another key: that fails, and not in silence.
+
+use rustix::process::Signal;
+
+use crate::flying::Flight;
+use crate::process::Ended;
+
+/// As a ground station writes it, and with white space around it.
+const ONE: &str = "1111111122222222333333334444444455555555666666667777777788888888";
+const OTHER: &str = " 1111111122222222333333334444444455555555666666667777777788888889\n";
+
+/// What the relay says, and whether the drone believes anything.
+fn tells(drone: Option<&str>, relay: Option<&str>, line: &str) -> (Ended, bool) {
+    let mut flight = Flight::started("arducopter", 380.0, [drone, relay]);
+    flight.relay.line(line);
+    let believed = !flight.drone.so_far().is_empty();
+    flight.relay.signal(Signal::TERM);
+    let ended = flight.relay.end();
+    assert_eq!(ended.status, Some(0));
+    assert!(!format!("{ended:?}").contains("5555"), "{ended:?}");
+    (ended, believed)
+}
+
+fn has(ended: &Ended, part: &str) -> bool {
+    ended.stdout.iter().any(|line| line.contains(part))
+}
+
+#[test]
+fn an_autopilot_that_signs_to_a_relay_without_a_key_is_told_of() {
+    let line =
+        "autopilot: signs its frames, and ignores what is not signed: give --autopilot-key-file";
+    let (ended, believed) = tells(Some(ONE), None, line);
+    assert!(!believed);
+    assert!(has(&ended, "autopilot: found"), "{ended:?}");
+}
+
+#[test]
+fn an_autopilot_that_does_not_sign_is_told_of_and_not_heard() {
+    let line = "autopilot: does not sign, and is not heard";
+    let (ended, _) = tells(None, Some(ONE), line);
+    assert!(has(&ended, "frames refused by their signatures"));
+    assert!(!has(&ended, "autopilot: found"), "{ended:?}");
+}
+
+#[test]
+fn two_keys_are_told_of_and_neither_hears_the_other() {
+    let line =
+        "autopilot: signs with another key than that of --autopilot-key-file, and is not heard";
+    let (ended, believed) = tells(Some(ONE), Some(OTHER), line);
+    assert!(!believed);
+    assert!(has(&ended, "frames refused by their signatures"));
+    assert!(!has(&ended, "autopilot: found"), "{ended:?}");
+}

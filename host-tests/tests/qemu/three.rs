@@ -1,0 +1,149 @@
+//! Three images at once, each with an autopilot of its own: MAVSDK, and two that are written here. In real time, which MAVSDK lives in.
+
+use std::time::Instant;
+
+use host_tests::firmware::emulator::Life;
+use mavlink::dialects::common::MavLandedState;
+use uav_relay::Placement;
+use uav_relay::flight::autopilot::Kind;
+use uav_relay_tools::provision::block::Flight;
+
+use crate::chain::simulated;
+use crate::fleet::{Fleet, PATIENCE};
+use crate::flight::{axis, scenario};
+use crate::mavsdk::Mavsdk;
+use crate::vehicle::{Vehicle, apart};
+
+/// Drones 1, 2 and 3; the autopilot of the first is MAVSDK.
+struct Three {
+    fleet: Fleet,
+    mavsdk: Mavsdk,
+    others: [Vehicle; 2],
+}
+
+impl Three {
+    /// All live until `done`.
+    fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
+        let end = Instant::now() + PATIENCE;
+        while !done(self) {
+            if Instant::now() > end {
+                println!(
+                    "{:#?}",
+                    self.mavsdk.heard.iter().rev().take(5).collect::<Vec<_>>()
+                );
+                println!(
+                    "{:?}",
+                    self.others.each_ref().map(|it| (it.place, it.told.last()))
+                );
+                self.fleet.give_up(what);
+            }
+            self.fleet.listen();
+            self.mavsdk.listen();
+            self.others.iter_mut().for_each(Vehicle::step);
+        }
+    }
+
+    fn has_logged(&self, drone: u16, text: &str) -> bool {
+        self.fleet.of_drone(drone).any(|line| line.text == text)
+    }
+
+    /// Where the first was told to be, which is where it then is, and where the others are.
+    fn places(&self) -> Option<[Placement; 3]> {
+        let first = axis().place(self.mavsdk.target()?)?;
+        let [second, third] = self.others.each_ref().map(|vehicle| vehicle.place);
+        Some([first, second, third])
+    }
+}
+
+#[test]
+fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
+    let flight = Flight::new(&scenario(), 3, 1e-4, 7).unwrap();
+    let to = simulated(&flight).into_iter().map(|place| {
+        let [x_m, y_m, altitude_m] = place.map(f32::from_bits);
+        Placement {
+            x_m,
+            y_m,
+            altitude_m,
+        }
+    });
+    let to: Vec<Placement> = to.collect();
+    // All of them before their places, so that each has to make room for the one behind.
+    let from = |index: usize| Placement {
+        x_m: to[index].x_m - 25.0,
+        altitude_m: to[index].altitude_m - 0.5,
+        ..to[index]
+    };
+    let mut fleet = Fleet::in_real_time(&flight);
+    let mut sockets = fleet.autopilots.drain(..);
+    let mavsdk = Mavsdk::start(sockets.next().unwrap(), axis().point(from(0)).unwrap());
+    let others = [1, 2].map(|index| {
+        let socket = sockets.next().unwrap();
+        Vehicle::new(Kind::ArduCopter, socket, axis(), from(index), Life::Real)
+    });
+    drop(sockets);
+    let mut three = Three {
+        fleet,
+        mavsdk,
+        others,
+    };
+
+    // Each is found, asked for what it says, and told nothing on the ground.
+    three.until("heartbeat of the first", |three| {
+        three.mavsdk.has_heard("HEARTBEAT")
+    });
+    three.mavsdk.order("px4");
+    three.until("autopilots found", |three| {
+        three.has_logged(1, "autopilot: found, Px4")
+            && [2, 3]
+                .iter()
+                .all(|drone| three.has_logged(*drone, "autopilot: found, ArduCopter"))
+    });
+    three.until("requests for messages", |three| {
+        [33, 245].iter().all(|id| three.mavsdk.is_asked_for(*id))
+            && three.others.iter().all(|vehicle| vehicle.asked.len() == 3)
+    });
+    assert_eq!(three.mavsdk.target(), None);
+
+    // Their pilots take off.
+    three.mavsdk.order("arm");
+    three.mavsdk.order("air");
+    for vehicle in &mut three.others {
+        vehicle.armed = true;
+        vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+    }
+    three.until("flight by the pilots", |three| {
+        (1..=3).all(|drone| three.has_logged(drone, "autopilot: in the air, flown by its pilot"))
+            && three.mavsdk.target().is_some()
+    });
+    assert!(three.others.iter().all(|vehicle| vehicle.told.is_empty()));
+
+    // And hand over.
+    three.mavsdk.order("mode offboard");
+    for vehicle in &mut three.others {
+        vehicle.granted = true;
+    }
+    three.until("flight to the agreed places", |three| {
+        let places = three.places();
+        places.is_some_and(|places| places.iter().zip(&to).all(|(at, to)| apart(*at, *to) < 1.0))
+    });
+    assert!(three.mavsdk.reads("relay: flies to its place"));
+    let flies = |text: &String| text == "relay: flies to its place";
+    assert!(
+        three
+            .others
+            .iter()
+            .all(|vehicle| vehicle.texts.iter().any(flies))
+    );
+
+    // One pilot takes over: that drone is released, and the others stay.
+    three.others[0].granted = false;
+    three.until("release", |three| {
+        let released = |text: &String| text == "relay: released";
+        three.others[0].texts.iter().any(released)
+    });
+    assert!(!three.mavsdk.reads("relay: released"));
+    let places = three.places().unwrap();
+    for (at, to) in [(places[0], to[0]), (places[2], to[2])] {
+        assert!(apart(at, to) < 1.0, "{at:?}, {to:?}");
+    }
+}
