@@ -101,8 +101,7 @@ pub struct Settings {
     /// The longest that a sweep (100 bytes) takes from one relay's `poll_transmit` to the next one's, its computing included;
     /// above 0. For messages that take longer it is multiplied.
     pub hop_time: Duration,
-    /// After this long without an answer from a neighbour the relay asks whether it is there, sixteen times
-    /// until `dead_after` where the chain is short, three times at the least; above 0.
+    /// After this long without an answer from a neighbour the relay asks whether it is there, sixteen times until `dead_after`; above 0.
     pub probe_after: Duration,
     /// After this long without one it counts as lost, and for this long at least a relay holds what was agreed on; above `probe_after`.
     pub dead_after: Duration,

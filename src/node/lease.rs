@@ -124,6 +124,11 @@ impl Lease {
         }
     }
 
+    /// Whether nothing has been agreed on in this view, as far as is known here.
+    pub(crate) const fn is_open(&self) -> bool {
+        matches!(self.state, LeaseState::Open)
+    }
+
     pub(crate) fn tenure(&self, now: Instant, settings: &Settings) -> Tenure {
         let long = settings.dead_after.times(2);
         let held = self.held.filter(|(_, until)| now.since(*until) <= long);

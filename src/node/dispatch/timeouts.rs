@@ -2,7 +2,9 @@
 
 use super::state::Node;
 use crate::event::About;
+use crate::node::neighbour::liveness::patient_tick;
 use crate::node::timing::first_pass;
+use crate::settings::Wiring;
 use crate::side::Side;
 use crate::time::Instant;
 
@@ -77,7 +79,10 @@ impl Node {
         }
         let node = neighbour.node();
         let ended = neighbour.has_no_peer();
-        let lost = neighbour.handle_timeout(now, settings, layers.lease.span(settings), searches);
+        let dead = layers.lease.span(settings);
+        let many = settings.wiring == Wiring::Shared && layers.lease.is_open();
+        let asking = many.then(|| patient_tick(settings, self.member.all));
+        let lost = neighbour.handle_timeout(now, settings, dead, searches, asking);
         let ends = neighbour.has_no_peer() && !ended;
         self.steering
             .link(side, Some(neighbour.node()).filter(|node| *node != 0));

@@ -25,16 +25,25 @@ const QUESTIONS: u16 = 16;
 /// How many times as many as lately.
 const MARGIN: u16 = 3;
 
-/// How long after one question the next one is asked, while an answer is urgent: as often as all of a chain of `all` relays can do on one
-/// channel, but three times or more from `probe_after` to `dead_after`. So a long chain takes longer to give up a relay, and what all of
-/// them ask while it forms is no more than the channel carries.
+/// How long after one question the next one is asked, while an answer is urgent: sixteen times or more within `dead_after`, as often as all
+/// of a chain of `all` relays can do on one channel.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
+    paced(settings, all, u64::from(QUESTIONS))
+}
+
+/// The same where many ask for long, as they share a channel and nothing has been agreed on yet: three times or more.
+pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
+    paced(settings, all, 3)
+}
+
+/// As long as a pass through the chain and back, but `least` times or more from `probe_after` to `dead_after`.
+fn paced(settings: &Settings, all: u16, least: u64) -> Duration {
     let span = settings
         .dead_after
         .as_micros()
         .saturating_sub(settings.probe_after.as_micros());
     let round = settings.hop_time.times(2 * u32::from(all));
-    let most = (span / 3).max(1);
+    let most = (span / least).max(1);
     Duration::from_micros(
         round
             .as_micros()

@@ -235,15 +235,17 @@ impl Neighbour {
     }
 
     /// Nothing has come for a while; whether the neighbour counts as lost since this moment, as it does after `dead`. `searches` tells
-    /// whether others could be heard here.
+    /// whether others could be heard here. It is asked again after the
+    /// time of `asking`, where that is another than usual.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
         settings: &Settings,
         dead: Duration,
         searches: bool,
+        asking: Option<Duration>,
     ) -> bool {
-        let step = self.jitter.spread(self.tick);
+        let step = self.jitter.spread(asking.unwrap_or(self.tick));
         let span = settings
             .dead_after
             .as_micros()
