@@ -59,10 +59,23 @@ struct Current {
     done: Option<Instant>,
 }
 
+/// How long a relay has held a lease.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Tenure {
+    /// It holds none.
+    None,
+    /// It holds one, and has not for long.
+    Recent,
+    /// For twice `dead_after`, with no gap as long as that.
+    Settled,
+}
+
 /// The lease of one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Lease {
     state: LeaseState,
+    /// Since when it has held one, with no long gap, and until when.
+    held: Option<(Instant, Instant)>,
     current: Option<Current>,
     /// Until when others may count on this relay.
     relied_on: Instant,
@@ -86,6 +99,7 @@ impl Lease {
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
             state: LeaseState::Open,
+            held: None,
             current: None,
             relied_on: now + settings.dead_after,
             rest: (ViewId::LOADED, now),
@@ -108,6 +122,21 @@ impl Lease {
             LeaseState::Until(at) => Some(at),
             LeaseState::Open | LeaseState::Lapsed => None,
         }
+    }
+
+    pub(crate) fn tenure(&self, now: Instant, settings: &Settings) -> Tenure {
+        let long = settings.dead_after.times(2);
+        let held = self.held.filter(|(_, until)| now.since(*until) <= long);
+        match held {
+            Some((since, _)) if now.since(since) >= long => Tenure::Settled,
+            _ if self.until().is_some_and(|until| until > now) => Tenure::Recent,
+            _ => Tenure::None,
+        }
+    }
+
+    /// It gives way to another relay of its number.
+    pub(crate) const fn give_way(&mut self) {
+        self.held = None;
     }
 
     /// How long a silence has to be until it says something.
@@ -188,7 +217,7 @@ impl Lease {
                     return Effects::REPEATED;
                 }
                 1 if current.done.is_some() => {
-                    self.grant(context.now, current, pulse.lease);
+                    self.grant(context, current, pulse.lease);
                     effects.heard_back = current.done;
                 }
                 // The leader has begun anew, or this relay was not asked for long.
@@ -203,7 +232,8 @@ impl Lease {
     /// All took part in `pulse`; so long ago, perhaps, that the lease has run out since. `next` is the span of the one after.
     ///
     /// Where that is more than twice as long, the first ones were too short: the lease would run out before it could be renewed.
-    fn grant(&mut self, now: Instant, pulse: Current, next: u16) {
+    fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
+        let now = context.now;
         if self.state == LeaseState::Open && next / 2 > pulse.span {
             return;
         }
@@ -211,6 +241,9 @@ impl Lease {
         if until > now {
             let until = self.until().map_or(until, |at| at.max(until));
             self.state = LeaseState::Until(until);
+            let gap = context.settings().dead_after.times(2);
+            let held = self.held.filter(|(_, until)| now.since(*until) <= gap);
+            self.held = Some((held.map_or(now, |(since, _)| since), until));
         }
     }
 
@@ -253,7 +286,7 @@ impl Lease {
         let lately = self.slowest.as_micros().saturating_sub(part);
         self.slowest = took.max(Duration::from_micros(lately));
         let next = self.given(context.settings());
-        self.grant(context.now, current, next);
+        self.grant(context, current, next);
         let soon = context.now + PAUSE;
         let paced = current.handed_on + period;
         self.next_at = Some(if first { soon } else { paced.max(soon) });

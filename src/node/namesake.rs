@@ -1,19 +1,23 @@
 //! Another node that uses this relay's own number, and which of the two stands down.
 //!
-//! The other one *takes part* if it says a hello that is not fresh, a pass, what comes back of one, or anything of a view. Then
+//! The other one *takes part* if it says a hello that is not fresh, a pass, what comes back of one, or anything of a view. A relay is
+//! *settled* if it has held a lease for twice `dead_after`, with no gap as long as that. Then
 //!
 //! | this relay | what happens | what it does |
 //! | --- | --- | --- |
 //! | any | a frame under its own number, the first for twice `dead_after` | `Event::IndexTaken` |
-//! | holds a valid lease | the other one takes part | goes on |
-//! | is fresh, or holds no valid lease | the other one takes part, or did within twice `dead_after` | stands down |
+//! | holds a lease, or is settled | a frame under its own number | defends it: says a hello to its own number, at most one in a quarter of a second; nothing where frames are signed |
+//! | is settled | the other one takes part | goes on |
+//! | is not settled | the other one takes part, or did within twice `dead_after` | stands down |
 //! | stands down | every `probe_after` | says a hello to its own number, so that the other one knows; nothing where frames are signed |
 //! | stands down | the other one takes part | goes on standing down |
 //! | stands down | the other one was not heard to for twice `dead_after`, and up to an eighth more by chance | takes part again |
 //! | stands down | its firmware says that the other one is gone | takes part again |
 //!
 //! A relay that stands down says nothing else, takes nothing in and has no set-point. So of two relays with one number the one that was
-//! switched on later is silent; if they were at the same time, both may be, until chance has one come back first.
+//! switched on later is silent: before it has a place it has said many frames, and each is answered by one that has it stand down, as with
+//! the defence of an address in RFC 5227. Where all of those got lost, it stands down when it hears the first. If both were switched on
+//! within twice `dead_after`, both may be silent, until chance has one come back first.
 //!
 //! *Where frames are signed* most of what goes to others cannot be checked: the tag of a message is over nonces that only its two ends
 //! know. What can be is a handshake, since its nonces stand in it. One with the right tag and a larger epoch than this relay's counts as
@@ -23,9 +27,10 @@
 //!
 //! A radio must not hand a relay its own frames: it could not tell them from another's, and would stand down.
 
+use super::lease::Tenure;
 use crate::jitter::Jitter;
 use crate::settings::Settings;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// What a frame under this relay's own number says of its sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -39,7 +44,16 @@ pub(crate) enum Claim {
     /// It is there, and takes part in nothing as far as it says.
     There,
     TakesPart,
+    /// Signed, with a larger epoch than this relay's: it counts as one that takes part, and no answer to it could be signed.
+    #[cfg_attr(
+        all(not(feature = "auth"), not(test)),
+        expect(dead_code, reason = "nothing is signed")
+    )]
+    Ahead,
 }
+
+/// The least time from one answer to the next.
+const DEFENCE_GAP: Duration = Duration::from_millis(250);
 
 /// What is known of another node of this relay's number.
 #[derive(Clone, Debug)]
@@ -50,7 +64,7 @@ pub(crate) struct Namesake {
     claimed: Option<Instant>,
     /// Until when this relay stands down, if it does.
     until: Option<Instant>,
-    /// When it says so next, and whether it is time to.
+    /// When it says so next, or may answer again, and whether it is time to.
     say_at: Instant,
     due: bool,
     jitter: Jitter,
@@ -88,16 +102,16 @@ impl Namesake {
         since.is_none_or(|since| since > settings.dead_after.times(2))
     }
 
-    /// A frame under this relay's own number, which `holds` a valid lease or not; whether it stands down from now on.
+    /// A frame under this relay's own number; whether it stands down from now on.
     pub(crate) fn hear(
         &mut self,
         now: Instant,
         claim: Claim,
-        holds: bool,
+        tenure: Tenure,
         settings: &Settings,
     ) -> bool {
         let counts = match claim {
-            Claim::TakesPart => true,
+            Claim::TakesPart | Claim::Ahead => true,
             Claim::Unproven => self.is_claimed(now, settings),
             Claim::There => false,
         };
@@ -107,7 +121,13 @@ impl Namesake {
         if counts && self.stands_down() {
             self.wait(now, settings);
         }
-        self.review(now, holds, settings)
+        let begins = self.review(now, tenure, settings);
+        let heard = matches!(claim, Claim::There | Claim::TakesPart);
+        if heard && tenure != Tenure::None && !self.stands_down() && self.say_at <= now {
+            self.say_at = now + DEFENCE_GAP;
+            self.due = true;
+        }
+        begins
     }
 
     fn is_claimed(&self, now: Instant, settings: &Settings) -> bool {
@@ -120,9 +140,10 @@ impl Namesake {
         self.until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Whether it stands down from now on: the other one takes part, and this one `holds` no valid lease.
-    pub(crate) fn review(&mut self, now: Instant, holds: bool, settings: &Settings) -> bool {
-        let begins = !holds && !self.stands_down() && self.is_claimed(now, settings);
+    /// Whether it stands down from now on: the other one takes part, and this one is not settled.
+    pub(crate) fn review(&mut self, now: Instant, tenure: Tenure, settings: &Settings) -> bool {
+        let begins =
+            tenure != Tenure::Settled && !self.stands_down() && self.is_claimed(now, settings);
         if begins {
             self.wait(now, settings);
             self.say_at = now + settings.probe_after;
@@ -163,7 +184,7 @@ impl Namesake {
 
 #[cfg(test)]
 mod tests {
-    use super::{Claim, Namesake, Settings, Twice};
+    use super::{Claim, Namesake, Settings, Tenure, Twice};
     use crate::time::Instant;
 
     fn at(seconds: u64) -> Instant {
@@ -172,47 +193,82 @@ mod tests {
 
     /// The state table, row by row.
     #[test]
-    fn who_has_no_lease_stands_down_before_who_takes_part() {
+    fn who_is_not_settled_stands_down_before_who_takes_part() {
         let settings = Settings::default();
-        for holds in [true, false] {
-            for claim in [Claim::Unproven, Claim::There, Claim::TakesPart] {
+        for tenure in [Tenure::None, Tenure::Recent, Tenure::Settled] {
+            for claim in [
+                Claim::Unproven,
+                Claim::There,
+                Claim::TakesPart,
+                Claim::Ahead,
+            ] {
                 let mut namesake = Namesake::new(1);
-                let down = namesake.hear(at(0), claim, holds, &settings);
+                let down = namesake.hear(at(0), claim, tenure, &settings);
+                let counts = matches!(claim, Claim::TakesPart | Claim::Ahead);
                 assert_eq!(
                     down,
-                    claim == Claim::TakesPart && !holds,
-                    "{claim:?} {holds}"
+                    counts && tenure != Tenure::Settled,
+                    "{claim:?} {tenure:?}"
                 );
                 assert_eq!(namesake.stands_down(), down);
+                let answerable = matches!(claim, Claim::There | Claim::TakesPart);
+                let defends = answerable && tenure != Tenure::None && !down;
+                assert_eq!(
+                    namesake.take_hello(),
+                    defends || down,
+                    "{claim:?} {tenure:?}"
+                );
             }
         }
+    }
+
+    #[test]
+    fn a_number_is_defended_four_times_a_second_at_most() {
+        let settings = Settings::default();
+        let mut namesake = Namesake::new(1);
+        let mut said = 0;
+        for tenth in 0..100 {
+            let now = Instant::from_millis(100 * tenth);
+            namesake.hear(now, Claim::There, Tenure::Settled, &settings);
+            said += u32::from(namesake.take_hello());
+        }
+        assert_eq!(said, 34, "one in three of those heard every 0.1 s");
     }
 
     #[test]
     fn it_takes_part_again_once_the_other_was_silent_for_twice_dead_after_or_is_gone() {
         let settings = Settings::default();
         let mut namesake = Namesake::new(1);
-        assert!(namesake.hear(at(0), Claim::TakesPart, false, &settings));
-        let again = namesake.hear(at(20), Claim::TakesPart, false, &settings);
-        assert!(!again, "it does already");
+        let hear = |namesake: &mut Namesake, seconds, claim| {
+            namesake.hear(at(seconds), claim, Tenure::None, &settings)
+        };
+        assert!(hear(&mut namesake, 0, Claim::TakesPart));
+        assert!(
+            !hear(&mut namesake, 20, Claim::TakesPart),
+            "it does already"
+        );
         // A relay that stands down as well keeps nobody down.
-        namesake.hear(at(40), Claim::There, false, &settings);
+        hear(&mut namesake, 40, Claim::There);
         assert!(!namesake.handle_timeout(at(49), &settings) && namesake.take_hello());
         assert!(namesake.handle_timeout(at(55), &settings) && !namesake.stands_down());
-        assert!(namesake.hear(at(70), Claim::TakesPart, false, &settings));
+        assert!(hear(&mut namesake, 70, Claim::TakesPart));
         assert!(namesake.clear() && !namesake.stands_down() && !namesake.clear());
     }
 
     #[test]
-    fn who_loses_its_lease_while_the_other_takes_part_stands_down_then() {
+    fn who_is_settled_no_more_while_the_other_takes_part_stands_down_then() {
         let settings = Settings::default();
         let mut namesake = Namesake::new(1);
-        assert!(!namesake.hear(at(0), Claim::Unproven, false, &settings));
-        assert!(!namesake.hear(at(0), Claim::TakesPart, true, &settings));
+        let hear = |namesake: &mut Namesake, seconds, claim, tenure| {
+            namesake.hear(at(seconds), claim, tenure, &settings)
+        };
+        assert!(!hear(&mut namesake, 0, Claim::Unproven, Tenure::None));
+        assert!(!hear(&mut namesake, 0, Claim::TakesPart, Tenure::Settled));
         // What cannot be checked begins nothing, but goes on with it.
-        assert!(!namesake.hear(at(25), Claim::Unproven, true, &settings));
-        assert!(!namesake.clone().review(at(56), false, &settings));
-        assert!(namesake.review(at(54), false, &settings));
+        assert!(!hear(&mut namesake, 25, Claim::Unproven, Tenure::Settled));
+        let mut late = namesake.clone();
+        assert!(!late.review(at(56), Tenure::None, &settings));
+        assert!(namesake.review(at(54), Tenure::None, &settings));
     }
 
     #[test]

@@ -11,7 +11,7 @@
 
 use super::PerTarget;
 use super::ladder::{Ladder, TARGETS};
-use super::retreat::{Heard, Retreat, Step, least};
+use super::retreat::{HopInterference, Retreat, Step, least};
 use super::spacing::{Hop, Stand, receiver_reach};
 use super::verdict::Verdict;
 use crate::mission::{Heading, Mission, Profile};
@@ -163,12 +163,12 @@ impl Link<'_> {
             let from_m = hop.reach(target, low, 1.0)?;
             return Some(Step { to_m: low, from_m });
         };
-        let heard = Heard::new(mission, behind.measured_per_w);
+        let interference = HopInterference::new(mission, behind.measured_per_w);
         if self.plain {
-            let from_m = hop.reach(target, low, heard.quiet(low))?;
+            let from_m = hop.reach(target, low, interference.quiet(low))?;
             return Some(Step { to_m: low, from_m });
         }
-        hop.longest(heard, target, low, high)
+        hop.longest(interference, target, low, high)
     }
 
     /// By how much a chain whose last relay this is overshoots for `target`, m: not negative when it closes; and where in its
@@ -190,8 +190,8 @@ impl Link<'_> {
             // Where no place is near enough, by how much the square is negative: it stays continuous in the target.
             Some(place - sqrt_in_place(squared.abs()).copysign(squared))
         };
-        let heard = Heard::new(mission, self.measured_per_w);
-        let here = value(reach, heard.quiet(reach))?;
+        let interference = HopInterference::new(mission, self.measured_per_w);
+        let here = value(reach, interference.quiet(reach))?;
         let high = if self.plain {
             reach
         } else {
@@ -203,7 +203,7 @@ impl Link<'_> {
                 from_m: here,
             }
         } else {
-            least(heard, c, [beyond, beyond], reach, high, value)?
+            least(interference, c, [beyond, beyond], reach, high, value)?
         };
         Some(((-step.from_m).max(-1e9), step.to_m))
     }

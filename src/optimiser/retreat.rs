@@ -115,14 +115,20 @@ impl Retreat {
     }
 
     /// The hop that begins nearest to Tx of all into [`low`, `high`]; `None` if there is none.
-    pub fn longest(&self, heard: Heard<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
+    pub fn longest(
+        &self,
+        interference: HopInterference<'_>,
+        target: f32,
+        low: f32,
+        high: f32,
+    ) -> Option<Step> {
         let low = low.max(self.nearest());
         let squares = [
             self.climb_squared,
             self.climb_squared + square(self.least_step),
         ];
         let value = |y, quiet| self.reach(target, y, quiet);
-        least(heard, self.gain / target, squares, low, high, value)
+        least(interference, self.gain / target, squares, low, high, value)
     }
 }
 
@@ -135,16 +141,16 @@ pub struct Step {
     pub from_m: f32,
 }
 
-/// Through what a hop is heard, place by place.
+/// The interference that a hop may meet, place by place.
 #[derive(Clone, Copy, Debug)]
-pub enum Heard<'a> {
+pub enum HopInterference<'a> {
     /// The same Upsilon everywhere, over the field's largest: what its receiver measures.
     Evenly(f32),
     /// The agreed field.
     In(&'a Field),
 }
 
-impl<'a> Heard<'a> {
+impl<'a> HopInterference<'a> {
     /// The mission's field, or what the receiver measures instead, 1/W.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.field(), measured_per_w) {
@@ -168,7 +174,7 @@ impl<'a> Heard<'a> {
 ///
 /// Work: at most three values for each point of the field in between that a hop could reach at all.
 pub(super) fn least(
-    heard: Heard<'_>,
+    interference: HopInterference<'_>,
     c: f32,
     squares: [f32; 2],
     low: f32,
@@ -187,12 +193,14 @@ pub(super) fn least(
         }
         best
     };
-    weigh(low, heard.quiet(low));
-    let Heard::In(field) = heard else { return best };
+    weigh(low, interference.quiet(low));
+    let HopInterference::In(field) = interference else {
+        return best;
+    };
     if field.is_constant() {
         return best;
     }
-    weigh(high, heard.quiet(high));
+    weigh(high, interference.quiet(high));
     let [apart, least_apart] = squares;
     let points = field.points();
     let first = points.partition_point(|point| point.x_m <= low);
@@ -212,7 +220,7 @@ pub(super) fn least(
         let best = if left.x_m > low {
             weigh(left.x_m, start)
         } else {
-            weigh(low, heard.quiet(low))
+            weigh(low, interference.quiet(low))
         };
         // To begin nearer to Tx than the best, a hop would have to be longer than any here can be.
         if let Some(best) = best
@@ -228,7 +236,7 @@ pub(super) fn least(
         for quiet in [steepest, shortest] {
             let y = left.x_m + (quiet - start) / slope;
             if y > low.max(left.x_m) && y < high.min(right.x_m) {
-                weigh(y, heard.quiet(y));
+                weigh(y, interference.quiet(y));
             }
         }
     }

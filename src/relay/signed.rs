@@ -52,7 +52,7 @@ pub(super) fn receive(
 /// What a frame under this relay's own number says of its sender.
 pub(super) fn claim(session: &Session, frame: &Opened<'_>) -> Claim {
     if session.is_ahead(frame) {
-        Claim::TakesPart
+        Claim::Ahead
     } else {
         Claim::Unproven
     }

@@ -1,6 +1,6 @@
 //! A new mission in flight, as a firmware sees it.
 
-use super::Relay;
+use super::facade::Relay;
 use crate::time::Instant;
 use crate::wire::upload::{Upload, UploadError};
 

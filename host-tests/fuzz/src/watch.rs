@@ -1,21 +1,22 @@
 //! A relay that is watched: after every input it is drained as a firmware drains it, and what its documentation promises
 //! must hold.
 
+mod frames;
 mod number;
 
 use uav_relay::guard::config::GuardConfig;
-use uav_relay::wire::deframe::Deframer;
-use uav_relay::wire::frame::{self, MAX_FRAME};
-use uav_relay::wire::message::Message;
+use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::wire::upload::Upload;
 use uav_relay::{
     Event, Identity, Instant, Method, Mission, MissionConfig, Placement, Port, Relay, Sample,
-    Settings, Side, Stats, ViewId, Wiring,
+    Settings, Side, Stats, ViewId,
 };
 
 use super::counted::{all, intact};
 use super::heap;
-use number::number_of;
+use frames::Frames;
+
+pub use frames::NETWORK;
 
 /// Frames that a relay can owe at once: a pass or what came of one, a sign that it is busy; the decision on a proposal; a pulse, and
 /// what came of it; to either side a heartbeat, four hellos, a fence, an offer and a hello to the ground; a handshake to each of
@@ -25,17 +26,11 @@ const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 8;
 /// Events that can be pending at once.
 const MOST_EVENTS: usize = 14;
 
-/// Nodes this far off are heard on a shared channel.
-const NEAR: u16 = 4;
-
 /// The shortest frame whose check sequence is worked out, on the wire: a header, no body, the check sequence.
 const LEAST_CHECKED: usize = 16;
 
 /// The shortest frame of a message, on the wire: that a relay is busy.
 const LEAST_MESSAGE: usize = 19;
-
-/// The network of every relay here.
-pub const NETWORK: u16 = 9;
 
 /// A frame that a relay has sent.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -59,15 +54,9 @@ pub struct Watched {
     view: ViewId,
     agreed: Option<Placement>,
     setpoint: Option<Placement>,
-    /// Frames it has sent.
-    sent: u32,
+    frames: Frames,
     /// Bytes that have come in since the last delimiter, by port.
     begun: [usize; 3],
-    /// Number of the last pass it has said anything of.
-    number: u16,
-    /// Number of the talk that its last fence was of.
-    association: u16,
-    asked: u16,
     /// View and number of the pass that its place is from, as far as that is known.
     held: Option<(ViewId, u16)>,
     /// What it flew when it was looked at last.
@@ -97,11 +86,8 @@ impl Watched {
             view: ViewId::LOADED,
             agreed: None,
             setpoint: None,
-            sent: 0,
+            frames: Frames::new(index, mission.relays()),
             begun: [0; 3],
-            number: 0,
-            association: 0,
-            asked: 0,
             held: None,
             flown: *mission.config(),
         })
@@ -119,17 +105,17 @@ impl Watched {
 
     /// Number of the last pass it has said anything of.
     pub const fn number(&self) -> u16 {
-        self.number
+        self.frames.number
     }
 
     /// Number of the talk that its last fence was of, 0 for none.
     pub const fn association(&self) -> u16 {
-        self.association
+        self.frames.association
     }
 
     /// The number of the last hello that it said, 0 for none.
     pub const fn asked(&self) -> u16 {
-        self.asked
+        self.frames.asked
     }
 
     /// View and number of the pass that the place it has agreed to is from; `None` where a guard leads it there, too.
@@ -207,7 +193,7 @@ impl Watched {
         while let Some(transmit) = heap::without(|| self.relay.poll_transmit(now, &mut buffer)) {
             let bytes = buffer.get(..transmit.len).unwrap_or_default().to_vec();
             let port = transmit.port;
-            self.look_at_frame(port, &bytes);
+            self.frames.look(&self.relay, &self.settings, port, &bytes);
             sent.push(Sent { port, bytes });
             assert!(
                 sent.len() <= MOST_FRAMES,
@@ -232,71 +218,6 @@ impl Watched {
         self.look_at_agreed(&events);
         self.look_at_numbers();
         (sent, events)
-    }
-
-    /// A frame must be one, from this relay, to the neighbour behind its port.
-    fn look_at_frame(&mut self, port: Port, bytes: &[u8]) {
-        let mut deframer = Deframer::new();
-        let mut frames = 0;
-        for &byte in bytes {
-            let Some(plain) = deframer.push(byte) else {
-                continue;
-            };
-            frames += 1;
-            let Ok(Ok(opened)) = plain.map(frame::open) else {
-                unreachable!("what is sent is no frame: {bytes:?}");
-            };
-            let header = opened.header;
-            let signs = self.settings.auth.is_some();
-            assert_eq!(opened.tag.is_some(), signs, "{opened:?}");
-            assert_eq!((header.network, header.sender), (NETWORK, self.node));
-            assert_eq!(header.counter, self.sent, "the counter of frames");
-            let far = match self.settings.wiring {
-                Wiring::Pair => 1,
-                Wiring::Shared => NEAR,
-            };
-            let off = self.node.abs_diff(header.destination) <= far;
-            let upstream = off && header.destination < self.node;
-            let downstream = off && header.destination > self.node;
-            // One that stands down says so to the other node of its number.
-            let own = header.destination == self.node && self.relay.stands_down();
-            let right = own
-                || match (self.settings.wiring, port) {
-                    (Wiring::Pair, Port::Upstream) => upstream,
-                    (Wiring::Pair, Port::Downstream) => downstream,
-                    (Wiring::Shared, Port::Shared) => upstream || downstream,
-                    _ => false,
-                };
-            assert!(right, "{header:?} through {port:?}");
-            let config = self.relay.mission().config();
-            // Tx and Rx are told which mission is held, where there is a key.
-            let all = if signs {
-                0..=self.all + 1
-            } else {
-                1..=self.all
-            };
-            let there = all.contains(&header.destination);
-            assert!(there, "{header:?} to nobody");
-            if opened.handshake {
-                continue;
-            }
-            let Ok(message) = Message::decode(opened.body) else {
-                unreachable!("what is sent is no message: {opened:?}");
-            };
-            if let Message::Sweep(sweep) = &message {
-                let inside = |place: &f32| (0.0..=config.distance_m).contains(place);
-                assert!(sweep.reaches.iter().all(inside), "{sweep:?}");
-            }
-            self.number = number_of(&message).unwrap_or(self.number);
-            if let Message::Hello(hello) = &message {
-                self.asked = hello.nonce;
-            }
-            if let Message::Fence { fence, .. } = &message {
-                self.association = fence.association;
-            }
-        }
-        assert_eq!(frames, 1, "{bytes:?}");
-        self.sent += 1;
     }
 
     /// A view comes after all before it, is told of and counted; the relay has a place in it, its neighbours are about it.
@@ -324,7 +245,7 @@ impl Watched {
         for (now, before) in pairs {
             assert!(now >= before, "{stats:?} after {:?}", self.stats);
         }
-        assert_eq!(stats.sent, self.sent);
+        assert_eq!(stats.sent, self.frames.sent);
         self.stats = stats;
     }
 
@@ -360,7 +281,7 @@ impl Watched {
     fn look_at_agreed(&mut self, events: &[Event]) {
         let agreed = self.relay.final_setpoint();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {
-            self.held = Some((self.view, self.number));
+            self.held = Some((self.view, self.frames.number));
         }
         assert!(agreed.is_some() || self.agreed.is_none(), "taken away");
         // A place of the mission before is held until the next agreement, and may have been agreed on just before that came.

@@ -1,4 +1,6 @@
 //! Who hears whom: a thread for each serial port that listens, and one that carries bytes through the medium.
+//!
+//! As at a serial port, what nobody reads in time is lost: a drone that falls behind hears less, not later and later.
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -7,11 +9,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::net::sockopt::set_socket_send_buffer_size;
+
 use super::medium::Medium;
 use uav_relay_sim::simulator::faults::Injected;
 
-/// How long a socket may take nothing before its bytes are dropped: nobody reads at the other end.
+/// How long a frame may take once there is room for its beginning.
 const PATIENCE: Duration = Duration::from_secs(2);
+
+/// What the kernel may use for frames that wait at a port, in bytes: some four, with what it needs for each.
+const WAITING: usize = 16_384;
 
 /// Drones connected to each other. Ends when every drone's sockets have been closed, or when it is dropped.
 #[derive(Debug)]
@@ -65,6 +73,7 @@ impl Network {
         let (stop, heard) = channel();
         for (sender, port) in ports.iter().enumerate() {
             port.set_write_timeout(Some(PATIENCE))?;
+            set_socket_send_buffer_size(port, WAITING)?;
             let (port, out) = (port.try_clone()?, stop.clone());
             std::thread::spawn(move || listen(port, sender, &out));
         }
@@ -107,6 +116,12 @@ fn listen(mut port: UnixStream, sender: usize, out: &Sender<Heard>) {
     }
 }
 
+/// Whether a frame can be written without waiting.
+fn has_room(port: &UnixStream) -> bool {
+    let mut asked = [PollFd::new(port, PollFlags::OUT)];
+    poll(&mut asked, Some(&Timespec::default())).is_ok_and(|ready| ready > 0)
+}
+
 fn carry(
     heard: &Receiver<Heard>,
     mut ports: Vec<UnixStream>,
@@ -117,7 +132,7 @@ fn carry(
     loop {
         let now = Instant::now();
         while let Some((receiver, bytes)) = medium.receive(now) {
-            if let Some(port) = ports.get_mut(receiver) {
+            if let Some(port) = ports.get_mut(receiver).filter(|port| has_room(port)) {
                 // A drone that is switched off hears nothing, and that is all.
                 _ = port.write_all(&bytes);
             }
@@ -134,6 +149,43 @@ fn carry(
             }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Read as _, Write as _};
+    use std::os::unix::net::UnixStream;
+    use std::time::{Duration, Instant};
+
+    use super::{Network, radio};
+    use crate::firmware::medium::Medium;
+    use uav_relay_sim::simulator::faults::Faults;
+    use uav_relay_sim::simulator::link::LinkSpec;
+
+    #[test]
+    fn a_port_that_nobody_reads_holds_up_no_other() {
+        let (mut drones, mut ports) = (Vec::new(), Vec::new());
+        for _ in 0..3 {
+            let (drone, port) = UnixStream::pair().unwrap();
+            drone
+                .set_read_timeout(Some(Duration::from_millis(500)))
+                .unwrap();
+            drones.push(drone);
+            ports.push(port);
+        }
+        let medium = Medium::new(3, LinkSpec::default(), Faults::default(), 1, Instant::now());
+        let _network = Network::connect(ports, radio(3, 2), medium).unwrap();
+        // More than a socket holds, and nobody reads the third.
+        let frame = [[1; 60].as_slice(), &[0]].concat();
+        for sent in 0..2_000 {
+            drones[0].write_all(&frame).unwrap();
+            let mut heard = vec![0; frame.len()];
+            drones[1]
+                .read_exact(&mut heard)
+                .unwrap_or_else(|error| panic!("after {sent} frames: {error}"));
+            assert_eq!(heard, frame);
         }
     }
 }

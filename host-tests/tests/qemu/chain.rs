@@ -114,6 +114,7 @@ fn twenty_settle_where_the_simulated_chain_does() {
     let flight = paper(20);
     let mut fleet = Fleet::of(Image::Wires, &flight, Faults::default(), 1);
     assert_eq!(fleet.places(), simulated(&flight));
+    drop(fleet);
     let mut fleet = Fleet::of(Image::Wires, &flight, BAD_DAY, 1);
     assert_eq!(fleet.places(), simulated(&flight));
 }

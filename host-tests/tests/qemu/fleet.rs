@@ -3,8 +3,8 @@
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
-use std::sync::OnceLock;
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use defmt_decoder::Table;
@@ -19,7 +19,7 @@ use uav_relay_tools::provision::block::Flight;
 use crate::log::{self, Line};
 
 /// How long anything may take before a test gives up.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
 
 /// And for each drone of the fleet, since all share this machine.
 const PATIENCE_A_DRONE: Duration = Duration::from_secs(10);
@@ -64,6 +64,9 @@ fn table(which: Image) -> &'static Table {
     TABLES[which as usize].get_or_init(|| log::table(&image(which.name())))
 }
 
+/// One fleet flies at a time: the drones' clocks keep up with the wall's, or what they say comes late.
+static AIR: Mutex<()> = Mutex::new(());
+
 /// The drones of a flight, switched on.
 pub(crate) struct Fleet {
     // Dropped in this order: without drones the threads of the network and of the logs come to their ends.
@@ -75,6 +78,7 @@ pub(crate) struct Fleet {
     new: Receiver<Line>,
     pub(crate) lines: Vec<Line>,
     _folder: tempfile::TempDir,
+    _air: MutexGuard<'static, ()>,
 }
 
 impl Fleet {
@@ -113,6 +117,7 @@ impl Fleet {
         faults: Faults,
         seed: u64,
     ) -> Self {
+        let air = AIR.lock().unwrap_or_else(PoisonError::into_inner);
         let (file, table) = (image(which.name()), table(which));
         let folder = tempfile::Builder::new().prefix("fleet").tempdir().unwrap();
         let (lines, new) = channel();
@@ -160,6 +165,7 @@ impl Fleet {
             new,
             lines: Vec::new(),
             _folder: folder,
+            _air: air,
         }
     }
 

@@ -15,7 +15,10 @@ fn five_on_one_radio_settle_where_the_simulated_chain_does() {
         // Drone 3 hears what 1, 2, 4 and 5 say to each other.
         let counters = fleet.counters(3);
         assert!(counters.counter("overheard").unwrap() > 0, "{counters:?}");
-        assert_eq!(counters.counter("misaddressed"), Some(0), "{counters:?}");
+        // On a bad day a drone may give up its neighbour and say a hello to the one beyond.
+        if faults == Faults::default() {
+            assert_eq!(counters.counter("misaddressed"), Some(0), "{counters:?}");
+        }
     }
 }
 

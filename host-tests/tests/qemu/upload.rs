@@ -158,6 +158,7 @@ fn three_fly_what_they_were_handed_before_they_were_switched_on() {
         let told = said.filter(|line| line.text == "mission version 3 was uploaded before");
         assert_eq!(told.count(), 1);
     }
+    drop(fleet);
     // With other blocks they have forgotten.
     let fresh = paper(3).signed(Some(Secret {
         key: KEY,

@@ -66,6 +66,7 @@ fn two_that_remember_a_view_without_them_do_not_fly_it() {
         lines.iter().any(|line| line.text == "event NoQuorum")
     });
     assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));
+    drop(fleet);
     // The same two without their flash.
     let mut fleet = Fleet::start(Image::Radio, &blocks, Faults::default(), 1);
     fleet.wait("places for two", |lines| {

@@ -1,4 +1,4 @@
-//! The autopilot's clock, on the relay's: when a position was true.
+//! The autopilot's clock, on the relay's: when a position was true. The relay's own, as it tells the autopilot.
 
 use crate::time::{Duration, Instant};
 
@@ -40,9 +40,18 @@ impl RemoteClock {
     }
 }
 
+/// Milliseconds, which wrap after 49 days as the autopilot's do. In two steps that the target has an instruction for: a division of 64 bits
+/// is a kilobyte of flash.
+#[expect(clippy::cast_possible_truncation, reason = "eight years are 48 bits")]
+pub(super) const fn millis(micros: u64) -> u32 {
+    let high = (micros >> 16) as u32;
+    let low = ((high % 1_000) << 16) | (micros & 0xFFFF) as u32;
+    ((high / 1_000) << 16).wrapping_add(low / 1_000)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::RemoteClock;
+    use super::{RemoteClock, millis};
     use crate::time::Instant;
 
     const fn at(ms: u64) -> Instant {
@@ -77,5 +86,15 @@ mod tests {
         assert!(clock.hear(at(100_000), 90_000).is_some());
         assert_eq!(clock.hear(at(101_000), 50), None);
         assert_eq!(clock.hear(at(101_200), 250), Some(at(101_200)));
+    }
+
+    #[test]
+    fn milliseconds_are_those_of_a_division() {
+        let mut micros = 0_u64;
+        for step in 0..40_000_u64 {
+            let wrapped = u32::try_from(micros / 1_000 % (1 << 32));
+            assert_eq!(Ok(millis(micros)), wrapped, "{micros}");
+            micros = (micros * 3 + step) % (1 << 48);
+        }
     }
 }

@@ -73,7 +73,7 @@ pub struct Position {
 
 /// What became of a message.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) enum Heard {
+pub(super) enum VehicleUpdate {
     /// Not from the autopilot, or of no use.
     Nothing,
     /// It is there, for the first time.
@@ -103,10 +103,10 @@ pub(super) struct Vehicle {
 
 impl Vehicle {
     /// Takes a message. Whoever was the first to say that it is an autopilot is the one, for good: another vehicle may be heard through it.
-    pub(super) fn hear(&mut self, now: Instant, received: &Received, axis: &Axis) -> Heard {
+    pub(super) fn hear(&mut self, now: Instant, received: &Received, axis: &Axis) -> VehicleUpdate {
         let from = received.from;
         let Some(message) = received.message else {
-            return Heard::Nothing;
+            return VehicleUpdate::Nothing;
         };
         let found = self.known.is_none();
         if found {
@@ -114,22 +114,22 @@ impl Vehicle {
                 kind, autopilot, ..
             } = message
             else {
-                return Heard::Nothing;
+                return VehicleUpdate::Nothing;
             };
             let Some(kind) = Kind::of(autopilot, kind).filter(|_| from.component == AUTOPILOT)
             else {
-                return Heard::Nothing;
+                return VehicleUpdate::Nothing;
             };
             self.known = Some((from, kind));
         }
         if self.address() != Some(from) {
-            return Heard::Nothing;
+            return VehicleUpdate::Nothing;
         }
         let heard = self.take(now, message, axis);
-        if found { Heard::Found } else { heard }
+        if found { VehicleUpdate::Found } else { heard }
     }
 
-    fn take(&mut self, now: Instant, message: Incoming, axis: &Axis) -> Heard {
+    fn take(&mut self, now: Instant, message: Incoming, axis: &Axis) -> VehicleUpdate {
         match message {
             Incoming::Heartbeat {
                 base_mode,
@@ -144,7 +144,7 @@ impl Vehicle {
                 self.armed = base_mode & ARMED != 0;
                 // Whether it is in the air is said anew after each take-off.
                 self.in_air &= self.armed;
-                Heard::News
+                VehicleUpdate::News
             }
             Incoming::ExtendedSysState { landed_state } => {
                 self.in_air = match landed_state {
@@ -152,7 +152,7 @@ impl Vehicle {
                     LANDING => self.in_air,
                     _ => false,
                 };
-                Heard::News
+                VehicleUpdate::News
             }
             Incoming::GlobalPosition {
                 boot_ms,
@@ -163,7 +163,7 @@ impl Vehicle {
             } => {
                 let Some(at) = self.clock.hear(now, boot_ms) else {
                     self.restart();
-                    return Heard::Restarted;
+                    return VehicleUpdate::Restarted;
                 };
                 let point = Geodetic {
                     lat_e7,
@@ -172,7 +172,7 @@ impl Vehicle {
                 };
                 // Before it has a fix it says 0, 0, which is near no line worth flying.
                 let Some(place) = axis.place(point) else {
-                    return Heard::Nothing;
+                    return VehicleUpdate::Nothing;
                 };
                 let position = Position {
                     at,
@@ -180,10 +180,12 @@ impl Vehicle {
                     velocity_m_s: velocity_cm_s.map(|v| f32::from(v) / 100.0),
                 };
                 self.position = Some(position);
-                Heard::Position(position)
+                VehicleUpdate::Position(position)
             }
-            Incoming::PositionTargetGlobal { lat_e7, lon_e7, .. } => Heard::Target(lat_e7, lon_e7),
-            _ => Heard::Nothing,
+            Incoming::PositionTargetGlobal { lat_e7, lon_e7, .. } => {
+                VehicleUpdate::Target(lat_e7, lon_e7)
+            }
+            _ => VehicleUpdate::Nothing,
         }
     }
 

@@ -15,35 +15,39 @@ impl Node {
             let node = self.member.node;
             self.raise_about(About::Index, Side::Upstream, node);
         }
-        let holds = self.holds(now);
+        let tenure = self.layers.lease.tenure(now, &settings);
         let placed = self.setpoint().is_some();
-        if self.namesake.hear(now, claim, holds, &settings) && placed {
+        if self.namesake.hear(now, claim, tenure, &settings) {
+            self.stood_down(placed);
+        }
+    }
+
+    fn stood_down(&mut self, placed: bool) {
+        self.layers.lease.give_way();
+        if placed {
             self.raise(Event::SetpointChanged);
         }
     }
 
-    fn holds(&self, now: Instant) -> bool {
-        self.layers.lease.until().is_some_and(|until| until > now)
-    }
-
-    /// Whether it stands down from now on, as it holds no lease any more and another node of its number takes part.
+    /// Whether it stands down from now on, as it is not settled and another node of its number takes part.
     pub(super) fn gives_way(&mut self, now: Instant) -> bool {
-        let holds = self.holds(now);
+        let settings = &self.member.settings;
+        let tenure = self.layers.lease.tenure(now, settings);
         let placed = self.setpoint().is_some();
-        let down = self.namesake.review(now, holds, &self.member.settings);
-        if down && placed {
-            self.raise(Event::SetpointChanged);
+        let down = self.namesake.review(now, tenure, settings);
+        if down {
+            self.stood_down(placed);
         }
         down
     }
 
-    /// What it says while it stands down: a hello to its own number, as one that has taken part in nothing.
+    /// What it says to its own number: while it stands down as one that has taken part in nothing, else that the number is taken.
     pub(super) fn next_to_namesake(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         if !self.namesake.take_hello() {
             return None;
         }
         let hello = Hello {
-            fresh: true,
+            fresh: self.stands_down(),
             form: false,
             ..self.hello(now, Side::Upstream, false, 0)
         };

@@ -8,8 +8,11 @@ use crate::wire::message::Message;
 impl Node {
     /// The next message to send, to which node at which side. Call until there is none.
     pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
+        if let Some(message) = self.next_to_namesake(now) {
+            return Some(message);
+        }
         if self.stands_down() {
-            return self.next_to_namesake(now);
+            return None;
         }
         if let Some(message) = self.next_of_a_round(now) {
             return Some(message);

@@ -4,7 +4,7 @@ use crate::node::context::Proposer;
 
 /// The nodes on one side by what was decided on views, 0 for none.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Agreed {
+pub(super) struct AgreedNodes {
     /// The node that was there when the view was agreed on.
     in_view: u16,
     /// The node that was there when a proposal was decided last, granted or not.
@@ -13,7 +13,7 @@ pub(super) struct Agreed {
     proposer: u16,
 }
 
-impl Agreed {
+impl AgreedNodes {
     pub(super) const fn on(node: u16) -> Self {
         Self {
             in_view: node,

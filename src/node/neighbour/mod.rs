@@ -9,12 +9,14 @@
 //! | [`hearing`] | which nodes were heard lately |
 //! | `damping` | links that come and go |
 //! | `agreed` | who was there when a view was decided on |
+//! | `decided` | what a decision on a view makes of who is there |
 //! | `hellos`, `signs` | what waits to be sent |
 //! | [`liveness`] | when a neighbour counts as lost |
 
 mod agreed;
 pub(crate) mod candidate;
 mod damping;
+mod decided;
 pub(crate) mod hearing;
 mod hellos;
 pub(crate) mod liveness;

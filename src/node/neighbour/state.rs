@@ -22,7 +22,7 @@
 //! `dead_after` without another. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be
 //! about to take it, too.
 
-use super::agreed::Agreed;
+use super::agreed::AgreedNodes;
 use super::candidate::Candidate;
 use super::damping::Damping;
 use super::hearing::{CANDIDATES, Hearing, InRow};
@@ -30,7 +30,6 @@ use super::hellos::Hellos;
 use super::liveness::{Liveness, patience, tick};
 use super::signs::Signs;
 use crate::jitter::Jitter;
-use crate::node::context::Proposer;
 use crate::node::timing::{first_pass, longest_lease};
 use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant};
@@ -55,7 +54,7 @@ enum NeighbourState {
 pub(crate) struct Neighbour {
     /// The node taken, 0 for none.
     pub(super) node: u16,
-    agreed: Agreed,
+    pub(super) agreed: AgreedNodes,
     /// A node that has come back is not counted before: the other side may be about to take it, too.
     grace: Instant,
     state: NeighbourState,
@@ -102,7 +101,7 @@ impl Neighbour {
     /// Before it has begun. All of it is zeros: nothing else could be made without a copy in flash.
     pub(super) const NONE: Self = Self {
         node: 0,
-        agreed: Agreed::on(0),
+        agreed: AgreedNodes::on(0),
         grace: Instant::ZERO,
         state: NeighbourState::NoPeer,
         liveness: Liveness::NONE,
@@ -153,7 +152,7 @@ impl Neighbour {
             return;
         }
         self.node = node;
-        self.agreed = Agreed::on(node);
+        self.agreed = AgreedNodes::on(node);
         self.state = NeighbourState::Linked;
         // Where others may have closed up since, it makes itself known soon.
         let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
@@ -175,43 +174,9 @@ impl Neighbour {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Whether it is certain who is there, and somebody else than when a proposal was decided last.
-    pub(crate) fn has_changed(&self, now: Instant) -> bool {
-        match self.state {
-            NeighbourState::Linked => self.node != self.agreed.counted() && now >= self.grace,
-            NeighbourState::NoPeer => self.agreed.counted() != 0,
-            NeighbourState::Pairing { .. } | NeighbourState::Searching { .. } => false,
-        }
-    }
-
-    /// Whether it is who was there when the view was agreed on.
-    pub(crate) const fn is_agreed(&self) -> bool {
-        self.node == self.agreed.node()
-    }
-
-    /// A proposal has come from whoever is there, or begins here: then nobody is to be before this relay.
-    pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
-        self.agreed.proposed_by(proposer, self.node);
-    }
-
-    /// The proposal that came from this side was granted.
-    pub(crate) const fn agree_with_proposer(&mut self) {
-        self.agreed.agree_with_proposer();
-    }
-
-    /// It was not granted: there is nothing to ask again until somebody else is there.
-    pub(crate) const fn refuse(&mut self) {
-        self.agreed.refuse(self.node);
-    }
-
     /// Whether whoever is there has come back just now.
     pub(crate) fn has_grace(&self, now: Instant) -> bool {
         now < self.grace
-    }
-
-    /// The proposal that was granted goes on to whoever is there, or ends here.
-    pub(crate) const fn agree(&mut self, ends: bool) {
-        self.agreed.agree(if ends { 0 } else { self.node });
     }
 
     /// Whether the node taken has been heard and is not lost.

@@ -12,7 +12,7 @@
 
 use super::asking::Asking;
 use super::electorate::{self, Electorate, Outcome};
-use super::proposed::{Proposed, Verdict, ViewDue};
+use super::proposed::{Conclusion, Proposed, ViewDue};
 use super::record::{RecordError, ViewRecord};
 use crate::node::context::{Context, Decided, Effects, Member, Proposer};
 use crate::node::numbering::Stragglers;
@@ -296,13 +296,13 @@ impl ViewChange {
             Outcome::Refused => None,
             Outcome::View(view) => Some(view),
         };
-        let verdict = Verdict {
+        let conclusion = Conclusion {
             there: place,
             base: poll.agreed,
             view: decided,
             lease_left,
         };
-        self.conclude(context, verdict)
+        self.conclude(context, conclusion)
     }
 
     fn on_decision(&mut self, context: &Context<'_>, decision: &Decision) -> Effects {
@@ -316,25 +316,25 @@ impl ViewChange {
                         view.id != proposed.view || view.relays > proposed.place
                     }) =>
             {
-                let verdict = Verdict {
+                let conclusion = Conclusion {
                     there: decision.there,
                     base: decision.base,
                     view: decision.view,
                     lease_left: decision.lease_left,
                 };
-                self.conclude(context, verdict)
+                self.conclude(context, conclusion)
             }
             _ => Effects::STALE,
         }
     }
 
-    fn conclude(&mut self, context: &Context<'_>, verdict: Verdict) -> Effects {
-        let Verdict {
+    fn conclude(&mut self, context: &Context<'_>, conclusion: Conclusion) -> Effects {
+        let Conclusion {
             there,
             base,
             view: decided,
             lease_left,
-        } = verdict;
+        } = conclusion;
         let Some(proposed) = &mut self.proposed else {
             return Effects::NONE;
         };

@@ -28,7 +28,7 @@ pub(crate) struct Proposed {
 
 /// What came of a proposal.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Verdict {
+pub(super) struct Conclusion {
     /// How many have taken part.
     pub(super) there: u16,
     /// The view that is followed.

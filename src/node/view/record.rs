@@ -51,9 +51,9 @@ impl core::error::Error for RecordError {}
 /// Bytes in their order, as numbers of one, two or four, the lowest byte first. Two functions that are called for every number take
 /// a third of the flash that an iterator over all of them does.
 #[derive(Debug)]
-struct Writer<'a>(core::slice::IterMut<'a, u8>);
+struct RecordWriter<'a>(core::slice::IterMut<'a, u8>);
 
-impl Writer<'_> {
+impl RecordWriter<'_> {
     #[inline(never)]
     fn put(&mut self, number: u32, length: usize) {
         for byte in number.to_le_bytes().into_iter().take(length) {
@@ -133,7 +133,7 @@ impl ViewRecord {
         let said = &self.electorate;
         let accepted = said.accepted.unwrap_or(nothing_after(said.agreed));
         let mut stored = [0; Self::LENGTH];
-        let mut to = Writer(stored.iter_mut());
+        let mut to = RecordWriter(stored.iter_mut());
         to.put(FORMAT, 1);
         to.put(u32::from(self.base), 2);
         to.put_view(said.agreed);

@@ -59,7 +59,7 @@ impl Policy {
             }
         }
         // On the edges of the box.
-        let worth = |y: f32, h: f32| gy * y + gh * h + 0.5 * (yy * y * y + hh * h * h) + yh * y * h;
+        let value = |y: f32, h: f32| gy * y + gh * h + 0.5 * (yy * y * y + hh * h * h) + yh * y * h;
         let mut best = (f32::NEG_INFINITY, 0.0, 0.0);
         for (y, h) in [
             (ly, along_h(ly)),
@@ -67,7 +67,7 @@ impl Policy {
             (along_y(lh), lh),
             (along_y(uh), uh),
         ] {
-            let w = worth(y, h);
+            let w = value(y, h);
             if w > best.0 {
                 best = (w, y, h);
             }

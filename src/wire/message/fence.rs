@@ -16,8 +16,8 @@ pub(super) fn encode(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<u
 
 /// The mission of the sender, and the fence.
 pub(super) fn decode(body: &[u8]) -> Result<(u16, Fence), MessageError> {
-    type Body = (PassId, [[u8; 2]; 2], [f32; 5], u8);
-    let (pass, [echo, number], places, flags): Body = read(body)?;
+    type FenceBody = (PassId, [[u8; 2]; 2], [f32; 5], u8);
+    let (pass, [echo, number], places, flags): FenceBody = read(body)?;
     let [x_m, target_m, y_m, altitude_m, apart_m] = places;
     let fence = Fence {
         association: pass.number(),

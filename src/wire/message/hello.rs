@@ -1,6 +1,6 @@
 //! What one node tells another about the chain as it sees it.
 
-use super::parts::{MessageError, read, write};
+use super::parts::{MessageError, Word, read, write};
 use super::tag;
 use crate::mission::MAX_RELAYS;
 use crate::view::ViewId;
@@ -39,8 +39,6 @@ pub struct Hello {
     /// A number for the offer that answers it; 0 at a node that takes none.
     pub nonce: u16,
 }
-
-type Word = [u8; 2];
 
 impl Hello {
     /// The mission; the neighbour; how many are behind; the newest view; digest and version of what it holds; the number for an offer; whom it hears; flags from bit 0: asks for

@@ -7,6 +7,9 @@ use crate::mission::Profile;
 use crate::optimiser::PerTarget;
 use crate::place::Placement;
 
+/// A number of 16 bits: always two bytes, which postcard would not make of a `u16`.
+pub(super) type Word = [u8; 2];
+
 /// Writes `body` to the start of `buffer`, and how many bytes it takes; `None` if it does not fit.
 pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
     postcard::to_slice(body, buffer)

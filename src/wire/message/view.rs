@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::parts::{MessageError, read, write};
+use super::parts::{MessageError, Word, read, write};
 use super::tag;
 use crate::mission::MAX_RELAYS;
 use crate::view::{View, ViewId};
@@ -83,8 +83,6 @@ pub struct Decision {
     /// How long its places are not to be taken, for the sake of members of the view before that are elsewhere, in tenths of a second.
     pub lease_left: u16,
 }
-
-type Word = [u8; 2];
 
 /// A mission, a proposal and a place.
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -175,7 +173,7 @@ impl Proposal {
 
     /// What is agreed on, or was decided on, was proposed before.
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (call, agreed, numbers, proposer, successor): Body = read(body)?;
+        let (call, agreed, numbers, proposer, successor): ProposalBody = read(body)?;
         let [votes, lease_left, rest] = numbers.map(u16::from_le_bytes);
         let agreed: View = SizedBody::view(agreed);
         let successor = successor.map(|(proposal, view)| Successor {
@@ -216,7 +214,7 @@ impl Proposal {
     }
 }
 
-type Body = (
+type ProposalBody = (
     CallBody,
     SizedBody,
     [Word; 3],

@@ -2,10 +2,27 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::{Duration, Instant};
+use uav_relay::{Duration, Instant, Placement};
+
+use crate::command::narrow;
 
 /// A place in the air: x, y and altitude, m.
 pub type Point = [f64; 3];
+
+/// A place as its point.
+pub(super) fn point(place: Placement) -> Point {
+    [place.x_m, place.y_m, place.altitude_m].map(f64::from)
+}
+
+/// A point as a place.
+pub(super) fn placement(at: Point) -> Placement {
+    let [x_m, y_m, altitude_m] = at.map(narrow);
+    Placement {
+        x_m,
+        y_m,
+        altitude_m,
+    }
+}
 
 /// The stream of random numbers that errors of positions are drawn from.
 const ERRORS: u64 = 2;

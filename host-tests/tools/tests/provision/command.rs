@@ -8,22 +8,13 @@ use uav_relay_sim::scenario::Scenario;
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::Block;
 
-use super::{paper, provision, reads, refusal};
+use super::{of_paper, paper, provision, reads, refusal};
 
 #[test]
 fn the_command_writes_the_block() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("relay3.bin");
-    let output = provision(&[
-        "--uavs",
-        "5",
-        "--index",
-        "3",
-        "--network",
-        "7",
-        "--out",
-        out.to_str().unwrap(),
-    ]);
+    let output = provision(&of_paper(out.to_str().unwrap()));
     assert!(output.status.success(), "{output:?}");
     assert_eq!(std::fs::read(&out).unwrap(), paper());
     let text = String::from_utf8(output.stdout).unwrap();
@@ -39,10 +30,7 @@ fn the_command_writes_what_the_relay_is_to_do() {
     let out = folder.path().join("relay.bin");
     let file = folder.path().join("field.toml");
     let written = |more: &[&str]| {
-        let mut arguments = vec!["--uavs", "5", "--index", "3", "--network", "7"];
-        arguments.extend(["--out", out.to_str().unwrap()]);
-        arguments.extend(more);
-        let output = provision(&arguments);
+        let output = provision(&[&of_paper(out.to_str().unwrap()), more].concat());
         assert!(output.status.success(), "{output:?}");
         let block: Block = std::fs::read(&out).unwrap().try_into().unwrap();
         reads(&block).unwrap()

@@ -68,6 +68,20 @@ fn changed(mut block: Block, at: usize, bytes: &[u8]) -> Block {
     block
 }
 
+/// What has the command write the block of [`paper`] to `out`.
+fn of_paper(out: &str) -> [&str; 8] {
+    [
+        "--uavs",
+        "5",
+        "--index",
+        "3",
+        "--network",
+        "7",
+        "--out",
+        out,
+    ]
+}
+
 fn provision(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_provision"))
         .args(arguments)

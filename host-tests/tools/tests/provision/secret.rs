@@ -7,7 +7,7 @@ use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Block, ConfigError, Secret, secret};
 use uav_relay_tools::provision::key;
 
-use super::{paper, provision, reads, refusal, with};
+use super::{of_paper, paper, provision, reads, refusal, with};
 
 const SECRET: Secret = Secret {
     key: *b"32 random bytes, known to nobody",
@@ -51,16 +51,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (out, file) = (path("block.bin"), path("key"));
     std::fs::write(&file, format!("\n  {}\r\n", "0aF1".repeat(16))).unwrap();
-    let plain = [
-        "--uavs",
-        "5",
-        "--index",
-        "3",
-        "--network",
-        "7",
-        "--out",
-        &out,
-    ];
+    let plain = of_paper(&out);
     let block = || <Block>::try_from(&std::fs::read(&out).unwrap()[..]).unwrap();
     let clock = || {
         let since = std::time::UNIX_EPOCH.elapsed().unwrap();

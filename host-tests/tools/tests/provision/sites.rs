@@ -7,7 +7,7 @@ use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Block, ConfigError, Sites};
 use uav_relay_tools::provision::course::{CourseError, course};
 
-use super::{changed, provision, reads, refusal};
+use super::{changed, of_paper, provision, reads, refusal};
 
 const TOML: &str = "[geometry]\naltitude_m = 20.0\n[power]\ntx_w = 80.0\nuav_w = 1.0\n\
     [[interferer]]\npower_w = 80\nx_m = 500\ny_m = 400\n\
@@ -128,8 +128,7 @@ fn the_command_has_them_from_the_scenario() {
     let (out, file, off) = (path("block.bin"), path("site.toml"), path("off.toml"));
     std::fs::write(&file, TOML.replace("-47", "47")).unwrap();
     std::fs::write(&off, TOML).unwrap();
-    let plain = ["--uavs", "5", "--index", "3", "--network", "7", "--out"];
-    let plain = [&plain[..], &[&out]].concat();
+    let plain = of_paper(&out);
     let sited = [&plain[..], &["--scenario", &file]].concat();
     let written = |more: &[&str]| {
         let output = provision(&[&sited[..], more].concat());

@@ -104,14 +104,14 @@ impl Model for Check {
 }
 
 /// A property that does not hold, and how it comes to that.
-pub(super) struct Found {
+pub(super) struct Counterexample {
     pub(super) what: &'static str,
     pub(super) how: String,
 }
 
 impl Check {
     /// Goes through everything, with the two threads of a small machine, and prints how much that was.
-    pub(super) fn search(&self) -> Option<Found> {
+    pub(super) fn search(&self) -> Option<Counterexample> {
         let began = Instant::now();
         let checker = self.clone().checker().threads(2);
         let checker = checker.finish_when(HasDiscoveries::Any).spawn_bfs().join();
@@ -142,7 +142,7 @@ impl Check {
             .collect();
         let how = steps.concat();
         println!("it does not hold that {what}:\n{how}");
-        Some(Found { what, how })
+        Some(Counterexample { what, how })
     }
 
     pub(super) fn holds(&self) {

@@ -5,11 +5,10 @@ use uav_relay::flight::autopilot::state::State;
 use uav_relay::guard::HoldReason;
 use uav_relay::{Duration, Instant, Side};
 
-use super::super::drones::{Nearest, Point, apart};
+use super::super::drones::{Nearest, Point, apart, point};
 use super::super::fleet::Vehicle;
 use super::super::outcome::Turning;
 use super::super::queue::Happening;
-use super::flight::point;
 use super::state::Chain;
 
 /// Between two steps of the flight.

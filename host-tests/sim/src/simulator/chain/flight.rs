@@ -1,11 +1,10 @@
 //! Drones that fly to their relays' setpoints, say where they are, and how near they come to each other.
 
-use uav_relay::{Instant, Placement};
+use uav_relay::Instant;
 
-use super::super::drones::{Flight, Nearest, Point, apart};
+use super::super::drones::{Flight, Nearest, apart, placement, point};
 use super::super::queue::Happening;
 use super::state::Chain;
-use crate::command::narrow;
 
 impl Chain {
     /// Has the drones take off, where there are any.
@@ -73,18 +72,5 @@ impl Chain {
                 let agreed = member.relay.final_setpoint();
                 agreed.is_some_and(|place| apart(point(place), drone.taken()) < 1e-3)
             })
-    }
-}
-
-pub(super) fn point(place: Placement) -> Point {
-    [place.x_m, place.y_m, place.altitude_m].map(f64::from)
-}
-
-fn placement(at: Point) -> Placement {
-    let [x_m, y_m, altitude_m] = at.map(narrow);
-    Placement {
-        x_m,
-        y_m,
-        altitude_m,
     }
 }

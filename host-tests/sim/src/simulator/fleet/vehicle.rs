@@ -5,13 +5,12 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::{Autopilot, Kind};
 use uav_relay::flight::mavlink::table::id;
-use uav_relay::{Duration, Instant, Placement};
+use uav_relay::{Duration, Instant};
 
 use super::frames::{Heard, Says, heard};
 use super::pilot::{Mode, Pilot};
 use super::spec::FleetSpec;
-use crate::command::narrow;
-use crate::simulator::drones::{Body, Point, sum};
+use crate::simulator::drones::{Body, Point, placement, point, sum};
 
 /// Streams of random numbers begin here: one for each drone.
 const DRONES: u64 = 1_000;
@@ -324,19 +323,10 @@ impl Vehicle {
                 if self.mode == Mode::Companion
                     && let Some(place) = self.spec.axis.place(at)
                 {
-                    self.goal = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
+                    self.goal = point(place);
                 }
             }
             None => {}
         }
-    }
-}
-
-fn placement(at: Point) -> Placement {
-    let [x_m, y_m, altitude_m] = at.map(narrow);
-    Placement {
-        x_m,
-        y_m,
-        altitude_m,
     }
 }

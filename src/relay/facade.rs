@@ -1,33 +1,23 @@
-//! The facade a firmware uses: bytes in, bytes and setpoints out, and no input or output of its own.
+//! Bytes, time, measurements and what the firmware knows in; frames and events out.
 
-mod incoming;
-mod port;
+use super::incoming::{self, Addressed};
+use super::port::{Port, Transmit};
 #[cfg(feature = "auth")]
-pub(crate) mod signed;
-#[cfg(feature = "upload")]
-mod uploads;
-
+use super::signed;
 use crate::event::Event;
-use crate::field::estimate::Estimate;
-use crate::guard::HoldReason;
-use crate::mission::{Mission, Profile};
+use crate::mission::Mission;
 use crate::node::Node;
-use crate::node::round::state::Phase;
 use crate::node::sample::Sample;
 use crate::node::view::record::{RecordError, ViewRecord};
 use crate::place::Placement;
 use crate::settings::{Identity, Settings, SetupError, Wiring, check};
 use crate::side::Side;
-use crate::stats::{Stats, bump};
+use crate::stats::bump;
 use crate::time::Instant;
-use crate::view::ViewId;
 use crate::wire::deframe::{DeframeError, Deframer};
 use crate::wire::frame::{self, FrameBuf, Header};
 #[cfg(feature = "auth")]
 use crate::wire::session::Session;
-pub use port::{Port, Transmit};
-
-use incoming::Addressed;
 
 /// One relay's share of the placement, sans-IO.
 ///
@@ -75,12 +65,12 @@ use incoming::Addressed;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Relay {
-    node: Node,
+    pub(super) node: Node,
     network: u16,
     wiring: Wiring,
     /// Upstream or shared, and downstream.
     deframers: [Deframer; 2],
-    counter: u32,
+    pub(super) counter: u32,
     #[cfg(feature = "auth")]
     session: Option<Session>,
 }
@@ -219,7 +209,7 @@ impl Relay {
 
     /// Takes one measurement of the interference, W or linear SIR, where `Settings::measure` asks for them.
     ///
-    /// Constant work. What is no use is counted as [`Stats::samples_refused`].
+    /// Constant work. What is no use is counted as [`Stats::samples_refused`](crate::Stats::samples_refused).
     pub fn handle_sample(&mut self, sample: Sample) {
         self.node.handle_sample(sample);
     }
@@ -319,59 +309,6 @@ impl Relay {
         self.node.poll_timeout()
     }
 
-    /// Where to fly, once the chain has agreed, in metres in the mission's frame: to the relay's place, or with `Settings::guard` as
-    /// far toward it as is safe by now.
-    pub fn setpoint(&self) -> Option<Placement> {
-        self.node.setpoint()
-    }
-
-    /// The place that the chain has agreed on for this relay, where it is to be in the end; `None` before the first agreement.
-    pub fn final_setpoint(&self) -> Option<Placement> {
-        self.node.final_setpoint()
-    }
-
-    /// What keeps the drone from the agreed place at `side`, where `Settings::guard` is set.
-    pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
-        self.node.hold_reason(side)
-    }
-
-    /// The SIR (linear) that every hop of the agreed chain meets; `None` before the first agreement.
-    pub fn target(&self) -> Option<f32> {
-        self.node.round().target()
-    }
-
-    /// At the leader, after Algorithm 1 or 4: at the altitudes held no chain has an SIR of this or more, linear. `None` elsewhere, and
-    /// with the paper's fixed step, which leaves chains out.
-    pub fn bound(&self) -> Option<f32> {
-        self.node.round().bound()
-    }
-
-    /// Where the relay is in the protocol.
-    pub fn phase(&self) -> Phase {
-        self.node.phase()
-    }
-
-    /// Whether it takes part in nothing and has no set-point, because another relay that does take part uses its number. That is over
-    /// with [`clear_index_taken`](Self::clear_index_taken), or once nothing was heard of the other for twice `Settings::dead_after`.
-    pub fn stands_down(&self) -> bool {
-        self.node.stands_down()
-    }
-
-    /// What has been counted since the relay was switched on.
-    pub fn stats(&self) -> &Stats {
-        self.node.stats()
-    }
-
-    /// Its place in the chain by the view agreed on, 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
-    pub fn index(&self) -> u16 {
-        self.node.member().index
-    }
-
-    /// The view of the chain that it is in, which it has accepted last: all that it says of places is of that view.
-    pub fn view(&self) -> ViewId {
-        self.node.member().view
-    }
-
     /// What it has said in the votes on views, to be stored whenever it has changed, *before* [`poll_transmit`](Self::poll_transmit) is
     /// called: a promise that is forgotten is none. Constant work.
     pub const fn view_record(&self) -> ViewRecord {
@@ -389,45 +326,4 @@ impl Relay {
     pub fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
         self.node.resume_view(now, record)
     }
-
-    /// Until when it may hold what was agreed on without hearing more: by then nobody else flies anything else. `None` before that is
-    /// known, and when the time is over.
-    pub fn lease(&self) -> Option<Instant> {
-        self.node.lease()
-    }
-
-    /// The node numbers of its neighbours toward the transmitter and toward the receiver, `None` where it has none. A node number is
-    /// the index that a relay was given before flight; no view changes it.
-    pub fn neighbours(&self) -> [Option<u16>; 2] {
-        self.node.neighbours()
-    }
-
-    /// The mission the relay flies, with as many relays as are in its view.
-    pub fn mission(&self) -> &Mission {
-        &self.node.member().mission
-    }
-
-    /// What the measurements at this place say so far, and `None` before they say anything.
-    pub fn estimate(&self) -> Option<Estimate> {
-        self.node.round().meter().estimate()
-    }
-
-    /// Upsilon that this relay uses instead of the agreed field's, 1/W, once it has measured enough.
-    pub fn measured_per_w(&self) -> Option<f32> {
-        self.node.round().meter().published()
-    }
-
-    /// While Algorithm 2 goes on, at the leader: rounds that are over, and the SIR (linear) of the chain after the last.
-    pub fn rounds(&self) -> Option<(u16, f32)> {
-        self.node.round().rounds()
-    }
-
-    /// What the relay holds; its altitude is the one chosen last.
-    pub fn profile(&self) -> Profile {
-        self.node.round().profile()
-    }
 }
-
-#[cfg(feature = "auth")]
-#[cfg(test)]
-mod tests;

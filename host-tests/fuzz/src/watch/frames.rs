@@ -1,0 +1,108 @@
+//! The frames that a watched relay sends: each is one, from it, to a node that is there.
+
+use uav_relay::wire::deframe::Deframer;
+use uav_relay::wire::frame;
+use uav_relay::wire::message::Message;
+use uav_relay::{Port, Relay, Settings, Wiring};
+
+use super::number::number_of;
+
+/// Nodes this far off are heard on a shared channel.
+const NEAR: u16 = 4;
+
+/// The network of every relay here.
+pub const NETWORK: u16 = 9;
+
+/// What the frames of a relay have said so far.
+#[derive(Clone, Debug)]
+pub(super) struct Frames {
+    /// Its node, and how many there are.
+    node: u16,
+    all: u16,
+    /// Frames it has sent.
+    pub(super) sent: u32,
+    /// Number of the last pass it has said anything of.
+    pub(super) number: u16,
+    /// Number of the talk that its last fence was of.
+    pub(super) association: u16,
+    /// The number of the last hello that it said.
+    pub(super) asked: u16,
+}
+
+impl Frames {
+    pub(super) const fn new(node: u16, all: u16) -> Self {
+        Self {
+            node,
+            all,
+            sent: 0,
+            number: 0,
+            association: 0,
+            asked: 0,
+        }
+    }
+
+    /// A frame must be one, from this relay, to the neighbour behind its port.
+    pub(super) fn look(&mut self, relay: &Relay, settings: &Settings, port: Port, bytes: &[u8]) {
+        let mut deframer = Deframer::new();
+        let mut frames = 0;
+        for &byte in bytes {
+            let Some(plain) = deframer.push(byte) else {
+                continue;
+            };
+            frames += 1;
+            let Ok(Ok(opened)) = plain.map(frame::open) else {
+                unreachable!("what is sent is no frame: {bytes:?}");
+            };
+            let header = opened.header;
+            let signs = settings.auth.is_some();
+            assert_eq!(opened.tag.is_some(), signs, "{opened:?}");
+            assert_eq!((header.network, header.sender), (NETWORK, self.node));
+            assert_eq!(header.counter, self.sent, "the counter of frames");
+            let far = match settings.wiring {
+                Wiring::Pair => 1,
+                Wiring::Shared => NEAR,
+            };
+            let off = self.node.abs_diff(header.destination) <= far;
+            let upstream = off && header.destination < self.node;
+            let downstream = off && header.destination > self.node;
+            // One that stands down says so to the other node of its number.
+            let own = header.destination == self.node && relay.stands_down();
+            let right = own
+                || match (settings.wiring, port) {
+                    (Wiring::Pair, Port::Upstream) => upstream,
+                    (Wiring::Pair, Port::Downstream) => downstream,
+                    (Wiring::Shared, Port::Shared) => upstream || downstream,
+                    _ => false,
+                };
+            assert!(right, "{header:?} through {port:?}");
+            let config = relay.mission().config();
+            // Tx and Rx are told which mission is held, where there is a key.
+            let all = if signs {
+                0..=self.all + 1
+            } else {
+                1..=self.all
+            };
+            let there = all.contains(&header.destination);
+            assert!(there, "{header:?} to nobody");
+            if opened.handshake {
+                continue;
+            }
+            let Ok(message) = Message::decode(opened.body) else {
+                unreachable!("what is sent is no message: {opened:?}");
+            };
+            if let Message::Sweep(sweep) = &message {
+                let inside = |place: &f32| (0.0..=config.distance_m).contains(place);
+                assert!(sweep.reaches.iter().all(inside), "{sweep:?}");
+            }
+            self.number = number_of(&message).unwrap_or(self.number);
+            if let Message::Hello(hello) = &message {
+                self.asked = hello.nonce;
+            }
+            if let Message::Fence { fence, .. } = &message {
+                self.association = fence.association;
+            }
+        }
+        assert_eq!(frames, 1, "{bytes:?}");
+        self.sent += 1;
+    }
+}

@@ -1,0 +1,55 @@
+//! What is wrong with a pair of sites.
+
+use crate::flight::geodetic::Geodetic;
+
+/// The shortest line: the units of a latitude turn it by a thousandth.
+pub const SHORTEST_M: f64 = 10.0;
+
+/// The longest line whose accuracy is known.
+pub const LONGEST_M: f64 = 100_000.0;
+
+/// What is wrong with a pair of sites.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum AxisError {
+    /// The latitude or longitude of the transmitter is not on earth.
+    Tx(Geodetic),
+    /// The latitude or longitude of the receiver is not on earth.
+    Rx(Geodetic),
+    /// The sites are nearer to each other than [`SHORTEST_M`].
+    TooShort {
+        /// The distance, m.
+        distance_m: f64,
+    },
+    /// The sites are farther from each other than [`LONGEST_M`].
+    TooLong {
+        /// The distance, m: of the chord.
+        distance_m: f64,
+    },
+}
+
+impl core::fmt::Display for AxisError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let site = |f: &mut core::fmt::Formatter<'_>, name, site: &Geodetic| {
+            let Geodetic { lat_e7, lon_e7, .. } = site;
+            write!(
+                f,
+                "site {name}: latitude {lat_e7} and longitude {lon_e7} in 1e-7 degrees: allowed are ±900000000 and ±1800000000"
+            )
+        };
+        match self {
+            Self::Tx(at) => site(f, "tx", at),
+            Self::Rx(at) => site(f, "rx", at),
+            Self::TooShort { distance_m } => write!(
+                f,
+                "the sites are {distance_m:.2} m apart: allowed are {SHORTEST_M} to {LONGEST_M} m"
+            ),
+            Self::TooLong { distance_m } => write!(
+                f,
+                "the sites are {distance_m:.0} m apart: allowed are {SHORTEST_M} to {LONGEST_M} m"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for AxisError {}

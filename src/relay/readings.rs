@@ -1,0 +1,104 @@
+//! What a relay knows, for its firmware to read: constant work, of the last agreement.
+
+use super::facade::Relay;
+use crate::field::estimate::Estimate;
+use crate::guard::HoldReason;
+use crate::mission::{Mission, Profile};
+use crate::node::round::state::Phase;
+use crate::place::Placement;
+use crate::side::Side;
+use crate::stats::Stats;
+use crate::time::Instant;
+use crate::view::ViewId;
+
+impl Relay {
+    /// Where to fly, once the chain has agreed, in metres in the mission's frame: to the relay's place, or with `Settings::guard` as
+    /// far toward it as is safe by now.
+    pub fn setpoint(&self) -> Option<Placement> {
+        self.node.setpoint()
+    }
+
+    /// The place that the chain has agreed on for this relay, where it is to be in the end; `None` before the first agreement.
+    pub fn final_setpoint(&self) -> Option<Placement> {
+        self.node.final_setpoint()
+    }
+
+    /// What keeps the drone from the agreed place at `side`, where `Settings::guard` is set.
+    pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
+        self.node.hold_reason(side)
+    }
+
+    /// The SIR (linear) that every hop of the agreed chain meets; `None` before the first agreement.
+    pub fn target(&self) -> Option<f32> {
+        self.node.round().target()
+    }
+
+    /// At the leader, after Algorithm 1 or 4: at the altitudes held no chain has an SIR of this or more, linear. `None` elsewhere, and
+    /// with the paper's fixed step, which leaves chains out.
+    pub fn bound(&self) -> Option<f32> {
+        self.node.round().bound()
+    }
+
+    /// Where the relay is in the protocol.
+    pub fn phase(&self) -> Phase {
+        self.node.phase()
+    }
+
+    /// Whether it takes part in nothing and has no set-point, because another relay that does take part uses its number. That is over
+    /// with [`clear_index_taken`](Self::clear_index_taken), or once nothing was heard of the other for twice `Settings::dead_after`.
+    pub fn stands_down(&self) -> bool {
+        self.node.stands_down()
+    }
+
+    /// What has been counted since the relay was switched on.
+    pub fn stats(&self) -> &Stats {
+        self.node.stats()
+    }
+
+    /// Its place in the chain by the view agreed on, 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
+    pub fn index(&self) -> u16 {
+        self.node.member().index
+    }
+
+    /// The view of the chain that it is in, which it has accepted last: all that it says of places is of that view.
+    pub fn view(&self) -> ViewId {
+        self.node.member().view
+    }
+
+    /// Until when it may hold what was agreed on without hearing more: by then nobody else flies anything else. `None` before that is
+    /// known, and when the time is over.
+    pub fn lease(&self) -> Option<Instant> {
+        self.node.lease()
+    }
+
+    /// The node numbers of its neighbours toward the transmitter and toward the receiver, `None` where it has none. A node number is
+    /// the index that a relay was given before flight; no view changes it.
+    pub fn neighbours(&self) -> [Option<u16>; 2] {
+        self.node.neighbours()
+    }
+
+    /// The mission the relay flies, with as many relays as are in its view.
+    pub fn mission(&self) -> &Mission {
+        &self.node.member().mission
+    }
+
+    /// What the measurements at this place say so far, and `None` before they say anything.
+    pub fn estimate(&self) -> Option<Estimate> {
+        self.node.round().meter().estimate()
+    }
+
+    /// Upsilon that this relay uses instead of the agreed field's, 1/W, once it has measured enough.
+    pub fn measured_per_w(&self) -> Option<f32> {
+        self.node.round().meter().published()
+    }
+
+    /// While Algorithm 2 goes on, at the leader: rounds that are over, and the SIR (linear) of the chain after the last.
+    pub fn rounds(&self) -> Option<(u16, f32)> {
+        self.node.round().rounds()
+    }
+
+    /// What the relay holds; its altitude is the one chosen last.
+    pub fn profile(&self) -> Profile {
+        self.node.round().profile()
+    }
+}
