@@ -1,8 +1,11 @@
 //! Places, sides and altitudes together: how near the true optimum the chain comes, in how many messages, whatever happens to frames.
 
+use std::task::Poll;
+
 use host_tests::flights::with_room;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::{Adjust, Instant, Method, Mission, MissionConfig, Profile, Side};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::joint::{CROWDED, ROOMY, Scenario, scenario, with_own};
@@ -532,4 +535,32 @@ fn faults_change_nothing_on_random_links() {
     }
     println!("{injected} frames lost or corrupted");
     assert!(injected > 10_000);
+}
+
+/// Starts that cannot become the best are given up, and the best one is not among them.
+#[test]
+fn few_portions_lead_to_the_joint_optimum() {
+    for (relays, lateral_m, most, best) in [
+        (8, 0.0, 500, 1.235_783_782_6),
+        (50, 0.0, 3_300, 6.498_377_624_4),
+        (8, 280.0, 1_200, 1.543_032_046),
+    ] {
+        let (link, corridor) = roomy(relays, 500.0, 150.0, lateral_m, 300.0);
+        let mission = setup(&link, corridor).unwrap().mission;
+        let mut solver = Solver::<100, 10>::new(&mission).unwrap();
+        let seat = Seat::common(&mission);
+        let mut portions = 1;
+        let target = loop {
+            if let Poll::Ready(solved) = solver.step(&mission, |_| seat) {
+                break f64::from(solved.unwrap());
+            }
+            portions += 1;
+        };
+        println!(
+            "{relays} relays: {portions} portions, {:e}",
+            1.0 - target / best
+        );
+        assert!(portions <= most, "{relays}: {portions}");
+        assert!(target >= best * (1.0 - 1e-5), "{relays}: {target}");
+    }
 }

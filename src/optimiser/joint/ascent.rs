@@ -12,6 +12,9 @@ const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 /// What is trusted at first, of a relay's distance from the interferer and of ln gamma.
 const TRUST: f32 = 0.5;
 
+/// Trust below which a step says little about what is to come.
+const RESTRAINED: f32 = 0.05;
+
 /// Trust below which nothing is gained any more.
 const LEAST_TRUST: f32 = 1e-4;
 
@@ -30,6 +33,19 @@ const SHORT: f32 = 2.0;
 
 /// How close to the optimum is close enough, in ln gamma.
 const CLOSE: f32 = 3e-6;
+
+/// What a step has to promise, in ln gamma, where it is the last that is worth while.
+const SETTLED: f32 = 0.3 * CLOSE;
+
+/// What is so little to gain, in ln gamma, that where an ascent ends is known.
+const FORESEEN: f32 = 1e-4;
+
+/// Iterations after which an ascent has come near its target, and the slack that is missing, in parts of D, where it will not.
+const ASTRAY_AFTER: u8 = 12;
+const ASTRAY: f32 = 0.3;
+
+/// The same where an ascent is over: less slack is made up for.
+const ASTRAY_AT_END: f32 = 0.1;
 
 /// Iterations after which what there is has to do.
 const ITERATIONS: u8 = 40;
@@ -168,11 +184,41 @@ impl Ascent {
         if self.at_limit() {
             return AscentStep::Raise;
         }
+        if self.is_within(SETTLED) {
+            return AscentStep::Over;
+        }
         // More than enough, and no use for it but a higher target.
         if self.slack > 1e-4 * self.distance_m && self.linear + self.square < 0.1 * self.slack {
             return AscentStep::Raise;
         }
         self.attempt()
+    }
+
+    /// Whether neither the slack nor the step is worth more than `by`, in ln gamma.
+    fn is_within(&self, by: f32) -> bool {
+        let least = by * -self.slope;
+        self.slack.abs() < least && (self.linear + self.square).abs() < least
+    }
+
+    /// Whether it goes up a slope that leads nowhere: the target rises, and the chain does not follow.
+    pub(crate) fn is_astray(&self) -> bool {
+        self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
+    }
+
+    /// Whether a chain that is not improved any more may yet meet its target.
+    pub(crate) fn is_kept_up_with(&self) -> bool {
+        self.slack > -ASTRAY_AT_END * self.distance_m
+    }
+
+    /// Whether it is about to end, as `turn` has it, no higher than `sigma`. Where there is a penalty nobody can tell.
+    pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
+        let gain = (self.linear + self.square).max(0.0);
+        let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
+        matches!(turn, AscentStep::Try { .. })
+            && self.penalty <= 0.0
+            && self.is_within(FORESEEN)
+            && self.trust >= RESTRAINED
+            && end < sigma + SETTLED
     }
 
     /// The target for each part of the step.

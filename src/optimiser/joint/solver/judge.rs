@@ -107,6 +107,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 (Some((sigma, _)), Purpose::Last) => {
                     if self.best.is_none_or(|(best, _)| sigma > best) {
                         self.best = Some((sigma, self.number));
+                        // An ascent that went astray came to less than it says.
+                        self.highest = self.ascent.sigma.min(sigma + 3.0 * JUDGED).max(sigma);
                     }
                     self.given_up()
                 }
@@ -177,7 +179,19 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Whether the start may still be the best.
     pub(super) fn is_promising(&self) -> bool {
-        self.again || self.best.is_none_or(|(best, _)| self.ascent.sigma > best)
+        let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
+        self.again || (higher() && self.ascent.is_kept_up_with())
+    }
+
+    /// Whether the start that goes on with `turn` is given up early: it cannot become the best.
+    pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
+        let other = !self.again && self.best.is_some();
+        other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
+    }
+
+    /// Whether no start can be better than the best one: it meets what the first or the last hop can have.
+    pub(super) fn is_complete(&self, ceiling: f32) -> bool {
+        self.best.is_some_and(|(best, _)| best >= ceiling + CEILING)
     }
 
     pub(super) fn next(

@@ -4,6 +4,9 @@
 //! bytes: the chain is cut into segments, of each of which only the outlook at its end is kept, and the policies of one segment are
 //! worked out again when the pass forward comes to it.
 //!
+//! A start is given up as soon as it is about to end no higher than the best one, or its target has left the chain behind; all others are
+//! once a chain meets what its first or last hop can have.
+//!
 //! | file | one idea |
 //! | --- | --- |
 //! | `state` | what a solver keeps, and one portion of its work |

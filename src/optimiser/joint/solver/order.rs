@@ -22,8 +22,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
     ) -> Poll<Result<f32, Infeasible>> {
-        let Some(start) = Start::number(self.number, Room::of(chain.mission)) else {
-            // All have been tried.
+        let next = Start::number(self.number, Room::of(chain.mission));
+        let complete = !self.again && self.is_complete(chain.ceiling());
+        let Some(start) = next.filter(|_| !complete) else {
+            // All have been tried, or the others are no use.
             let Some((_, number)) = self.best else {
                 return Poll::Ready(Err(Infeasible));
             };

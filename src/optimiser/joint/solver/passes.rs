@@ -78,7 +78,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             Work::Back(next)
         } else {
             let turn = self.ascent.weighed();
-            self.next(turn, chain)
+            if self.is_dropped(turn) {
+                self.given_up()
+            } else {
+                self.next(turn, chain)
+            }
         };
     }
 

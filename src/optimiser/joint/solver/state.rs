@@ -20,6 +20,8 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     pub(super) start: Start,
     /// The best so far: its target in ln gamma, and the number of its start.
     pub(super) best: Option<(f32, u8)>,
+    /// What the ascent of that start came to, before it was judged.
+    pub(super) highest: f32,
     /// Whether the best start is done once more, since the chain that is kept came of another.
     pub(super) again: bool,
     pub(super) ascent: Ascent,
@@ -48,6 +50,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             number: 0,
             start: Start::Far,
             best: None,
+            highest: f32::NEG_INFINITY,
             again: false,
             ascent: Ascent::new(1.0, 0.0, 0.0, 0.0),
             work: Work::Begin,
