@@ -128,7 +128,7 @@ impl Retreat {
             self.climb_squared + square(self.least_step),
         ];
         let value = |y, quiet| self.reach(target, y, quiet);
-        least(interference, self.gain / target, squares, low, high, value)
+        least(interference, self.gain / target, squares, low, high, &value)
     }
 }
 
@@ -179,7 +179,7 @@ pub(super) fn least(
     squares: [f32; 2],
     low: f32,
     high: f32,
-    value: impl Fn(f32, f32) -> Option<f32>,
+    value: &dyn Fn(f32, f32) -> Option<f32>,
 ) -> Option<Step> {
     if low > high {
         return None;
