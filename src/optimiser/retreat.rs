@@ -173,6 +173,7 @@ impl<'a> HopInterference<'a> {
 /// root is of less than the second of `squares`, of which q is the first. Of equal ones the one nearest to Tx.
 ///
 /// Work: at most three values for each point of the field in between that a hop could reach at all.
+#[inline(never)] // called for the last hop and for the others
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,
