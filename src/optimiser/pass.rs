@@ -205,7 +205,7 @@ impl Link<'_> {
                 from_m: here,
             }
         } else {
-            least(interference, c, [beyond, beyond], reach, high, &value)?
+            least(interference, c, [beyond, beyond], reach, high, value)?
         };
         Some(((-step.from_m).max(-1e9), step.to_m))
     }

@@ -128,7 +128,7 @@ impl Retreat {
             self.climb_squared + square(self.least_step),
         ];
         let value = |y, quiet| self.reach(target, y, quiet);
-        least(interference, self.gain / target, squares, low, high, &value)
+        least(interference, self.gain / target, squares, low, high, value)
     }
 }
 
@@ -173,14 +173,13 @@ impl<'a> HopInterference<'a> {
 /// root is of less than the second of `squares`, of which q is the first. Of equal ones the one nearest to Tx.
 ///
 /// Work: at most three values for each point of the field in between that a hop could reach at all.
-#[inline(never)] // called for the last hop and for the others
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,
     squares: [f32; 2],
     low: f32,
     high: f32,
-    value: &dyn Fn(f32, f32) -> Option<f32>,
+    value: impl Fn(f32, f32) -> Option<f32>,
 ) -> Option<Step> {
     if low > high {
         return None;
