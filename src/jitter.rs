@@ -30,6 +30,7 @@ impl Jitter {
     }
 
     /// `span` and up to an eighth more, so that relays on a shared channel do not go on in step.
+    #[inline(never)] // called from many places
     pub(crate) fn spread(&mut self, span: Duration) -> Duration {
         // A part of the eighth by multiplication: there is no division of this width on a Cortex-M.
         let eighth = (span.as_micros() / 8 + 1).min(u64::from(u32::MAX));

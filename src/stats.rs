@@ -79,6 +79,7 @@ impl Stats {
 }
 
 /// Counts one more, up to the maximum.
+#[inline(never)] // called from many places
 pub(crate) fn bump(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }

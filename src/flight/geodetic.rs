@@ -36,6 +36,7 @@ impl Geodetic {
     clippy::cast_possible_truncation,
     reason = "saturates, and callers hand in what fits"
 )]
+#[inline(never)] // called from several places
 pub(super) fn to_integer(value: f64) -> i32 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }

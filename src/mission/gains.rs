@@ -21,6 +21,7 @@ impl Mission {
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
     )]
+    #[inline(never)] // called from many places
     pub const fn receiver_gain(&self, power_w: f32) -> f32 {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }

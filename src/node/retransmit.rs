@@ -114,6 +114,7 @@ impl Retransmit {
     ///
     /// Nobody says that it has arrived. Where frames get lost it is said again as many times as that number of hops has binary digits: then
     /// it is seldom that it has to be asked for, which takes the relay before as long as it waits for an answer.
+    #[inline(never)] // called from many places
     pub(crate) fn answered(&mut self, now: Instant, trip: Trip) {
         self.stop();
         if self.lossy {

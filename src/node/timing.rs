@@ -21,6 +21,7 @@ pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
 }
 
 /// Tenths of a second, rounded up.
+#[inline(never)] // called from several places
 pub(crate) fn tenths(span: Duration) -> u16 {
     // In words of 32 bits: nothing else in a relay divides 64 by more than a power of two, and the routine for it takes 900 bytes of flash.
     let micros = u32::try_from(span.as_micros().div_ceil(32)).unwrap_or(u32::MAX);

@@ -155,6 +155,8 @@ impl Link<'_> {
     /// The hop that begins nearest to Tx of all that end from `low` to `high`; on a plain pass, at `low`.
     fn longest(&self, hop: &Retreat, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
+        // A hop toward Tx is one in a field: where there can be none, the image has nothing of it.
+        mission.field()?;
         // Whatever a neighbour says, nobody stands beyond Rx.
         if low > distance_m {
             return None;

@@ -187,6 +187,7 @@ impl Axis {
     }
 
     /// Whether a place is finite and near the line. NaN is not.
+    #[inline(never)] // called from several places
     pub(super) fn is_around(&self, place: Placement) -> bool {
         let Placement {
             x_m,

@@ -56,6 +56,7 @@ impl Vector {
         [lat, libm::atan2(self.y, self.x)]
     }
 
+    #[inline(never)] // called from many places, and what it calls is no instruction
     pub(super) fn plus(self, other: Self) -> Self {
         Self {
             x: self.x + other.x,
@@ -64,6 +65,7 @@ impl Vector {
         }
     }
 
+    #[inline(never)] // as `plus`
     pub(super) fn times(self, factor: f64) -> Self {
         Self {
             x: self.x * factor,
@@ -72,6 +74,7 @@ impl Vector {
         }
     }
 
+    #[inline(never)] // as `plus`
     pub(super) fn minus(self, other: Self) -> Self {
         self.plus(other.times(-1.0))
     }

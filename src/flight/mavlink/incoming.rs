@@ -8,6 +8,7 @@ use super::table::id;
 pub(super) struct Payload<'a>(pub(super) &'a [u8]);
 
 impl Payload<'_> {
+    #[inline(never)] // called from many places
     fn bytes<const N: usize>(self, at: usize) -> [u8; N] {
         core::array::from_fn(|i| self.0.get(at + i).copied().unwrap_or(0))
     }

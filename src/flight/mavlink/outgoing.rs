@@ -189,6 +189,7 @@ impl Outgoing<'_> {
 struct Writer(FrameBytes);
 
 impl Writer {
+    #[inline(never)] // called from many places
     fn bytes(&mut self, bytes: &[u8]) {
         debug_assert!(self.0.len() + bytes.len() <= self.0.capacity());
         for byte in bytes {

@@ -10,6 +10,7 @@ use crate::wire::message::Hello;
 
 impl Node {
     /// Owes node `to` at `side` a hello, which may ask for one in return.
+    #[inline(never)] // called from many places
     pub(super) fn owe_hello(&mut self, side: Side, to: u16, ask: bool) {
         let distance = to.abs_diff(self.member.node);
         self.layers.neighbours.at_mut(side).owe(distance, ask);

@@ -38,6 +38,7 @@ impl Asking {
     }
 
     /// The same at once, however often it has asked in vain: something new has come to be known.
+    #[inline(never)] // called from many places
     pub(crate) fn ask_anew(&mut self, now: Instant) {
         self.asks = true;
         self.tries = 0;

@@ -32,6 +32,7 @@ impl Room {
     }
 
     /// What of it is nearest to `at`.
+    #[inline(never)] // called from many places
     pub const fn nearest(self, at: CrossSection) -> CrossSection {
         CrossSection {
             y_m: self.lateral.nearest(at.y_m),

@@ -1,6 +1,6 @@
 //! The fence between two neighbours, as [`Fence`] has it.
 
-use super::parts::{MessageError, PassId, read, write};
+use super::parts::{MessageError, PassId, Word, read, write};
 use super::tag;
 use crate::guard::Fence;
 use crate::place::CrossSection;
@@ -8,7 +8,7 @@ use crate::place::CrossSection;
 /// The number beside the mission is that of the association.
 pub(super) fn encode(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, mission);
-    let numbers = [fence.echo.to_le_bytes(), fence.number.to_le_bytes()];
+    let numbers = [fence.echo, fence.number].map(Word::new);
     let CrossSection { y_m, altitude_m } = fence.across;
     let places = [fence.x_m, fence.target_m, y_m, altitude_m, fence.apart_m];
     write(&(tag::FENCE, pass, numbers, places, fence.flags), buffer)
@@ -16,13 +16,13 @@ pub(super) fn encode(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<u
 
 /// The mission of the sender, and the fence.
 pub(super) fn decode(body: &[u8]) -> Result<(u16, Fence), MessageError> {
-    type FenceBody = (PassId, [[u8; 2]; 2], [f32; 5], u8);
+    type FenceBody = (PassId, [Word; 2], [f32; 5], u8);
     let (pass, [echo, number], places, flags): FenceBody = read(body)?;
     let [x_m, target_m, y_m, altitude_m, apart_m] = places;
     let fence = Fence {
         association: pass.number(),
-        echo: u16::from_le_bytes(echo),
-        number: u16::from_le_bytes(number),
+        echo: echo.number(),
+        number: number.number(),
         x_m,
         target_m,
         across: CrossSection { y_m, altitude_m },

@@ -48,9 +48,9 @@ impl Hello {
             .into_iter()
             .rev()
             .fold(0_u8, |flags, flag| flags << 1 | u8::from(flag));
-        let last = [self.holds.digest, self.holds.version, self.nonce].map(u16::to_le_bytes);
+        let last = [self.holds.digest, self.holds.version, self.nonce].map(Word::new);
         let newest = self.newest.bits().to_le_bytes();
-        let near = [self.mission, self.neighbour, self.behind].map(u16::to_le_bytes);
+        let near = [self.mission, self.neighbour, self.behind].map(Word::new);
         write(
             &(tag::HELLO, near, newest, last, [self.hears, flags]),
             buffer,
@@ -64,14 +64,14 @@ impl Hello {
             [Word; 3],
             [u8; 2],
         ) = read(body)?;
-        let neighbour = u16::from_le_bytes(neighbour);
-        let behind = u16::from_le_bytes(behind);
+        let neighbour = neighbour.number();
+        let behind = behind.number();
         let known = neighbour <= MAX_RELAYS && (1..=MAX_RELAYS).contains(&behind);
         if !known || hears > 0x0F || flags > 0x1F {
             return Err(MessageError::Value);
         }
         Ok(Self {
-            mission: u16::from_le_bytes(mission),
+            mission: mission.number(),
             newest: ViewId::from_bits(u32::from_le_bytes(newest)),
             neighbour,
             ask: flags & 1 != 0,
@@ -81,10 +81,10 @@ impl Hello {
             behind,
             flies: flags & 16 != 0,
             hears,
-            nonce: u16::from_le_bytes(nonce),
+            nonce: nonce.number(),
             holds: MissionId {
-                version: u16::from_le_bytes(version),
-                digest: u16::from_le_bytes(digest),
+                version: version.number(),
+                digest: digest.number(),
             },
         })
     }

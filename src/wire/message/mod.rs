@@ -24,7 +24,7 @@ pub use self::sweep::{Answer, Sweep};
 pub use self::turn::{AdjustStep, Moved, Token};
 pub use self::view::{Decision, Poll, Proposal, Successor};
 
-use self::parts::{read, write};
+use self::parts::{Word, read, write};
 #[cfg(feature = "upload")]
 use super::upload::Upload;
 use crate::guard::Fence;
@@ -149,13 +149,13 @@ impl Message {
             Self::Fence { .. } if !cfg!(feature = "guard") => None,
             Self::Sweep(sweep) => sweep.encode(buffer),
             Self::Verdict(answer) => answer.encode(buffer),
-            Self::Busy { sweep } => write(&(tag::BUSY, sweep.to_le_bytes()), buffer),
+            Self::Busy { sweep } => write(&(tag::BUSY, Word::new(*sweep)), buffer),
             Self::Heartbeat {
                 mission,
                 ask,
                 answer,
             } => {
-                let numbers = [*mission, *ask, *answer].map(u16::to_le_bytes);
+                let numbers = [*mission, *ask, *answer].map(Word::new);
                 write(&(tag::HEARTBEAT, numbers), buffer)
             }
             Self::Pulse(pulse) => pulse.encode(buffer),
@@ -193,14 +193,14 @@ impl Message {
             }
             tag::VERDICT => Answer::decode(body).map(Self::Verdict),
             tag::BUSY => Ok(Self::Busy {
-                sweep: u16::from_le_bytes(read(body)?),
+                sweep: read::<Word>(body)?.number(),
             }),
             tag::HEARTBEAT => {
-                let [mission, ask, answer]: [[u8; 2]; 3] = read(body)?;
+                let [mission, ask, answer]: [Word; 3] = read(body)?;
                 Ok(Self::Heartbeat {
-                    mission: u16::from_le_bytes(mission),
-                    ask: u16::from_le_bytes(ask),
-                    answer: u16::from_le_bytes(answer),
+                    mission: mission.number(),
+                    ask: ask.number(),
+                    answer: answer.number(),
                 })
             }
             tag::PULSE => Pulse::decode(body).map(Self::Pulse),

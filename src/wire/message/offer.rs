@@ -2,21 +2,21 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::parts::{MessageError, PassId, read, write};
+use super::parts::{MessageError, PassId, Word, read, write};
 use super::tag;
 use crate::channel::Channel;
 use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
 use crate::wire::upload::Upload;
 
 pub(super) fn encode(upload: &Upload, answer: u16, buffer: &mut [u8]) -> Option<usize> {
-    let answer = answer.to_le_bytes();
-    write(&(tag::OFFER, OfferBody::of(upload), answer), buffer)
+    let body = (tag::OFFER, OfferBody::of(upload), Word::new(answer));
+    write(&body, buffer)
 }
 
 pub(super) fn decode(body: &[u8]) -> Result<(Upload, u16), MessageError> {
-    let (body, answer): (OfferBody, [u8; 2]) = read(body)?;
+    let (body, answer): (OfferBody, Word) = read(body)?;
     let upload = body.checked().ok_or(MessageError::Value)?;
-    Ok((upload, u16::from_le_bytes(answer)))
+    Ok((upload, answer.number()))
 }
 
 /// As it is stored: without what it answers, which says nothing of the mission.
@@ -41,7 +41,7 @@ impl Upload {
 struct OfferBody {
     /// The number is the version, the mission the base.
     pass: PassId,
-    relays: [u8; 2],
+    relays: Word,
     numbers: [f32; 9],
     factors: [f64; 3],
     bands: [f32; 4],
@@ -56,7 +56,7 @@ impl OfferBody {
         };
         Self {
             pass: PassId::new(upload.version(), upload.base()),
-            relays: c.relays.to_le_bytes(),
+            relays: Word::new(c.relays),
             numbers: [
                 c.distance_m,
                 c.min_separation_m,
@@ -93,7 +93,7 @@ impl OfferBody {
             tolerance,
         ] = self.numbers;
         let config = MissionConfig {
-            relays: u16::from_le_bytes(self.relays),
+            relays: self.relays.number(),
             distance_m,
             min_separation_m,
             tx_power_w,

@@ -1,14 +1,32 @@
 //! What bodies of several kinds have in common, and the ranges of their numbers. A type of its own costs no byte, and saves
 //! the code to read it once more.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::mission::Profile;
 use crate::optimiser::PerTarget;
 use crate::place::Placement;
 
 /// A number of 16 bits: always two bytes, which postcard would not make of a `u16`.
-pub(super) type Word = [u8; 2];
+#[derive(Clone, Copy, Deserialize)]
+pub(super) struct Word([u8; 2]);
+
+impl Word {
+    pub(super) const fn new(number: u16) -> Self {
+        Self(number.to_le_bytes())
+    }
+
+    pub(super) const fn number(self) -> u16 {
+        u16::from_le_bytes(self.0)
+    }
+}
+
+impl Serialize for Word {
+    #[inline(never)] // called from many places
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(serializer)
+    }
+}
 
 /// Writes `body` to the start of `buffer`, and how many bytes it takes; `None` if it does not fit.
 pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
@@ -48,24 +66,24 @@ pub(super) const FARTHEST_M: f32 = 2e9;
 /// Which pass, of which mission.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct PassId {
-    number: [u8; 2],
-    mission: [u8; 2],
+    number: Word,
+    mission: Word,
 }
 
 impl PassId {
     pub(super) const fn new(number: u16, mission: u16) -> Self {
         Self {
-            number: number.to_le_bytes(),
-            mission: mission.to_le_bytes(),
+            number: Word::new(number),
+            mission: Word::new(mission),
         }
     }
 
     pub(super) const fn number(self) -> u16 {
-        u16::from_le_bytes(self.number)
+        self.number.number()
     }
 
     pub(super) const fn mission(self) -> u16 {
-        u16::from_le_bytes(self.mission)
+        self.mission.number()
     }
 }
 

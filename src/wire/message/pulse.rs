@@ -1,6 +1,6 @@
 //! A pulse, by which the relays of a view know that all of them still hold it, and what comes back of it.
 
-use super::parts::{MessageError, PassId, read, write};
+use super::parts::{MessageError, PassId, Word, read, write};
 use super::tag;
 
 /// Onward: the leader of the view still holds it.
@@ -30,12 +30,12 @@ pub struct Pulsed {
 impl Pulse {
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.mission);
-        write(&(tag::PULSE, pass, self.lease.to_le_bytes()), buffer)
+        write(&(tag::PULSE, pass, Word::new(self.lease)), buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (pass, lease): (PassId, [u8; 2]) = read(body)?;
-        let lease = u16::from_le_bytes(lease);
+        let (pass, lease): (PassId, Word) = read(body)?;
+        let lease = lease.number();
         if lease == 0 {
             return Err(MessageError::Value);
         }

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::parts::{MessageError, PassId, profile, read, write};
+use super::parts::{MessageError, PassId, Word, profile, read, write};
 use crate::mission::MAX_RELAYS;
 
 /// The most relays that one roster names.
@@ -36,7 +36,7 @@ pub struct Roster {
 }
 
 /// For each relay its index, its altitude or 0, and its power.
-type Parts = Vec<([u8; 2], f32, f32), MOST_NAMED>;
+type Parts = Vec<(Word, f32, f32), MOST_NAMED>;
 
 impl Roster {
     /// The message of this tag, onward or back.
@@ -44,13 +44,13 @@ impl Roster {
         let pass = PassId::new(self.number, self.mission);
         let mut parts = Parts::new();
         for seat in &self.seats {
-            _ = parts.push((seat.index.to_le_bytes(), seat.held_m, seat.power_w));
+            _ = parts.push((Word::new(seat.index), seat.held_m, seat.power_w));
         }
-        write(&(tag, pass, self.after.to_le_bytes(), parts), buffer)
+        write(&(tag, pass, Word::new(self.after), parts), buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (pass, after, parts): (PassId, [u8; 2], Parts) = read(body)?;
+        let (pass, after, parts): (PassId, Word, Parts) = read(body)?;
         // No empty varint bytes in the count: see `take_targets`.
         if body.len() != 7 + 10 * parts.len() {
             return Err(MessageError::Encoding);
@@ -58,13 +58,13 @@ impl Roster {
         let mut roster = Self {
             number: pass.number(),
             mission: pass.mission(),
-            after: u16::from_le_bytes(after),
+            after: after.number(),
             seats: OwnSeats::new(),
         };
         let mut last = roster.after;
         // By reference: what is left of an iterator by value is dropped by code that could panic.
         for &(index, held_m, power_w) in &parts {
-            let index = u16::from_le_bytes(index);
+            let index = index.number();
             let chooses = held_m.to_bits() == 0;
             let sound = profile(if chooses { 1.0 } else { held_m }, power_w).is_some();
             if !(sound && index > last && index <= MAX_RELAYS) {

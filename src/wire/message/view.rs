@@ -96,21 +96,21 @@ struct CallBody {
 impl CallBody {
     const fn new(mission_id: MissionId, proposal: ViewId, place: u16) -> Self {
         Self {
-            digest: mission_id.digest.to_le_bytes(),
-            version: mission_id.version.to_le_bytes(),
+            digest: Word::new(mission_id.digest),
+            version: Word::new(mission_id.version),
             proposal: proposal.bits().to_le_bytes(),
-            place: place.to_le_bytes(),
+            place: Word::new(place),
         }
     }
 
     /// The numbers, if they are in range.
     fn checked(self) -> Option<(MissionId, ViewId, u16)> {
         let mission_id = MissionId {
-            version: u16::from_le_bytes(self.version),
-            digest: u16::from_le_bytes(self.digest),
+            version: self.version.number(),
+            digest: self.digest.number(),
         };
         let proposal = ViewId::from_bits(u32::from_le_bytes(self.proposal));
-        let place = u16::from_le_bytes(self.place);
+        let place = self.place.number();
         let known = proposal.is_proposed() && is_size(place);
         known.then_some((mission_id, proposal, place))
     }
@@ -127,14 +127,14 @@ impl SizedBody {
     const fn of(view: View) -> Self {
         Self {
             id: view.id.bits().to_le_bytes(),
-            relays: view.relays.to_le_bytes(),
+            relays: Word::new(view.relays),
         }
     }
 
     fn view(self) -> View {
         View {
             id: ViewId::from_bits(u32::from_le_bytes(self.id)),
-            relays: u16::from_le_bytes(self.relays),
+            relays: self.relays.number(),
         }
     }
 }
@@ -163,7 +163,7 @@ impl Proposal {
             (proposal, SizedBody::of(successor.view))
         });
         let call = CallBody::new(self.mission_id, self.view, self.place);
-        let numbers = [votes, lease_left, rest].map(u16::to_le_bytes);
+        let numbers = [votes, lease_left, rest].map(Word::new);
         let agreed = SizedBody::of(agreed);
         write(
             &(tag::PROPOSAL, call, agreed, numbers, proposer, successor),
@@ -174,7 +174,7 @@ impl Proposal {
     /// What is agreed on, or was decided on, was proposed before.
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (call, agreed, numbers, proposer, successor): ProposalBody = read(body)?;
-        let [votes, lease_left, rest] = numbers.map(u16::from_le_bytes);
+        let [votes, lease_left, rest] = numbers.map(Word::number);
         let agreed: View = SizedBody::view(agreed);
         let successor = successor.map(|(proposal, view)| Successor {
             proposal: ViewId::from_bits(u32::from_le_bytes(proposal)),
@@ -227,7 +227,7 @@ impl Decision {
         let call = CallBody::new(self.mission_id, self.proposal, self.place);
         let view = self.view.map(SizedBody::of);
         let base = SizedBody::of(self.base);
-        let numbers = [self.there, self.lease_left].map(u16::to_le_bytes);
+        let numbers = [self.there, self.lease_left].map(Word::new);
         write(&(tag::DECISION, call, base, view, numbers), buffer)
     }
 
@@ -235,7 +235,7 @@ impl Decision {
         let (call, base, view, numbers): (CallBody, SizedBody, Option<SizedBody>, [Word; 2]) =
             read(body)?;
         let base = base.view();
-        let [there, lease_left] = numbers.map(u16::from_le_bytes);
+        let [there, lease_left] = numbers.map(Word::number);
         let view = view.map(SizedBody::view);
         let known = is_view(base)
             && is_size(there)

@@ -72,6 +72,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.cell(index).place(seat.room)
     }
 
+    #[inline(never)] // called from many places
     pub(super) fn cell(&self, index: u16) -> Cell {
         let at = usize::from(index).wrapping_sub(1);
         self.cells.get(at).copied().unwrap_or_default()
@@ -121,6 +122,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// Keeps the `cell` of relay `index`, which comes after one at `x_m`.
+    #[inline(never)] // called from several places
     pub(super) fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
         if let Some(mark) = self.mark(index) {
             mark.x_m = x_m;
