@@ -1,19 +1,40 @@
-//! `cargo cost`: what the firmware costs, held against its budgets; and the proof that it cannot panic.
+//! `cargo cost`: what the firmware costs, held against its budgets and against what the documents say; and the proof that it cannot panic.
 //!
 //! Builds the relay image and the counting image with the firmware profile, reads sizes and the deepest stack from the
 //! relay's ELF, runs the counting image in QEMU, and links the relay image with a panic handler that cannot be linked.
+//! `cargo cost --write` has the documents say what was measured.
 
 mod counted;
+mod document;
 mod image;
 mod row;
 
-use std::process::ExitCode;
+use std::path::Path;
+use std::process::{Command, ExitCode};
 
 use row::Row;
 
+const USAGE: &str = "cargo cost [--write]: what the firmware costs\n\n  --write  README.md and host-tests/RESULTS.md say from now on what was measured";
+
 fn main() -> ExitCode {
-    match measure() {
-        Ok(rows) => report(&rows),
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let write = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] => false,
+        ["--write"] => true,
+        ["--help" | "-h"] => {
+            println!("{USAGE}");
+            return ExitCode::SUCCESS;
+        }
+        _ => {
+            eprintln!("cost: {}: not an option\n\n{USAGE}", arguments.join(" "));
+            return ExitCode::from(2);
+        }
+    };
+    match measure().and_then(|rows| report(&rows, write)) {
+        Ok(()) => {
+            println!("cost: all within budget");
+            ExitCode::SUCCESS
+        }
         Err(error) => {
             println!("cost: {error}");
             ExitCode::FAILURE
@@ -21,27 +42,52 @@ fn main() -> ExitCode {
     }
 }
 
-fn report(rows: &[Row]) -> ExitCode {
-    println!("| | measured | budget |\n| --- | --- | --- |");
-    let mut over = Vec::new();
-    for row in rows {
-        let budget = row
-            .budget
-            .map_or_else(String::new, |budget| format!("{budget} {}", row.unit));
-        println!("| {} | {} {} | {budget} |", row.what, row.value, row.unit);
-        if row.budget.is_some_and(|budget| row.value > budget) {
-            over.push(row.what);
-        }
-    }
+fn report(rows: &[Row], write: bool) -> Result<(), String> {
+    print!("{}", document::table(rows));
     println!(
         "No panic is reachable in any of these images, and one put there on purpose does not link."
     );
-    if over.is_empty() {
-        println!("cost: all within budget");
-        ExitCode::SUCCESS
-    } else {
-        println!("cost: over budget: {}", over.join("; "));
-        ExitCode::FAILURE
+    let over: Vec<&str> = rows
+        .iter()
+        .filter(|row| row.budget.is_some_and(|budget| row.value > budget))
+        .map(|row| row.what)
+        .collect();
+    if !over.is_empty() {
+        return Err(format!("over budget: {}", over.join("; ")));
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let (rustc, qemu) = (version("rustc")?, version("qemu-system-arm")?);
+    if !document::are_of(&root, &rustc, &qemu) {
+        println!(
+            "The documents are of another compiler or emulator than rustc {rustc} and QEMU {qemu}."
+        );
+        return Ok(());
+    }
+    for document in document::all(&root, rows)? {
+        if write {
+            document.write()?;
+        } else if !document.is_right() {
+            return Err(format!(
+                "{} says something else: `cargo cost --write`",
+                document.name()
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The first two numbers of the version that `program` says.
+fn version(program: &str) -> Result<String, String> {
+    let output = Command::new(program).arg("--version").output();
+    let output = output.map_err(|error| format!("{program}: {error}"))?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let numbers = text
+        .split_whitespace()
+        .find(|word| word.starts_with(|first: char| first.is_ascii_digit()));
+    let mut parts = numbers.unwrap_or_default().split('.');
+    match (parts.next(), parts.next()) {
+        (Some(major), Some(minor)) => Ok(format!("{major}.{minor}")),
+        _ => Err(format!("{program} says no version: {text}")),
     }
 }
 

@@ -1,0 +1,153 @@
+//! What the documents say of costs: the table of `host-tests/RESULTS.md`, and three rows of `README.md`.
+
+use std::path::{Path, PathBuf};
+
+use crate::row::Row;
+
+const HEAD: &str = "| | measured | budget |\n| --- | --- | --- |\n";
+
+/// A document as it stands, and as it should be.
+pub(crate) struct Document {
+    /// Where it is in the checkout.
+    name: &'static str,
+    path: PathBuf,
+    kept: String,
+    measured: String,
+}
+
+impl Document {
+    /// Whether it says what was measured.
+    pub(crate) fn is_right(&self) -> bool {
+        self.kept == self.measured
+    }
+
+    pub(crate) const fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Has it say what was measured.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(crate) fn write(&self) -> Result<(), String> {
+        let written = std::fs::write(&self.path, &self.measured);
+        written.map_err(|error| format!("{}: {error}", self.name))
+    }
+}
+
+/// The table of all rows.
+pub(crate) fn table(rows: &[Row]) -> String {
+    let lines = rows.iter().map(|row| {
+        let (what, unit, value) = (row.what, row.unit, row.value);
+        let budget = row
+            .budget
+            .map_or_else(String::new, |budget| format!("{budget} {unit}"));
+        format!("| {what} | {value} {unit} | {budget} |\n")
+    });
+    std::iter::once(HEAD.to_owned()).chain(lines).collect()
+}
+
+/// Both documents of the checkout at `root`.
+///
+/// # Errors
+/// When one cannot be read, or has no place for what was measured.
+pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
+    let results = with(root, "host-tests/RESULTS.md", |text| {
+        let begin = text.find(HEAD)?;
+        let after = text.get(begin..)?;
+        let end = begin + after.find("\n\n")? + 1;
+        Some([text.get(..begin)?, &table(rows), text.get(end..)?].concat())
+    })?;
+    let readme = with(root, "README.md", |text| {
+        let mut text = text.to_owned();
+        for (begins, says) in lines(rows)? {
+            let begin = text.find(begins)?;
+            let end = begin + text.get(begin..)?.find('\n')?;
+            text.replace_range(begin..end, &format!("{begins}{says} | `cargo cost` |"));
+        }
+        Some(text)
+    })?;
+    Ok([results, readme])
+}
+
+/// Whether the documents are of this compiler and this emulator: others have other costs.
+pub(crate) fn are_of(root: &Path, rustc: &str, qemu: &str) -> bool {
+    let results = std::fs::read_to_string(root.join("host-tests/RESULTS.md"));
+    results.is_ok_and(|text| text.contains(&format!("(rustc {rustc}, QEMU {qemu}, ")))
+}
+
+fn with(
+    root: &Path,
+    name: &'static str,
+    measured: impl Fn(&str) -> Option<String>,
+) -> Result<Document, String> {
+    let path = root.join(name);
+    let kept = std::fs::read_to_string(&path).map_err(|error| format!("{name}: {error}"))?;
+    let measured = measured(&kept).ok_or_else(|| format!("{name}: no place for costs"))?;
+    Ok(Document {
+        name,
+        path,
+        kept,
+        measured,
+    })
+}
+
+/// How rows of the README begin, and what they go on with.
+fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
+    let image = |what: &str| {
+        let at = rows.iter().position(|row| row.what == what)?;
+        let [flash, ram, stack] = rows.get(at..at + 3)? else {
+            return None;
+        };
+        let [flash, ram, stack] = [flash, ram, stack].map(|row| in_threes(row.value));
+        Some(format!("{flash}, {ram} and {stack} bytes"))
+    };
+    let sweep = rows
+        .iter()
+        .position(|row| row.what == "a full sweep, message in to message out")?;
+    let [sweep, frame] = rows.get(sweep..sweep + 2)? else {
+        return None;
+    };
+    Some([
+        (
+            "| flash, static RAM, stack: Algorithm 1 alone | ",
+            image("flash of the relay image, Algorithm 1 alone")?,
+        ),
+        (
+            "| the same with every feature | ",
+            image("flash of the relay image, everything")?,
+        ),
+        (
+            "| a sweep of 16 targets, message in to message out | ",
+            format!(
+                "{} instructions, {} bytes on the wire",
+                in_threes(sweep.value),
+                frame.value
+            ),
+        ),
+    ])
+}
+
+/// A number with a space between thousands.
+fn in_threes(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_threes;
+
+    #[test]
+    fn thousands_stand_apart() {
+        let texts = [7, 100, 4_900, 139_600, 1_000_000].map(in_threes);
+        assert_eq!(texts, ["7", "100", "4 900", "139 600", "1 000 000"]);
+    }
+}
