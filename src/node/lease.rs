@@ -129,6 +129,7 @@ impl Lease {
         matches!(self.state, LeaseState::Open)
     }
 
+    /// How long it has held one, as of `now`.
     pub(crate) fn tenure(&self, now: Instant, settings: &Settings) -> Tenure {
         let long = settings.dead_after.times(2);
         let held = self.held.filter(|(_, until)| now.since(*until) <= long);

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use crate::problem::{Choice, Problem};
 use crate::results::{Answer, Found, Results, Run, Solved};
 use crate::score::{Score, judge, score};
+use uav_relay_xtask::number::spaced;
 
 const TITLES: [(Choice, &str); 3] = [
     (
@@ -240,17 +241,4 @@ fn two_digits(value: f64) -> String {
         reason = "a whole number, at most the largest u64"
     )]
     spaced(rounded.round() as u64)
-}
-
-/// A whole number in groups of three digits.
-fn spaced(value: u64) -> String {
-    let digits = value.to_string();
-    let mut text = String::new();
-    for (at, digit) in digits.chars().enumerate() {
-        if at > 0 && (digits.len() - at).is_multiple_of(3) {
-            text.push(' ');
-        }
-        text.push(digit);
-    }
-    text
 }

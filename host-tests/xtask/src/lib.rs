@@ -1,5 +1,6 @@
-//! What `cargo ci` and `cargo cost` have in common.
+//! What the commands of the project have in common.
 
+pub mod number;
 pub mod stack;
 pub mod toolchain;
 

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use uav_relay_xtask::number::spaced;
+
 use crate::row::Row;
 
 const HEAD: &str = "| | measured | budget |\n| --- | --- | --- |\n";
@@ -99,7 +101,7 @@ fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
         let [flash, ram, stack] = rows.get(at..at + 3)? else {
             return None;
         };
-        let [flash, ram, stack] = [flash, ram, stack].map(|row| in_threes(row.value));
+        let [flash, ram, stack] = [flash, ram, stack].map(|row| spaced(row.value));
         Some(format!("{flash}, {ram} and {stack} bytes"))
     };
     let sweep = rows
@@ -121,33 +123,9 @@ fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
             "| a sweep of 16 targets, message in to message out | ",
             format!(
                 "{} instructions, {} bytes on the wire",
-                in_threes(sweep.value),
+                spaced(sweep.value),
                 frame.value
             ),
         ),
     ])
-}
-
-/// A number with a space between thousands.
-fn in_threes(value: u64) -> String {
-    let digits = value.to_string();
-    let mut text = String::new();
-    for (at, digit) in digits.chars().enumerate() {
-        if at > 0 && (digits.len() - at).is_multiple_of(3) {
-            text.push(' ');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::in_threes;
-
-    #[test]
-    fn thousands_stand_apart() {
-        let texts = [7, 100, 4_900, 139_600, 1_000_000].map(in_threes);
-        assert_eq!(texts, ["7", "100", "4 900", "139 600", "1 000 000"]);
-    }
 }
