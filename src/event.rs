@@ -83,19 +83,32 @@ pub enum Event {
     /// was loaded with (`Settings::sited`). It flies on as before. Raised once for each such mission. An operator uploads one that keeps
     /// the distance, or loads all relays anew for other sites.
     UploadRefused,
+    /// This relay believes something else of the interference than before: `Relay::belief`. New places follow.
+    Believed,
+    /// Raised at the leader: what the relays hear is not of one source on the ground, or says too little. The last belief is kept, see
+    /// `Relay::unfit`.
+    InterfererUnclear,
+    /// A relay hears something else of the interference than all the others, by more than 6 dB: what it measures is left out. An operator
+    /// looks at its receiver.
+    SensorOff {
+        /// Which one.
+        node: u16,
+    },
     /// The chain has agreed to fly it: `Relay::mission` and `Relay::version` have new values, and new places follow.
     Adopted,
 }
 
 /// Events about nobody in particular, in the order in which they are told: these first, those about a node, and the others.
 const FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
-const LAST: [Event; 6] = [
+const LAST: [Event; 8] = [
     Event::Reformed,
     Event::LeaseLapsed,
     Event::NoQuorum,
     Event::UploadRefused,
     Event::Uploaded,
     Event::Adopted,
+    Event::Believed,
+    Event::InterfererUnclear,
 ];
 
 /// What can be told of a node on one side.
@@ -111,6 +124,8 @@ pub(crate) enum About {
     Epoch,
     /// The number itself; of this relay's own, on either side.
     Index,
+    /// Its measurements.
+    Sensor,
 }
 
 impl About {
@@ -124,6 +139,7 @@ impl About {
         #[cfg(feature = "auth")]
         Self::Epoch,
         Self::Index,
+        Self::Sensor,
     ];
 
     const fn event(self, side: Side, node: u16) -> Event {
@@ -137,6 +153,7 @@ impl About {
             #[cfg(feature = "auth")]
             Self::Epoch => Event::EpochWentBack { node },
             Self::Index => Event::IndexTaken { node },
+            Self::Sensor => Event::SensorOff { node },
         }
     }
 }

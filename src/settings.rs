@@ -76,6 +76,37 @@ pub struct Measure {
     pub samples: u32,
 }
 
+/// How a chain finds its interferer by what its relays hear.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Listen {
+    /// How long after an agreement the leader asks what is heard; above 0. While nothing new comes of it, it asks less and less often,
+    /// down to a 64th.
+    pub every: Duration,
+    /// After so long what was heard elsewhere, or before, counts half; above 0. For an interferer that moves, a few seconds.
+    pub half_life: Duration,
+    /// By how much one measurement is off, relative: 1e-3 to 1. One over the root of the independent samples in it.
+    pub relative_error: f32,
+}
+
+impl Default for Listen {
+    /// Every five seconds, half after a minute, 3 %: a thousand samples.
+    fn default() -> Self {
+        Self {
+            every: Duration::from_millis(5_000),
+            half_life: Duration::from_millis(60_000),
+            relative_error: 0.03,
+        }
+    }
+}
+
+impl Listen {
+    fn is_valid(&self) -> bool {
+        let timed = self.every.as_micros() > 0 && self.half_life.as_micros() > 0;
+        timed && (1e-3..=1.0).contains(&self.relative_error)
+    }
+}
+
 /// What a firmware may choose.
 #[expect(clippy::struct_excessive_bools, reason = "settings, each for itself")]
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -89,6 +120,9 @@ pub struct Settings {
     pub method: Method,
     /// In a field: whether and how this relay measures it, to use what it measured instead of what was agreed.
     pub measure: Option<Measure>,
+    /// Not in a field: whether and how the chain finds its interferer by what the relays measure. All relays of a chain listen, or none
+    /// does.
+    pub listen: Option<Listen>,
     /// Which targets the leader tries; the others follow.
     pub schedule: Schedule,
     /// Whether the leader first solves the chain from the mission, with the bracketed schedule: one round trip if it is right.
@@ -126,6 +160,7 @@ impl Default for Settings {
             hold_altitude: false,
             method: Method::Align,
             measure: None,
+            listen: None,
             schedule: Schedule::Bracketed,
             predict: true,
             wiring: Wiring::Pair,
@@ -160,6 +195,9 @@ pub enum SetupError {
     /// `measure.i_max_w` is not within 1e-30 to 1e6, or `measure.samples` not within 100 to 1 000 000, or the crate was built
     /// without the feature `field`.
     Measure,
+    /// `listen.every` or `listen.half_life` is zero, or `listen.relative_error` not within 1e-3 to 1, or the mission is in a field, or the
+    /// crate was built without the feature `sensing`.
+    Listen,
     /// `hop_time` is zero.
     HopTime,
     /// `auth.epoch` is zero.
@@ -184,6 +222,9 @@ impl core::fmt::Display for SetupError {
             Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
             Self::Measure => {
                 "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000, and the feature field on"
+            }
+            Self::Listen => {
+                "listen.every and listen.half_life must be above 0, listen.relative_error within 1e-3 to 1, the mission not in a field, and the feature sensing on"
             }
             Self::HopTime => "hop_time must be above 0",
             Self::Epoch => "auth.epoch must be above 0, and above that of every start before",
@@ -244,6 +285,11 @@ pub(crate) fn check(
             && (100..=1_000_000).contains(&samples))
     {
         return Err(SetupError::Measure);
+    }
+    if let Some(listen) = settings.listen
+        && !(cfg!(feature = "sensing") && listen.is_valid() && mission.field().is_none())
+    {
+        return Err(SetupError::Listen);
     }
     if settings.hop_time.as_micros() == 0 {
         return Err(SetupError::HopTime);

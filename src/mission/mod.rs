@@ -8,6 +8,7 @@
 //! | `gains` | what transmit powers are worth on its hops |
 //! | `steps` | the least steps between its relays |
 
+mod believed;
 mod config;
 mod error;
 mod gains;

@@ -15,6 +15,23 @@ pub struct Interferer {
     pub y_m: f32,
 }
 
+impl Interferer {
+    /// Whether it is of a power that is taken.
+    pub(super) const fn is_powered(&self) -> bool {
+        within(self.power_w, 1e-6, 1e9)
+    }
+
+    /// Whether it is at a place that is taken.
+    pub(super) const fn is_placed(&self) -> bool {
+        within(self.x_m, -1e7, 1e7) && within(self.y_m, -1e7, 1e7)
+    }
+
+    /// Whether all its numbers are within their ranges.
+    pub const fn is_valid(&self) -> bool {
+        self.is_powered() && self.is_placed()
+    }
+}
+
 /// What degrades the hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -23,6 +40,8 @@ pub enum Interference {
     Source(Interferer),
     /// Interference that is only known as a distribution along x.
     Field(Field),
+    /// One transmitter, and nobody knows where. Until the relays have found it ([`crate::Settings::listen`]) they spread evenly.
+    Unknown,
 }
 
 /// Which way the places of a chain are worked out, one relay after the other, and hence who begins.

@@ -1,5 +1,6 @@
 //! A mission whose parameters have been checked, and what is asked of it.
 
+use super::believed::{FAR, even_gains};
 use super::config::MissionConfig;
 use super::error::MissionError;
 use super::parts::{Heading, Interference, Interferer, within};
@@ -59,10 +60,10 @@ impl Mission {
             return Err(MissionError::Lateral);
         }
         if let Interference::Source(interferer) = &interference {
-            if !within(interferer.power_w, 1e-6, 1e9) {
+            if !interferer.is_powered() {
                 return Err(MissionError::InterfererPower);
             }
-            if !within(interferer.x_m, -1e7, 1e7) || !within(interferer.y_m, -1e7, 1e7) {
+            if !interferer.is_placed() {
                 return Err(MissionError::InterfererPlace);
             }
         }
@@ -84,6 +85,7 @@ impl Mission {
                     channel.mu_nlos() / eta * (beyond * beyond + aside * aside) / p_msi,
                 )
             }
+            Interference::Unknown => even_gains(distance_m, common.power_w),
             Interference::Field(field) => {
                 let most = field.largest() as f64;
                 (
@@ -141,10 +143,11 @@ impl Mission {
         &self.config.interference
     }
 
-    /// The interferer, where there is one.
+    /// The interferer, where there is one; where nobody knows it, one far away, which is the same everywhere.
     pub const fn interferer(&self) -> Option<&Interferer> {
         match &self.config.interference {
             Interference::Source(interferer) => Some(interferer),
+            Interference::Unknown => Some(&FAR),
             Interference::Field(_) => None,
         }
     }

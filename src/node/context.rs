@@ -3,7 +3,7 @@
 use super::retransmit::Trip;
 use super::timing::{longest_lease, tenths};
 use super::view::electorate::Held;
-use crate::mission::{Band, Heading, Mission};
+use crate::mission::{Band, Heading, Interference, Mission};
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
 use crate::time::Instant;
@@ -15,6 +15,8 @@ use crate::wire::digest::{MissionId, digest};
 pub(crate) struct Member {
     /// The mission that it flies, with as many relays as are in the view.
     pub(crate) mission: Mission,
+    /// What that mission says of the interference, whatever is believed.
+    pub(crate) interference: Interference,
     pub(crate) settings: Settings,
     /// Its own node number, from 1 next to Tx.
     pub(crate) node: u16,
@@ -41,6 +43,7 @@ impl Member {
             active: MissionId { version: 0, digest },
             view: ViewId::LOADED,
             index: node,
+            interference: *mission.interference(),
             mission,
         }
     }
@@ -190,6 +193,12 @@ pub(crate) struct Effects {
     pub(crate) ask: bool,
     /// What came of a proposal.
     pub(crate) decided: Option<Decided>,
+    /// Something else is believed of the interference.
+    pub(crate) believes: bool,
+    /// What is heard of it is not of one source.
+    pub(crate) unclear: bool,
+    /// The node that hears something else than all the others.
+    pub(crate) off: Option<u16>,
 }
 
 /// What came of a proposal.
@@ -226,6 +235,9 @@ impl Effects {
         proposed_by: None,
         ask: false,
         decided: None,
+        believes: false,
+        unclear: false,
+        off: None,
     };
 
     pub(crate) const STALE: Self = Self {

@@ -22,6 +22,20 @@ pub enum Sample {
         /// That power, W: above 0, at most `Measure::i_max_w`.
         power_w: f32,
     },
+    /// The mean interference power that was received at a place on the way or where the drone hovers, over enough time that its
+    /// relative error is that of [`Listen`](crate::settings::Listen): without the signals of the chain itself, and without the noise of the
+    /// receiver.
+    Heard {
+        /// Where the drone was.
+        at: Placement,
+        /// That power, W: 1e-30 to 1e6.
+        power_w: f32,
+    },
+    /// The same at the ground receiver, handed to relay N.
+    Receiver {
+        /// That power, W: 1e-30 to 1e6.
+        power_w: f32,
+    },
     /// SIR of the first hop, linear, as relay 1 measures it at its setpoint: what Algorithm 4 compares with the target.
     FirstHop {
         /// That SIR, linear, above 0.
@@ -65,7 +79,7 @@ impl Meter {
                 let squared = square(at.x_m) + square(at.y_m) + square(at.altitude_m);
                 mission.first_hop_power_w(squared) / sir
             }
-            (Sample::FirstHop { .. }, None) => return false,
+            _ => return false,
         };
         let before = estimator.accepted();
         estimator.push(power_w);

@@ -210,8 +210,8 @@ impl Relay {
     /// Takes one measurement of the interference, W or linear SIR, where `Settings::measure` asks for them.
     ///
     /// Constant work. What is no use is counted as [`Stats::samples_refused`](crate::Stats::samples_refused).
-    pub fn handle_sample(&mut self, sample: Sample) {
-        self.node.handle_sample(sample);
+    pub fn handle_sample(&mut self, now: Instant, sample: Sample) {
+        self.node.handle_sample(now, sample);
     }
 
     /// Takes in where the drone was at time `at`, `x_m` and altitude: when that was measured, not when it was read. Where

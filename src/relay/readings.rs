@@ -6,6 +6,8 @@ use crate::guard::HoldReason;
 use crate::mission::{Mission, Profile};
 use crate::node::round::state::Phase;
 use crate::place::Placement;
+use crate::sensing::belief::Told;
+use crate::sensing::fit::Unfit;
 use crate::side::Side;
 use crate::stats::Stats;
 use crate::time::Instant;
@@ -90,6 +92,16 @@ impl Relay {
     /// Upsilon that this relay uses instead of the agreed field's, 1/W, once it has measured enough.
     pub fn measured_per_w(&self) -> Option<f32> {
         self.node.round().meter().published()
+    }
+
+    /// What it believes of the interference, and the number of that: of the mission before the chain has found anything else.
+    pub fn belief(&self) -> Told {
+        self.node.round().told()
+    }
+
+    /// At the leader: why nothing was made of what was heard last.
+    pub fn unfit(&self) -> Option<Unfit> {
+        self.node.round().unfit()
     }
 
     /// While Algorithm 2 goes on, at the leader: rounds that are over, and the SIR (linear) of the chain after the last.

@@ -29,6 +29,8 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
                 crc.update(&number.to_le_bytes());
             }
         }
+        // No interferer has a power of 0.
+        Interference::Unknown => crc.update(&[0; 12]),
         Interference::Field(field) => {
             for point in field.points() {
                 crc.update(&point.x_m.to_le_bytes());

@@ -17,13 +17,13 @@ pub fn write(
     autopilot_key: Option<[u8; 32]>,
 ) -> Block {
     let mission = config.mission.config();
-    let source = config.mission.interferer().copied().unwrap_or(Interferer {
+    let source = config.mission.known_source().unwrap_or(Interferer {
         power_w: 0.0,
         x_m: 0.0,
         y_m: 0.0,
     });
     let points = match &mission.interference {
-        Interference::Source(_) => &[][..],
+        Interference::Source(_) | Interference::Unknown => &[][..],
         Interference::Field(field) => field.points(),
     };
     let (method, rounds, explore_m) = match config.method {

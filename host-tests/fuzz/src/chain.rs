@@ -287,7 +287,7 @@ impl Chain {
         };
         for power_w in [power_w, other_w] {
             let sample = Sample::Interference { power_w };
-            member.watched.sample(sample, 64);
+            member.watched.sample(self.now, sample, 64);
         }
         self.settle(at);
     }

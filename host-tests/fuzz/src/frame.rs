@@ -1,6 +1,7 @@
 //! Any bytes behind a good check sequence: what can be read can be written, and is then the same.
 
 use uav_relay::mission::MAX_RELAYS;
+use uav_relay::sensing::belief::Belief;
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};
@@ -238,6 +239,12 @@ fn look_at(message: &Message) {
             for seat in &roster.seats {
                 assert!(seat.held_m.to_bits() == 0 || is_flown(seat.held_m));
                 assert!((1e-6..=1e6).contains(&seat.power_w));
+            }
+        }
+        Message::Sense(hearing) | Message::Sensed(hearing) => {
+            assert!(hearing.sums.count() >= 0.0 && hearing.sums.age_s() >= 0.0);
+            if let Belief::Source { source, receiver_w } = hearing.told.belief {
+                assert!(source.is_valid() && receiver_w >= 0.0);
             }
         }
         Message::Token(token) => {

@@ -215,7 +215,7 @@ impl Bench {
                 sir: input.mostly(|input| input.scaled(1e-9, 1e9)),
             }
         };
-        self.watched.sample(sample, count);
+        self.watched.sample(self.now, sample, count);
     }
 
     /// It is told where it is or was, now and then that a neighbour has landed.

@@ -153,10 +153,10 @@ impl Watched {
     }
 
     /// A measurement comes in, `count` times over.
-    pub fn sample(&mut self, sample: Sample, count: u8) {
+    pub fn sample(&mut self, now: Instant, sample: Sample, count: u8) {
         heap::without(|| {
             for _ in 0..count {
-                self.relay.handle_sample(sample);
+                self.relay.handle_sample(now, sample);
             }
         });
     }

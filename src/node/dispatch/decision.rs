@@ -80,6 +80,7 @@ impl Node {
     /// `mission` is another one than before.
     pub(super) fn adopt(&mut self, mission: Mission, id: MissionId) {
         self.member.mission = mission;
+        self.member.interference = *mission.interference();
         self.member.active = id;
         let common = mission.config().common;
         let profile = self.member.settings.profile.unwrap_or(common);

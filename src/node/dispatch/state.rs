@@ -58,7 +58,7 @@ impl Node {
                 view: ViewChange::new(member.all, mission.leader(), !seed),
                 lease: Lease::new(!seed.rotate_left(16), now, settings),
                 update: MissionUpdate::new(member.active, seed.rotate_left(4), now),
-                round: Round::new(leads, number, profile, settings.measure, seed),
+                round: Round::new(leads, number, profile, settings, seed, now),
             },
             steering: Steering::NONE,
             namesake: Namesake::new(seed.rotate_left(24)),
@@ -146,6 +146,28 @@ impl Node {
         if effects.infeasible {
             self.raise(Event::Infeasible);
         }
+        if effects.believes {
+            self.believe();
+        }
+        if effects.unclear {
+            self.raise(Event::InterfererUnclear);
+        }
+        if let Some(node) = effects.off {
+            self.raise_about(About::Sensor, onward, node);
+        }
+    }
+
+    /// Flies by what is believed from now on.
+    fn believe(&mut self) {
+        let told = self.layers.round.told();
+        let believing = self
+            .member
+            .mission
+            .believing(self.member.interference, &told.belief);
+        if let Ok(mission) = believing {
+            self.member.mission = mission;
+            self.raise(Event::Believed);
+        }
     }
 
     pub(crate) fn poll_event(&mut self) -> Option<Event> {
@@ -208,8 +230,8 @@ impl Node {
     }
 
     /// One measurement, by a relay that measures.
-    pub(crate) fn handle_sample(&mut self, sample: Sample) {
-        if !self.layers.round.handle_sample(&self.member, sample) {
+    pub(crate) fn handle_sample(&mut self, now: Instant, sample: Sample) {
+        if !self.layers.round.handle_sample(now, &self.member, sample) {
             bump(&mut self.telemetry.stats.samples_refused);
         }
     }

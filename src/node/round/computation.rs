@@ -1,6 +1,7 @@
 //! What a relay holds while it does its share of an algorithm: the pass that is under way, its place, its targets.
 
 use super::seats::Seats;
+use super::sense::{Sense, Sensing};
 use super::state::{Action, Phase, RoundState};
 use super::sweeping::Sweeping;
 use super::task::LeaderTask;
@@ -11,7 +12,8 @@ use crate::node::sample::Meter;
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement, Station};
-use crate::settings::Measure;
+use crate::settings::Settings;
+use crate::time::Instant;
 use crate::wire::message::{Answer, Message, Moved, Roster, Sweep, Token};
 
 /// Places weighed in one call of `work` in Algorithm 2, and a row of 24 more at most.
@@ -20,12 +22,14 @@ pub(super) const PLACES_AT_ONCE: u16 = 600;
 /// Whether this crate was built with the methods beyond Algorithm 1. Without one, none of its code is reached.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
 pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
+pub(crate) const SENSING: bool = cfg!(feature = "sensing");
 
 /// What the current pass carries.
 #[derive(Clone, Debug)]
 pub(super) enum PassKind {
     Sweep(Sweeping),
     Gather(Roster),
+    Sense(Sense),
     Turn(Turning),
 }
 
@@ -60,6 +64,8 @@ pub(crate) struct Computation {
     pub(super) setpoint: Option<Placement>,
     /// What it measures there.
     pub(super) meter: Meter,
+    /// What it hears of the interference.
+    pub(super) sensing: Sensing,
     pub(super) target: Option<f32>,
     /// At the leader, what no chain can have.
     pub(super) bound: Option<f32>,
@@ -71,7 +77,8 @@ impl Computation {
         leader: bool,
         number: u16,
         profile: Profile,
-        measure: Option<Measure>,
+        settings: &Settings,
+        now: Instant,
     ) -> Self {
         Self {
             state: RoundState::new(if leader { Phase::Planning } else { Phase::Idle }, number),
@@ -84,7 +91,8 @@ impl Computation {
             at: profile.on_line().at,
             after: None,
             setpoint: None,
-            meter: Meter::new(measure),
+            meter: Meter::new(settings.measure),
+            sensing: Sensing::new(settings.listen, now),
             target: None,
             bound: None,
         }
@@ -101,6 +109,7 @@ impl Computation {
         self.profile = profile;
         self.chosen = None;
         self.seats = Seats::UNKNOWN;
+        self.sensing.load();
         if self.setpoint.is_none() {
             self.at = profile.on_line().at;
         }
@@ -127,6 +136,7 @@ impl Computation {
         self.after = None;
         self.chosen = None;
         self.seats = Seats::UNKNOWN;
+        self.sensing.renew();
         self.state.renew(leads);
     }
 
@@ -190,6 +200,7 @@ impl Computation {
                 reaches: sweeping.reaches.clone(),
             })),
             PassKind::Gather(roster) if ALTITUDE => Some(Message::Gather(roster.clone())),
+            PassKind::Sense(sense) if SENSING => Some(Message::Sense(sense.hearing)),
             PassKind::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Token(Token {
                     number,
@@ -214,7 +225,7 @@ impl Computation {
         match &self.pass {
             PassKind::Turn(_) => true,
             PassKind::Sweep(sweeping) => sweeping.chosen,
-            PassKind::Gather(_) => false,
+            PassKind::Gather(_) | PassKind::Sense(_) => false,
         }
     }
 
@@ -233,6 +244,7 @@ impl Computation {
                 own: sweeping.own || self.differs(context),
             })),
             PassKind::Gather(roster) if ALTITUDE => Some(Message::Gathered(roster.clone())),
+            PassKind::Sense(sense) if SENSING => Some(Message::Sensed(sense.hearing)),
             PassKind::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Moved(Moved {
                     number,

@@ -22,7 +22,7 @@ const FIELD_HOPS_AT_ONCE: u16 = 8;
 impl Computation {
     /// Goes on with the leader's computation; whether the next pass can begin.
     pub(super) fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
-        if self.gathers(context) {
+        if self.has_to_tell(context) || self.gathers(context) {
             return Ok(true);
         }
         if self.is_solving(context) {
@@ -121,6 +121,9 @@ impl Computation {
     /// The leader begins the pass it has planned.
     pub(super) fn begin_pass(&mut self, context: &Context<'_>) -> Action {
         let mission = context.mission();
+        if self.has_to_tell(context) {
+            return self.begin_sense(context);
+        }
         if self.gathers(context) {
             self.begin();
             return self.begin_gathering(context);
@@ -145,7 +148,7 @@ impl Computation {
         }
     }
 
-    fn begin(&mut self) {
+    pub(super) fn begin(&mut self) {
         self.state.begin();
         self.sweeps = self.sweeps.saturating_add(1);
     }

@@ -19,6 +19,7 @@ mod computation;
 mod gathering;
 mod leader;
 mod seats;
+mod sense;
 pub(crate) mod state;
 mod sweep;
 mod sweeping;
@@ -34,11 +35,14 @@ use super::sample::{Meter, Sample};
 use super::timing::{PAUSE, earliest};
 use crate::mission::Profile;
 use crate::place::Placement;
-use crate::settings::Measure;
+use crate::sensing::belief::Told;
+use crate::sensing::fit::Unfit;
+use crate::settings::Settings;
 use crate::time::Instant;
 use crate::wire::message::Message;
 
-use computation::{ADJUST, ALTITUDE, Computation};
+use computation::{ADJUST, ALTITUDE, Computation, SENSING};
+use sense::Found;
 use state::{Action, Phase};
 
 /// What is to be sent.
@@ -66,11 +70,12 @@ impl Round {
         leads: bool,
         number: u16,
         profile: Profile,
-        measure: Option<Measure>,
+        settings: &Settings,
         seed: u32,
+        now: Instant,
     ) -> Self {
         Self {
-            computation: Computation::new(leads, number, profile, measure),
+            computation: Computation::new(leads, number, profile, settings, now),
             retransmit: Retransmit::new(seed),
             work_at: None,
             said_at: None,
@@ -86,11 +91,14 @@ impl Round {
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
         let (before, said_at) = (computation.state, self.said_at);
+        let found = computation.sensing.found();
         let next = match message {
             Message::Sweep(sweep) => computation.on_sweep(context, sweep),
             Message::Verdict(answer) => computation.on_verdict(context, answer),
             Message::Gather(roster) if ALTITUDE => computation.on_gather(context, roster),
             Message::Gathered(roster) if ALTITUDE => computation.on_gathered(context, roster),
+            Message::Sense(hearing) if SENSING => computation.on_sense(context, hearing),
+            Message::Sensed(hearing) if SENSING => computation.on_sensed(context, hearing),
             Message::Token(token) if ADJUST => computation.on_token(context, token),
             Message::Moved(moved) if ADJUST => computation.on_moved(context, moved),
             Message::Busy { sweep } => {
@@ -106,7 +114,7 @@ impl Round {
         Effects {
             heard_onward: said_at.filter(|_| state.answers(before)),
             heard_back: said_at.filter(|_| state.follows(before)),
-            ..self.proceed(context, next)
+            ..self.proceed_with(context, next, found)
         }
     }
 
@@ -122,6 +130,15 @@ impl Round {
             None => false,
         };
         self.due.onward |= resent;
+        if SENSING && self.computation.sensing.take_due(context.now) && self.computation.may_sense(context) {
+            let found = self.computation.sensing.found();
+            let next = self.computation.begin_sense(context);
+            return Effects {
+                resent,
+                began: true,
+                ..self.proceed_with(context, next, found)
+            };
+        }
         if self.work_at.is_none_or(|at| at > context.now) {
             return Effects {
                 resent,
@@ -130,12 +147,29 @@ impl Round {
         }
         self.work_at = None;
         let sweeps = self.computation.sweeps;
+        let found = self.computation.sensing.found();
         let next = self.computation.work(context);
         let began = self.computation.sweeps != sweeps;
-        let effects = self.proceed(context, next);
+        let effects = self.proceed_with(context, next, found);
         Effects {
             resent,
             began,
+            ..effects
+        }
+    }
+
+    /// As [`proceed`](Self::proceed), and says what has been found since `before`.
+    fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Found) -> Effects {
+        let effects = self.proceed(context, next);
+        if !SENSING {
+            return effects;
+        }
+        self.computation.plan_to_sense(context);
+        let found = self.computation.sensing.found();
+        Effects {
+            believes: found.told != before.told,
+            unclear: found.unfit.is_some() && found.unfit != before.unfit,
+            off: (found.off != before.off && found.off != 0).then_some(found.off),
             ..effects
         }
     }
@@ -207,7 +241,12 @@ impl Round {
     }
 
     /// One measurement, by a relay that measures; whether it was of use.
-    pub(crate) fn handle_sample(&mut self, member: &Member, sample: Sample) -> bool {
+    pub(crate) fn handle_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
+        if let Sample::Heard { .. } | Sample::Receiver { .. } = sample {
+            return SENSING
+                && member.settings.listen.is_some()
+                && self.computation.sensing.take(now, member, sample);
+        }
         let at = self.computation.setpoint.filter(|_| member.index == 1);
         self.computation.meter.take(&member.mission, at, sample)
     }
@@ -291,7 +330,8 @@ impl Round {
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        earliest(self.work_at, self.retransmit.next_timeout())
+        let due = earliest(self.work_at, self.retransmit.next_timeout());
+        earliest(due, self.computation.sensing.next_timeout())
     }
 
     pub(crate) const fn phase(&self) -> Phase {
@@ -321,6 +361,16 @@ impl Round {
     /// What it has measured.
     pub(crate) const fn meter(&self) -> &Meter {
         &self.computation.meter
+    }
+
+    /// What it believes of the interference.
+    pub(crate) const fn told(&self) -> Told {
+        self.computation.sensing.told
+    }
+
+    /// Why nothing was made of what was heard last.
+    pub(crate) const fn unfit(&self) -> Option<Unfit> {
+        self.computation.sensing.unfit()
     }
 
     pub(crate) const fn target(&self) -> Option<f32> {

@@ -5,6 +5,7 @@
 //! tuple, whose order is the format. `parts` has what several kinds have in common.
 
 mod fence;
+mod hearing;
 mod hello;
 #[cfg(feature = "upload")]
 mod offer;
@@ -16,6 +17,7 @@ mod tag;
 mod turn;
 mod view;
 
+pub use self::hearing::{Hearing, Receiver};
 pub use self::hello::Hello;
 pub use self::parts::MessageError;
 pub use self::pulse::{Pulse, Pulsed};
@@ -29,8 +31,8 @@ use self::parts::{Word, read, write};
 use super::upload::Upload;
 use crate::guard::Fence;
 
-/// The longest body: a sweep of sixteen targets with what was measured, or from aside of the line.
-pub const MAX_BODY: usize = 88;
+/// The longest body: what relays hear.
+pub const MAX_BODY: usize = 106;
 
 /// One message between neighbours. *Onward* is the way a pass goes: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]
@@ -57,6 +59,10 @@ pub enum Message {
     Gather(Roster),
     /// Back: what those along the whole chain do.
     Gathered(Roster),
+    /// Onward: what is believed of the interference, and what the relays up to the sender hear.
+    Sense(Hearing),
+    /// Back: what those along the whole chain do.
+    Sensed(Hearing),
     /// Onward: whose turn it is to move.
     Token(Token),
     /// Back: who has moved where.
@@ -99,6 +105,7 @@ impl Message {
             Self::Pulse(pulse) => Some(pulse.mission),
             Self::Pulsed(pulsed) => Some(pulsed.mission),
             Self::Gather(roster) | Self::Gathered(roster) => Some(roster.mission),
+            Self::Sense(hearing) | Self::Sensed(hearing) => Some(hearing.mission),
             Self::Token(token) => Some(token.mission),
             Self::Moved(moved) => Some(moved.mission),
             Self::Hello(hello) => Some(hello.mission),
@@ -117,6 +124,8 @@ impl Message {
                 | Self::Verdict(_)
                 | Self::Gather(_)
                 | Self::Gathered(_)
+                | Self::Sense(_)
+                | Self::Sensed(_)
                 | Self::Token(_)
                 | Self::Moved(_)
                 | Self::Pulse(_)
@@ -133,7 +142,12 @@ impl Message {
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,
-            Self::Sweep(_) | Self::Gather(_) | Self::Token(_) | Self::Proposal(_) | Self::Pulse(_)
+            Self::Sweep(_)
+                | Self::Gather(_)
+                | Self::Sense(_)
+                | Self::Token(_)
+                | Self::Proposal(_)
+                | Self::Pulse(_)
         )
     }
 }
@@ -145,6 +159,7 @@ impl Message {
         match self {
             // What it was built without it never says.
             Self::Gather(_) | Self::Gathered(_) if !cfg!(feature = "altitude") => None,
+            Self::Sense(_) | Self::Sensed(_) if !cfg!(feature = "sensing") => None,
             Self::Token(_) | Self::Moved(_) if !cfg!(feature = "adjust") => None,
             Self::Fence { .. } if !cfg!(feature = "guard") => None,
             Self::Sweep(sweep) => sweep.encode(buffer),
@@ -162,6 +177,8 @@ impl Message {
             Self::Pulsed(pulsed) => pulsed.encode(buffer),
             Self::Gather(roster) => roster.encode(tag::GATHER, buffer),
             Self::Gathered(roster) => roster.encode(tag::GATHERED, buffer),
+            Self::Sense(hearing) => hearing.encode(tag::SENSE, buffer),
+            Self::Sensed(hearing) => hearing.encode(tag::SENSED, buffer),
             Self::Token(token) => token.encode(buffer),
             Self::Moved(moved) => moved.encode(buffer),
             Self::Hello(hello) => hello.encode(buffer),
@@ -186,6 +203,7 @@ impl Message {
             tag::ASIDE | tag::GATHER | tag::GATHERED if !cfg!(feature = "altitude") => {
                 Err(MessageError::Value)
             }
+            tag::SENSE | tag::SENSED if !cfg!(feature = "sensing") => Err(MessageError::Value),
             tag::TOKEN | tag::MOVED if !cfg!(feature = "adjust") => Err(MessageError::Value),
             tag::FENCE if !cfg!(feature = "guard") => Err(MessageError::Value),
             tag @ (tag::SWEEP | tag::MEASURED | tag::ASIDE) => {
@@ -207,6 +225,8 @@ impl Message {
             tag::PULSED => Pulsed::decode(body).map(Self::Pulsed),
             tag::GATHER => Roster::decode(body).map(Self::Gather),
             tag::GATHERED => Roster::decode(body).map(Self::Gathered),
+            tag::SENSE => Hearing::decode(body).map(Self::Sense),
+            tag::SENSED => Hearing::decode(body).map(Self::Sensed),
             tag::TOKEN => Token::decode(body).map(Self::Token),
             tag::MOVED => Moved::decode(body).map(Self::Moved),
             tag::HELLO => Hello::decode(body).map(Self::Hello),

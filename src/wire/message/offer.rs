@@ -52,7 +52,7 @@ impl OfferBody {
         let c = upload.config();
         let (power_w, x_m, y_m) = match c.interference {
             Interference::Source(at) => (at.power_w, at.x_m, at.y_m),
-            Interference::Field(_) => (0.0, 0.0, 0.0),
+            Interference::Field(_) | Interference::Unknown => (0.0, 0.0, 0.0),
         };
         Self {
             pass: PassId::new(upload.version(), upload.base()),
@@ -107,11 +107,15 @@ impl OfferBody {
                 most_m: right_m,
             },
             channel: Channel::from_factors(mu_los, mu_nlos, eta)?,
-            interference: Interference::Source(Interferer {
-                power_w: from_w,
-                x_m,
-                y_m,
-            }),
+            interference: if [from_w, x_m, y_m].map(f32::to_bits) == [0; 3] {
+                Interference::Unknown
+            } else {
+                Interference::Source(Interferer {
+                    power_w: from_w,
+                    x_m,
+                    y_m,
+                })
+            },
             tolerance,
         };
         Upload::checked(self.pass.number(), self.pass.mission(), config).ok()

@@ -18,3 +18,5 @@ pub(super) const FENCE: u8 = 13;
 pub(super) const OFFER: u8 = 14;
 pub(super) const PULSE: u8 = 15;
 pub(super) const PULSED: u8 = 16;
+pub(super) const SENSE: u8 = 17;
+pub(super) const SENSED: u8 = 18;

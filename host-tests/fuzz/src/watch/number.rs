@@ -9,6 +9,7 @@ pub(super) const fn number_of(message: &Message) -> Option<u16> {
         Message::Verdict(answer) => answer.number,
         Message::Busy { sweep } => *sweep,
         Message::Gather(roster) | Message::Gathered(roster) => roster.number,
+        Message::Sense(hearing) | Message::Sensed(hearing) => hearing.number,
         Message::Token(token) => token.number,
         Message::Moved(moved) => moved.number,
         Message::Heartbeat { .. }

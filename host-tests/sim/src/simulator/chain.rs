@@ -10,6 +10,7 @@ mod ground;
 mod hearing;
 mod judge;
 mod limits;
+mod listening;
 mod start;
 mod state;
 mod station;
@@ -89,7 +90,8 @@ impl Chain {
             {
                 for _ in 0..samples {
                     let power_w = draw(place, &mut self.rng);
-                    member.relay.handle_sample(Sample::Interference { power_w });
+                    let sample = Sample::Interference { power_w };
+                    member.relay.handle_sample(self.now, sample);
                 }
             }
             self.drain(index);
@@ -174,6 +176,7 @@ impl Chain {
             Happening::Restart => self.restart_autopilot(index),
             Happening::Part => self.tell_of_partitions(),
             Happening::Air(event) => self.on_air(event),
+            Happening::Listen => self.measure_all(),
             Happening::Strike(kind) => self.strike(kind),
             Happening::Upload => self.begin_upload(index),
             Happening::Heard { bytes } => self.hear(index, &bytes),

@@ -9,6 +9,7 @@
 //! | [`attack`], [`forge`] | what an attacker does, and the frames it makes up |
 //! | [`queue`] | what happens when, in order |
 //! | [`setup`], [`outcome`] | what a chain is run with, and what came of it |
+//! | [`sky`] | interferers that nobody told the relays of |
 //! | [`drones`] | drones that fly to where they are told, and know where they are only nearly |
 //! | [`fleet`] | drones with an autopilot each, and their pilots |
 //! | [`flying`] | groups of relays with an agreement of their own |
@@ -36,4 +37,5 @@ pub mod optimum;
 pub mod outcome;
 pub mod queue;
 pub mod setup;
+pub mod sky;
 pub mod watch;

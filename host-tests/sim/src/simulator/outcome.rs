@@ -9,6 +9,7 @@ use super::drones::{Nearest, Point};
 use super::faults::Injected;
 use super::flying::Seen;
 use super::medium::AirCounts;
+use super::sky::Stand;
 
 /// Something worth a line in the story of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -190,6 +191,8 @@ pub struct Outcome {
     pub air: AirCounts,
     /// What the run was like over its whole time; of a soak, and of relays on a shared channel.
     pub watched: Option<Watched>,
+    /// Where the relays were, each time that they measured.
+    pub stands: Vec<Stand>,
 }
 
 impl Outcome {

@@ -41,6 +41,8 @@ pub enum Happening {
     Part,
     /// Something is due on the shared channel; the relay is of no account.
     Air(AirEvent),
+    /// All relays measure the interference where they are.
+    Listen,
     /// The attacker sends a frame to one of the relays.
     Strike(Strike),
 }

@@ -13,6 +13,7 @@ use super::faults::Faults;
 use super::fleet::spec::FleetSpec;
 use super::link::LinkSpec;
 use super::medium::access::{self, Access};
+use super::sky::Sky;
 
 /// A time in which relays 1 to `after` and the others do not hear each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -100,6 +101,8 @@ pub struct Setup {
     pub burst: f64,
     /// Relays that do not hear another one for a time.
     pub deaf: Vec<Deaf>,
+    /// What the relays hear, where they are to find it out.
+    pub sky: Option<Sky>,
     /// The run goes on until then whatever has come of it before, and is judged all the time.
     pub soak: Option<Instant>,
     /// After this time frames get through, if there is one.
@@ -136,6 +139,7 @@ impl Setup {
             access: Access::Ideal,
             burst: 1.0,
             deaf: Vec::new(),
+            sky: None,
             soak: None,
             faults_end: None,
             seed: 1,

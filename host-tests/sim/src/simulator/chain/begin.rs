@@ -46,6 +46,7 @@ impl Chain {
                 swept: 0,
                 stored: None,
                 safe: None,
+                measured: None,
                 relay,
                 wake: None,
             });
@@ -104,6 +105,7 @@ impl Chain {
                 unsafe_setpoints: 0,
                 air: AirCounts::default(),
                 watched: None,
+                stands: Vec::new(),
             },
             now: Instant::ZERO,
             happenings: 0,
@@ -114,10 +116,17 @@ impl Chain {
             fleet: Vec::new(),
             medium,
             bursts,
+            agreed: None,
+            agreements: 0,
+            listened: false,
             watch: None,
         };
         if shared || chain.setup.soak.is_some() {
             chain.begin_watch(run);
+        }
+        if let Some(sky) = &chain.setup.sky {
+            let first = Instant::ZERO + sky.period;
+            chain.queue.put(first, 0, Happening::Listen);
         }
         chain.expect_an_attack();
         chain.take_off();

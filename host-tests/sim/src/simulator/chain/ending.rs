@@ -8,6 +8,9 @@ use super::station::Station;
 
 impl Chain {
     pub(super) fn ending(&self) -> Option<Ending> {
+        if self.setup.sky.is_some() {
+            return self.listened.then_some(Ending::Soaked);
+        }
         if self.ahead > 0 || self.setup.soak.is_some() {
             return None;
         }

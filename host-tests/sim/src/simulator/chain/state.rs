@@ -35,6 +35,8 @@ pub(super) struct Member {
     pub(super) stored: Option<Upload>,
     /// Where it was told to fly when that was last found to be within its limits.
     pub(super) safe: Option<Placement>,
+    /// Where it has measured the interference last.
+    pub(super) measured: Option<Placement>,
     /// The wake-up in the queue that counts: the earliest one. Any other is void.
     pub(super) wake: Option<Instant>,
 }
@@ -61,6 +63,11 @@ pub struct Chain {
     pub(super) medium: Option<Medium>,
     /// Where losses come in runs.
     pub(super) bursts: Option<Bursts>,
+    /// Where all were told to be when they agreed last, and how often that has changed.
+    pub(super) agreed: Option<Vec<Placement>>,
+    pub(super) agreements: u32,
+    /// Whether all has been heard that was to be.
+    pub(super) listened: bool,
     /// Where its whole time counts.
     pub(super) watch: Option<Watch>,
 }

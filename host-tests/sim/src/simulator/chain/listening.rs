@@ -1,0 +1,78 @@
+//! Relays that measure the interference where they are.
+
+use uav_relay::{Phase, Placement, Sample};
+
+use super::super::drones::placement;
+use super::super::queue::Happening;
+use super::super::sky::Stand;
+use super::state::Chain;
+
+impl Chain {
+    /// Every relay that is on measures where it is, and where all are is written down.
+    pub(super) fn measure_all(&mut self) {
+        let Some(sky) = self.setup.sky.clone() else {
+            return;
+        };
+        let now = self.now;
+        let scene = sky.scene_at(now);
+        let mut places = Vec::new();
+        for index in 0..self.members.len() {
+            let flown = self
+                .flight
+                .as_ref()
+                .and_then(|flight| flight.drones.get(index))
+                .map(|drone| placement(drone.taken()));
+            let Some(member) = self.members.get_mut(index) else {
+                continue;
+            };
+            let Some(at) = flown.or(member.relay.setpoint()) else {
+                continue;
+            };
+            if member.killed.is_some() {
+                continue;
+            }
+            places.push(at);
+            if sky.once && member.measured == Some(at) {
+                continue;
+            }
+            member.measured = Some(at);
+            let power_w = sky.heard_w(&scene, member.node, at, &mut self.rng);
+            member.relay.handle_sample(
+                now,
+                Sample::Heard {
+                    at,
+                    power_w: crate::command::narrow(power_w),
+                },
+            );
+            if member.node == self.setup.mission.relays() {
+                let power_w = crate::command::narrow(sky.receiver_w(&scene, &mut self.rng));
+                member.relay.handle_sample(now, Sample::Receiver { power_w });
+            }
+        }
+        self.stand(places);
+        if now < sky.until {
+            self.queue.put(now + sky.period, 0, Happening::Listen);
+        } else {
+            self.listened = true;
+        }
+    }
+
+    fn stand(&mut self, places: Vec<Placement>) {
+        let agreed = self
+            .members
+            .iter()
+            .filter(|member| member.killed.is_none())
+            .all(|member| member.relay.phase() == Phase::Holding);
+        let goals = self.setpoints();
+        if agreed && goals.is_some() && goals != self.agreed {
+            self.agreed.clone_from(&goals);
+            self.agreements += 1;
+        }
+        self.outcome.stands.push(Stand {
+            at: self.now,
+            places,
+            goals,
+            agreements: self.agreements,
+        });
+    }
+}

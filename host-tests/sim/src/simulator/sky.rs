@@ -1,0 +1,114 @@
+//! What the relays of a run hear: interferers that nobody tells them of.
+
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, Gamma, StandardNormal};
+use uav_relay::{Duration, Instant, Placement};
+
+use crate::scene::{Place, Scene};
+
+/// What is heard, and when.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sky {
+    /// The true interferers, where they are at time 0.
+    pub scene: Scene,
+    /// How fast all of them move, m/s along the line and to its right.
+    pub velocity_mps: [f64; 2],
+    /// Independent samples in one measurement.
+    pub samples: u32,
+    /// Standard deviation of a place's own error, dB.
+    pub shadow_db: f64,
+    /// How often every relay measures.
+    pub period: Duration,
+    /// Whether it measures once at a place, and then no more.
+    pub once: bool,
+    /// Relays whose receiver says something else: index from 1, and by how many dB too much.
+    pub broken: Vec<(u16, f64)>,
+    /// The run goes on until then.
+    pub until: Instant,
+    /// Seed of the shadows.
+    pub seed: u64,
+}
+
+/// Places nearer than this have the same shadow, m.
+const SHADOW_M: f64 = 5.0;
+
+impl Sky {
+    /// A thousand samples a second, without shadows, for ten minutes.
+    pub const fn of(scene: Scene) -> Self {
+        Self {
+            scene,
+            velocity_mps: [0.0; 2],
+            samples: 1_000,
+            shadow_db: 0.0,
+            period: Duration::from_millis(1_000),
+            once: false,
+            broken: Vec::new(),
+            until: Instant::from_millis(600_000),
+            seed: 1,
+        }
+    }
+
+    /// The interferers as they are at `now`.
+    pub fn scene_at(&self, now: Instant) -> Scene {
+        let seconds = now.as_micros() as f64 * 1e-6;
+        let mut scene = self.scene.clone();
+        let [vx, vy] = self.velocity_mps;
+        for source in &mut scene.sources {
+            source.x_m += vx * seconds;
+            source.y_m += vy * seconds;
+        }
+        scene
+    }
+
+    /// What relay `index` (from 1) measures at `at`, W.
+    pub(super) fn heard_w(
+        &self,
+        scene: &Scene,
+        index: u16,
+        at: Placement,
+        rng: &mut ChaCha8Rng,
+    ) -> f64 {
+        let broken = self.broken.iter().find(|(which, _)| *which == index);
+        let off_db = broken.map_or(0.0, |(_, db)| *db) + self.shadow_db * self.shadow(at.into());
+        scene.interference_w(at) * decibel(off_db) * self.mean(rng)
+    }
+
+    /// What the receiver measures, W.
+    pub(super) fn receiver_w(&self, scene: &Scene, rng: &mut ChaCha8Rng) -> f64 {
+        scene.interference_rx_w() * self.mean(rng)
+    }
+
+    /// The mean of so many exponential samples with a mean of 1.
+    fn mean(&self, rng: &mut impl Rng) -> f64 {
+        let samples = f64::from(self.samples);
+        Gamma::new(samples, 1.0 / samples).map_or(1.0, |shape| shape.sample(rng))
+    }
+
+    /// A standard normal number of the place's own.
+    fn shadow(&self, at: Place) -> f64 {
+        use rand::SeedableRng as _;
+        let cell = [at.x, at.y, at.h].map(|m| (m / SHADOW_M).round() as i64);
+        let key = cell.iter().fold(self.seed, |key, part| {
+            (key.rotate_left(17) ^ part.cast_unsigned()).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        });
+        StandardNormal.sample(&mut ChaCha8Rng::seed_from_u64(key))
+    }
+}
+
+fn decibel(db: f64) -> f64 {
+    libm::pow(10.0, db / 10.0)
+}
+
+/// Where the relays stand at some time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stand {
+    /// When.
+    pub at: Instant,
+    /// Of every relay: where its drone is, or where it was told to be where drones are not simulated.
+    pub places: Vec<Placement>,
+    /// Where they were told to be, if all were.
+    pub goals: Option<Vec<Placement>>,
+    /// How many agreements there have been on other places than before.
+    pub agreements: u32,
+}

@@ -1,0 +1,76 @@
+//! A mission with another idea of its interference: what the relays have found, or nothing at all.
+
+use super::error::MissionError;
+use super::parts::{Interference, Interferer};
+use super::validated::Mission;
+use crate::power_ratio::PowerRatio;
+use crate::sensing::belief::{Belief, Spread};
+
+/// What takes the place of an interferer that nobody knows: one so far away that it is the same everywhere, (X - x)^2 + Y^2 to 1e-7.
+pub(super) const FAR: Interferer = Interferer {
+    power_w: 1.0,
+    x_m: 0.0,
+    y_m: 1e7,
+};
+
+/// One over the square of its distance.
+const FAR_AWAY: f64 = 1e-14;
+
+/// A hop half as long as the others.
+const HALF_AS_LONG: f64 = 0.25;
+
+impl Mission {
+    /// The interferer, where it is known and not one that stands for none.
+    pub const fn known_source(&self) -> Option<Interferer> {
+        match self.config.interference {
+            Interference::Source(interferer) => Some(interferer),
+            _ => None,
+        }
+    }
+
+    /// The same mission, whose interference is `own` or what is believed instead.
+    ///
+    /// # Errors
+    /// [`MissionError`] where what is believed is out of range.
+    pub(crate) fn believing(
+        &self,
+        own: Interference,
+        belief: &Belief,
+    ) -> Result<Self, MissionError> {
+        let (interference, spread, receiver_w) = match *belief {
+            Belief::Mission => (own, Spread::Even, 0.0),
+            Belief::Unknown(spread) => (Interference::Unknown, spread, 0.0),
+            Belief::Source { source, receiver_w } => {
+                (Interference::Source(source), Spread::Even, receiver_w)
+            }
+        };
+        let config = super::MissionConfig {
+            interference,
+            ..self.config
+        };
+        let mut mission = Self::try_new(config)?;
+        if receiver_w > 0.0 {
+            let eta = config.channel.eta();
+            mission.receiver_gain_per_w = 1.0 / (eta * f64::from(receiver_w));
+        }
+        match spread {
+            Spread::Even => {}
+            Spread::TowardTx => {
+                mission.tx_gain = PowerRatio::new(mission.tx_gain.wide() * HALF_AS_LONG);
+            }
+            Spread::TowardRx => mission.receiver_gain_per_w *= HALF_AS_LONG,
+        }
+        Ok(mission)
+    }
+}
+
+/// The gains of a mission that knows nothing, of relays of `power_w`: on every hop SIR = (D / d)^2, so that the best places are even ones.
+pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
+    let squared = distance_m as f64 * distance_m as f64;
+    let power_w = power_w as f64;
+    (
+        squared * FAR_AWAY,
+        squared * FAR_AWAY / power_w,
+        squared / power_w,
+    )
+}

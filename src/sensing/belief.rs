@@ -1,0 +1,251 @@
+//! What the chain flies by, and when something else takes its place.
+//!
+//! | what the sums say | what is believed | what follows |
+//! | --- | --- | --- |
+//! | a source | nothing yet | it is believed |
+//! | a source | another one, and more than 1 % of the SIR hangs on it | it is believed if chance would not make it so, or if a quarter more is known than when the last one was |
+//! | a source | nearly the same | nothing |
+//! | too few places | nothing yet | the next spread: the relays hear other places |
+//! | too few places | a source that what is heard contradicts | the relays spread evenly |
+//! | too few places, or no source | a source | it is kept |
+
+use super::fit::{Fit, Unfit, misfit};
+use super::sums::Sums;
+use super::terms::{coefficients, terms};
+use super::track::Track;
+use crate::mission::{Interferer, Mission};
+use crate::place::Placement;
+use crate::settings::Listen;
+use crate::time::{Duration, Instant};
+use crate::wire::message::Receiver;
+
+/// What the chain believes of the interference.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Belief {
+    /// What the mission says.
+    #[default]
+    Mission,
+    /// Nothing: the relays spread along the line, to hear.
+    Unknown(Spread),
+    /// One source.
+    Source {
+        /// Where, and how strong.
+        source: Interferer,
+        /// What the receiver hears of it, W; 0 where it has not said, and the source's path loss over the ground is taken.
+        receiver_w: f32,
+    },
+}
+
+/// How relays spread that know nothing.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Spread {
+    /// Evenly.
+    #[default]
+    Even,
+    /// The first hop half as long as the others.
+    TowardTx,
+    /// The last hop half as long as the others.
+    TowardRx,
+}
+
+impl Spread {
+    const fn next(self) -> Self {
+        match self {
+            Self::Even => Self::TowardTx,
+            Self::TowardTx => Self::TowardRx,
+            Self::TowardRx => Self::Even,
+        }
+    }
+}
+
+/// A belief and its number, which counts up at the leader and wraps.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Told {
+    /// Its number, 0 for what was loaded.
+    pub number: u16,
+    /// What is believed.
+    pub belief: Belief,
+}
+
+/// Relative, as a mean square: what is not worth an agreement.
+const WORTH: f64 = 1e-5;
+
+/// How many times what chance would make a difference has to be.
+const BEYOND_CHANCE: f64 = 16.0;
+
+/// How much more has to be known for the same again, and how often that is: a world that is still becomes silent.
+const LEARNED: f64 = 1.1;
+const REFINED: u8 = 4;
+
+/// How long drones take to follow by a few metres.
+const FLIGHT: Duration = Duration::from_millis(1_000);
+
+/// A mean square of relative errors above which a belief is contradicted.
+const CONTRADICTED: f64 = 0.25;
+
+/// How much was known when a belief was taken up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Known {
+    /// Places over the variance of one.
+    information: f64,
+    /// How often the same was taken up again, because more was known.
+    refined: u8,
+    /// Which way the interferer goes.
+    track: Track,
+}
+
+impl Known {
+    pub(crate) const NOTHING: Self = Self {
+        information: 0.0,
+        refined: 0,
+        track: Track::NONE,
+    };
+}
+
+/// What sums make of a belief.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Review {
+    /// What is to be believed instead.
+    pub(crate) adopt: Option<Belief>,
+    /// How much was known by then.
+    pub(crate) known: Known,
+    /// Why there is no source.
+    pub(crate) unfit: Option<Unfit>,
+}
+
+/// Reviews `told`, of which `mission` is made, by `sums` along the chain and what the receiver hears, W or 0. `before` is what was
+/// known when it was taken up.
+pub(crate) fn review(
+    mission: &Mission,
+    belief: &Belief,
+    sums: &Sums,
+    receiver: Receiver,
+    listen: &Listen,
+    before: Known,
+    now: Instant,
+) -> Review {
+    let known = mission.known_source();
+    let keep = |unfit| Review {
+        adopt: None,
+        known: before,
+        unfit,
+    };
+    let fit = match Fit::of(sums, listen.relative_error) {
+        Ok(fit) => fit,
+        Err(unfit) => return at_a_loss(mission, belief, sums, known, before, unfit),
+    };
+    let side_m = known.map_or(1.0, |source| source.y_m);
+    let found = match fit.source(mission, side_m) {
+        Ok(found) => found,
+        Err(unfit) => return keep(Some(unfit)),
+    };
+    let unfit = (!found.is_one).then_some(Unfit::NoSource);
+    let mut track = before.track;
+    let mut source = found.source;
+    if found.is_one {
+        let age = (sums.age_s() * 1e6) as u64;
+        let heard = Instant::from_micros(now.as_micros().saturating_sub(age));
+        track.take(&found, heard, listen.half_life);
+        // What is agreed on now holds until the next look, and the drones have to fly there.
+        let ahead = Duration::from_micros(listen.every.as_micros() / 2);
+        if let Some([x_m, y_m]) = track.ahead(now + ahead + FLIGHT) {
+            source.x_m = x_m;
+            source.y_m = y_m;
+        }
+    }
+    let receiver_w = at_receiver(mission, &fit, &source, receiver, listen.relative_error);
+    let information = fit.information();
+    let before = Known { track, ..before };
+    let keep = |unfit| Review {
+        adopt: None,
+        known: before,
+        unfit,
+    };
+    let adopt = |refined| Review {
+        adopt: Some(Belief::Source { source, receiver_w }),
+        known: Known {
+            information,
+            refined,
+            track,
+        },
+        unfit,
+    };
+    let Some(known) = known else { return adopt(0) };
+    let (off, chance) = fit.off(&coefficients(mission, &source), &coefficients(mission, &known));
+    let receiver = match belief {
+        Belief::Source {
+            receiver_w: before, ..
+        } if receiver_w > 0.0 => {
+            let ratio = f64::from(before - receiver_w) / f64::from(receiver_w);
+            ratio * ratio
+        }
+        _ => 0.0,
+    };
+    if !(off > WORTH || receiver > 4.0 * WORTH) {
+        keep(unfit)
+    } else if off > BEYOND_CHANCE * chance || receiver > 1_000.0 * WORTH {
+        adopt(0)
+    } else if information > LEARNED * before.information && before.refined < REFINED {
+        adopt(before.refined + 1)
+    } else {
+        keep(unfit)
+    }
+}
+
+/// What the receiver hears, W: what it says, and, as far as that is in line with it, what the source makes of it over the ground. Both count
+/// by how sure they are. 0 where the receiver has said nothing.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a power between two that are floats"
+)]
+fn at_receiver(
+    mission: &Mission,
+    fit: &Fit,
+    source: &Interferer,
+    receiver: Receiver,
+    relative_error: f32,
+) -> f32 {
+    if !(receiver.power_w > 0.0 && receiver.count > 0.0) {
+        return 0.0;
+    }
+    let heard = f64::from(receiver.power_w);
+    let chance = f64::from(relative_error) * f64::from(relative_error) / f64::from(receiver.count);
+    let config = mission.config();
+    let (beyond, aside) = (source.x_m - config.distance_m, source.y_m);
+    let (beyond, aside) = (f64::from(beyond), f64::from(aside));
+    let squared = beyond * beyond + aside * aside;
+    let made = f64::from(source.power_w) / (config.channel.mu_nlos() * squared);
+    let unsure = fit.relative_variance(&terms(config.distance_m, Placement::on_line(config.distance_m, 0.0)));
+    let off = made / heard - 1.0;
+    if !(off * off < 9.0 * (chance + unsure)) {
+        return receiver.power_w;
+    }
+    (heard * (1.0 + off * chance / (chance + unsure))) as f32
+}
+
+fn at_a_loss(
+    mission: &Mission,
+    belief: &Belief,
+    sums: &Sums,
+    known: Option<Interferer>,
+    before: Known,
+    unfit: Unfit,
+) -> Review {
+    let contradicted = known.is_none_or(|known| {
+        misfit(sums, &coefficients(mission, &known)) > CONTRADICTED
+    });
+    let spread = match belief {
+        Belief::Unknown(spread) => spread.next(),
+        Belief::Mission if known.is_none() => Spread::Even.next(),
+        _ => Spread::Even,
+    };
+    let heard = sums.count() > 0.0;
+    Review {
+        adopt: (heard && contradicted).then_some(Belief::Unknown(spread)),
+        known: if contradicted { Known::NOTHING } else { before },
+        unfit: Some(unfit),
+    }
+}
