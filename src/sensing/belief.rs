@@ -76,6 +76,9 @@ const WORTH: f64 = 1e-5;
 /// How many times what chance would make a difference has to be.
 const BEYOND_CHANCE: f64 = 16.0;
 
+/// Relative, as a mean square: when an interferer that is seen to move is followed, for it goes on.
+const SOON: f64 = 1e-4;
+
 /// How much more has to be known for the same again, and how often that is: a world that is still becomes silent.
 const LEARNED: f64 = 1.1;
 const REFINED: u8 = 4;
@@ -145,15 +148,19 @@ pub(crate) fn review(
     let unfit = (!found.is_one).then_some(Unfit::NoSource);
     let mut track = before.track;
     let mut source = found.source;
+    let mut moves = false;
     if found.is_one {
         let age = (sums.age_s() * 1e6) as u64;
         let heard = Instant::from_micros(now.as_micros().saturating_sub(age));
         track.take(&found, heard, listen.half_life);
         // What is agreed on now holds until the next look, and the drones have to fly there.
         let ahead = Duration::from_micros(listen.every.as_micros() / 2);
-        if let Some([x_m, y_m]) = track.ahead(now + ahead + FLIGHT) {
-            source.x_m = x_m;
-            source.y_m = y_m;
+        if let Some([was, will]) = track.ahead(now + ahead + FLIGHT)
+            && let Some(power_w) = fit.power_w(mission, was)
+        {
+            let [x_m, y_m] = will;
+            source = Interferer { power_w, x_m, y_m };
+            moves = true;
         }
     }
     let receiver_w = at_receiver(mission, &fit, &source, receiver, listen.relative_error);
@@ -186,7 +193,7 @@ pub(crate) fn review(
     };
     if !(off > WORTH || receiver > 4.0 * WORTH) {
         keep(unfit)
-    } else if off > BEYOND_CHANCE * chance || receiver > 1_000.0 * WORTH {
+    } else if (moves && off > SOON) || off > BEYOND_CHANCE * chance || receiver > 1_000.0 * WORTH {
         adopt(0)
     } else if information > LEARNED * before.information && before.refined < REFINED {
         adopt(before.refined + 1)

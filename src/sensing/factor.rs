@@ -10,7 +10,7 @@ pub(super) struct Factor {
 }
 
 /// A pivot is no pivot below this part of what it came from: seven digits of an f32, of sums of some hundred places.
-const SINGULAR: f64 = 1e-5;
+const SINGULAR: f64 = 2e-6;
 
 impl Factor {
     /// Of the products as [`Sums`](super::sums::Sums) has them. The last unknown is left out where its pivot is not above `least`. `None`

@@ -88,6 +88,21 @@ impl Fit {
         value(&self.coefficients, terms)
     }
 
+    /// The power that a source at this place most likely has, W: k = m g / (g G g), as in `nearest`.
+    pub(crate) fn power_w(&self, mission: &Mission, [x_m, y_m]: [f32; 2]) -> Option<f32> {
+        let unit = Interferer {
+            power_w: mission.config().common.power_w,
+            x_m,
+            y_m,
+        };
+        let shape = coefficients(mission, &unit);
+        let [a, b, c, d] = shape;
+        let [av, bv, cv, dv] = self.right;
+        let with = a * av + b * bv + c * cv + d * dv;
+        let power_w = (f64::from(unit.power_w) * quadratic(&self.products, shape) / with) as f32;
+        (1e-6..=1e9).contains(&power_w).then_some(power_w)
+    }
+
     /// The variance of that, relative to the square of what is heard.
     pub(crate) fn relative_variance(&self, terms: &Terms) -> f64 {
         let heard = self.value(terms);

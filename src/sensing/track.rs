@@ -108,15 +108,15 @@ impl Track {
         self.at = Some(at);
     }
 
-    /// Where it will be at `then`, m along the line and to its right; `None` while it is not seen to move.
-    pub(crate) fn ahead(&self, then: Instant) -> Option<[f32; 2]> {
+    /// Where it was by the last fit, and where it will be at `then`, m along the line and to its right; `None` while it is not seen to move.
+    pub(crate) fn ahead(&self, then: Instant) -> Option<[[f32; 2]; 2]> {
         let seconds = then.since(self.at?).as_micros() as f32 * 1e-6;
         let [x, y] = self.axes;
-        (x.is_moving() || y.is_moving()).then(|| {
-            [x, y].map(|axis| {
-                let speed = if axis.is_moving() { axis.speed } else { 0.0 };
-                axis.at + seconds * speed
-            })
-        })
+        let along = |axis: Axis, seconds: f32| {
+            let speed = if axis.is_moving() { axis.speed } else { 0.0 };
+            axis.at + seconds * speed
+        };
+        (x.is_moving() || y.is_moving())
+            .then(|| [[x.at, y.at], [along(x, seconds), along(y, seconds)]])
     }
 }

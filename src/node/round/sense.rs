@@ -29,6 +29,9 @@ use crate::wire::message::{Hearing, Receiver};
 /// The time between passes grows up to so many times the least.
 const RAREST: u32 = 64;
 
+/// and doubles when so many passes in a row have changed nothing.
+const PATIENCE: u8 = 4;
+
 /// What a relay hears, and what it believes of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing {
@@ -48,6 +51,7 @@ pub(crate) struct Sensing {
     unfit: Option<Unfit>,
     /// How long to wait for the next pass, and until when.
     wait: u32,
+    kept: u8,
     at: Option<Instant>,
 }
 
@@ -70,6 +74,7 @@ impl Sensing {
             known: Known::NOTHING,
             unfit: None,
             wait: 1,
+            kept: 0,
             at: None,
         }
     }
@@ -296,7 +301,10 @@ impl Computation {
             return Action::Answer { agreed: false };
         }
         if holds && !self.reconsiders(context, &hearing) {
-            self.sensing.wait = (2 * self.sensing.wait).min(RAREST);
+            self.sensing.kept = (self.sensing.kept + 1) % PATIENCE;
+            if self.sensing.kept == 0 {
+                self.sensing.wait = (2 * self.sensing.wait).min(RAREST);
+            }
             return Action::Nothing;
         }
         self.state.plan();
@@ -327,6 +335,7 @@ impl Computation {
             belief,
         };
         self.sensing.has_told = false;
+        self.sensing.kept = 0;
         self.sensing.wait = 1;
         self.task.rest();
         self.chosen = None;

@@ -3,6 +3,7 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Gamma, StandardNormal};
+use uav_relay::sensing::belief::Told;
 use uav_relay::{Duration, Instant, Placement};
 
 use crate::scene::{Place, Scene};
@@ -109,6 +110,8 @@ pub struct Stand {
     pub places: Vec<Placement>,
     /// Where they were told to be, if all were.
     pub goals: Option<Vec<Placement>>,
+    /// What the first relay believes.
+    pub believed: Told,
     /// How many agreements there have been on other places than before.
     pub agreements: u32,
 }

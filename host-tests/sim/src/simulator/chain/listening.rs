@@ -1,5 +1,6 @@
 //! Relays that measure the interference where they are.
 
+use uav_relay::sensing::belief::Told;
 use uav_relay::{Phase, Placement, Sample};
 
 use super::super::drones::placement;
@@ -68,7 +69,9 @@ impl Chain {
             self.agreed.clone_from(&goals);
             self.agreements += 1;
         }
+        let leader = self.members.first();
         self.outcome.stands.push(Stand {
+            believed: leader.map_or_else(Told::default, |leader| leader.relay.belief()),
             at: self.now,
             places,
             goals,
