@@ -11,7 +11,7 @@
 
 use super::fit::{Fit, Unfit, misfit};
 use super::sums::Sums;
-use super::terms::{coefficients, terms};
+use super::terms::{coefficients, terms, unit_w};
 use super::track::Track;
 use crate::mission::{Interferer, Mission};
 use crate::place::Placement;
@@ -140,6 +140,7 @@ pub(crate) fn review(
         Ok(fit) => fit,
         Err(unfit) => return at_a_loss(mission, belief, sums, known, before, unfit),
     };
+    let fit = with_receiver(mission, fit, sums, receiver, listen.relative_error);
     let side_m = known.map_or(1.0, |source| source.y_m);
     let found = match fit.source(mission, side_m) {
         Ok(found) => found,
@@ -200,6 +201,37 @@ pub(crate) fn review(
     } else {
         keep(unfit)
     }
+}
+
+/// The fit that counts the receiver as one place more, as far as what it hears is in line with the others: then the path loss over the ground
+/// is what the mission says.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "v of a power that is a float"
+)]
+fn with_receiver(
+    mission: &Mission,
+    fit: Fit,
+    sums: &Sums,
+    receiver: Receiver,
+    relative_error: f32,
+) -> Fit {
+    if !(receiver.power_w > 0.0 && receiver.count > 0.0) {
+        return fit;
+    }
+    let config = mission.config();
+    let there = terms(config.distance_m, Placement::on_line(config.distance_m, 0.0));
+    let ground = config.channel.eta() / config.channel.mu_nlos();
+    let v = f64::from(unit_w(mission)) * ground / f64::from(receiver.power_w);
+    let expected = fit.value(&there);
+    let off = v / expected - 1.0;
+    let chance = 9.0 * (fit.variance() + fit.relative_variance(&there));
+    if !(expected > 0.0 && off * off < chance) {
+        return fit;
+    }
+    let mut sums = *sums;
+    sums.add(&there, v as f32, expected as f32, 1.0, receiver.count);
+    Fit::of(&sums, relative_error).unwrap_or(fit)
 }
 
 /// What the receiver hears, W: what it says, and, as far as that is in line with it, what the source makes of it over the ground. Both count
