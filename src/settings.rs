@@ -101,6 +101,16 @@ impl Default for Listen {
 }
 
 impl Listen {
+    /// For an interferer that moves: every second, and the faster forgotten the more relays hear it, half after 16 s over their number.
+    pub const fn following(relays: u16) -> Self {
+        let relays = if relays > 0 { relays as u64 } else { 1 };
+        Self {
+            every: Duration::from_millis(1_000),
+            half_life: Duration::from_millis(16_000 / relays + 100),
+            relative_error: 0.03,
+        }
+    }
+
     fn is_valid(&self) -> bool {
         let timed = self.every.as_micros() > 0 && self.half_life.as_micros() > 0;
         timed && (1e-3..=1.0).contains(&self.relative_error)

@@ -74,10 +74,13 @@ pub struct Told {
 const WORTH: f64 = 1e-5;
 
 /// How many times what chance would make a difference has to be.
-const BEYOND_CHANCE: f64 = 16.0;
+const BEYOND_CHANCE: f64 = 8.0;
 
 /// Relative, as a mean square: when an interferer that is seen to move is followed, for it goes on.
 const SOON: f64 = 1e-4;
+
+/// How many times what chance would make the track may be off what is heard.
+const ASTRAY: f64 = 4.0;
 
 /// How much more has to be known for the same again, and how often that is: a world that is still becomes silent.
 const LEARNED: f64 = 1.1;
@@ -94,6 +97,8 @@ const CONTRADICTED: f64 = 0.25;
 pub(crate) struct Known {
     /// Places over the variance of one.
     information: f64,
+    /// How far off it may be by chance, relative, as a mean square.
+    chance: f64,
     /// How often the same was taken up again, because more was known.
     refined: u8,
     /// Which way the interferer goes.
@@ -103,6 +108,7 @@ pub(crate) struct Known {
 impl Known {
     pub(crate) const NOTHING: Self = Self {
         information: 0.0,
+        chance: 0.0,
         refined: 0,
         track: Track::NONE,
     };
@@ -159,9 +165,14 @@ pub(crate) fn review(
         if let Some([was, will]) = track.ahead(now + ahead + FLIGHT)
             && let Some(power_w) = fit.power_w(mission, was)
         {
-            let [x_m, y_m] = will;
-            source = Interferer { power_w, x_m, y_m };
-            moves = true;
+            let at = |[x_m, y_m]: [f32; 2]| Interferer { power_w, x_m, y_m };
+            if fit.off_by(&coefficients(mission, &at(was))) <= ASTRAY * fit.chance() {
+                source = at(will);
+                moves = true;
+            } else {
+                track = Track::NONE;
+                track.take(&found, heard, listen.half_life);
+            }
         }
     }
     let receiver_w = at_receiver(mission, &fit, &source, receiver, listen.relative_error);
@@ -176,13 +187,15 @@ pub(crate) fn review(
         adopt: Some(Belief::Source { source, receiver_w }),
         known: Known {
             information,
+            chance: fit.chance(),
             refined,
             track,
         },
         unfit,
     };
     let Some(known) = known else { return adopt(0) };
-    let (off, chance) = fit.off(&coefficients(mission, &source), &coefficients(mission, &known));
+    let chance = fit.chance();
+    let off = fit.off(&coefficients(mission, &source), &coefficients(mission, &known));
     let receiver = match belief {
         Belief::Source {
             receiver_w: before, ..
@@ -194,7 +207,7 @@ pub(crate) fn review(
     };
     if !(off > WORTH || receiver > 4.0 * WORTH) {
         keep(unfit)
-    } else if (moves && off > SOON) || off > BEYOND_CHANCE * chance || receiver > 1_000.0 * WORTH {
+    } else if (moves && off > SOON) || off > BEYOND_CHANCE * (chance + before.chance) || receiver > 1_000.0 * WORTH {
         adopt(0)
     } else if information > LEARNED * before.information && before.refined < REFINED {
         adopt(before.refined + 1)

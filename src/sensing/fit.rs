@@ -119,14 +119,22 @@ impl Fit {
         self.count / self.variance
     }
 
-    /// The mean square of the relative differences between two lots of coefficients, over the places that it is of; and how much of that
-    /// chance alone would make.
-    pub(crate) fn off(&self, one: &[f64; 4], others: &[f64; 4]) -> (f64, f64) {
+    /// The mean square of the relative differences between two lots of coefficients, over the places that it is of.
+    pub(crate) fn off(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
         let [a, b, c, d] = *one;
         let [p, q, r, s] = *others;
-        let square = quadratic(&self.products, [a - p, b - q, c - r, d - s]);
+        quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
+    }
+
+    /// How far off others are from itself.
+    pub(crate) fn off_by(&self, others: &[f64; 4]) -> f64 {
+        self.off(&self.coefficients, others)
+    }
+
+    /// How far off it may be itself by chance, in the same measure.
+    pub(crate) fn chance(&self) -> f64 {
         let unknowns = if self.factor.whole { 4.0 } else { 3.0 };
-        (square / self.count, unknowns * self.variance / self.count)
+        unknowns * self.variance / self.count
     }
 
     /// The source, and whether what is heard is that of one. Its side of the line is that of `side_m` where the places do not tell.

@@ -11,7 +11,7 @@ use crate::time::{Duration, Instant};
 const SPEED: f32 = 10.0;
 
 /// Times the standard deviation that a velocity must be to count.
-const CERTAIN: f32 = 9.0;
+const CERTAIN: f32 = 16.0;
 
 /// Times the standard deviation from which on a fit is of another interferer.
 const ELSEWHERE: f32 = 49.0;

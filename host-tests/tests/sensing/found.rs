@@ -1,75 +1,122 @@
-//! One still source: how much of the optimum after how many agreements.
+//! Still sources: how much of the optimum after how many agreements.
 
 use rayon::prelude::*;
-use uav_relay::Interference;
+use uav_relay::{Interference, Interferer};
 use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::setup::Setup;
 
 use crate::scenes::{Wild, by_agreement, count, quantile};
 
-/// Shares of the optimum after 0, 1, 2, .. agreements that followed what was heard: of every scene, one list for each number.
-fn shares(relays: u16, sources: usize, change: impl Fn(&Wild, &mut uav_relay_sim::simulator::setup::Setup) + Sync) -> Vec<Vec<f64>> {
+/// The agreements that are told of.
+const LAST: usize = 8;
+
+/// Shares of the optimum after 0, 1, 2, .. agreements that followed what was heard, of every scene.
+fn shares(
+    relays: u16,
+    sources: usize,
+    setup: impl Fn(&Wild) -> Setup + Sync,
+) -> [Vec<f64>; LAST + 1] {
     let scenes: Vec<u64> = (0..count(60)).collect();
     let each: Vec<Vec<f64>> = scenes
         .into_par_iter()
         .map(|seed| {
             let wild = Wild::new(seed, relays, sources);
-            let mut setup = wild.setup(Interference::Unknown);
-            change(&wild, &mut setup);
-            let outcome = run(setup).unwrap();
+            let outcome = run(setup(&wild)).unwrap();
             let best = wild.optimum();
             let sirs = by_agreement(&wild.scene(), &outcome.stands);
-            (0..=8)
-                .map(|at| sirs.get(at).or(sirs.last()).map_or(0.0, |sir| sir / best))
+            assert!(!sirs.is_empty(), "{seed}");
+            (0..=LAST)
+                .map(|at| sirs.get(at).or(sirs.last()).unwrap() / best)
                 .collect()
         })
         .collect();
-    (0..=8)
-        .map(|at| each.iter().map(|one| one[at]).collect())
-        .collect()
+    std::array::from_fn(|at| each.iter().map(|one| one[at]).collect())
 }
 
-fn print(what: &str, shares: &mut [Vec<f64>]) {
-    for (at, shares) in shares.iter_mut().enumerate() {
-        println!(
-            "{what}, after {at}: least {:.4} 1 % {:.4} 10 % {:.4} median {:.4} most {:.6}",
-            quantile(shares, 0.0),
-            quantile(shares, 0.01),
-            quantile(shares, 0.1),
-            quantile(shares, 0.5),
-            quantile(shares, 1.0)
-        );
+fn unknown(wild: &Wild) -> Setup {
+    wild.setup(Interference::Unknown)
+}
+
+fn print(what: &str, shares: &mut [Vec<f64>; LAST + 1]) {
+    for at in [0, 1, 2, 3, 5, LAST] {
+        let shares = &mut shares[at];
+        let [least, tenth, median] = [0.0, 0.1, 0.5].map(|part| quantile(shares, part));
+        println!("{what}, after {at}: median {median:.4}, 10 % {tenth:.4}, least {least:.4}");
     }
 }
 
 #[test]
 fn one_source_is_found() {
     for relays in [3, 5, 8, 20] {
-        let mut shares = shares(relays, 1, |_, _| {});
+        let mut shares = shares(relays, 1, unknown);
         print(&format!("N = {relays}"), &mut shares);
+        assert!(quantile(&mut shares[1], 0.5) >= 0.98);
+        assert!(quantile(&mut shares[5], 0.5) >= 0.99);
+        assert!(quantile(&mut shares[5], 0.1) >= 0.97);
+        assert!(quantile(&mut shares[5], 0.0) >= 0.5);
     }
 }
 
 #[test]
 fn one_or_two_relays_fly_to_learn() {
     for relays in [1, 2] {
-        let mut shares = shares(relays, 1, |_, _| {});
+        let mut shares = shares(relays, 1, unknown);
         print(&format!("N = {relays}"), &mut shares);
+        assert!(quantile(&mut shares[5], 0.5) >= 0.98);
     }
 }
 
 #[test]
-fn shadows() {
-    let mut hovering = shares(8, 1, |_, setup| setup.sky.as_mut().unwrap().shadow_db = 1.0);
-    print("N = 8, 1 dB", &mut hovering);
-    let mut flown = shares(8, 1, |wild, setup| {
-        *setup = wild.flown(Interference::Unknown);
+fn places_with_a_shadow_of_their_own() {
+    let mut hovering = shares(8, 1, |wild| {
+        let mut setup = unknown(wild);
         setup.sky.as_mut().unwrap().shadow_db = 1.0;
+        setup
     });
-    print("N = 8, 1 dB, flown", &mut flown);
+    print("N = 8, 1 dB, hovering alone", &mut hovering);
+    let mut flown = shares(8, 1, |wild| {
+        let mut setup = wild.flown(Interference::Unknown);
+        setup.sky.as_mut().unwrap().shadow_db = 1.0;
+        setup
+    });
+    print("N = 8, 1 dB, on their way too", &mut flown);
+    assert!(quantile(&mut hovering[5], 0.5) >= 0.94);
+    assert!(quantile(&mut flown[LAST], 0.5) >= 0.95);
 }
 
 #[test]
-fn two_sources() {
-    let mut shares = shares(8, 2, |_, _| {});
-    print("N = 8, two", &mut shares);
+fn two_sources_are_met_by_the_one_that_comes_nearest() {
+    let mut heard = shares(8, 2, unknown);
+    print("N = 8, two sources", &mut heard);
+    let mut told = shares(8, 2, |wild| {
+        let mut setup = unknown(wild);
+        // The paper's hypothetical interferer.
+        setup.mission =
+            uav_relay_sim::mission::mission(&wild.scenario, wild.relays, 1e-4).map_or(setup.mission, |it| it.0);
+        setup.settings.listen = None;
+        setup
+    });
+    print("N = 8, two sources, the paper's way", &mut told);
+    assert!(quantile(&mut heard[5], 0.5) >= 0.98);
+    assert!(quantile(&mut heard[5], 0.1) >= 0.9);
+}
+
+#[test]
+fn a_wrong_guess_is_unlearned() {
+    for relays in [3, 8] {
+        let mut shares = shares(relays, 1, |wild| {
+            // Mirrored about the middle, a hundred times as strong, and nearer.
+            let source = &wild.scene().sources[0];
+            wild.setup(Interference::Source(Interferer {
+                power_w: (100.0 * source.power_w) as f32,
+                x_m: (1_000.0 - source.x_m) as f32,
+                y_m: (-0.3 * source.y_m) as f32,
+            }))
+        });
+        print(&format!("N = {relays}, a wrong guess"), &mut shares);
+        assert!(quantile(&mut shares[3], 0.5) >= 0.98);
+        assert!(quantile(&mut shares[5], 0.5) >= 0.99);
+        assert!(quantile(&mut shares[LAST], 0.1) >= 0.97);
+        assert!(quantile(&mut shares[LAST], 0.0) >= 0.5);
+    }
 }

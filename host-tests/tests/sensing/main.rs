@@ -6,3 +6,4 @@ mod scenes;
 
 mod following;
 mod found;
+mod steady;

@@ -51,6 +51,20 @@ impl Wild {
         }
     }
 
+    /// The one source is there, m.
+    pub(crate) fn place(&mut self, x_m: f64, y_m: f64) {
+        if let Known::Sources(sources) = &mut self.scenario.interference {
+            (sources[0].x_m, sources[0].y_m) = (x_m, y_m);
+        }
+    }
+
+    /// The same with the sources of `scene`.
+    pub(crate) fn with(&self, scene: &Scene) -> Self {
+        let mut wild = self.clone();
+        wild.scenario.interference = Known::Sources(scene.sources.clone());
+        wild
+    }
+
     pub(crate) fn scene(&self) -> Scene {
         Scene::new(&self.scenario, self.relays).unwrap()
     }
@@ -80,7 +94,7 @@ impl Wild {
         let (mission, _) =
             uav_relay_sim::mission::mission(&self.scenario, self.relays, 1e-6).unwrap();
         let told = places(&run(Setup::new(mission)).unwrap());
-        (share(&self.scene(), &told), told)
+        (sir(&self.scene(), &told), told)
     }
 
     /// The same with drones of 10 m/s, which start beside the transmitter and measure once a second on their way.
@@ -118,7 +132,7 @@ fn places(outcome: &Outcome) -> Vec<uav_relay::Placement> {
 }
 
 /// The SIR of a chain there, linear.
-pub(crate) fn share(scene: &Scene, places: &[uav_relay::Placement]) -> f64 {
+pub(crate) fn sir(scene: &Scene, places: &[uav_relay::Placement]) -> f64 {
     scene.chain_sir(places)
 }
 
@@ -128,7 +142,7 @@ pub(crate) fn by_agreement(scene: &Scene, stands: &[Stand]) -> Vec<f64> {
     for stand in stands {
         let at = stand.agreements as usize;
         if at > sirs.len() {
-            sirs.push(share(scene, stand.goals.as_ref().unwrap()));
+            sirs.push(sir(scene, stand.goals.as_ref().unwrap()));
         }
     }
     sirs

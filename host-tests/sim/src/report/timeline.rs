@@ -69,6 +69,9 @@ impl MomentReport {
             Turning::Released => "released",
             Turning::Blind => "blind",
             Turning::Restarted => "restarted",
+            Turning::Believes => "believes",
+            Turning::Unclear => "unclear",
+            Turning::Off => "off",
         };
         let (view, relays) = match moment.what {
             Turning::Reformed { view, relays, .. } => (Some(view), Some(relays)),

@@ -153,6 +153,7 @@ impl Chain {
                 relays: member.relay.mission().relays(),
                 view: member.relay.view().number(),
                 version: member.relay.version(),
+                believed: member.relay.belief(),
                 seen: Seen::of(&member.relay, member.killed.is_none()),
             })
             .collect();

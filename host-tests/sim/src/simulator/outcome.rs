@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use uav_relay::sensing::belief::Told;
 use uav_relay::{Duration, Instant, Placement, Profile, Side, Stats};
 
 use super::attack::Struck;
@@ -73,6 +74,12 @@ pub enum Turning {
     Blind,
     /// Its autopilot was switched off and on.
     Restarted,
+    /// It believes something else of the interference than before.
+    Believes,
+    /// What is heard is not of one source.
+    Unclear,
+    /// The other one hears something else than all the others.
+    Off,
 }
 
 /// A turning and whose it was.
@@ -132,6 +139,8 @@ pub struct RelayEnd {
     pub view: u32,
     /// Version of the mission that it flies.
     pub version: u16,
+    /// What it believes of the interference.
+    pub believed: Told,
     /// What it showed.
     pub seen: Seen,
 }

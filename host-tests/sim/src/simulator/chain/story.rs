@@ -26,6 +26,9 @@ impl Chain {
                 Event::KeyMismatch { node } => (Turning::OtherKey, Some(node)),
                 Event::EpochWentBack { node } => (Turning::OldEpoch, Some(node)),
                 Event::IndexTaken { node } => (Turning::Namesake, Some(node)),
+                Event::Believed => (Turning::Believes, None),
+                Event::InterfererUnclear => (Turning::Unclear, None),
+                Event::SensorOff { node } => (Turning::Off, Some(node)),
                 Event::LeaseLapsed => (Turning::Lapsed, None),
                 Event::Converged => {
                     self.holding += 1;
