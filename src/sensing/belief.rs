@@ -70,14 +70,18 @@ pub struct Told {
     pub belief: Belief,
 }
 
-/// Relative, as a mean square: what is not worth an agreement.
+/// Relative, as a mean square: what is not worth an agreement, though more is known,
 const WORTH: f64 = 1e-5;
 
-/// How many times what chance would make a difference has to be.
-const BEYOND_CHANCE: f64 = 8.0;
+/// and what is a change of the interference,
+const CHANGE: f64 = 1e-4;
 
-/// Relative, as a mean square: when an interferer that is seen to move is followed, for it goes on.
-const SOON: f64 = 1e-4;
+/// if it is so many times what chance would make: where nothing is seen to move, and where something is.
+const BEYOND_CHANCE: f64 = 8.0;
+const FOLLOWED: f64 = 1.5;
+
+/// The same for the receiver alone.
+const LOUDER: f64 = 0.025;
 
 /// How many times what chance would make the track may be off what is heard.
 const ASTRAY: f64 = 4.0;
@@ -195,7 +199,10 @@ pub(crate) fn review(
     };
     let Some(known) = known else { return adopt(0) };
     let chance = fit.chance();
-    let off = fit.off(&coefficients(mission, &source), &coefficients(mission, &known));
+    let off = fit.off(
+        &coefficients(mission, &source),
+        &coefficients(mission, &known),
+    );
     let receiver = match belief {
         Belief::Source {
             receiver_w: before, ..
@@ -205,11 +212,14 @@ pub(crate) fn review(
         }
         _ => 0.0,
     };
-    if !(off > WORTH || receiver > 4.0 * WORTH) {
-        keep(unfit)
-    } else if (moves && off > SOON) || off > BEYOND_CHANCE * (chance + before.chance) || receiver > 1_000.0 * WORTH {
+    let by_chance = chance + before.chance;
+    let times = if moves { FOLLOWED } else { BEYOND_CHANCE };
+    if off > CHANGE && off > times * by_chance || receiver > LOUDER {
         adopt(0)
-    } else if information > LEARNED * before.information && before.refined < REFINED {
+    } else if (off > WORTH || receiver > 4.0 * WORTH)
+        && information > LEARNED * before.information
+        && before.refined < REFINED
+    {
         adopt(before.refined + 1)
     } else {
         keep(unfit)
@@ -233,12 +243,15 @@ fn with_receiver(
         return fit;
     }
     let config = mission.config();
-    let there = terms(config.distance_m, Placement::on_line(config.distance_m, 0.0));
+    let there = terms(
+        config.distance_m,
+        Placement::on_line(config.distance_m, 0.0),
+    );
     let ground = config.channel.eta() / config.channel.mu_nlos();
     let v = f64::from(unit_w(mission)) * ground / f64::from(receiver.power_w);
     let expected = fit.value(&there);
     let off = v / expected - 1.0;
-    let chance = 9.0 * (fit.variance() + fit.relative_variance(&there));
+    let chance = 25.0 * (fit.variance() + fit.relative_variance(&there));
     if !(expected > 0.0 && off * off < chance) {
         return fit;
     }
@@ -270,9 +283,12 @@ fn at_receiver(
     let (beyond, aside) = (f64::from(beyond), f64::from(aside));
     let squared = beyond * beyond + aside * aside;
     let made = f64::from(source.power_w) / (config.channel.mu_nlos() * squared);
-    let unsure = fit.relative_variance(&terms(config.distance_m, Placement::on_line(config.distance_m, 0.0)));
+    let unsure = fit.relative_variance(&terms(
+        config.distance_m,
+        Placement::on_line(config.distance_m, 0.0),
+    ));
     let off = made / heard - 1.0;
-    if !(off * off < 9.0 * (chance + unsure)) {
+    if !(off * off < 25.0 * (chance + unsure)) {
         return receiver.power_w;
     }
     (heard * (1.0 + off * chance / (chance + unsure))) as f32
@@ -286,9 +302,8 @@ fn at_a_loss(
     before: Known,
     unfit: Unfit,
 ) -> Review {
-    let contradicted = known.is_none_or(|known| {
-        misfit(sums, &coefficients(mission, &known)) > CONTRADICTED
-    });
+    let contradicted =
+        known.is_none_or(|known| misfit(sums, &coefficients(mission, &known)) > CONTRADICTED);
     let spread = match belief {
         Belief::Unknown(spread) => spread.next(),
         Belief::Mission if known.is_none() => Spread::Even.next(),

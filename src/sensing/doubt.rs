@@ -13,6 +13,9 @@ const FACTOR: f64 = 2.0;
 /// and only beyond seven standard deviations of what the others are apart.
 const DEVIATIONS: f64 = 49.0;
 
+/// The others are of one mind up to this variance of their relative errors (some 1.5 dB).
+const OF_ONE_MIND: f64 = 0.1;
+
 /// Whether a relay that hears `place` is off all the others, whose sums are `others`.
 ///
 /// The difference of v and what the others make of it, e, is (v / e - e / v) / 2, which grows alike in both directions.
@@ -24,10 +27,14 @@ pub(crate) fn is_off(others: &Sums, place: &Place, relative_error: f32) -> bool 
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
     };
+    if fit.variance() > OF_ONE_MIND {
+        return false;
+    }
     let ratio = f64::from(place.v) / fit.value(&place.terms);
     if !(ratio > 0.0) {
         return false;
     }
     let off = 0.5 * (ratio - 1.0 / ratio);
-    off * off > (FACTOR * FACTOR).max(DEVIATIONS * (fit.variance() + fit.relative_variance(&place.terms)))
+    off * off
+        > (FACTOR * FACTOR).max(DEVIATIONS * (fit.variance() + fit.relative_variance(&place.terms)))
 }

@@ -56,8 +56,26 @@ impl Fit {
     /// # Errors
     /// [`Unfit::Places`]: the three unknowns of the line cannot be told apart.
     pub fn of(sums: &Sums, relative_error: f32) -> Result<Self, Unfit> {
-        let [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd, av, bv, cv, dv, vv, count, measured, _] =
-            sums.numbers.map(f64::from);
+        let [
+            aa,
+            ab,
+            ac,
+            ad,
+            bb,
+            bc,
+            bd,
+            cc,
+            cd,
+            dd,
+            av,
+            bv,
+            cv,
+            dv,
+            vv,
+            count,
+            measured,
+            _,
+        ] = sums.numbers.map(f64::from);
         let products = [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd];
         let factor = Factor::new(products, SIDES * aa).ok_or(Unfit::Places)?;
         let right = [av, bv, cv, dv];
@@ -173,9 +191,8 @@ impl Fit {
                 let along = [0.0, -0.5 / k, -x / k, 0.0];
                 let side = 0.5 / (apart * k);
                 let aside = [side, side * x, side * (2.0 * x * x - above), side * t];
-                let variance = |slopes| {
-                    (self.variance * self.factor.variance(slopes) * half * half) as f32
-                };
+                let variance =
+                    |slopes| (self.variance * self.factor.variance(slopes) * half * half) as f32;
                 return Ok(Found {
                     source: found,
                     variance_m2: [variance(along), variance(aside)],
@@ -200,8 +217,26 @@ impl Fit {
 
 /// The mean square of what coefficients leave of `sums`, relative.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
-    let [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd, av, bv, cv, dv, vv, count, _, _] =
-        sums.numbers.map(f64::from);
+    let [
+        aa,
+        ab,
+        ac,
+        ad,
+        bb,
+        bc,
+        bd,
+        cc,
+        cd,
+        dd,
+        av,
+        bv,
+        cv,
+        dv,
+        vv,
+        count,
+        _,
+        _,
+    ] = sums.numbers.map(f64::from);
     let [a, b, c, d] = *coefficients;
     let products = [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd];
     let left = vv - 2.0 * (a * av + b * bv + c * cv + d * dv) + quadratic(&products, *coefficients);

@@ -15,7 +15,12 @@ const FINER: u8 = 5;
 
 /// X', Y' and k of the source nearest to these products, and on this side of the line of places (1 or -1, from `side` on). 414 places,
 /// some 16 000 instructions on a Cortex-M4F. `None` where no source makes anything of them.
-pub(super) fn nearest(products: &[f32; 10], right: &[f32; 4], side: f32, sign: f32) -> Option<[f32; 3]> {
+pub(super) fn nearest(
+    products: &[f32; 10],
+    right: &[f32; 4],
+    side: f32,
+    sign: f32,
+) -> Option<[f32; 3]> {
     let mut best = Best {
         products,
         right,

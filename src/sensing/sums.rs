@@ -23,13 +23,25 @@ impl Sums {
 
     /// Adds a place with these `terms` where v was heard and `expected` was to be, above 0 both, which counts `share` and was `measured` so often. At most 60 instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
-        
         let even = sqrt(v / expected);
         let weight = 2.0 * share * even / (v * v + expected * expected);
         let [a, b, c, d] = *terms;
         let row = [
-            a * a, a * b, a * c, a * d, b * b, b * c, b * d, c * c, c * d, d * d, a * v, b * v,
-            c * v, d * v, v * v,
+            a * a,
+            a * b,
+            a * c,
+            a * d,
+            b * b,
+            b * c,
+            b * d,
+            c * c,
+            c * d,
+            d * d,
+            a * v,
+            b * v,
+            c * v,
+            d * v,
+            v * v,
         ];
         for (sum, number) in self.numbers.iter_mut().zip(row) {
             *sum += weight * number;
@@ -80,6 +92,8 @@ impl Sums {
     pub(crate) fn is_sound(&self) -> bool {
         let [aa, .., vv, count, measurements, age] = self.numbers;
         self.numbers.iter().all(|number| number.is_finite())
-            && [aa, vv, count, measurements, age].iter().all(|number| *number >= 0.0)
+            && [aa, vv, count, measurements, age]
+                .iter()
+                .all(|number| *number >= 0.0)
     }
 }

@@ -29,8 +29,16 @@ pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     let config = mission.config();
     let half = 0.5 * f64::from(config.distance_m);
     let k = f64::from(config.common.power_w) / f64::from(source.power_w);
-    let (x, y) = (f64::from(source.x_m) / half - 1.0, f64::from(source.y_m) / half);
-    [k * (x * x + y * y + 1.0 / 3.0), -2.0 * k * x, k, -2.0 * k * y]
+    let (x, y) = (
+        f64::from(source.x_m) / half - 1.0,
+        f64::from(source.y_m) / half,
+    );
+    [
+        k * (x * x + y * y + 1.0 / 3.0),
+        -2.0 * k * x,
+        k,
+        -2.0 * k * y,
+    ]
 }
 
 /// The sum of `terms` with these coefficients.

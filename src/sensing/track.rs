@@ -86,7 +86,9 @@ impl Track {
     /// Takes a fit of what was heard at `at`, with this half-life.
     pub(crate) fn take(&mut self, found: &Found, at: Instant, half_life: Duration) {
         let half_life = half_life.as_micros() as f32 * 1e-6;
-        let fits = [found.source.x_m, found.source.y_m].into_iter().zip(found.variance_m2);
+        let fits = [found.source.x_m, found.source.y_m]
+            .into_iter()
+            .zip(found.variance_m2);
         let Some(before) = self.at else {
             for (axis, (place, variance)) in self.axes.iter_mut().zip(fits) {
                 *axis = Axis::new(place, variance);

@@ -91,8 +91,8 @@ fn two_sources_are_met_by_the_one_that_comes_nearest() {
     let mut told = shares(8, 2, |wild| {
         let mut setup = unknown(wild);
         // The paper's hypothetical interferer.
-        setup.mission =
-            uav_relay_sim::mission::mission(&wild.scenario, wild.relays, 1e-4).map_or(setup.mission, |it| it.0);
+        setup.mission = uav_relay_sim::mission::mission(&wild.scenario, wild.relays, 1e-4)
+            .map_or(setup.mission, |it| it.0);
         setup.settings.listen = None;
         setup
     });

@@ -130,7 +130,10 @@ impl Round {
             None => false,
         };
         self.due.onward |= resent;
-        if SENSING && self.computation.sensing.take_due(context.now) && self.computation.may_sense(context) {
+        if SENSING
+            && self.computation.sensing.take_due(context.now)
+            && self.computation.may_sense(context)
+        {
             let found = self.computation.sensing.found();
             let next = self.computation.begin_sense(context);
             return Effects {

@@ -23,8 +23,8 @@ pub struct Sky {
     pub period: Duration,
     /// Whether it measures once at a place, and then no more.
     pub once: bool,
-    /// Relays whose receiver says something else: index from 1, and by how many dB too much.
-    pub broken: Vec<(u16, f64)>,
+    /// Relays whose receiver says something else: index from 1, by how many dB too much, and since when.
+    pub broken: Vec<(u16, f64, Instant)>,
     /// The run goes on until then.
     pub until: Instant,
     /// Seed of the shadows.
@@ -67,11 +67,15 @@ impl Sky {
         &self,
         scene: &Scene,
         index: u16,
+        now: Instant,
         at: Placement,
         rng: &mut ChaCha8Rng,
     ) -> f64 {
-        let broken = self.broken.iter().find(|(which, _)| *which == index);
-        let off_db = broken.map_or(0.0, |(_, db)| *db) + self.shadow_db * self.shadow(at.into());
+        let broken = self
+            .broken
+            .iter()
+            .find(|(which, _, since)| *which == index && now >= *since);
+        let off_db = broken.map_or(0.0, |(_, db, _)| *db) + self.shadow_db * self.shadow(at.into());
         scene.interference_w(at) * decibel(off_db) * self.mean(rng)
     }
 

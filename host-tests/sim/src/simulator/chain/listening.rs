@@ -37,7 +37,7 @@ impl Chain {
                 continue;
             }
             member.measured = Some(at);
-            let power_w = sky.heard_w(&scene, member.node, at, &mut self.rng);
+            let power_w = sky.heard_w(&scene, member.node, now, at, &mut self.rng);
             member.relay.handle_sample(
                 now,
                 Sample::Heard {
@@ -47,7 +47,9 @@ impl Chain {
             );
             if member.node == self.setup.mission.relays() {
                 let power_w = crate::command::narrow(sky.receiver_w(&scene, &mut self.rng));
-                member.relay.handle_sample(now, Sample::Receiver { power_w });
+                member
+                    .relay
+                    .handle_sample(now, Sample::Receiver { power_w });
             }
         }
         self.stand(places);
