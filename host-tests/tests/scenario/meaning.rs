@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use uav_relay_sim::scenario::{
-    AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Source,
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, Noise, RelayOverride, Source,
 };
 
 use super::*;
@@ -72,6 +72,7 @@ fn a_file_with_every_key_means_what_it_says() {
                 y_m: -300.0,
             },
         ]),
+        noise: Noise::default(),
         relays: BTreeMap::from([
             (
                 3,
