@@ -12,8 +12,12 @@ use super::scene::Scene;
 fn the_locus_is_where_the_hops_are_equal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(504));
     let mut roots = [0_u32; 3];
-    for _ in 0..20_000 {
-        let mut scene = Scene::random(&mut rng);
+    for draw in 0..30_000 {
+        let mut scene = if draw % 3 > 0 {
+            Scene::random(&mut rng)
+        } else {
+            Scene::noisy(&mut rng)
+        };
         let x = f64::from(rng.random_range(0.0..=scene.link.distance_m) as f32);
         let power_w = scene.mission.config().common.power_w;
         let found = locus::altitudes(&scene.mission, x as f32, power_w);

@@ -62,11 +62,12 @@
 //! - On a sphere about Rx s and l depend on x and y alone, so SIR_1 rises toward some side, and the relay sinks as it moves there: the
 //!   lowest is the best wherever there is room. But in an upright face of the box along the line the level lines may touch
 //!   above the ground: `touching`. In the two across the line l is the same along such a circle: there they do not.
+//! - Where the touching place is outside the corridor another one may be within: `corridor` searches for it.
 //!
 //! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
 use super::edge::{Edge, TwoHops, narrow};
-use super::{Found, touching};
+use super::{Found, corridor, touching};
 use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::place::Placement;
 
@@ -91,12 +92,14 @@ pub enum AsideCase {
     Level,
     /// With noise: on an upright wall of the corridor, where the lines of equal SIR of both hops touch.
     Wall,
+    /// With noise: at the lowest altitude within the corridor, by a search; nothing proves that it is the best.
+    Inside,
     /// The interferer stands at Rx (X = D, Y = 0), and no place helps: SIR_2 is 0; above Rx.
     Drowned,
 }
 
 impl AsideCase {
-    /// Its number: 1 to 3 as above, then the edges along x, y and upward, 7 to 9.
+    /// Its number: 1 to 3 as above, then the edges along x, y and upward, 7 to 10.
     pub const fn number(self) -> u8 {
         match self {
             Self::Touching => 1,
@@ -106,6 +109,7 @@ impl AsideCase {
             Self::Level => 7,
             Self::Drowned => 8,
             Self::Wall => 9,
+            Self::Inside => 10,
         }
     }
 }
@@ -148,6 +152,12 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
         y_m,
         altitude_m,
     };
+    if mission.noise_at_a_metre() > 0.0 && !across.is_single() {
+        let found = corridor::best(&hops, interferer, along, across, band.least_m);
+        if found.sir > best.0.sir {
+            best = (found, AsideCase::Inside);
+        }
+    }
     for y in both_ends(across) {
         if let Some(found) = touching::inside(&hops, interferer, y, band)
             && found.sir > best.0.sir

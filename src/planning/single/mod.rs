@@ -15,6 +15,7 @@
 //! Theorem 3 may lie inside the box (`touching`); the mission's noise is in all of them but [`noise`], which has its own.
 
 pub mod aside;
+mod corridor;
 mod edge;
 mod edge_noise;
 pub mod free;

@@ -144,6 +144,7 @@ fn sideways(case: aside::AsideCase) -> &'static str {
             "on an upright edge of the corridor, at Tx or Rx"
         }
         AsideCase::Level => "the interferer stands at Tx: the first hop is the same everywhere",
+        AsideCase::Inside => "within the corridor at the lowest altitude, by a search",
         AsideCase::Wall => {
             "on a wall of the corridor, where the lines of equal SINR of both hops touch"
         }
