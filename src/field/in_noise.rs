@@ -12,7 +12,7 @@
 //! -2 N / (1 + N u)^3 is below 0, so by Jensen's inequality E[u / (1 + N u)] <= E[u] / (1 + N E[u]). Nothing above 0 is a lower bound
 //! by Upsilon alone: u = Upsilon / p with the probability p, and else next to 0, has this Upsilon and makes E[u / (1 + N u)] as small as
 //! p does. Where the mean of I is known, 1 / (E[I] + N) is one, for 1 / (I + N) is convex in I. How far the bound is off for Beta
-//! distributions: `noise_in_a_field_is_bounded_from_above` in `host-tests/tests/field/noise.rs`.
+//! distributions: `noise_in_a_field_is_bounded_from_above` in `host-tests/tests/noise/field.rs`.
 //!
 //! A relay that measures needs no bound: its receiver hears I + N, and so what it estimates is E[1 / (I + N)].
 

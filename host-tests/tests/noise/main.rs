@@ -3,6 +3,7 @@
 //! `COUNT` in the environment takes that many random chains or scenes in place of those of CI, `SEED` others.
 
 mod chains;
+mod field;
 mod reach;
 mod space;
 

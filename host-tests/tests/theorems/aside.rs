@@ -300,7 +300,10 @@ fn a_relay_aside_at_its_altitude_in_noise_is_no_worse_than_brute_force() {
         |scene| (scene.band.0, scene.band.0),
         |scene| aside::best_at(&scene.mission, scene.profile(scene.band.0)).unwrap(),
     );
-    for case in CASES.iter().filter(|case| !matches!(**case, "Edge(Upward)" | "Level")) {
+    for case in CASES
+        .iter()
+        .filter(|case| !matches!(**case, "Edge(Upward)" | "Level"))
+    {
         assert!(seen.contains_key(*case), "{case}: {seen:?}");
     }
 }
@@ -317,7 +320,12 @@ fn a_relay_aside_in_noise_is_no_worse_than_brute_force() {
             aside::best_place(&scene.mission, power_w).unwrap()
         },
     );
-    for case in CASES.iter().copied().chain(["Wall", "Inside"]).filter(|case| *case != "Level") {
+    for case in CASES
+        .iter()
+        .copied()
+        .chain(["Wall", "Inside"])
+        .filter(|case| *case != "Level")
+    {
         assert!(seen.contains_key(case), "{case}: {seen:?}");
     }
 }

@@ -367,6 +367,7 @@ fn the_vectors_hold_offers_of_every_extreme() {
     some(|offer| offer.left_m == -1e5 && offer.right_m == 1e5);
     some(|offer| offer.left_m == 0.0 && offer.right_m == 0.0);
     some(|offer| offer.left_m < 0.0 && offer.right_m == 0.0);
+    some(|offer| offer.noise_w > 0.0);
     some(|offer| offer.answer == 0);
     some(|offer| offer.answer == u16::MAX);
 }

@@ -80,8 +80,8 @@ pub(super) const FILE: Keys = &[
     optional("channel", Rule::Table(CHANNEL)),
     optional("interferer", Rule::Tables(INTERFERER, 1)),
     optional("relay", Rule::Tables(RELAY, 0)),
-    optional("noise", Rule::Table(NOISE)),
     optional("field", Rule::Table(FIELD)),
+    optional("noise", Rule::Table(NOISE)),
     optional("site", Rule::Table(SITES)),
 ];
 

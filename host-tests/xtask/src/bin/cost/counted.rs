@@ -128,6 +128,18 @@ const COUNTED: &[Counted] = &[
     ("`size_of::<Relay>()`", "bytes", &["size_of_relay"], None),
     ("one reach", "instructions", &["reach"], Some(150)),
     (
+        "one reach in noise, the longest of 120",
+        "instructions",
+        &["reach_noise"],
+        None,
+    ),
+    (
+        "one reach in noise, the median of 120",
+        "instructions",
+        &["reach_noise_median"],
+        None,
+    ),
+    (
         "a full sweep, message in to message out",
         "instructions",
         &["sweep"],
