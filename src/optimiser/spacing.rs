@@ -41,8 +41,6 @@
 mod noise;
 mod stretched;
 
-use noise::NoisyHop;
-
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
@@ -160,35 +158,10 @@ impl Hop {
     /// so what is promised for the target holds at the f32 that is returned. Constant work; with noise at most 96 evaluations of
     /// the hop, usually five.
     pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
-        let place = self.noise_free(target, from_m)?;
-        if self.noise > 0.0 {
-            self.in_noise(target, from_m, place)
+        if self.is_silent() {
+            self.in_silence(target, from_m)
         } else {
-            Some(place)
-        }
-    }
-
-    /// The same with noise, which reaches no farther than `place` without it.
-    #[inline(never)] // out of the way of a sweep without noise
-    fn in_noise(&self, target: f32, from_m: f32, place: f32) -> Option<f32> {
-        let hop = self.noisy(target, from_m);
-        let most = place - from_m;
-        if place >= self.end_m && hop.is_met(most) {
-            return Some(place);
-        }
-        let d = hop.last(self.least_step, hop.through_noise()?.min(most))?;
-        rounded(from_m, d)
-    }
-
-    fn noisy(&self, target: f32, from_m: f32) -> NoisyHop {
-        NoisyHop {
-            ratio: self.sender.gain.ratio(target),
-            excess: self.sender.gain.excess(target),
-            ahead: self.interferer_x_m - from_m,
-            aside_squared: self.aside_squared,
-            across_squared: self.across_squared,
-            base: self.base,
-            noise: self.noise,
+            self.in_noise(target, from_m)
         }
     }
 
@@ -197,7 +170,7 @@ impl Hop {
         reason = "a call would cost a sweep a hundred instructions"
     )]
     #[inline(always)]
-    fn noise_free(&self, target: f32, from_m: f32) -> Option<f32> {
+    fn in_silence(&self, target: f32, from_m: f32) -> Option<f32> {
         let room = self.end_m - from_m;
         if room < self.least_step {
             return None;
@@ -240,6 +213,12 @@ impl Hop {
     /// before, which is as near as it may be. Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
         self.reach(target, from_m)
+            .or_else(|| self.held_back(target, from_m))
+    }
+
+    /// The same of a hop that is silent.
+    pub(super) fn outermost_in_silence(&self, target: f32, from_m: f32) -> Option<f32> {
+        self.in_silence(target, from_m)
             .or_else(|| self.held_back(target, from_m))
     }
 

@@ -319,7 +319,7 @@ fn noise_out_of_range_is_refused_with_its_range() {
         ),
         (
             "bandwidth_hz = 2e12\n",
-            "noise.bandwidth_hz = 2e12",
+            "noise.bandwidth_hz = 2000000000000.0",
             "0 to 1e12 Hz",
         ),
         ("bandwidth_hz = nan\n", "noise.bandwidth_hz", "0 to 1e12 Hz"),

@@ -32,6 +32,7 @@
 //! g falls with rho and, at one place, with the distance of the sender: the reach falls with the target and rises with the sender's
 //! place, as without noise. Accuracy: `reaches_in_noise_agree_with_the_reference` in `host-tests/tests/noise/`.
 
+use super::{Hop, rounded};
 use crate::root::sqrt;
 use crate::sir::square;
 
@@ -49,6 +50,38 @@ const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// A step so short, as a part of the place, is the last one.
 const CLOSE: f32 = 5e-7;
+
+impl Hop {
+    /// Whether the receivers have no noise.
+    pub(in crate::optimiser) fn is_silent(&self) -> bool {
+        !(self.noise > 0.0)
+    }
+
+    /// [`Hop::reach`] with noise, which reaches no farther than without it.
+    #[inline(never)] // out of the way of a sweep without noise
+    pub(super) fn in_noise(&self, target: f32, from_m: f32) -> Option<f32> {
+        let place = self.in_silence(target, from_m)?;
+        let hop = self.noisy(target, from_m);
+        let most = place - from_m;
+        if place >= self.end_m && hop.is_met(most) {
+            return Some(place);
+        }
+        let d = hop.last(self.least_step, hop.through_noise()?.min(most))?;
+        rounded(from_m, d)
+    }
+
+    pub(super) fn noisy(&self, target: f32, from_m: f32) -> NoisyHop {
+        NoisyHop {
+            ratio: self.sender.gain.ratio(target),
+            excess: self.sender.gain.excess(target),
+            ahead: self.interferer_x_m - from_m,
+            aside_squared: self.aside_squared,
+            across_squared: self.across_squared,
+            base: self.base,
+            noise: self.noise,
+        }
+    }
+}
 
 /// One hop for one target.
 #[derive(Clone, Copy, Debug)]

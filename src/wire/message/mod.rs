@@ -29,8 +29,8 @@ use self::parts::{Word, read, write};
 use super::upload::Upload;
 use crate::guard::Fence;
 
-/// The longest body: a sweep of sixteen targets with what was measured, or from aside of the line.
-pub const MAX_BODY: usize = 88;
+/// The longest body: an offer; a sweep of sixteen targets, from aside of the line, is a byte shorter.
+pub const MAX_BODY: usize = 89;
 
 /// One message between neighbours. *Onward* is the way a pass goes: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]

@@ -107,7 +107,7 @@ const UPLOADED: &[Counted] = &[
         &["offer"],
         None,
     ),
-    ("its frame", "bytes", &["offer_bytes"], Some(112)),
+    ("its frame", "bytes", &["offer_bytes"], Some(116)),
 ];
 
 /// A row of what the counting image reports: the largest of the figures with these names.
