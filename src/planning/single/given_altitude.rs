@@ -82,8 +82,9 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCa
                 (two.crossing(peak, end_m), PlaceCase::BeyondHill)
             });
         }
-        Extremum::Valley(bottom) if bottom < end_m => (bottom, true),
-        Extremum::ValleyAndHill(bottom, _) if bottom < end_m => (bottom, true),
+        Extremum::Valley(bottom) | Extremum::ValleyAndHill(bottom, _) if bottom < end_m => {
+            (bottom, true)
+        }
         _ => (end_m, false),
     };
     if two.first(0.0) < two.second(0.0) {
