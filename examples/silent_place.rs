@@ -30,6 +30,7 @@ const MISSION: Mission = Mission::new(MissionConfig {
         x_m: 500.0,
         y_m: 400.0,
     }),
+    noise_w: 0.0,
     tolerance: 1e-4,
 });
 

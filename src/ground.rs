@@ -92,6 +92,7 @@ pub enum Progress {
 /// #     common: Profile { altitude_m: 20.0, power_w: 1.0 },
 /// #     channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?, band: Band::at(20.0), lateral: Band::NONE,
 /// #     interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
+/// #     noise_w: 0.0,
 /// #     tolerance: 1e-4,
 /// # })?;
 /// # let mut sent = 0;

@@ -35,6 +35,7 @@ pub(crate) const fn mission(relays: u16) -> Mission {
             x_m: 500.0,
             y_m: 400.0,
         }),
+        noise_w: 0.0,
         tolerance: 1e-4,
     })
 }

@@ -5,6 +5,7 @@ use cortex_m_semihosting::hprintln;
 use uav_relay::FrameBuf;
 use uav_relay::Instant;
 use uav_relay::Mission;
+use uav_relay::MissionConfig;
 use uav_relay::Phase;
 use uav_relay::Port;
 use uav_relay::Settings;
@@ -35,6 +36,38 @@ pub(crate) fn reach() {
         }
     }
     hprintln!("reach {}", most);
+    reach_in_noise();
+}
+
+/// The same hops in noise, from a ten-thousandth of what of the interferer arrives 100 m from it to a hundred times that.
+fn reach_in_noise() {
+    const LEVELS: usize = 4;
+    let mut all = [0; LEVELS * 30];
+    let mut slots = all.iter_mut();
+    for noise_w in [1e-10_f32, 1e-8, 1e-6, 1e-4] {
+        let Ok(mission) = Mission::try_new(MissionConfig {
+            noise_w,
+            ..*MISSION.config()
+        }) else {
+            continue;
+        };
+        let common = mission.config().common;
+        let sender = Sender::relay(&mission, common.on_line());
+        let at = common.on_line().at;
+        let middle = Hop::new(&mission, &INTERFERER, sender, 4, at, 0.0);
+        for from in [100.0_f32, 400.0, 499.9, 500.1, 600.0, 900.0] {
+            for target in [0.005_f32, 0.0125, 1.0, 5.0, 40.0] {
+                let (hop, target, from) = (black_box(&middle), black_box(target), black_box(from));
+                if let Some(slot) = slots.next() {
+                    *slot = instructions(|| hop.reach(target, from));
+                }
+            }
+        }
+    }
+    all.sort_unstable();
+    hprintln!("reach_noise {}", all.last().copied().unwrap_or(0));
+    let middle = all.get(all.len() / 2).copied();
+    hprintln!("reach_noise_median {}", middle.unwrap_or(0));
 }
 
 /// A full sweep through a middle relay, and through the last one of a chain of three; the verdict on its way back.

@@ -34,6 +34,9 @@ pub(crate) struct MissionOptions {
     /// Interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7)
     #[arg(long, value_name = "P,X,Y", default_value = "80,500,400", allow_hyphen_values = true, value_parser = interferer)]
     pub(crate) interferer: Interferer,
+    /// Noise power at every receiver, W, 0 to 1
+    #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = noise)]
+    pub(crate) noise: f32,
     /// Least distance between two relays, m, 0 to 1e5
     #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = separation)]
     pub(crate) min_separation: f32,
@@ -68,6 +71,7 @@ impl MissionOptions {
                 most_m: self.lateral_max,
             },
             interference,
+            noise_w: self.noise,
             tolerance: 1e-4,
         })
     }
@@ -121,6 +125,11 @@ pub(crate) fn right(text: &str) -> Result<f32, String> {
 /// W, 1e-6 to 1e6.
 pub(crate) fn power(text: &str) -> Result<f32, String> {
     number(text, 1e-6, 1e6)
+}
+
+/// W, 0 to 1.
+pub(crate) fn noise(text: &str) -> Result<f32, String> {
+    number(text, 0.0, 1.0)
 }
 
 /// m, 0 to 1e5.

@@ -11,7 +11,8 @@ use uav_relay::{
 use crate::command;
 use crate::key;
 use crate::mission::{
-    MissionOptions, altitude, band, distance, interferer, left, mission, power, right, separation,
+    MissionOptions, altitude, band, distance, interferer, left, mission, noise, power, right,
+    separation,
 };
 use crate::site::SiteOptions;
 
@@ -79,6 +80,9 @@ struct Options {
     /// New interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7)
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = interferer)]
     new_interferer: Option<Interferer>,
+    /// New noise power at every receiver, W, 0 to 1
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = noise)]
+    new_noise: Option<f32>,
     /// New least distance between two relays, m, 0 to 1e5
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = separation)]
     new_min_separation: Option<f32>,
@@ -167,6 +171,7 @@ fn changed(options: &Options, loaded: &MissionConfig) -> MissionConfig {
         interference: options
             .new_interferer
             .map_or(loaded.interference, Interference::Source),
+        noise_w: options.new_noise.unwrap_or(loaded.noise_w),
         ..*loaded
     }
 }

@@ -6,6 +6,9 @@
 //! measurements, [`estimate::Estimator`] fits one.
 
 pub mod estimate;
+mod in_noise;
+
+pub use in_noise::InNoise;
 
 /// The most points a field may have.
 pub const MAX_POINTS: usize = 1024;
@@ -146,6 +149,11 @@ impl Field {
     /// of the two points. Work: at most eleven comparisons of a binary search, three divisions. The accuracy is asserted by
     /// `interpolation_agrees_with_f64_and_stays_between_its_neighbours` in `host-tests/tests/field/table.rs`.
     pub const fn upsilon(&self, x_m: f32) -> f32 {
+        self.in_noise(0.0).upsilon(x_m)
+    }
+
+    /// The two points that `x_m` is between, or the one whose Upsilon it has.
+    const fn around(&self, x_m: f32) -> (FieldPoint, Option<FieldPoint>) {
         let mut around = self.points;
         while around.len() > 2 {
             let middle = around.len() / 2;
@@ -161,11 +169,17 @@ impl Field {
             };
         }
         match around {
-            [left, right] if left.x_m < x_m && x_m < right.x_m => between(*left, *right, x_m),
-            [_, right] if right.x_m <= x_m => right.upsilon_per_w,
-            [end, ..] => end.upsilon_per_w,
+            [left, right] if left.x_m < x_m && x_m < right.x_m => (*left, Some(*right)),
+            [_, right] if right.x_m <= x_m => (*right, None),
+            [end, ..] => (*end, None),
             // No field is empty.
-            [] => self.smallest,
+            [] => (
+                FieldPoint {
+                    x_m,
+                    upsilon_per_w: self.smallest,
+                },
+                None,
+            ),
         }
     }
 }

@@ -51,7 +51,8 @@ impl Mission {
         let mut mission = Self::try_new(config)?;
         if receiver_w > 0.0 {
             let eta = config.channel.eta();
-            mission.receiver_gain_per_w = 1.0 / (eta * f64::from(receiver_w));
+            let heard = f64::from(receiver_w) + f64::from(config.noise_w);
+            mission.receiver_gain_per_w = 1.0 / (eta * heard);
         }
         match spread {
             Spread::Even => {}

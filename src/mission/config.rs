@@ -38,6 +38,9 @@ pub struct MissionConfig {
     pub channel: Channel,
     /// What degrades the hops.
     pub interference: Interference,
+    /// Noise power at the input of every receiver, W: 0 to 1, and at most 1e12 times what of the interferer arrives a metre from it. 0 is
+    /// the paper's receiver; with any other number what is called SIR is the SINR, signal over interference and noise.
+    pub noise_w: f32,
     /// How close to the best SIR is close enough, relative: 1e-6 to 0.1.
     pub tolerance: f32,
 }

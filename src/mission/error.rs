@@ -25,6 +25,8 @@ pub enum MissionError {
     InterfererPower,
     /// `interferer.x_m` or `interferer.y_m` is not within -1e7 to 1e7.
     InterfererPlace,
+    /// `noise_w` is not within 0 to 1, or is above 1e12 times what of the interferer arrives a metre from it.
+    Noise,
     /// The crate was built without its feature `field`.
     Field,
     /// `tolerance` is not within 1e-6 to 0.1.
@@ -50,6 +52,9 @@ impl core::fmt::Display for MissionError {
             Self::Lateral => "lateral must be within -1e5 to 1e5, from least to most, with 0 in it",
             Self::InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
             Self::InterfererPlace => "interferer.x_m and y_m must be within -1e7 to 1e7",
+            Self::Noise => {
+                "noise_w must be within 0 to 1, and at most 1e12 times what of the interferer arrives a metre from it"
+            }
             Self::Field => "a field of interference needs the feature `field`",
             Self::Tolerance => "tolerance must be within 1e-6 to 0.1",
         })

@@ -27,6 +27,7 @@ pub(crate) fn paper(relays: u16) -> MissionConfig {
         lateral: Band::NONE,
         channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
         interference: Interference::Source(interferer()),
+        noise_w: 0.0,
         tolerance: 1e-4,
     }
 }
@@ -40,7 +41,7 @@ fn with_source(config: &mut MissionConfig, change: impl FnOnce(&mut Interferer))
 #[test]
 fn every_parameter_is_checked_at_both_ends_and_for_nan() {
     type Set = fn(&mut MissionConfig, f32);
-    let table: [(Set, f32, f32, MissionError); 11] = [
+    let table: [(Set, f32, f32, MissionError); 12] = [
         (|c, v| c.distance_m = v, 1.0, 1e6, MissionError::Distance),
         (
             |c, v| c.min_separation_m = v,
@@ -79,6 +80,16 @@ fn every_parameter_is_checked_at_both_ends_and_for_nan() {
             1e7,
             MissionError::InterfererPlace,
         ),
+        (
+            |c, v| {
+                // Loud enough that noise of 1 W is no more than a part of it.
+                with_source(c, |source| source.power_w = 1e9);
+                c.noise_w = v;
+            },
+            0.0,
+            1.0,
+            MissionError::Noise,
+        ),
         (|c, v| c.tolerance = v, 1e-6, 0.1, MissionError::Tolerance),
     ];
     for (set, least, most, error) in table {
@@ -106,4 +117,22 @@ fn every_parameter_is_checked_at_both_ends_and_for_nan() {
         Err(MissionError::TooManyForDistance)
     );
     assert!(Mission::try_new(paper(250)).is_ok());
+}
+
+#[test]
+fn noise_that_leaves_nothing_of_the_interferer_is_refused() {
+    let with = |noise_w: f32| {
+        let mut config = paper(1);
+        with_source(&mut config, |source| source.power_w = 1e-6);
+        let channel = Channel::from_db(2e9, 100.0, 121.0, AirGround::Los).unwrap();
+        Mission::try_new(MissionConfig {
+            channel,
+            noise_w,
+            ..config
+        })
+        .map(|_| ())
+    };
+    // eta is 7e13: 1e12 times what arrives a metre from a microwatt is 1.4e-8 W.
+    assert_eq!(with(1e-8), Ok(()));
+    assert_eq!(with(2e-8), Err(MissionError::Noise));
 }

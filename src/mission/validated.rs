@@ -4,7 +4,7 @@ use super::believed::{FAR, even_gains};
 use super::config::MissionConfig;
 use super::error::MissionError;
 use super::parts::{Heading, Interference, Interferer, within};
-use crate::field::Field;
+use crate::field::{Field, InNoise};
 use crate::power_ratio::PowerRatio;
 
 /// A validated mission, with what is derived from it once.
@@ -16,9 +16,16 @@ pub struct Mission {
     /// What a relay's transmit power is worth on a drone-to-drone hop, 1/W: eta / (`mu_los` `p_MSI`), in a field m^2/W:
     /// `Upsilon_max` / `mu_los`.
     pub(super) relay_gain_per_w: f64,
-    /// What it is worth on the last hop, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) / eta.
+    /// What it is worth on the last hop, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) / eta. With
+    /// noise, of the interference and the noise at Rx together.
     pub(super) receiver_gain_per_w: f64,
+    /// N eta / `p_MSI`, 1/m^2: the noise over what of the interferer arrives at a relay a metre from it; 0 without noise and in a field.
+    pub(super) noise_at_a_metre: f32,
 }
+
+/// The most that noise may be, as a part of what of the interferer arrives at a relay a metre from it: with more nothing of the
+/// interferer would be left to an f32.
+const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
     /// Checks every parameter. Usable in a constant, where [`Mission::new`] turns a mistake into a failed build.
@@ -36,6 +43,7 @@ impl Mission {
             lateral,
             channel,
             interference,
+            noise_w,
             tolerance,
         } = config;
         if !within(distance_m, 1.0, 1e6) {
@@ -70,28 +78,40 @@ impl Mission {
         if !within(tolerance, 1e-6, 0.1) {
             return Err(MissionError::Tolerance);
         }
+        if !within(noise_w, 0.0, 1.0) {
+            return Err(MissionError::Noise);
+        }
         if matches!(interference, Interference::Field(_)) && !cfg!(feature = "field") {
             return Err(MissionError::Field);
         }
         let eta = channel.eta();
+        let (noise, mut noise_at_a_metre) = (noise_w as f64, 0.0);
         let (tx_gain, relay_gain_per_w, receiver_gain_per_w) = match interference {
             Interference::Source(interferer) => {
                 let p_msi = interferer.power_w as f64;
                 let beyond = interferer.x_m as f64 - distance_m as f64;
                 let aside = interferer.y_m as f64;
+                let squared = beyond * beyond + aside * aside;
+                noise_at_a_metre = noise * eta / p_msi;
+                if noise_at_a_metre > MOST_NOISE {
+                    return Err(MissionError::Noise);
+                }
+                // I + N at Rx in place of I, as parts of I.
+                let louder = 1.0 + noise * channel.mu_nlos() * squared / p_msi;
                 (
                     tx_power_w as f64 / p_msi,
                     eta / channel.mu_los() / p_msi,
-                    channel.mu_nlos() / eta * (beyond * beyond + aside * aside) / p_msi,
+                    channel.mu_nlos() / eta * squared / p_msi / louder,
                 )
             }
             Interference::Unknown => even_gains(distance_m, common.power_w),
             Interference::Field(field) => {
-                let most = field.largest() as f64;
+                let heard = field.in_noise(noise_w);
+                let most = heard.largest() as f64;
                 (
                     tx_power_w as f64 * most / eta,
                     most / channel.mu_los(),
-                    field.upsilon(distance_m) as f64 / eta,
+                    heard.upsilon(distance_m) as f64 / eta,
                 )
             }
         };
@@ -100,6 +120,8 @@ impl Mission {
             tx_gain: PowerRatio::new(tx_gain),
             relay_gain_per_w,
             receiver_gain_per_w,
+            #[expect(clippy::cast_possible_truncation, reason = "it is given as an f32")]
+            noise_at_a_metre: noise_at_a_metre as f32,
         })
     }
 
@@ -158,6 +180,20 @@ impl Mission {
             Interference::Field(field) if cfg!(feature = "field") => Some(field),
             _ => None,
         }
+    }
+
+    /// The field as the receivers hear it, with their noise, where there is one.
+    pub const fn heard(&self) -> Option<InNoise<'_>> {
+        match self.field() {
+            Some(field) => Some(field.in_noise(self.config.noise_w)),
+            None => None,
+        }
+    }
+
+    /// nu = N eta / `p_MSI`, 1/m^2: the noise over what of the interferer arrives at a relay a metre from it; 0 without noise and in a
+    /// field, whose noise is in its Upsilon.
+    pub const fn noise_at_a_metre(&self) -> f32 {
+        self.noise_at_a_metre
     }
 
     /// Which way the places are worked out.

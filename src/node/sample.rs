@@ -23,8 +23,8 @@ pub enum Sample {
         power_w: f32,
     },
     /// The mean interference power that was received at a place on the way or where the drone hovers, over enough time that its
-    /// relative error is that of [`Listen`](crate::settings::Listen): without the signals of the chain itself, and without the noise of the
-    /// receiver.
+    /// relative error is that of [`Listen`](crate::settings::Listen): without the signals of the chain itself; with the noise of the receiver,
+    /// which the mission tells (`MissionConfig::noise_w`) and the relay takes off.
     Heard {
         /// Where the drone was.
         at: Placement,

@@ -13,7 +13,7 @@ use crate::mission::{Interferer, Mission};
 use crate::place::Placement;
 use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
-use crate::sir::square;
+use crate::sir::{in_noise, square};
 
 /// Altitudes in one round of the search from coarse to fine.
 const ROWS: u8 = 5;
@@ -63,7 +63,9 @@ pub struct Hops {
     gain_out: f32,
     to_rx: bool,
     interferer: Interferer,
-    /// What the interference is at the relay after this one: (X - x)^2 + Y^2 + h^2, m^2.
+    /// nu = N eta / P, 1/m^2: 0 without noise.
+    noise: f32,
+    /// What the interference is at the relay after this one, by [`crate::sir::quiet`], m^2.
     quiet_after: f32,
 }
 
@@ -92,16 +94,19 @@ impl Hops {
             },
             to_rx: after.is_none(),
             interferer: *interferer,
-            quiet_after: square(interferer.x_m - to.x_m)
-                + square(interferer.y_m)
-                + square(to.altitude_m),
+            noise: mission.noise_at_a_metre(),
+            quiet_after: in_noise(
+                square(interferer.x_m - to.x_m) + square(interferer.y_m) + square(to.altitude_m),
+                mission.noise_at_a_metre(),
+            ),
         }
     }
 
     /// The SIR of the hop to the relay at `at` and of the one from it, by the very operations of [`crate::sir`].
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
-        let quiet = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
+        let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
+        let quiet = in_noise(s, self.noise);
         let (from, to) = (self.before.place, self.after.place);
         let incoming =
             self.gain_in.value() * quiet / (square(x - from.x_m) + square(h - from.altitude_m));
@@ -309,6 +314,7 @@ mod tests {
                 x_m: 50.0,
                 y_m: 10.0,
             },
+            noise: 0.0,
             quiet_after: 1e6,
         };
         LocalSearch::new(Local::Fine, hops, at(50.0, altitude_m), 1e5, band)

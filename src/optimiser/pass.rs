@@ -82,6 +82,12 @@ impl Link<'_> {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
         match self.onward() {
+            // Asked once for all the targets of a sweep.
+            Some(Onward::Rx(hop)) if hop.is_silent() && !self.plain => {
+                let reach =
+                    |(&target, &from_m): (&f32, &f32)| hop.outermost_in_silence(target, from_m);
+                fill(reaches, pairs.map_while(reach));
+            }
             Some(Onward::Rx(hop)) => {
                 let reach = |(&target, &from_m): (&f32, &f32)| {
                     if self.plain {

@@ -24,7 +24,7 @@
 //!
 //! Accuracy: `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` asserts it in f64.
 
-use crate::field::Field;
+use crate::field::{FieldPoint, InNoise};
 use crate::mission::Mission;
 use crate::place::Station;
 use crate::root::sqrt;
@@ -147,13 +147,13 @@ pub enum HopInterference<'a> {
     /// The same Upsilon everywhere, over the field's largest: what its receiver measures.
     Evenly(f32),
     /// The agreed field.
-    In(&'a Field),
+    In(InNoise<'a>),
 }
 
 impl<'a> HopInterference<'a> {
-    /// The mission's field, or what the receiver measures instead, 1/W.
+    /// The mission's field with the noise, or what the receiver measures instead, 1/W: that has its noise in it.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
-        match (mission.field(), measured_per_w) {
+        match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
             (Some(field), None) => Self::In(field),
             (None, _) => Self::Evenly(1.0),
@@ -204,6 +204,7 @@ pub(super) fn least(
     let [apart, least_apart] = squares;
     let points = field.points();
     let first = points.partition_point(|point| point.x_m <= low);
+    let level = |point: FieldPoint| field.point(point).upsilon_per_w / field.largest();
     for pair in points
         .get(first.saturating_sub(1)..)
         .unwrap_or_default()
@@ -213,10 +214,7 @@ pub(super) fn least(
         if left.x_m >= high {
             break;
         }
-        let (start, end) = (
-            left.upsilon_per_w / field.largest(),
-            right.upsilon_per_w / field.largest(),
-        );
+        let (start, end) = (level(*left), level(*right));
         let best = if left.x_m > low {
             weigh(left.x_m, start)
         } else {
@@ -244,7 +242,7 @@ pub(super) fn least(
         .last()
         .filter(|last| last.x_m > low && last.x_m < high)
     {
-        weigh(last.x_m, last.upsilon_per_w / field.largest());
+        weigh(last.x_m, level(*last));
     }
     best
 }

@@ -33,13 +33,18 @@
 //! to climb before it comes near, or to leave the least step room. `at_mixed_altitudes` and `with_a_separation_that_binds` in
 //! `host-tests/tests/exact.rs` holds it against all places at once.
 //!
+//! With noise of their own receivers hear less, and the reach has no such form: `noise` searches for it from this one on.
+//!
 //! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement.rs` asserts it against a bisection of the
 //! SIR itself in f64.
+
+mod noise;
+mod stretched;
 
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
-use crate::sir::{Sender, square};
+use crate::sir::{Sender, in_noise, square};
 
 /// Where the relay before on the pass is to stand.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -68,6 +73,8 @@ pub struct Hop {
     base: f32,
     /// (y - y0)^2 + (h - h0)^2, m^2.
     across_squared: f32,
+    /// nu = N eta / P, 1/m^2: 0 without noise.
+    noise: f32,
     /// The least step to the node, m.
     least_step: f32,
     /// Whether the sender is Tx, which cannot hold back.
@@ -90,7 +97,8 @@ impl Hop {
         spread_squared: f32,
     ) -> Self {
         let end_m = mission.end_for(index, spread_squared);
-        let hop = Self::free(interferer, sender, at, end_m);
+        let noise = mission.noise_at_a_metre();
+        let hop = Self::free(interferer, noise, sender, at, end_m);
         let before = mission.end_for(index.saturating_sub(1), spread_squared);
         Self {
             from_tx: index <= 1,
@@ -105,9 +113,11 @@ impl Hop {
         }
     }
 
-    /// The hop from `sender` to a node at `at` that may be as near to it as it likes, and goes no farther than `end_m`.
+    /// The hop from `sender` to a node at `at` that may be as near to it as it likes, and goes no farther than `end_m`, in
+    /// noise of nu = `noise`, 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
+        noise: f32,
         sender: Sender,
         at: CrossSection,
         end_m: f32,
@@ -121,6 +131,7 @@ impl Hop {
             base: (aside - from.y_m) * (aside + from.y_m - 2.0 * at.y_m)
                 + from.altitude_m * (at.altitude_m + climb),
             across_squared: at.apart_squared(from),
+            noise,
             from_tx: true,
             least_step: 0.0,
             end_m,
@@ -144,8 +155,22 @@ impl Hop {
     /// The farthest place in [`from_m`, end] at which the node still meets `target`, m along x; `None` if there is none.
     ///
     /// `target` is a linear SIR above zero, `from_m` the sender's place in [0, D]. The place is rounded toward the sender,
-    /// so what is promised for the target holds at the f32 that is returned. Constant work.
+    /// so what is promised for the target holds at the f32 that is returned. Constant work; with noise at most 96 evaluations of
+    /// the hop, usually five.
     pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
+        if self.is_silent() {
+            self.in_silence(target, from_m)
+        } else {
+            self.in_noise(target, from_m)
+        }
+    }
+
+    #[expect(
+        clippy::inline_always,
+        reason = "a call would cost a sweep a hundred instructions"
+    )]
+    #[inline(always)]
+    fn in_silence(&self, target: f32, from_m: f32) -> Option<f32> {
         let room = self.end_m - from_m;
         if room < self.least_step {
             return None;
@@ -179,14 +204,7 @@ impl Hop {
             // With C < 0 the feasible stretch lies wholly beyond the end; else rounding put the root on it.
             return if c < 0.0 { None } else { Some(self.end_m) };
         }
-        let place = from_m + d;
-        let place = if place - from_m > d {
-            place.next_down()
-        } else {
-            place
-        };
-        // A hop too short for an f32 is none: two relays never share a place.
-        (place > from_m).then_some(place)
+        rounded(from_m, d)
     }
 
     /// The farthest place at which the node meets `target` with its sender anywhere in [0, `from_m`]; `None` if there is none.
@@ -198,6 +216,12 @@ impl Hop {
             .or_else(|| self.held_back(target, from_m))
     }
 
+    /// The same of a hop that is silent.
+    pub(super) fn outermost_in_silence(&self, target: f32, from_m: f32) -> Option<f32> {
+        self.in_silence(target, from_m)
+            .or_else(|| self.held_back(target, from_m))
+    }
+
     fn held_back(&self, target: f32, from_m: f32) -> Option<f32> {
         let ratio = self.sender.gain.ratio(target);
         if self.from_tx || !(ratio <= MOST_RATIO) {
@@ -206,7 +230,13 @@ impl Hop {
         let near = (from_m + self.least_step).min(self.end_m);
         // Nobody hears even the nearest sender within this of the interferer; its place is rounded, as is the node's.
         let nearest = self.least_step + 2.0 * f32::EPSILON * near;
-        let zone = sqrt(ratio * (square(nearest) + self.across_squared) - self.aside_squared);
+        let needed = ratio * (square(nearest) + self.across_squared);
+        // s / (1 + nu s) >= needed: nowhere, where the sender is not heard through the noise.
+        let left = 1.0 - self.noise * needed;
+        if !(left > 0.0) {
+            return None;
+        }
+        let zone = sqrt(needed / left - self.aside_squared);
         let place = if (near - self.interferer_x_m).abs() < zone {
             (self.interferer_x_m - zone).next_down()
         } else {
@@ -236,6 +266,7 @@ impl Hop {
             return Some(Stand::AtReach);
         }
         let heard = square(self.interferer_x_m - place) + self.aside_squared;
+        let heard = in_noise(heard, self.noise);
         let ratio = self.sender.gain.ratio(target);
         let at = |from: f32| {
             let needed = ratio * (square(place - from) + self.across_squared);
@@ -260,40 +291,20 @@ impl Hop {
 /// What rounding may take from a hop's SIR at the edge of where it meets its target, relative.
 const ROUNDING: f32 = 4e-6;
 
-impl Hop {
-    /// The reach as a smooth function of everything: without a least step, and behind `from_m` where the hop across takes more than
-    /// there is. `None` where there is none at all.
-    pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
-        let ratio = self.sender.gain.ratio(target);
-        if !(ratio <= MOST_RATIO) {
-            return None;
-        }
-        let u = self.interferer_x_m - from_m;
-        let e = self.sender.gain.excess(target);
-        let h = self.base - e * self.across_squared;
-        let discriminant = ratio * square(u) + e * h;
-        if !(e > 0.0) {
-            let room = self.end_m - from_m;
-            let all = square(u - room) + self.aside_squared
-                >= ratio * (square(room) + self.across_squared);
-            if all || (discriminant < 0.0 && u >= 0.0) {
-                return Some(self.end_m.max(from_m));
-            }
-            if !(u >= 0.0 && square(u) + h >= 0.0) {
-                return None;
-            }
-        }
-        if discriminant < 0.0 {
-            return None;
-        }
-        let r = sqrt_in_place(discriminant);
-        let d = if u >= 0.0 {
-            (square(u) + h) / (u + r)
-        } else {
-            (r - u) / e
-        };
-        Some((from_m + d).min(self.end_m.max(from_m)))
-    }
+/// The place `d` beyond `from_m`, rounded toward it; `None` for a hop too short for an f32: two relays never share a place.
+#[expect(
+    clippy::inline_always,
+    reason = "a call would cost a sweep a hundred instructions"
+)]
+#[inline(always)]
+fn rounded(from_m: f32, d: f32) -> Option<f32> {
+    let place = from_m + d;
+    let place = if place - from_m > d {
+        place.next_down()
+    } else {
+        place
+    };
+    (place > from_m).then_some(place)
 }
 
 /// The farthest a relay may be from the receiver, m along x, for the receiver to meet `target`: the paper's `d_max`.

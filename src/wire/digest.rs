@@ -46,6 +46,10 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
         crc.update(&band.least_m.to_le_bytes());
         crc.update(&band.most_m.to_le_bytes());
     }
+    // Nothing of what there is none of: a mission without noise has the digest it always had.
+    if c.noise_w > 0.0 {
+        crc.update(&c.noise_w.to_le_bytes());
+    }
     let [a, b, ..] = crc.finalize().to_le_bytes();
     u16::from_le_bytes([a, b])
 }
@@ -106,5 +110,6 @@ mod tests {
             })
         );
         assert_ne!(same, of(|c| c.tolerance = 2e-4));
+        assert_ne!(same, of(|c| c.noise_w = 1e-13));
     }
 }

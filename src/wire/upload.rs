@@ -8,7 +8,7 @@ use super::digest::{MissionId, digest, of};
 use crate::mission::{Interference, Mission, MissionConfig, MissionError};
 
 /// Bytes of an upload as it is stored; those of the body of an offer but its last two.
-pub const LENGTH: usize = 83;
+pub const LENGTH: usize = 87;
 
 /// A mission with a version.
 #[derive(Clone, Copy, PartialEq, Debug)]

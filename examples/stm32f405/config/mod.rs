@@ -49,7 +49,8 @@
 //! | 308 | i32 | height of the ground there above the mean sea level, mm |
 //! | 312 | f32 | the drone's greatest speed, m/s: 0.1 to 20; 0 is 5 m/s, and is what stands here without sites |
 //! | 316 | 32 bytes | the key that the autopilot signs with; all 0 where it does not, or there are no sites |
-//! | 348 | u32 | CRC-32C of bytes 0 to 347 |
+//! | 348 | f32 | noise power at every receiver, W: 0 to 1 |
+//! | 352 | u32 | CRC-32C of bytes 0 to 351 |
 //!
 //! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Field` and, by `course.rs`, `Axis`.
 //!
@@ -80,10 +81,10 @@ pub const ADDRESS: u32 = 0x080E_0000;
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// The version of the table above.
-pub const VERSION: u16 = 6;
+pub const VERSION: u16 = 7;
 
 /// Bytes of a block.
-pub const LEN: usize = 352;
+pub const LEN: usize = 356;
 
 /// Points of a field that a block has room for.
 pub const MAX_POINTS: usize = 16;
@@ -100,8 +101,11 @@ const SITES: usize = SECRET + 36;
 /// Where the autopilot's key begins.
 const AUTOPILOT_KEY: usize = SITES + 28;
 
+/// Where the noise is.
+const NOISE: usize = AUTOPILOT_KEY + 32;
+
 /// [`LEN`] as the block states it.
-const LEN_FIELD: u16 = 352;
+const LEN_FIELD: u16 = 356;
 
 /// A block as it is stored.
 pub type Block = [u8; LEN];
@@ -169,6 +173,8 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     if sites.is_none() && autopilot_key(block).is_some() {
         return Err(ConfigError::AutopilotKey);
     }
+    let (_, noise) = block.split_at(NOISE);
+    let noise_w = Reader(noise).f32();
     let channel = numbers.channel().map_err(ConfigError::Channel)?;
     let mission = Mission::try_new(MissionConfig {
         relays,
@@ -180,6 +186,7 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
         lateral,
         channel,
         interference,
+        noise_w,
         tolerance,
     })
     .map_err(ConfigError::Mission)?;

@@ -101,6 +101,7 @@ pub fn write(
     }
     bytes.resize(AUTOPILOT_KEY, 0);
     bytes.extend(autopilot_key.unwrap_or_default());
+    bytes.extend(mission.noise_w.to_le_bytes());
     bytes.resize(CHECKED, 0);
     let check = crc(&bytes);
     bytes.extend(check.to_le_bytes());

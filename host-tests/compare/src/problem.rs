@@ -122,6 +122,8 @@ impl Problem {
             mu_nlos: factor(channel.excess_loss_nlos_db),
             // All scenarios see the ground in line of sight.
             eta: mu_los,
+            // They are without noise, as the other solvers are.
+            noise_w: 0.0,
             relays: vec![station; usize::from(self.relays)],
         };
         let corridor = match self.choice {

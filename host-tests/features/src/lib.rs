@@ -35,6 +35,7 @@ pub fn paper(relays: u16) -> Mission {
             x_m: 500.0,
             y_m: 400.0,
         }),
+        noise_w: 0.0,
         tolerance: 1e-4,
     })
     .expect("in range")

@@ -56,6 +56,7 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
             x_m: 500.0,
             y_m: 400.0,
         }),
+        noise_w: 0.0,
         tolerance: 1e-4,
     };
     Some(match kind {
@@ -143,6 +144,7 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
         band: Band { least_m, most_m },
         lateral,
         interference,
+        noise_w: 0.0,
         tolerance: input.scaled(1e-6, 0.1),
     })
 }

@@ -111,6 +111,7 @@ impl Case {
             mu_los: p.mu_los,
             mu_nlos: p.mu_nlos,
             eta: p.eta,
+            noise_w: 0.0,
             relays: vec![
                 Station {
                     altitude_m: p.h,

@@ -40,6 +40,7 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
             x_m: narrow(link.x_i),
             y_m: narrow(link.y_i),
         }),
+        noise_w: narrow(link.noise_w),
         tolerance: narrow(tolerance),
     };
     let own = (1..)
@@ -68,6 +69,7 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
         mu_los: link.mu_los,
         mu_nlos: link.mu_nlos,
         eta: link.eta,
+        noise_w: link.noise_w,
         band: Corridor::plane(altitude_m, altitude_m),
         relays: link.relays.iter().map(relay).collect(),
     })
@@ -107,6 +109,7 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
         )
         .ok()?,
         interference: uav_relay::Interference::Field(Field::try_new(points.leak()).ok()?),
+        noise_w: 0.0,
         tolerance: 1e-4,
     };
     Mission::try_new(config).ok()
@@ -125,6 +128,7 @@ pub fn as_relays_know_it(link: &Link) -> Link {
         interferer_w: round(link.interferer_w),
         x_i: round(link.x_i),
         y_i: round(link.y_i),
+        noise_w: round(link.noise_w),
         relays: link
             .relays
             .iter()

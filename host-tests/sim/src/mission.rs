@@ -85,6 +85,7 @@ pub fn mission(
         },
         channel: channel(scenario).map_err(Refusal::Channel)?,
         interference,
+        noise_w: narrow(scenario.noise.power_w()),
         tolerance: narrow(tolerance),
     };
     let mission = Mission::try_new(config).map_err(|error| match error {

@@ -58,6 +58,8 @@ pub struct Scene {
     pub mu_nlos: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
+    /// Noise power of every receiver, watts, >= 0; with any, what is called SIR is the SINR.
+    pub noise_w: f64,
     /// The altitudes that relays without one of their own may be given, and how far to the side all may go.
     pub band: Corridor,
     /// The relays from Tx to Rx; their number is N.
@@ -118,6 +120,7 @@ impl Scene {
             mu_los: channel.mu_los(),
             mu_nlos: channel.mu_nlos(),
             eta: channel.eta(),
+            noise_w: scenario.noise.power_w(),
             band: Corridor {
                 least_m: scenario.altitude_min_m,
                 most_m: scenario.altitude_max_m,
@@ -208,14 +211,14 @@ impl Scene {
             to.y - by.y,
             to.h - by.h,
         );
-        signal / self.interference_w(to)
+        signal / (self.interference_w(to) + self.noise_w)
     }
 
     /// SIR (linear) at Rx of what `relay`, the last one, sends from there.
     pub fn sir_at_rx(&self, at: impl Into<Place>, relay: &Relay) -> f64 {
         let Place { x, y, h } = at.into();
         let signal = received_w(relay.power_w, self.eta, self.distance_m - x, y, h);
-        signal / self.interference_rx_w()
+        signal / (self.interference_rx_w() + self.noise_w)
     }
 }
 

@@ -112,6 +112,7 @@ fn the_best_of_two_levels_is_beaten() {
         mu_los: 1.0,
         mu_nlos: 1.0,
         eta: 1.0,
+        noise_w: 0.0,
         relays: vec![relay; 8],
     };
     let best = best_of_levels(&link, &[20.0, 150.0]);

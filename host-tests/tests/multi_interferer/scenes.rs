@@ -25,7 +25,7 @@ use uav_relay_oracle::mission::scene_of;
 use uav_relay_oracle::random::log_uniform;
 use uav_relay_oracle::reference::Link;
 use uav_relay_sim::scenario::{
-    AirGround, ChannelSpec, Interference, RelayOverride, Scenario, Source,
+    AirGround, ChannelSpec, Interference, Noise, RelayOverride, Scenario, Source,
 };
 use uav_relay_sim::scene::Scene;
 
@@ -87,6 +87,7 @@ pub(crate) fn scenario(
             ..ChannelSpec::default()
         },
         interference: Interference::Sources(sources),
+        noise: Noise::default(),
         relays,
     };
     (scenario, n)

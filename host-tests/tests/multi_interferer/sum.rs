@@ -59,6 +59,7 @@ fn alone(scene: &Scene, source: &Source) -> Link {
         mu_los: scene.mu_los,
         mu_nlos: scene.mu_nlos,
         eta: scene.eta,
+        noise_w: scene.noise_w,
         relays: scene.relays.iter().map(station).collect(),
     }
 }

@@ -4,7 +4,9 @@
 use std::time::Instant;
 
 use uav_relay::{Adjust, Method};
-use uav_relay_sim::scenario::{BetaPoint, Field, Interference, RelayOverride, Scenario, Source};
+use uav_relay_sim::scenario::{
+    BetaPoint, Field, Interference, Noise, RelayOverride, Scenario, Source,
+};
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_tools::provision::block::Flight;
 
@@ -53,6 +55,29 @@ pub(crate) fn field() -> Flight {
         ..Scenario::default()
     };
     Flight::new(&scenario, 5, 1e-4, 7).unwrap()
+}
+
+/// The paper's scenario with receivers of 20 MHz and a noise figure of 60 dB: a part of what they hear, everywhere.
+fn noisy(method: Method, most_m: f64) -> Flight {
+    let scenario = Scenario {
+        altitude_max_m: most_m,
+        noise: Noise {
+            bandwidth_hz: 20e6,
+            figure_db: 60.0,
+        },
+        ..Scenario::default()
+    };
+    Flight::new(&scenario, 5, 1e-4, 7).unwrap().by(method)
+}
+
+/// Searches by a bounded number of steps come to the same bits on board as here.
+#[test]
+fn five_in_noise_settle_at_the_places_of_the_simulated_chain() {
+    let silent = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
+    let flight = noisy(Method::Align, 20.0);
+    assert_ne!(simulated(&flight), simulated(&silent));
+    settles(&flight);
+    settles(&noisy(Method::Joint, 300.0));
 }
 
 /// Emulated drones agree on the places of the simulated chain, clean and on a bad day.

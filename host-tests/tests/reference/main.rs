@@ -130,6 +130,7 @@ fn each_hop_uses_its_own_path_loss() {
         mu_los: 2.0,
         mu_nlos: 12.0,
         eta: 3.0,
+        noise_w: 0.0,
         relays: relays.to_vec(),
     };
     let first = (6.0 / 7500.0) / (5.0 / 4200.0);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use uav_relay_sim::scenario::{
-    AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Source,
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, Noise, RelayOverride, Source,
 };
 
 use super::*;
@@ -72,6 +72,7 @@ fn a_file_with_every_key_means_what_it_says() {
                 y_m: -300.0,
             },
         ]),
+        noise: Noise::default(),
         relays: BTreeMap::from([
             (
                 3,
@@ -202,4 +203,19 @@ fn the_words_of_air_ground_are_exact() {
             ],
         );
     }
+}
+
+#[test]
+fn noise_is_k_t_b_f() {
+    let noise = |text: &str| parse(&small(text)).unwrap().noise;
+    assert_eq!(noise(""), Noise::default());
+    assert!(noise("").power_w() <= 0.0 && noise("[noise]\nfigure_db = 9\n").power_w() <= 0.0);
+    // -174 dBm/Hz + 73 dB for 20 MHz + 6 dB: -95 dBm.
+    let dbm = 10.0 * (1e3 * noise("[noise]\nbandwidth_hz = 20e6\n").power_w()).log10();
+    assert!((dbm + 94.965).abs() < 0.01, "{dbm}");
+    let given = noise("[noise]\nbandwidth_hz = 1e6\nfigure_db = 0\n").power_w();
+    assert!(
+        (given / (1.380_649e-23 * 290.0 * 1e6) - 1.0).abs() < 1e-12,
+        "{given}"
+    );
 }

@@ -308,3 +308,30 @@ fn a_file_that_cannot_be_read_is_named() {
     let good = Temporary::new("good.toml", small("").as_bytes());
     assert_eq!(Scenario::load(&good.0).unwrap(), parse(&small("")).unwrap());
 }
+
+#[test]
+fn noise_out_of_range_is_refused_with_its_range() {
+    for (text, key, range) in [
+        (
+            "bandwidth_hz = -1\n",
+            "noise.bandwidth_hz = -1",
+            "0 to 1e12 Hz",
+        ),
+        (
+            "bandwidth_hz = 2e12\n",
+            "noise.bandwidth_hz = 2000000000000.0",
+            "0 to 1e12 Hz",
+        ),
+        ("bandwidth_hz = nan\n", "noise.bandwidth_hz", "0 to 1e12 Hz"),
+        ("figure_db = -0.1\n", "noise.figure_db = -0.1", "0 to 60 dB"),
+        ("figure_db = 61\n", "noise.figure_db = 61", "0 to 60 dB"),
+    ] {
+        let text = small(&format!("[noise]\n{text}"));
+        refused(&text, Problem::OutOfRange, &[key, range]);
+    }
+    refused(
+        &small("[noise]\nfloor_dbm = -100\n"),
+        Problem::UnknownKey,
+        &["noise.floor_dbm", "bandwidth_hz, figure_db"],
+    );
+}

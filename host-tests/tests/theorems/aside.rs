@@ -38,6 +38,13 @@ impl Roomy {
         }
     }
 
+    /// The same with noise.
+    fn noisy(rng: &mut impl Rng) -> Self {
+        let silent = Self::random(rng);
+        let link = random::in_noise(rng, &silent.scene.link);
+        Self::new(Scene::new(&link, silent.scene.band), silent.lateral)
+    }
+
     /// As [`Scene::random`], some on the line or next to Tx or Rx; room to both sides, to one, or none.
     fn random(rng: &mut impl Rng) -> Self {
         let mut scene = Scene::random(rng);
@@ -193,12 +200,13 @@ struct Seen {
 fn no_worse_than_brute_force(
     seed: u64,
     count: u64,
+    draw: impl Fn(&mut ChaCha8Rng) -> Roomy + Sync,
     band: impl Fn(&Scene) -> (f64, f64) + Sync,
     best: impl Fn(&Scene) -> (Found, AsideCase) + Sync,
 ) -> BTreeMap<String, u32> {
     let first = random::seed(seed) << 32;
     let look = |number: u64| {
-        let roomy = Roomy::random(&mut ChaCha8Rng::seed_from_u64(first + number));
+        let roomy = draw(&mut ChaCha8Rng::seed_from_u64(first + number));
         let (found, case) = best(&roomy.scene);
         let ranges = roomy.ranges(band(&roomy.scene));
         let place = found.place;
@@ -257,6 +265,7 @@ fn a_relay_aside_at_its_altitude_is_no_worse_than_brute_force() {
     let seen = no_worse_than_brute_force(
         511,
         count(),
+        Roomy::random,
         |scene| (scene.band.0, scene.band.0),
         |scene| aside::best_at(&scene.mission, scene.profile(scene.band.0)).unwrap(),
     );
@@ -270,6 +279,7 @@ fn a_relay_aside_is_no_worse_than_brute_force() {
     let seen = no_worse_than_brute_force(
         512,
         count(),
+        Roomy::random,
         |scene| scene.band,
         |scene| {
             let power_w = scene.mission.config().common.power_w;
@@ -277,6 +287,45 @@ fn a_relay_aside_is_no_worse_than_brute_force() {
         },
     );
     for case in CASES {
+        assert!(seen.contains_key(case), "{case}: {seen:?}");
+    }
+}
+
+#[test]
+fn a_relay_aside_at_its_altitude_in_noise_is_no_worse_than_brute_force() {
+    let seen = no_worse_than_brute_force(
+        531,
+        count(),
+        Roomy::noisy,
+        |scene| (scene.band.0, scene.band.0),
+        |scene| aside::best_at(&scene.mission, scene.profile(scene.band.0)).unwrap(),
+    );
+    for case in CASES
+        .iter()
+        .filter(|case| !matches!(**case, "Edge(Upward)" | "Level"))
+    {
+        assert!(seen.contains_key(*case), "{case}: {seen:?}");
+    }
+}
+
+#[test]
+fn a_relay_aside_in_noise_is_no_worse_than_brute_force() {
+    let seen = no_worse_than_brute_force(
+        532,
+        count(),
+        Roomy::noisy,
+        |scene| scene.band,
+        |scene| {
+            let power_w = scene.mission.config().common.power_w;
+            aside::best_place(&scene.mission, power_w).unwrap()
+        },
+    );
+    for case in CASES
+        .iter()
+        .copied()
+        .chain(["Wall", "Inside"])
+        .filter(|case| *case != "Level")
+    {
         assert!(seen.contains_key(case), "{case}: {seen:?}");
     }
 }

@@ -12,8 +12,12 @@ use super::scene::Scene;
 fn the_locus_is_where_the_hops_are_equal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(504));
     let mut roots = [0_u32; 3];
-    for _ in 0..20_000 {
-        let mut scene = Scene::random(&mut rng);
+    for draw in 0..30_000 {
+        let mut scene = if draw % 3 > 0 {
+            Scene::random(&mut rng)
+        } else {
+            Scene::noisy(&mut rng)
+        };
         let x = f64::from(rng.random_range(0.0..=scene.link.distance_m) as f32);
         let power_w = scene.mission.config().common.power_w;
         let found = locus::altitudes(&scene.mission, x as f32, power_w);
@@ -62,14 +66,22 @@ fn the_locus_is_where_the_hops_are_equal() {
 #[test]
 fn turns_agree_with_a_scan() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(505));
-    let mut seen = [0_u32; 4];
-    for _ in 0..20_000 {
-        let scene = Scene::random(&mut rng);
+    let mut seen = [0_u32; 5];
+    for draw in 0..40_000 {
+        let scene = if draw % 2 == 0 {
+            Scene::random(&mut rng)
+        } else {
+            Scene::noisy(&mut rng)
+        };
         let (link, h) = (&scene.link, scene.band.0);
         let sir = |x: f64| link.sir_relay(1, 0.0, x).unwrap();
         // By more than f64's own rounding: next to Tx an interferer leaves SIR_1 all but level.
         let rises = |x: f64, by: f64| sir(x * (1.0 + by)) > sir(x * (1.0 - by)) * (1.0 + 1e-14);
-        match first_hop_turn(scene.mission.interferer().unwrap(), h as f32) {
+        match first_hop_turn(
+            &scene.mission,
+            scene.mission.interferer().unwrap(),
+            h as f32,
+        ) {
             // So far away that f64 cannot tell the bottom from its surroundings.
             Extremum::Valley(x) if f64::from(x) > 100.0 * link.distance_m => {
                 for part in [0.01, 0.3, 1.0, 3.0] {
@@ -92,6 +104,25 @@ fn turns_agree_with_a_scan() {
                 let top = sir(x) * (1.0 + 1e-14);
                 assert!(top >= sir(x * 0.999) && top >= sir(x * 1.001), "{link:?}");
                 seen[1] += 1;
+            }
+            Extremum::ValleyAndHill(low, high) => {
+                let (low, high) = (f64::from(low), f64::from(high));
+                let bottom = sir(low) * (1.0 - 1e-14);
+                assert!(low < high, "{link:?}");
+                assert!(
+                    bottom <= sir(low * 0.999) && bottom <= sir(low * 1.001),
+                    "{link:?}"
+                );
+                let top = sir(high) * (1.0 + 1e-14);
+                assert!(
+                    top >= sir(high * 0.999) && top >= sir(high * 1.001),
+                    "{link:?}"
+                );
+                assert!(
+                    !rises(low * 0.9, 1e-3) && !rises(high * 1.1, 1e-3),
+                    "{link:?}"
+                );
+                seen[4] += 1;
             }
             Extremum::Falls => {
                 for part in [0.01, 0.3, 1.0, 3.0] {

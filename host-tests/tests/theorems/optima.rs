@@ -11,6 +11,7 @@ use super::{ALLOWED, count};
 /// Holds the places that `best` finds against brute force over the box that `over` says, and counts the cases.
 fn no_worse_than_brute_force(
     seed: u64,
+    draw: impl Fn(&mut ChaCha8Rng) -> Scene,
     over: impl Fn(&mut ChaCha8Rng, &Scene) -> ((f64, f64), (f64, f64)),
     best: impl Fn(&Scene, (f64, f64), (f64, f64)) -> (Found, String),
 ) -> std::collections::BTreeMap<String, u32> {
@@ -18,7 +19,7 @@ fn no_worse_than_brute_force(
     let mut seen = std::collections::BTreeMap::new();
     let (mut worst, mut above, mut missed) = (0.0_f64, 0.0_f64, 0);
     for _ in 0..count() {
-        let mut scene = Scene::random(&mut rng);
+        let mut scene = draw(&mut rng);
         let (x, h) = over(&mut rng, &scene);
         let (found, case) = best(&scene, x, h);
         let place = found.place;
@@ -59,6 +60,7 @@ fn no_worse_than_brute_force(
 fn theorem_1_is_no_worse_than_brute_force() {
     let seen = no_worse_than_brute_force(
         501,
+        Scene::random,
         |_, scene| ((0.0, scene.link.distance_m), (scene.band.0, scene.band.0)),
         |scene, _, h| {
             let (found, case) =
@@ -73,6 +75,7 @@ fn theorem_1_is_no_worse_than_brute_force() {
 fn theorem_2_is_no_worse_than_brute_force() {
     let seen = no_worse_than_brute_force(
         502,
+        Scene::random,
         |rng, scene| {
             let d = scene.link.distance_m;
             let x = match rng.random_range(0..8) {
@@ -95,6 +98,7 @@ fn theorem_2_is_no_worse_than_brute_force() {
 fn theorem_3_is_no_worse_than_brute_force() {
     let seen = no_worse_than_brute_force(
         503,
+        Scene::random,
         |_, scene| ((0.0, scene.link.distance_m), scene.band),
         |scene, _, _| {
             let power_w = scene.mission.config().common.power_w;
@@ -103,6 +107,66 @@ fn theorem_3_is_no_worse_than_brute_force() {
         },
     );
     for edge in ["Lowest", "Highest", "AboveRx"] {
+        assert!(
+            seen.keys().any(|case| case.starts_with(edge)),
+            "{edge}: {seen:?}"
+        );
+    }
+}
+
+#[test]
+fn theorem_1_in_noise_is_no_worse_than_brute_force() {
+    let seen = no_worse_than_brute_force(
+        521,
+        Scene::noisy,
+        |_, scene| ((0.0, scene.link.distance_m), (scene.band.0, scene.band.0)),
+        |scene, _, h| {
+            let (found, case) =
+                given_altitude::best_place(&scene.mission, scene.profile(h.0)).unwrap();
+            (found, format!("{case:?}"))
+        },
+    );
+    // All but that SIR_1 is level, and the one more.
+    assert_eq!(seen.len(), 10, "every case: {seen:?}");
+    assert!(!seen.contains_key("Level") && seen.contains_key("SecondHill"));
+}
+
+#[test]
+fn theorem_2_in_noise_is_no_worse_than_brute_force() {
+    let seen = no_worse_than_brute_force(
+        522,
+        Scene::noisy,
+        |rng, scene| {
+            let d = scene.link.distance_m;
+            let x = match rng.random_range(0..8) {
+                0 => 0.0,
+                1 => d,
+                _ => f64::from(rng.random_range(0.0..=d) as f32).min(d),
+            };
+            ((x, x), scene.band)
+        },
+        |scene, x, _| {
+            let power_w = scene.mission.config().common.power_w;
+            let (found, case) = given_x::best_place(&scene.mission, x.0 as f32, power_w).unwrap();
+            (found, format!("{case:?}"))
+        },
+    );
+    assert_eq!(seen.len(), 4, "every case: {seen:?}");
+}
+
+#[test]
+fn theorem_3_in_noise_is_no_worse_than_brute_force() {
+    let seen = no_worse_than_brute_force(
+        523,
+        Scene::noisy,
+        |_, scene| ((0.0, scene.link.distance_m), scene.band),
+        |scene, _, _| {
+            let power_w = scene.mission.config().common.power_w;
+            let (found, case) = free::best_place(&scene.mission, power_w).unwrap();
+            (found, format!("{case:?}"))
+        },
+    );
+    for edge in ["Lowest", "Highest", "AboveRx", "Touching"] {
         assert!(
             seen.keys().any(|case| case.starts_with(edge)),
             "{edge}: {seen:?}"

@@ -52,6 +52,13 @@ impl Scene {
         Self::new(&link, (low, high))
     }
 
+    /// The same with noise, from all but none to some that drowns the interferer.
+    pub(crate) fn noisy(rng: &mut impl Rng) -> Self {
+        let scene = Self::random(rng);
+        let link = random::in_noise(rng, &scene.link);
+        Self::new(&link, scene.band)
+    }
+
     pub(crate) fn of(case: &Case) -> Self {
         Self::new(&case.link(1), (case.params.h_min, case.params.h_max))
     }

@@ -148,7 +148,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
     let seen: Cell<BTreeMap<&str, u32>> = Cell::new(BTreeMap::new());
     let (from, to) = match mission.interference {
-        Interference::Source(_) => (Port::Upstream, Port::Downstream),
+        Interference::Source(_) | Interference::Unknown => (Port::Upstream, Port::Downstream),
         Interference::Field(_) => (Port::Downstream, Port::Upstream),
     };
     TestRunner::new(config(1500))

@@ -194,7 +194,9 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
 pub(crate) fn relay_4(config: MissionConfig) -> (Relay, Port, Port) {
     let relay = relay_of(config, 4, Wiring::Pair);
     match config.interference {
-        Interference::Source(_) => (relay, Port::Upstream, Port::Downstream),
+        Interference::Source(_) | Interference::Unknown => {
+            (relay, Port::Upstream, Port::Downstream)
+        }
         Interference::Field(_) => (relay, Port::Downstream, Port::Upstream),
     }
 }

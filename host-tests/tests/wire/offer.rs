@@ -31,6 +31,8 @@ pub(crate) struct Offer {
     /// How far to the left, at most 0, and to the right, at least 0.
     pub(crate) left_m: f32,
     pub(crate) right_m: f32,
+    /// Noise power at every receiver; 0 for none.
+    pub(crate) noise_w: f32,
     /// The number of the hello that it answers; 0 for none.
     pub(crate) answer: u16,
 }
@@ -53,11 +55,12 @@ pub(crate) const LEAST: usize = 67;
 pub(crate) const MOST: usize = 71;
 pub(crate) const LEFT: usize = 75;
 pub(crate) const RIGHT: usize = 79;
-pub(crate) const ANSWER: usize = 83;
+pub(crate) const NOISE: usize = 83;
+pub(crate) const ANSWER: usize = 87;
 
 /// Bytes of the body, and how many of them are kept across a reboot.
-pub(crate) const BYTES: usize = 85;
-pub(crate) const KEPT: usize = 83;
+pub(crate) const BYTES: usize = 89;
+pub(crate) const KEPT: usize = 87;
 
 impl Offer {
     /// The bytes of the body.
@@ -82,7 +85,13 @@ impl Offer {
         for number in [self.mu_los, self.mu_nlos, self.eta] {
             out.extend(number.to_le_bytes());
         }
-        for number in [self.least_m, self.most_m, self.left_m, self.right_m] {
+        for number in [
+            self.least_m,
+            self.most_m,
+            self.left_m,
+            self.right_m,
+            self.noise_w,
+        ] {
             out.extend(number.to_le_bytes());
         }
         out.extend(self.answer.to_le_bytes());
@@ -122,6 +131,7 @@ impl Offer {
             most_m: real(MOST),
             left_m: real(LEFT),
             right_m: real(RIGHT),
+            noise_w: real(NOISE),
             answer: word(ANSWER),
         };
         Some((offer, rest))
@@ -146,6 +156,8 @@ impl Offer {
             && (self.least_m..=self.most_m).contains(&self.altitude_m)
             && (-1e5..=0.0).contains(&self.left_m)
             && (0.0..=1e5).contains(&self.right_m)
+            && (0.0..=1.0).contains(&self.noise_w)
+            && f64::from(self.noise_w) * self.eta / f64::from(self.interferer_w) <= 1e12
     }
 
     /// Whether the relays have room between Tx and Rx.
@@ -155,10 +167,12 @@ impl Offer {
         narrow(f64::from(self.relays - 1) * wide(step)) <= self.distance_m
     }
 
-    /// The digest of the mission that it is of: CRC-32C of all but version, base and answer.
+    /// The digest of the mission that it is of: CRC-32C of all but version, base and answer, and of the noise only where there is some.
     pub(crate) fn digest(&self) -> u16 {
         let body = self.kept();
-        let bytes = &body[RELAYS..];
+        // A mission without noise is told by what there is of it.
+        let end = if self.noise_w > 0.0 { KEPT } else { NOISE };
+        let bytes = &body[RELAYS..end];
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes);
         u16::try_from(crc & 0xFFFF).unwrap()
     }
@@ -190,7 +204,10 @@ impl Offer {
         assert_eq!(config.min_separation_m, self.min_separation_m);
         assert_eq!(config.tx_power_w, self.tx_power_w);
         assert_eq!(config.interference, Interference::Source(interferer));
-        assert_eq!(config.tolerance, self.tolerance);
+        assert_eq!(
+            (config.tolerance, config.noise_w),
+            (self.tolerance, self.noise_w)
+        );
         let channel = config.channel;
         let factors = [channel.mu_los(), channel.mu_nlos(), channel.eta()];
         assert_eq!(factors, [self.mu_los, self.mu_nlos, self.eta]);
@@ -229,6 +246,7 @@ pub(crate) fn offer() -> Offer {
         most_m: 300.0,
         left_m: -60.0,
         right_m: 40.5,
+        noise_w: 0.0,
         answer: 0,
     }
 }

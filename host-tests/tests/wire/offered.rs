@@ -4,12 +4,12 @@ use proptest::prelude::*;
 
 use super::codec::Said;
 use super::offer::{
-    ALTITUDE, DISTANCE, ETA, INTERFERER, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, Offer, POWER, RIGHT,
-    SEPARATION, TOLERANCE, TX_POWER, X, Y,
+    ALTITUDE, DISTANCE, ETA, INTERFERER, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, NOISE, Offer, POWER,
+    RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y,
 };
 
 /// Where four bytes of an offer are an f32, or the upper half of an f64.
-pub(crate) const NUMBERS: [usize; 16] = [
+pub(crate) const NUMBERS: [usize; 17] = [
     DISTANCE,
     SEPARATION,
     TX_POWER,
@@ -26,6 +26,7 @@ pub(crate) const NUMBERS: [usize; 16] = [
     MOST,
     LEFT,
     RIGHT,
+    NOISE,
 ];
 
 /// From `least` to `most`, small and large alike, and both often.
@@ -45,6 +46,11 @@ fn rooms() -> BoxedStrategy<(u16, f32, f32)> {
             (relays, distance_m, apart)
         })
         .boxed()
+}
+
+/// Parts of the most noise: often none.
+fn noises() -> BoxedStrategy<f64> {
+    prop_oneof![2 => Just(0.0), 2 => 0.0..=1.0_f64, 1 => Just(1.0)].boxed()
 }
 
 /// Path-loss factors in order.
@@ -106,7 +112,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
         rooms(),
         powers,
         (beside(), beside()),
-        scaled(1e-6, 0.1),
+        (scaled(1e-6, 0.1), noises()),
         factors(),
         bands(),
         (room(), room()),
@@ -117,7 +123,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
                 (relays, distance_m, min_separation_m),
                 (tx_power_w, power_w, interferer_w),
                 (x_m, y_m),
-                tolerance,
+                (tolerance, noise),
                 [mu_los, mu_nlos, eta],
                 [least_m, most_m, altitude_m],
                 (left_m, right_m),
@@ -142,6 +148,8 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
                     most_m,
                     left_m: -left_m,
                     right_m,
+                    // No louder than 1e12 times the interferer at a metre.
+                    noise_w: (noise * (9e11 * f64::from(interferer_w) / eta).min(1.0)) as f32,
                     answer,
                 })
             },

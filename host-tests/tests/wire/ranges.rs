@@ -7,8 +7,8 @@ use uav_relay::wire::message::{Message, MessageError};
 use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile, Upload};
 
 use super::offer::{
-    ALTITUDE, BYTES, DISTANCE, ETA, INTERFERER, KEPT, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, Offer,
-    POWER, RELAYS, RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y, offer,
+    ALTITUDE, BYTES, DISTANCE, ETA, INTERFERER, KEPT, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, NOISE,
+    Offer, POWER, RELAYS, RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y, offer,
 };
 
 /// Whether a body is taken; out of range is the only other thing that it may be.
@@ -66,6 +66,7 @@ fn every_f32_of_an_offer_is_taken_up_to_its_bounds_and_no_farther() {
         (offer(), MOST, 20.0, 1e5, "highest altitude"),
         (offer(), LEFT, -1e5, 0.0, "room to the left"),
         (offer(), RIGHT, 0.0, 1e5, "room to the right"),
+        (offer(), NOISE, 0.0, 1.0, "noise"),
     ] {
         for good in [least, most, f32::midpoint(least, most)] {
             let body = with(&offer, at, &f32::to_le_bytes(good));
@@ -85,7 +86,7 @@ fn every_f32_of_an_offer_is_taken_up_to_its_bounds_and_no_farther() {
             assert!(!taken(&body), "{what} {bad}");
         }
     }
-    for at in [SEPARATION, X, Y, LEFT, RIGHT] {
+    for at in [SEPARATION, X, Y, LEFT, RIGHT, NOISE] {
         assert!(taken(&with(&offer(), at, &(-0.0_f32).to_le_bytes())));
     }
 }
@@ -194,6 +195,7 @@ fn other(channel: Channel) -> MissionConfig {
             x_m: 700.0,
             y_m: -300.0,
         }),
+        noise_w: 1e-12,
         tolerance: 2e-4,
     }
 }
@@ -239,6 +241,7 @@ fn an_upload_is_written_as_its_mission_has_it_and_read_back() {
             most_m: 250.0,
             left_m: -35.0,
             right_m: 45.0,
+            noise_w: 1e-12,
             answer: 77,
         };
         let mut bytes = [0; KEPT];

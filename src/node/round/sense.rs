@@ -131,19 +131,30 @@ impl Sensing {
 
     /// One measurement; whether it was of use.
     pub(super) fn take(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
-        let is_power = |power_w: f32| (1e-30..=1e6).contains(&power_w);
+        let noise_w = member.mission.config().noise_w;
+        // What is left above the receiver's own noise.
+        let heard = |power_w: f32| {
+            let heard_w = power_w - noise_w;
+            (1e-30..=1e6).contains(&heard_w).then_some(heard_w)
+        };
         match sample {
-            Sample::Heard { at, power_w } if is_power(power_w) && is_near(at) => {
+            Sample::Heard { at, power_w } if is_near(at) => {
+                let Some(heard_w) = heard(power_w) else {
+                    return false;
+                };
                 let unit = unit_w(&member.mission);
                 let distance_m = member.mission.config().distance_m;
                 let expected = expected_at(&member.mission);
                 self.listener
-                    .take(now, distance_m, at, power_w / unit, expected);
+                    .take(now, distance_m, at, heard_w / unit, expected);
                 true
             }
-            Sample::Receiver { power_w } if is_power(power_w) => {
-                self.receiver.take(now, self.listener.half_life(), power_w);
-                true
+            Sample::Receiver { power_w } => {
+                let heard = heard(power_w);
+                if let Some(heard_w) = heard {
+                    self.receiver.take(now, self.listener.half_life(), heard_w);
+                }
+                heard.is_some()
             }
             _ => false,
         }

@@ -30,7 +30,8 @@ impl Line {
         let mission = Mission::try_new(paper(RELAYS)).unwrap();
         let profile = mission.config().common;
         let of = |at: u16| Member::new(mission, settings, at + 1);
-        let mut rounds = [0, 1, 2].map(|at| Round::new(at == 0, 7, profile, None, at));
+        let mut rounds = [0, 1, 2]
+            .map(|at| Round::new(at == 0, 7, profile, &Settings::default(), at, Instant::ZERO));
         rounds[0].work_soon(Instant::ZERO);
         Self {
             members: [0, 1, 2].map(of),

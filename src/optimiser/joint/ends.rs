@@ -10,7 +10,14 @@ use crate::sir::{Sender, square};
 /// What of a ceiling is aimed at.
 const LITTLE: f32 = 0.999_97;
 
+/// Halvings of the way to where a first hop is best without noise.
+const HALVINGS: u8 = 24;
+
 /// The most that a first hop into `room` meets, but for a little that leaves the relay its choice.
+///
+/// That is straight away from the interferer, t times as far from Tx. With U and B the squared distances along that line and across it,
+/// s = B + (1 + t)^2 U + h^2, and the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t: so
+/// with noise it is best nearer to Tx, and there once.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);
@@ -18,7 +25,25 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
     let sum = square(m.x_m) + square(m.y_m) + 2.0 * squared;
     let across = square(m.x_m - behind) + squared;
     let most = (sum + sqrt((square(sum) - 4.0 * squared * across).max(0.0))) / (2.0 * squared);
-    let far = -1.0 / (most - 1.0).max(1e-6);
+    let mut far = -1.0 / (most - 1.0).max(1e-6);
+    let noise = mission.noise_at_a_metre();
+    if noise > 0.0 {
+        let along = square(behind) + square(m.y_m);
+        let rises = |t: f32| {
+            let s = across + square(1.0 + t) * along;
+            squared - t * (across - squared + along) - square(t) * along > noise * t * s * s
+        };
+        let (mut low, mut high) = (0.0, -far);
+        for _ in 0..HALVINGS {
+            let t = 0.5 * (low + high);
+            if rises(t) {
+                low = t;
+            } else {
+                high = t;
+            }
+        }
+        far = -low;
+    }
     let at = room.nearest(CrossSection {
         y_m: far * m.y_m,
         altitude_m: 0.0,

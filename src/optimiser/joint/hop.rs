@@ -4,15 +4,17 @@
 //! long as it may be,
 //!
 //! ```text
-//! 2 F = |p' - m|^2 - c |p' - p|^2 = 0
+//! 2 F = q(|p' - m|^2) - c |p' - p|^2 = 0,    q(s) = s / (1 + nu s)
 //! ```
 //!
 //! and one coordinate of p' follows from the other two, w, and from p (see [`Coordinate`]): p'_1 = R(z), z = (p_1, p_2, p_3, w_2, w_3).
-//! F is quadratic, so its derivatives are products of two numbers, or constants; those of R follow by differentiating
-//! F(R(z), z) = 0 once and twice, with a = -dF/dp'_1 = (m - p')_1 + c (p' - p)_1:
+//! With v = p' - m, w = 1 + nu s, q' = 1 / w^2 and q'' = -2 nu / w^3, its derivatives by p' are F_i = q' v_i - c (p' - p)_i and
+//! F_ij = (q' - c) [i = j] + 2 q'' v_i v_j; by p they are c (p' - p)_i and -c [i = j], by one of each c [i = j]. Without noise q' is 1 and
+//! q'' is 0: F is quadratic. Those of R follow by differentiating F(R(z), z) = 0 once and twice, with a = -dF/dp'_1 =
+//! -q' v_1 + c (p' - p)_1:
 //!
 //! ```text
-//! R_z = F_z / a,    R_zz' = (F_zz' + F_1z R_z' + R_z F_1z' + (1 - c) R_z R_z') / a
+//! R_z = F_z / a,    R_zz' = (F_zz' + F_1z R_z' + R_z F_1z' + F_11 R_z R_z') / a
 //! ```
 //!
 //! and by ln gamma R = -c |p' - p|^2 / 2a. `host-tests/tests/joint_method.rs` holds the chains that come of
@@ -52,37 +54,73 @@ impl Reach {
 
     /// Of the hop `from` - `to`, with the interferer at `source` and the coordinate first that follows. [`Reach::FIXED`] where none
     /// does: at the very rim of what can be reached.
-    pub(super) fn new(c: f32, source: Triple, from: Triple, to: Triple) -> Self {
+    ///
+    /// `noise` is nu, 1/m^2.
+    pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
-        let a = sx - x + c * d;
+        let (away, aside, above) = (x - sx, y - sy, z - sz);
+        let Bend { q, twice: bent } =
+            Bend::new(noise, square(away) + square(aside) + square(above));
+        let a = c * d - q * away;
         let length = square(d) + square(dy) + square(dz);
         if !(square(a) > 1e-9 * c * length) {
             return Self::FIXED;
         }
         let by_p = [c * d, c * dy, c * dz].map(|f| f / a);
-        let by_w = [y - sy - c * dy, z - sz - c * dz].map(|f| f / a);
+        let by_w = [q * aside - c * dy, q * above - c * dz].map(|f| f / a);
         let [p, p1, p2] = by_p;
         let [w1, w2] = by_w;
-        let k = 1.0 - c;
-        let by_x = |r: f32| (c * r + k * p * r) / a;
-        let both = |r: f32, q: f32| k * r * q / a;
-        let twice = |f: f32, r: f32, q: f32| (f + k * r * q) / a;
-        let across = |r: f32| (r * c + k * r * p) / a;
+        let k = q - c;
+        // F_11, and by the first with each of w, which are 0 without noise.
+        let k1 = k + bent * square(away);
+        let [f1, f2] = [bent * away * aside, bent * away * above];
+        let by_x = |r: f32| (c * r + k1 * p * r) / a;
+        let both = |r: f32, q: f32| k1 * r * q / a;
+        let twice = |f: f32, r: f32, q: f32| (f + k1 * r * q) / a;
+        let across = |r: f32, f: f32| (r * c + f * p + k1 * r * p) / a;
+        let by_wp = |w: f32, f: f32, p: f32, cross: f32| (cross + f * p + k1 * w * p) / a;
+        let by_ww =
+            |f: f32, w: f32, g: f32, v: f32, cross: f32| (cross + f * v + w * g + k1 * w * v) / a;
         Self {
             by_p,
             by_w,
             by_pp: [
-                [(-c + c * p + p * c + k * p * p) / a, by_x(p1), by_x(p2)],
-                [across(p1), twice(-c, p1, p1), both(p1, p2)],
-                [across(p2), both(p2, p1), twice(-c, p2, p2)],
+                [(-c + c * p + p * c + k1 * p * p) / a, by_x(p1), by_x(p2)],
+                [across(p1, 0.0), twice(-c, p1, p1), both(p1, p2)],
+                [across(p2, 0.0), both(p2, p1), twice(-c, p2, p2)],
             ],
             by_wp: [
-                [across(w1), twice(c, w1, p1), both(w1, p2)],
-                [across(w2), both(w2, p1), twice(c, w2, p2)],
+                [across(w1, f1), by_wp(w1, f1, p1, c), by_wp(w1, f1, p2, 0.0)],
+                [across(w2, f2), by_wp(w2, f2, p1, 0.0), by_wp(w2, f2, p2, c)],
             ],
-            by_ww: [twice(k, w1, w1), both(w1, w2), twice(k, w2, w2)],
+            by_ww: [
+                by_ww(f1, w1, f1, w1, k + bent * square(aside)),
+                by_ww(f1, w1, f2, w2, bent * aside * above),
+                by_ww(f2, w2, f2, w2, k + bent * square(above)),
+            ],
             by_target: -0.5 * c * length / a,
+        }
+    }
+}
+
+/// How much is heard of the interference s m^2 away, with noise: q'(s) and 2 q''(s).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bend {
+    pub(super) q: f32,
+    twice: f32,
+}
+
+impl Bend {
+    pub(super) fn new(noise: f32, s: f32) -> Self {
+        if !(noise > 0.0) {
+            return Self { q: 1.0, twice: 0.0 };
+        }
+        let inverse = 1.0 / (1.0 + noise * s);
+        let q = square(inverse);
+        Self {
+            q,
+            twice: -4.0 * noise * inverse * q,
         }
     }
 }

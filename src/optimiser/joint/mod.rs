@@ -8,6 +8,7 @@
 //! | --- | --- |
 //! | `axis` | which coordinate of a place follows from the other two |
 //! | `hop` | how a hop's end moves with everything it depends on |
+//! | `tangent` | with noise, a hop that looks like one without |
 //! | `outlook` | what the rest of the chain is worth, as the relay before it sees it |
 //! | `policy` | a relay's step, and how it follows what changed before it |
 //! | `room` | where a relay may fly across the line |
@@ -29,6 +30,7 @@ mod seek;
 mod site;
 pub mod solver;
 mod starts;
+mod tangent;
 mod weigh;
 
 pub use room::Room;

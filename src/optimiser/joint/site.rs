@@ -4,6 +4,7 @@ use super::axis::{Coordinate, Triple, triple};
 use super::ends::first_most;
 use super::policy::Policy;
 use super::room::Room;
+use super::tangent::Tangent;
 use crate::mission::{Interferer, Mission};
 use crate::optimiser::spacing::Hop;
 use crate::place::{CrossSection, Placement};
@@ -16,10 +17,18 @@ const RIM: f32 = 0.999_99;
 /// The least separation is taken for that much larger, so that what is left missing is none.
 pub(super) const MARGIN: f32 = 1.0005;
 
+/// How often what is met is taken anew by its tangent.
+const TANGENTS: u8 = 3;
+
+/// Halvings of a way that is not reached to its end.
+const HALVINGS: u8 = 12;
+
 /// A relay, as its place is chosen.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
+    /// nu = N eta / P, 1/m^2: 0 without noise.
+    pub(super) noise: f32,
     pub(super) sender: Sender,
     pub(super) room: Room,
     pub(super) distance_m: f32,
@@ -41,6 +50,7 @@ impl<'a> Site<'a> {
         let config = mission.config();
         Self {
             interferer,
+            noise: mission.noise_at_a_metre(),
             sender,
             room,
             distance_m: config.distance_m,
@@ -70,7 +80,22 @@ impl<'a> Site<'a> {
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
-        let hop = Hop::free(self.interferer, self.sender, at, self.distance_m);
+        let place = self.stretched(target, from_m, at);
+        if place.is_none() && self.noise > 0.0 {
+            return self.halved(target, from_m, at);
+        }
+        place
+    }
+
+    /// The end of the hop at `at` across the line.
+    fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
+        let hop = Hop::free(
+            self.interferer,
+            self.noise,
+            self.sender,
+            at,
+            self.distance_m,
+        );
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
@@ -81,7 +106,7 @@ impl<'a> Site<'a> {
     /// (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
-        let Some((middle, rim)) = self.disk(target, from_m, from_m) else {
+        let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
             return Some(wanted);
         };
         if wanted.apart_squared(middle) <= rim {
@@ -91,26 +116,76 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// The middle and the squared radius of what a hop reaches for c > 1 at `x_m` or beyond.
-    fn disk(&self, target: f32, from_m: f32, x_m: f32) -> Option<(CrossSection, f32)> {
-        let Sender { at: from, gain } = self.sender;
-        let e = gain.excess(target);
+    /// The middle and the squared radius of what a hop reaches for c > 1 at `x_m` or beyond; with noise, as it is about `wanted`.
+    fn disk(
+        &self,
+        target: f32,
+        from_m: f32,
+        x_m: f32,
+        wanted: CrossSection,
+    ) -> Option<(CrossSection, f32)> {
+        let gain = self.sender.gain;
+        let (c, e) = (gain.ratio(target), gain.excess(target));
+        if !(self.noise > 0.0) {
+            return self.disk_by(&Tangent::free(c, e), from_m, x_m);
+        }
+        let [sx, sy, _] = self.source();
+        let from = self.sender.at;
+        let mut s = square(sx - from_m) + square(from.y_m - sy) + square(from.altitude_m);
+        let mut disk = None;
+        for _ in 0..TANGENTS {
+            let tangent = Tangent::new(self.noise, c, e, s);
+            disk = self.disk_by(&tangent, from_m, x_m);
+            let (middle, rim) = disk?;
+            // Where it ends toward what is wanted.
+            let share = sqrt(rim / wanted.apart_squared(middle).max(1e-9)).min(1.0);
+            let y = middle.y_m + share * (wanted.y_m - middle.y_m);
+            let h = middle.altitude_m + share * (wanted.altitude_m - middle.altitude_m);
+            let x = x_m.max(from_m + (from_m - sx) / tangent.e);
+            s = square(x.min(self.distance_m) - sx) + square(y - sy) + square(h);
+        }
+        disk
+    }
+
+    fn disk_by(&self, tangent: &Tangent, from_m: f32, x_m: f32) -> Option<(CrossSection, f32)> {
+        let Tangent { c, e, spare } = *tangent;
         if !(e > 0.0) {
             return None;
         }
-        let m = self.interferer;
+        let (m, from) = (self.interferer, self.sender.at);
         let (ahead, aside, above) = (m.x_m - from_m, from.y_m - m.y_m, from.altitude_m);
         let squared = square(ahead) + square(aside) + square(above);
         // By how much the middle is before that, or beyond Rx.
         let before = e * (x_m - from_m) + ahead;
         let beyond = -(e * (self.distance_m - from_m) + ahead);
         let off = before.max(beyond).max(0.0);
-        let rim = (RIM * gain.ratio(target) * squared - square(off)) / square(e);
+        let rim = (RIM * c * squared + RIM * e * spare - square(off)) / square(e);
         let middle = CrossSection {
             y_m: from.y_m + aside / e,
             altitude_m: from.altitude_m + above / e,
         };
         Some((middle, rim))
+    }
+
+    /// The farthest that a hop gets on the way from where the sender is across the line to `wanted`, which it does not reach.
+    fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
+        let near = self.room.nearest(self.sender.at);
+        let way = |share: f32| CrossSection {
+            y_m: near.y_m + share * (wanted.y_m - near.y_m),
+            altitude_m: near.altitude_m + share * (wanted.altitude_m - near.altitude_m),
+        };
+        let mut found = self.stretched(target, from_m, near)?;
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if let Some(place) = self.stretched(target, from_m, self.room.nearest(way(middle))) {
+                found = place;
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(found)
     }
 
     /// Where the relay goes across the line for `share` of its `policy`, when the sender is at `from` instead of `change` before that.
@@ -135,8 +210,8 @@ impl<'a> Site<'a> {
                 });
                 // What was right above Rx stays there.
                 let there = nominal.x_m >= self.distance_m;
-                let disk = self.disk(target, from.x_m, self.distance_m);
-                match disk.filter(|_| there) {
+                let disk = || self.disk(target, from.x_m, self.distance_m, wanted);
+                match there.then(disk).flatten() {
                     Some((middle, rim)) if wanted.apart_squared(middle) > rim => {
                         toward(nominal.cross_section(), wanted, middle, rim).unwrap_or(wanted)
                     }
@@ -180,30 +255,51 @@ impl<'a> Site<'a> {
         } else {
             target * (2.0 - RIM)
         };
-        let (e, c) = (gain.excess(target), gain.ratio(target));
-        let [m, m1, m2] = policy.axis.first(self.source());
-        let [p, p1, p2] = policy.axis.first(triple(from));
-        let [a, b] = at;
-        let u = if policy.rising { m - p } else { p - m };
-        let rest = square(m1 - a) + square(m2 - b) - c * (square(a - p1) + square(b - p2));
-        let root = c * square(u) + e * rest;
-        if !(root >= 0.0) {
-            return None;
+        let source = policy.axis.first(self.source());
+        let from = policy.axis.first(triple(from));
+        let mut tangent = Tangent::free(gain.ratio(target), gain.excess(target));
+        let mut found = follows(&tangent, policy.rising, source, from, at);
+        if self.noise > 0.0 {
+            let [m, m1, m2] = source;
+            let [a, b] = at;
+            for _ in 0..TANGENTS {
+                let s = square(found? - m) + square(a - m1) + square(b - m2);
+                tangent = Tangent::new(self.noise, gain.ratio(target), gain.excess(target), s);
+                found = follows(&tangent, policy.rising, source, from, at);
+            }
         }
-        let r = sqrt(root);
-        let d = if !(e > 0.0) {
-            (u + r) / -e.min(-1e-6)
-        } else if u >= 0.0 {
-            (square(u) + rest) / (u + r)
-        } else {
-            (r - u) / e
-        };
-        Some(if policy.rising { p + d } else { p - d })
+        found
     }
 
     pub(super) const fn source(&self) -> Triple {
         [self.interferer.x_m, self.interferer.y_m, 0.0]
     }
+}
+
+/// The first coordinate, for the other two `at`, of where a hop ends that is met as `tangent` has it.
+fn follows(
+    tangent: &Tangent,
+    rising: bool,
+    [m, m1, m2]: Triple,
+    [p, p1, p2]: Triple,
+    [a, b]: [f32; 2],
+) -> Option<f32> {
+    let Tangent { c, e, spare } = *tangent;
+    let u = if rising { m - p } else { p - m };
+    let rest = square(m1 - a) + square(m2 - b) - c * (square(a - p1) + square(b - p2)) + spare;
+    let root = c * square(u) + e * rest;
+    if !(root >= 0.0) {
+        return None;
+    }
+    let r = sqrt(root);
+    let d = if !(e > 0.0) {
+        (u + r) / -e.min(-1e-6)
+    } else if u >= 0.0 {
+        (square(u) + rest) / (u + r)
+    } else {
+        (r - u) / e
+    };
+    Some(if rising { p + d } else { p - d })
 }
 
 /// What lies on the way from `best` to `wanted` within a circle; `None` if nothing does.

@@ -1,14 +1,14 @@
 //! What the place of a relay is worth to the one before: one relay's worth of a pass back.
 
 use super::axis::{Coordinate, Triple, minus, triple};
-use super::hop::Reach;
+use super::hop::{Bend, Reach};
 use super::outlook::Outlook;
 use super::policy::Policy;
 use super::room::Room;
 use super::site::Site;
 use crate::place::Placement;
 use crate::root::sqrt;
-use crate::sir::square;
+use crate::sir::{in_noise, square};
 
 /// What one part of the least separation that is missing costs, in parts of D: a slope that no gain of slack outweighs.
 const STIFFNESS: f32 = 100.0;
@@ -20,22 +20,26 @@ const EDGE: f32 = 2e-6;
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// By how much the relay at `to` is nearer to the interferer than a hop of the least separation allows, in squares, m^2, and the
-    /// weight of that: |p' - p|^2 = |p' - m|^2 / c is then less than d_min^2.
-    fn near(&self, c: f32, to: Placement) -> (f32, f32) {
+    /// By how much the relay at `to` is nearer to the interferer than a hop of the least separation allows, in squares, m^2, the
+    /// weight of that, and its slope by ln gamma: |p' - p|^2 = q(|p' - m|^2) / c is then less than d_min^2. With noise,
+    /// |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
+    fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
-            return (0.0, 0.0);
+            return (0.0, 0.0, 0.0);
         }
         let m = self.interferer;
-        let least = c * square(self.apart_m);
+        let quiet = c * square(self.apart_m);
+        // Where not even the noise allows such a hop, nowhere is far enough: 1000 L stands for that.
+        let left = (1.0 - self.noise * quiet).max(1e-3);
+        let least = quiet / left;
         let squared = square(m.x_m - to.x_m) + square(m.y_m - to.y_m) + square(to.altitude_m);
         let weight = STIFFNESS * self.distance_m / square(least);
-        ((least - squared).max(0.0), weight)
+        ((least - squared).max(0.0), weight, least / left)
     }
 
     /// What the relay at `to` takes off the slack for being there, m.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
-        let (near, weight) = self.near(self.sender.gain.ratio(target), to);
+        let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)
     }
 
@@ -55,11 +59,11 @@ impl Site<'_> {
         let c = self.sender.gain.ratio(target.min(self.most));
         let source = self.source();
         let place = triple(to);
-        let (near, weight) = self.near(c, to);
+        let (near, weight, by_target) = self.near(c, to);
         let [dx, dy, dh] = minus(source, place);
         if near > 0.0 {
             let slope = [2.0 * dx, 2.0 * dy, 2.0 * dh];
-            outlook.penalise(weight, near, slope, c * square(self.apart_m));
+            outlook.penalise(weight, near, slope, by_target);
         }
         let Room { lateral, band } = self.room;
         let low = [from.x_m, lateral.least_m, band.least_m];
@@ -68,7 +72,8 @@ impl Site<'_> {
         let at_end = to.x_m >= self.distance_m - EDGE * self.distance_m;
         let [hx, hy, hh] = minus(place, triple(from));
         let reached = c * (square(hx) + square(hy) + square(hh));
-        let spare = square(dx) + square(dy) + square(dh) - reached;
+        let heard = square(dx) + square(dy) + square(dh);
+        let spare = in_noise(heard, self.noise) - reached;
         let loose = at_end && spare > TIGHT * reached;
         let (axis, normal) = if loose {
             (Coordinate::X, 0.0)
@@ -79,13 +84,13 @@ impl Site<'_> {
             Reach::FIXED
         } else {
             let [source, from, place] = [source, triple(from), place].map(|p| axis.first(p));
-            let hop = Reach::new(c, source, from, place);
+            let hop = Reach::new(c, self.noise, source, from, place);
             Reach {
                 by_target: if capped { 0.0 } else { hop.by_target },
                 ..hop
             }
         };
-        let far = trust * sqrt(square(dx) + square(dy) + square(dh));
+        let far = trust * sqrt(heard);
         let [_, l1, l2] = axis.first(low.map(|low| low.max(-far).min(0.0)));
         let [_, h1, h2] = axis.first(high.map(|high| high.min(far).max(0.0)));
         let policy = outlook.pass(axis, &hop, [l1, l2], [h1, h2]);
@@ -108,7 +113,8 @@ impl Site<'_> {
         let rounding = EDGE * self.distance_m;
         let [dx, dy, dh] = minus(triple(to), self.source());
         let [hx, hy, hh] = minus(triple(to), triple(from));
-        let [nx, ny, nh] = [dx - c * hx, dy - c * hy, dh - c * hh];
+        let Bend { q, .. } = Bend::new(self.noise, square(dx) + square(dy) + square(dh));
+        let [nx, ny, nh] = [q * dx - c * hx, q * dy - c * hy, q * dh - c * hh];
         let ([lx, ly, lh], [ux, uy, uh]) = (low, high);
         let mut best = (Coordinate::X, nx);
         // Rather x, by which the chain gets on.

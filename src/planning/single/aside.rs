@@ -51,10 +51,23 @@
 //! place higher up can be turned down until it is in the lowest plane or in an upright face, and in an upright face all level
 //! circles have their middles on the ground, so that they touch nowhere above it.
 //!
+//! **With noise** SIR_1 = A s / (l (1 + nu s)), s and l the squared distances from the interferer and from Tx.
+//!
+//! - The hill is at t times as far from Tx, straight away from the interferer, as that is: where h^2 = t q + t^2 q + nu t s^2 with
+//!   s = (1 + t)^2 q + h^2, once, nearer than without. It still is the only top: along the line on the other side, where
+//!   (1 / s w)(r - |(X, Y)|) = r / l, 1 / s w is above 1 / l, and SIR_1 rises to both sides.
+//! - On a circle about Rx s and l are linear in (cos w, sin w): they run around an ellipse. q(s) / l with q(s) = s / (1 + nu s) is at
+//!   least v on a convex set, q(s) - v l being concave, and better with more s and less l. So on the arc from the place nearest to Tx to
+//!   that farthest from the interferer it has one top, and that is the circle's: halving finds it.
+//! - On a sphere about Rx s and l depend on x and y alone, so SIR_1 rises toward some side, and the relay sinks as it moves there: the
+//!   lowest is the best wherever there is room. But in an upright face of the box along the line the level lines may touch
+//!   above the ground: `touching`. In the two across the line l is the same along such a circle: there they do not.
+//! - Where the touching place is outside the corridor another one may be within: `corridor` searches for it.
+//!
 //! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
-use super::Found;
 use super::edge::{Edge, TwoHops, narrow};
+use super::{Found, corridor, touching};
 use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::place::Placement;
 
@@ -77,12 +90,16 @@ pub enum AsideCase {
     Edge(EdgeCoordinate),
     /// The interferer stands at Tx (X = Y = 0), SIR_1 is the same everywhere: above Rx.
     Level,
+    /// With noise: on an upright wall of the corridor, where the lines of equal SIR of both hops touch.
+    Wall,
+    /// With noise: at the lowest altitude within the corridor, by a search; nothing proves that it is the best.
+    Inside,
     /// The interferer stands at Rx (X = D, Y = 0), and no place helps: SIR_2 is 0; above Rx.
     Drowned,
 }
 
 impl AsideCase {
-    /// Its number: 1 to 3 as above, then the edges along x, y and upward, 7 and 8.
+    /// Its number: 1 to 3 as above, then the edges along x, y and upward, 7 to 10.
     pub const fn number(self) -> u8 {
         match self {
             Self::Touching => 1,
@@ -91,13 +108,15 @@ impl AsideCase {
             Self::Edge(axis) => axis as u8,
             Self::Level => 7,
             Self::Drowned => 8,
+            Self::Wall => 9,
+            Self::Inside => 10,
         }
     }
 }
 
 /// Where a relay that holds `profile` does best in [0, D] and the mission's room to the side, and why; `None` in a field.
 ///
-/// The mission's band of altitudes is not looked at. Work: 48 halvings in f64, and where they end outside the corridor at most
+/// The mission's band of altitudes is not looked at. Work: 48 halvings in f64, with noise as many for each, and where they end outside the corridor at most
 /// 272 evaluations of both hops.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
@@ -128,6 +147,24 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
     // Above Rx is always within.
     let above_rx = Placement::on_line(config.distance_m, band.least_m);
     let mut best = (hops.found(above_rx), AsideCase::AboveRx);
+    let at = |x_m: f32, y_m: f32, altitude_m: f32| Placement {
+        x_m,
+        y_m,
+        altitude_m,
+    };
+    if mission.noise_at_a_metre() > 0.0 && !across.is_single() {
+        let found = corridor::best(&hops, interferer, along, across, band.least_m);
+        if found.sir > best.0.sir {
+            best = (found, AsideCase::Inside);
+        }
+    }
+    for y in both_ends(across) {
+        if let Some(found) = touching::inside(&hops, interferer, y, band)
+            && found.sir > best.0.sir
+        {
+            best = (found, AsideCase::Wall);
+        }
+    }
     let mut weigh = |free: EdgeCoordinate, room: Band, through: Placement| {
         let edge = Edge {
             free,
@@ -138,11 +175,6 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
         if found.sir > best.0.sir {
             best = (found, AsideCase::Edge(free));
         }
-    };
-    let at = |x_m: f32, y_m: f32, altitude_m: f32| Placement {
-        x_m,
-        y_m,
-        altitude_m,
     };
     for h in both_ends(band) {
         for y in both_ends(across) {
@@ -185,6 +217,7 @@ fn without_limits(
         y: f64::from(interferer.y_m),
         h2: squared(f64::from(altitude_m)),
         g: mission.last_to_first(power_w),
+        noise: f64::from(mission.noise_at_a_metre()),
     };
     let (place, case) = scene.best();
     let place = Placement {
@@ -195,13 +228,14 @@ fn without_limits(
     (place, case)
 }
 
-/// The plane at one altitude, in m and m^2: D, X, Y, h^2 and G = K / A.
+/// The plane at one altitude, in m and m^2: D, X, Y, h^2, G = K / A and nu.
 struct Plane {
     d: f64,
     x: f64,
     y: f64,
     h2: f64,
     g: f64,
+    noise: f64,
 }
 
 impl Plane {
@@ -211,14 +245,13 @@ impl Plane {
             return (above_rx, AsideCase::Drowned);
         }
         let q = squared(self.x) + squared(self.y);
-        if !(q > 0.0) {
+        if !(q > 0.0 || self.noise > 0.0) {
             return (above_rx, AsideCase::Level);
         }
         if self.first(above_rx) >= self.second(0.0) {
             return (above_rx, AsideCase::AboveRx);
         }
-        let away = libm::sqrt(q);
-        let t = 2.0 * self.h2 / (away + libm::sqrt(q + 4.0 * self.h2)) / away;
+        let t = self.hill(q);
         let hill = (-self.x * t, -self.y * t);
         let far = libm::hypot(self.d - hill.0, hill.1);
         if self.first(hill) <= self.second(far) {
@@ -239,7 +272,56 @@ impl Plane {
     /// SIR_1 / A.
     fn first(&self, (x, y): (f64, f64)) -> f64 {
         let heard = squared(self.x - x) + squared(self.y - y) + self.h2;
-        heard / (squared(x) + squared(y) + self.h2)
+        heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
+    }
+
+    /// How much farther from Tx than the interferer the hill is, on the other side.
+    fn hill(&self, q: f64) -> f64 {
+        let away = libm::sqrt(q);
+        if !(away > 0.0) {
+            return 0.0;
+        }
+        let t = 2.0 * self.h2 / (away + libm::sqrt(q + 4.0 * self.h2)) / away;
+        if !(self.noise > 0.0) {
+            return t;
+        }
+        let (mut low, mut high) = (0.0, t);
+        for _ in 0..HALVINGS {
+            let t = 0.5 * (low + high);
+            let s = squared(1.0 + t) * q + self.h2;
+            if self.h2 > t * q + squared(t) * q + self.noise * t * squared(s) {
+                low = t;
+            } else {
+                high = t;
+            }
+        }
+        low
+    }
+
+    /// Where SIR_1 is largest on the circle of radius `s` about Rx, with noise.
+    fn loudest_in_noise(&self, s: f64) -> (f64, f64) {
+        let at = |w: f64| (self.d - s * libm::cos(w), s * libm::sin(w));
+        // From the place nearest to Tx, at 0, to that farthest from the interferer.
+        let mut far = libm::atan2(-self.y, self.x - self.d);
+        if !(squared(self.x) + squared(self.y) > 0.0) {
+            far = 0.0;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let part = 0.5 * (low + high);
+            let w = part * far;
+            let (x, y) = at(w);
+            let (dx, dy) = (s * libm::sin(w) * far, s * libm::cos(w) * far);
+            let heard = squared(self.x - x) + squared(self.y - y) + self.h2;
+            let from = squared(x) + squared(y) + self.h2;
+            let more = (x - self.x) * dx + (y - self.y) * dy;
+            if more * from > (x * dx + y * dy) * heard * (1.0 + self.noise * heard) {
+                low = part;
+            } else {
+                high = part;
+            }
+        }
+        at(low * far)
     }
 
     /// SIR_2 / A at the distance `s` from Rx along the ground.
@@ -249,6 +331,9 @@ impl Plane {
 
     /// Where SIR_1 is largest on the circle of radius `s` about Rx.
     fn loudest(&self, s: f64) -> (f64, f64) {
+        if self.noise > 0.0 {
+            return self.loudest_in_noise(s);
+        }
         let a = squared(self.x) + squared(self.y) - 2.0 * self.x * self.d;
         let (b, e) = (2.0 * self.x * s, -2.0 * self.y * s);
         let (m, n) = (squared(self.d) + squared(s) + self.h2, 2.0 * self.d * s);

@@ -2,7 +2,8 @@
 //!
 //! With t for what is free, SIR_1 = A ((t - P)^2 + a) / (t^2 + b) and SIR_2 = K / ((t - E)^2 + d). SIR_2 turns at E alone.
 //! SIR_1 turns where P t^2 - (P^2 + a - b) t - P b = 0, at two places whose product is -b. Between these three both only rise
-//! or only fall: the worse of the two is best at an end of such a piece, or where they cross, which is once.
+//! or only fall: the worse of the two is best at an end of such a piece, or where they cross, which is once. With noise it may turn at
+//! three places: [`edge_noise`].
 //!
 //! | free | P | a | b | E |
 //! | --- | --- | --- | --- | --- |
@@ -10,7 +11,7 @@
 //! | y | Y | (X - x)^2 + h^2 | x^2 + h^2 | 0 |
 //! | h | 0 | (X - x)^2 + (Y - y)^2 | x^2 + y^2 | 0 |
 
-use super::{Found, HALVINGS};
+use super::{Found, HALVINGS, edge_noise};
 use crate::mission::{Band, Interferer, Mission};
 use crate::place::Placement;
 use crate::sir::{self, Sender};
@@ -71,7 +72,7 @@ impl Edge {
     }
 
     /// Where SIR_1 turns, in f64, and where SIR_2 does; those that do not exist are no numbers, or far away.
-    fn turns(&self, mission: &Mission, interferer: &Interferer) -> [f32; 3] {
+    fn turns(&self, mission: &Mission, interferer: &Interferer) -> [f32; 4] {
         let wide = |x: f32| f64::from(x);
         let squared = |x: f64| x * x;
         let at = self.through;
@@ -97,17 +98,22 @@ impl Edge {
                 0.0,
             ),
         };
+        let noise = wide(mission.noise_at_a_metre());
+        if noise > 0.0 {
+            let [behind, valley, hill] = edge_noise::turns(p, a, b, noise).map(narrow);
+            return [behind, valley, hill, end];
+        }
         let half = 0.5 * (squared(p) + a - b);
         // The root of the larger size first, the other from their product: neither cancels.
         let root = libm::sqrt(squared(half) + squared(p) * b);
         let sum = half + libm::copysign(root, half);
-        [narrow(sum / p), narrow(-p * b / sum), end]
+        [narrow(sum / p), narrow(-p * b / sum), end, f32::NAN]
     }
 
     /// The best place on it.
     ///
-    /// Work: at most 8 evaluations of both hops, and 40 more for each piece on which one SIR rises, the other falls, and they
-    /// cross: one such piece for x and for the altitude, two for y.
+    /// Work: at most 10 evaluations of both hops, and 40 more for each piece on which one SIR rises, the other falls, and they
+    /// cross: without noise one such piece for x and for the altitude, two for y.
     pub(super) fn best(&self, hops: &TwoHops<'_>, interferer: &Interferer) -> Found {
         let Band {
             least_m: from,
@@ -153,10 +159,13 @@ impl Edge {
     }
 }
 
-fn in_order([a, b, c]: [f32; 3]) -> [f32; 3] {
+/// Rising; in place of what is no number, one of the others.
+fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
     let (a, b) = (a.min(b), a.max(b));
-    let (b, c) = (b.min(c), b.max(c));
-    [a.min(b), a.max(b), c]
+    let (c, d) = (c.min(d), c.max(d));
+    let (a, c) = (a.min(c), a.max(c));
+    let (b, d) = (b.min(d), b.max(d));
+    [a, b.min(c), b.max(c), d]
 }
 
 #[expect(

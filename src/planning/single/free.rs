@@ -9,12 +9,15 @@
 //! On the edges Theorems 1 and 2 are exact, and the best of them is the optimum. Right above Tx both SIRs fall with the altitude,
 //! so of that edge only the lowest place counts, which is on the lowest edge too: three are left.
 //!
+//! With noise the lines of equal SIR_1 are no circles, and there is one place inside at which they may touch: `touching`.
+//!
 //! Accuracy: `theorem_3_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
-use super::{Found, given_altitude, given_x};
+use super::edge::TwoHops;
+use super::{Found, given_altitude, given_x, touching};
 use crate::mission::{Mission, Profile};
 
-/// On which edge of the box the best place lies, and which case applied there. On a corner it is the first of them.
+/// On which edge of the box the best place lies, or that it is inside, and which case applied there. On a corner it is the first of them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FreeCase {
@@ -24,6 +27,8 @@ pub enum FreeCase {
     Highest(given_altitude::PlaceCase),
     /// Right above Rx, by Theorem 2.
     AboveRx(given_x::AltitudeCase),
+    /// With noise: inside the box, where the lines of equal SIR of both hops touch.
+    Touching,
 }
 
 /// Where a relay of `power_w` watts does best in [0, D] and the mission's band, and why; `None` in a field.
@@ -49,5 +54,9 @@ pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> 
     weigh(found, FreeCase::Highest(case));
     let (found, case) = given_x::best_place(mission, config.distance_m, power_w)?;
     weigh(found, FreeCase::AboveRx(case));
+    let hops = TwoHops { mission, power_w };
+    if let Some(found) = touching::inside(&hops, mission.interferer()?, 0.0, config.band) {
+        weigh(found, FreeCase::Touching);
+    }
     Some(best)
 }

@@ -4,6 +4,9 @@
 //! before the valley, or above Rx. With the interferer behind Tx (X < 0), which the paper leaves out, SIR_1 rises up to a hill
 //! and falls beyond: up to the hill both rise, so the best place is the hilltop, the crossing beyond it, or above Rx.
 //!
+//! With noise SIR_1 falls for good in the end: beyond its valley it has a hill, or neither. Up to the hill both rise; beyond it the best
+//! is the hilltop, the crossing, or above Rx.
+//!
 //! The crossing is a root of the paper's quartic. Its coefficients cancel in f32; the SIRs themselves do not, so the root is
 //! found by halving a stretch on which their difference changes its sign once.
 //!
@@ -38,6 +41,8 @@ pub enum PlaceCase {
     Level = 9,
     /// The interferer stands at Rx (X = D, Y = 0), and no place helps: SIR_2 is 0; x = D.
     Drowned = 10,
+    /// With noise: the best is beyond the valley of SIR_1, on the hill that follows it, or where the SIRs cross beyond that.
+    SecondHill = 11,
 }
 
 impl PlaceCase {
@@ -54,7 +59,7 @@ impl PlaceCase {
 
 /// Where a relay that holds `profile` does best between Tx and Rx, and why; `None` in a field.
 ///
-/// Any place of the interferer, any D and altitude that a mission takes. Work: at most 90 evaluations of both hops.
+/// Any place of the interferer, any D and altitude that a mission takes. Work: at most 90 evaluations of both hops, and with noise 230 more.
 pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
     let interferer = mission.interferer()?;
     let two = Two { mission, profile };
@@ -65,7 +70,8 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCa
     }
     let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
     // How far SIR_1 falls, and whether it rises again before Rx.
-    let (to, valley) = match first_hop_turn(interferer, profile.altitude_m) {
+    let turn = first_hop_turn(mission, interferer, profile.altitude_m);
+    let (to, valley) = match turn {
         Extremum::Level => return Some((above_rx, PlaceCase::Level)),
         Extremum::Hill(peak) => {
             return Some(if peak >= end_m || !worse_first(end_m) {
@@ -76,16 +82,41 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCa
                 (two.crossing(peak, end_m), PlaceCase::BeyondHill)
             });
         }
-        Extremum::Valley(bottom) if bottom < end_m => (bottom, true),
+        Extremum::Valley(bottom) | Extremum::ValleyAndHill(bottom, _) if bottom < end_m => {
+            (bottom, true)
+        }
         _ => (end_m, false),
     };
     if two.first(0.0) < two.second(0.0) {
         return Some((two.found(0.0), PlaceCase::AboveTx));
     }
-    Some(match (worse_first(to), valley) {
+    let second = second_hill(two, turn, end_m);
+    let first = match (worse_first(to), valley) {
         (true, false) => (two.crossing(0.0, to), PlaceCase::Crossing),
         (true, true) => (two.crossing(0.0, to).or(above_rx), PlaceCase::BeforeValley),
         (false, false) => (above_rx, PlaceCase::AboveRx),
         (false, true) => (above_rx, PlaceCase::OverValley),
+    };
+    Some(match second {
+        Some(second) if second.sir > first.0.sir => (second, PlaceCase::SecondHill),
+        _ => first,
+    })
+}
+
+/// The best on the hill that follows the valley of SIR_1, or beyond it, if that is before `end_m`.
+fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
+    let Extremum::ValleyAndHill(_, hill) = turn else {
+        return None;
+    };
+    let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
+    if !(hill < end_m) {
+        return None;
+    }
+    Some(if worse_first(hill) {
+        two.found(hill)
+    } else if worse_first(end_m) {
+        two.crossing(hill, end_m)
+    } else {
+        two.found(end_m)
     })
 }

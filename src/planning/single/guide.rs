@@ -16,7 +16,7 @@ pub struct Guide {
     /// C_2: above it the first hop is the better one even right above Rx.
     pub c2: f32,
     /// C_3: above it the first hop is the better one even where it is worst, be that between Tx and Rx or beyond. Only for an
-    /// interferer ahead of Tx (X > 0).
+    /// interferer ahead of Tx (X > 0); with noise, where it is worst before its hill.
     pub c3: Option<f32>,
 }
 
@@ -36,8 +36,10 @@ pub fn ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
     Some(Guide {
         c1: equal_at(0.0),
         c2: equal_at(config.distance_m),
-        c3: match first_hop_turn(interferer, altitude_m) {
-            Extremum::Valley(bottom) if bottom < 1e18 => Some(equal_at(bottom)),
+        c3: match first_hop_turn(mission, interferer, altitude_m) {
+            Extremum::Valley(bottom) | Extremum::ValleyAndHill(bottom, _) if bottom < 1e18 => {
+                Some(equal_at(bottom))
+            }
             _ => None,
         },
     })

@@ -7,8 +7,14 @@
 //! u^2 + (a + c - G) u + a c - G b = 0,
 //! ```
 //!
-//! the paper's A u^2 + B u + C = 0 divided by A = p_t. Worked out in f64, and so exact to the last place of the f32 that
-//! comes out. Accuracy: `the_locus_is_where_the_hops_are_equal` in `host-tests/tests/theorems/`.
+//! the paper's A u^2 + B u + C = 0 divided by A = p_t. With noise SIR_1 has a factor 1 + nu (a + u) below, K has the noise at Rx in it, and
+//!
+//! ```text
+//! (1 - G nu) u^2 + (a + c - G - G nu (a + b)) u + a c - G b - G nu a b = 0.
+//! ```
+//!
+//!  Worked out in f64, and so exact to the last place of the f32
+//! that comes out. Accuracy: `the_locus_is_where_the_hops_are_equal` in `host-tests/tests/theorems/`.
 
 use crate::mission::Mission;
 
@@ -27,9 +33,10 @@ pub fn altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] 
     let b = squared(x);
     let c = squared(wide(mission.config().distance_m) - x);
     let g = mission.last_to_first(power_w);
-    let half = 0.5 * (a + c - g);
-    let product = a * c - g * b;
-    let discriminant = half * half - product;
+    let lost = g * wide(mission.noise_at_a_metre());
+    let half = 0.5 * (a + c - g - lost * (a + b));
+    let (square, product) = (1.0 - lost, a * c - g * b - lost * a * b);
+    let discriminant = half * half - square * product;
     if discriminant < 0.0 {
         return [None; 2];
     }
@@ -40,7 +47,9 @@ pub fn altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] 
     } else {
         0.0
     };
-    [near.min(far), near.max(far)].map(|u| (u > 0.0).then(|| narrow(libm::sqrt(u))))
+    let far = far / square;
+    [near.min(far), near.max(far)]
+        .map(|u| (u > 0.0 && u.is_finite()).then(|| narrow(libm::sqrt(u))))
 }
 
 #[expect(

@@ -11,10 +11,13 @@
 //!
 //! They rest on where the two SIRs are equal ([`locus`], Lemma 1) and on where that of the first hop turns
 //! ([`crate::sir::first_hop_turn`], Lemma 2); [`guide`] has C_1, C_2 and C_3, the ratios of powers at which the cases change.
-//! SIR_2 rises with x and falls with the altitude, always.
+//! SIR_2 rises with x and falls with the altitude, always. Where receivers have noise SIR_1 may turn once more, and the best place of
+//! Theorem 3 may lie inside the box (`touching`); the mission's noise is in all of them but [`noise`], which has its own.
 
 pub mod aside;
+mod corridor;
 mod edge;
+mod edge_noise;
 pub mod free;
 pub mod given_altitude;
 pub mod given_x;
@@ -22,6 +25,7 @@ pub mod guide;
 pub mod locus;
 pub mod noise;
 pub mod stochastic;
+mod touching;
 
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;

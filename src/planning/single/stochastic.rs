@@ -12,7 +12,7 @@
 //! Accuracy: `host-tests/tests/single.rs`, against a dense search in f64.
 
 use super::{Found, Two};
-use crate::field::Field;
+use crate::field::InNoise;
 use crate::mission::{Mission, Profile};
 use crate::root::sqrt;
 use crate::sir::square;
@@ -32,7 +32,7 @@ fn best_of(two: &Two, low: f32, high: f32) -> Found {
 /// Within 1e-5 of the best SIR, relative. Work: at most 260 evaluations of both hops for each two points of the field; a plan's, not
 /// one for a relay's main loop.
 pub fn best_place(mission: &Mission, profile: Profile) -> Option<Found> {
-    let field = mission.field()?;
+    let field = mission.heard()?;
     let two = Two { mission, profile };
     let end_m = mission.config().distance_m;
     let mut best = two.found(0.0);
@@ -45,7 +45,7 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<Found> {
             continue;
         }
         let mut piece = from;
-        for turn in turns(field, from, to, profile.altitude_m)
+        for turn in turns(&field, from, to, profile.altitude_m)
             .into_iter()
             .chain([to])
         {
@@ -60,7 +60,7 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<Found> {
 }
 
 /// Where E(SIR_1) may turn in a stretch on which Upsilon is a straight line, rising: the roots of b x^2 + 2 a x - b h^2 = 0.
-fn turns(field: &Field, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
+fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
     let (at_low, at_high) = (field.upsilon(low), field.upsilon(high));
     let b = (at_high - at_low) / (high - low);
     let a = at_low - b * low;

@@ -36,7 +36,7 @@ impl Upload {
     }
 }
 
-/// The wire form: version and base, and the numbers in the order of the digest, the bands last.
+/// The wire form: version and base, and the numbers in the order of the digest.
 #[derive(Serialize, Deserialize)]
 struct OfferBody {
     /// The number is the version, the mission the base.
@@ -45,6 +45,7 @@ struct OfferBody {
     numbers: [f32; 9],
     factors: [f64; 3],
     bands: [f32; 4],
+    noise_w: f32,
 }
 
 impl OfferBody {
@@ -75,6 +76,7 @@ impl OfferBody {
                 c.lateral.least_m,
                 c.lateral.most_m,
             ],
+            noise_w: c.noise_w,
         }
     }
 
@@ -116,6 +118,7 @@ impl OfferBody {
                     y_m,
                 })
             },
+            noise_w: self.noise_w,
             tolerance,
         };
         Upload::checked(self.pass.number(), self.pass.mission(), config).ok()

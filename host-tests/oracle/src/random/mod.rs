@@ -86,7 +86,21 @@ pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
         mu_los,
         mu_nlos,
         eta,
+        noise_w: 0.0,
         relays: relays(rng, style, common),
+    }
+}
+
+/// The same link with noise of 1e-6 to 1e4 of what of the interferer arrives at some place along it, and at most what a mission takes.
+pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
+    let place = rng.random_range(0.0..=link.distance_m);
+    let altitude_m = link.relays.first().map_or(1.0, |relay| relay.altitude_m);
+    let squared = (place - link.x_i).powi(2) + link.y_i.powi(2) + altitude_m.powi(2);
+    let arrives_w = link.interferer_w / link.eta / squared;
+    let noise_w = arrives_w * log_uniform(rng, 1e-6, 1e4);
+    Link {
+        noise_w: noise_w.min(1.0).min(9e11 * link.interferer_w / link.eta),
+        ..link.clone()
     }
 }
 

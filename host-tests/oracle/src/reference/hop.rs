@@ -42,7 +42,7 @@ impl<'a> Hop<'a> {
         )
     }
 
-    /// Received power over received interference (linear).
+    /// Received power over received interference and noise (linear).
     pub(super) fn sir(&self, x: f64) -> f64 {
         let signal = received_w(
             self.sender_w,
@@ -52,43 +52,82 @@ impl<'a> Hop<'a> {
             self.own_h - self.sender_h,
         );
         let link = self.link;
-        signal
-            / received_w(
-                link.interferer_w,
-                link.eta,
-                x - link.x_i,
-                link.y_i,
-                self.own_h,
-            )
+        signal / (self.interference_w(x) + link.noise_w)
+    }
+
+    fn interference_w(&self, x: f64) -> f64 {
+        let link = self.link;
+        received_w(
+            link.interferer_w,
+            link.eta,
+            x - link.x_i,
+            link.y_i,
+            self.own_h,
+        )
     }
 
     pub(super) fn meets(&self, x: f64, target: f64) -> bool {
         meets(self.sir(x), target)
     }
 
-    /// Sign of the SIR's slope: each path loss grows at the relative rate 2 dx / distance^2.
-    fn rises(&self, x: f64) -> bool {
+    /// The SIR's slope, times what leaves a concave function of the place beyond the sender (see [`super`]): above 0 where it rises.
+    ///
+    /// Each path loss grows at the relative rate 2 dx / distance^2, and the interference is a part of what is heard with the signal.
+    fn rise(&self, x: f64) -> f64 {
         let (dx, dh) = (x - self.sender_x, self.own_h - self.sender_h);
         let (ix, iy, ih) = (x - self.link.x_i, self.link.y_i, self.own_h);
-        // NaN (receiver on top of its sender, where the SIR is infinite) compares as false: from there it only falls.
-        ix / (ix * ix + iy * iy + ih * ih) > dx / (dx * dx + dh * dh)
+        let (l, s) = (dx * dx + dh * dh, ix * ix + iy * iy + ih * ih);
+        let interference_w = self.interference_w(x);
+        let louder = 1.0 + self.link.noise_w / interference_w;
+        // ix / (s louder) - dx / l, times l s louder / dx.
+        ix * l / dx - s * louder
     }
 
-    /// The turning point of the SIR between `low` and `high`, both at or past the sender, or `high` if there is none.
-    ///
-    /// The SIR is monotone from `low` to the returned place and from there to `high`. About 60 slope evaluations.
-    pub(super) fn turn(&self, low: f64, high: f64) -> f64 {
-        let first = self.rises(low);
-        if first == self.rises(high) {
-            return high;
+    fn rises(&self, x: f64) -> bool {
+        // At the sender's own place, at one altitude with it, the SIR is infinite: from there it only falls.
+        if x > self.sender_x {
+            self.rise(x) > 0.0
+        } else {
+            self.link.x_i < x && self.own_h.total_cmp(&self.sender_h).is_ne()
         }
-        bisect(low, high, |x| self.rises(x) == first)
+    }
+
+    /// The turning points of the SIR from `low` to `high`, both at or past the sender, rising; at most two.
+    ///
+    /// The SIR is monotone between them. About 60 slope evaluations, with noise 300.
+    pub(super) fn turns(&self, low: f64, high: f64) -> Vec<f64> {
+        let (first, last) = (self.rises(low), self.rises(high));
+        let sign = |from: f64, to: f64| bisect(from, to, |x| self.rises(x) == self.rises(from));
+        if first != last {
+            return vec![sign(low, high)];
+        }
+        if first || !(self.link.noise_w > 0.0) {
+            return Vec::new();
+        }
+        // It may rise in between, about the top of a concave function.
+        let (mut from, mut to) = (low, high);
+        for _ in 0..HALVINGS {
+            let third = (to - from) / 3.0;
+            let (a, b) = (from + third, to - third);
+            if self.rise(a) < self.rise(b) {
+                from = a;
+            } else {
+                to = b;
+            }
+        }
+        let top = from.midpoint(to);
+        if self.rises(top) {
+            vec![sign(low, top), sign(top, high)]
+        } else {
+            Vec::new()
+        }
     }
 
     /// The largest SIR between `low` and `high`, both at or past the sender.
     pub(super) fn peak(&self, low: f64, high: f64) -> f64 {
-        let turn = self.turn(low, high);
-        self.sir(low).max(self.sir(high)).max(self.sir(turn))
+        let turns = self.turns(low, high);
+        let ends = self.sir(low).max(self.sir(high));
+        turns.iter().fold(ends, |most, &x| most.max(self.sir(x)))
     }
 }
 

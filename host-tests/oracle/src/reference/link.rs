@@ -30,6 +30,8 @@ pub struct Link {
     pub mu_nlos: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
+    /// Noise power of every receiver, watts, >= 0; with any, what is called SIR is the SINR.
+    pub noise_w: f64,
     /// The relays from Tx to Rx; their number is N.
     pub relays: Vec<Station>,
 }
@@ -55,6 +57,7 @@ impl Link {
             mu_los,
             mu_nlos: path_loss_factor(2e9, 10_f64.powf(2.1)),
             eta: mu_los,
+            noise_w: 0.0,
             relays: vec![
                 Station {
                     altitude_m: 20.0,

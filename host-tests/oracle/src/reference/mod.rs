@@ -9,6 +9,10 @@
 //! product of that quadratic's roots is -(height difference)^2 <= 0: at most one turning point lies beyond the sender. So the
 //! SIR only falls, only rises, forms one valley (interferer ahead) or one hill (interferer behind), and bisection is safe.
 //!
+//! With noise nu = N eta / P it has the sign of u d^2 - (u^2 + a^2 - b^2) d - u b^2 - nu d s^2, s = (d - u)^2 + a^2, where u is how
+//! far the interferer is ahead, a how far aside, b the difference in height. Over d that is concave for u > 0, so there are at most two
+//! turning points, a valley and then a hill; for u < 0 each of its terms falls, so there is at most one.
+//!
 //! Order of travel: a relay never stands behind the one before it (0 <= `x_1` <= ... <= `x_N` <= D). The least separation is
 //! carried for the tests that check it, and ignored by every search here but that of [`joint`].
 //!

@@ -18,14 +18,15 @@ impl Link {
         if meets(end) {
             return Some(end);
         }
-        // With the far end failing and one turning point at most, there is exactly one crossing beyond any place that meets
-        // the target. If the near end fails too, only the top of a hill can meet it.
-        let inside = if meets(from_x) {
-            from_x
-        } else {
-            hop.turn(from_x, end)
-        };
-        meets(inside).then(|| bisect(inside, end, meets))
+        // Between two turning points there is at most one crossing: the last place is beyond the last of them that meets the target.
+        let mut outside = end;
+        for inside in hop.turns(from_x, end).into_iter().rev().chain([from_x]) {
+            if meets(inside) {
+                return Some(bisect(inside, outside, meets));
+            }
+            outside = inside;
+        }
+        None
     }
 
     /// The largest distance from Rx, metres, at which the last relay meets `target` (linear, > 0) at Rx; it may exceed D.

@@ -17,8 +17,8 @@ impl Link {
     /// Per relay and interval about 300 SIR evaluations; the intervals are seldom more than three.
     pub fn placement(&self, target: f64) -> Option<Vec<f64>> {
         let first = Hop::new(self, 1, 0.0)?;
-        let turn = first.turn(0.0, self.distance_m);
-        let mut sets = vec![where_true(0.0, turn, self.distance_m, |x| {
+        let turns = first.turns(0.0, self.distance_m);
+        let mut sets = vec![where_true(0.0, &turns, self.distance_m, |x| {
             first.meets(x, target)
         })];
         for k in 2..=self.len() {
@@ -50,12 +50,12 @@ impl Link {
         for (&(start, end), gap_end) in set.iter().zip(gap_ends) {
             // Straight above one another the signal is constant, and the interference peaks abreast of the interferer.
             let abreast = self.x_i.clamp(start, end);
-            pieces.extend(where_true(start, abreast, end, |x| {
+            pieces.extend(where_true(start, &[abreast], end, |x| {
                 self.sir_relay(k, x, x)
                     .is_some_and(|sir| meets(sir, target))
             }));
             if let Some(hop) = Hop::new(self, k, end) {
-                pieces.extend(where_true(end, hop.turn(end, gap_end), gap_end, |x| {
+                pieces.extend(where_true(end, &hop.turns(end, gap_end), gap_end, |x| {
                     hop.meets(x, target)
                 }));
             }
@@ -64,15 +64,19 @@ impl Link {
     }
 }
 
-/// The part of [`low`, `high`] on which `holds`, given that it changes at most once on either side of `turn`.
-fn where_true(low: f64, turn: f64, high: f64, holds: impl Fn(f64) -> bool) -> Vec<Interval> {
-    let pieces = [(low, turn), (turn, high)].map(|(a, b)| match (holds(a), holds(b)) {
-        (true, true) => Some((a, b)),
-        (true, false) => Some((a, bisect(a, b, &holds))),
-        (false, true) => Some((bisect(b, a, &holds), b)),
-        (false, false) => None,
-    });
-    merge(&pieces.into_iter().flatten().collect::<Vec<_>>())
+/// The part of [`low`, `high`] on which `holds`, given that it changes at most once between two of its `turns`, which rise.
+fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -> Vec<Interval> {
+    let corners = || turns.iter().copied().chain([high]);
+    let froms = std::iter::once(low).chain(turns.iter().copied());
+    let pieces = froms
+        .zip(corners())
+        .map(|(a, b)| match (holds(a), holds(b)) {
+            (true, true) => Some((a, b)),
+            (true, false) => Some((a, bisect(a, b, &holds))),
+            (false, true) => Some((bisect(b, a, &holds), b)),
+            (false, false) => None,
+        });
+    merge(&pieces.flatten().collect::<Vec<_>>())
 }
 
 /// Joins intervals, sorted by their starts, that touch.

@@ -1,4 +1,4 @@
-//! The SIR of every hop, from received powers.
+//! The SIR of every hop, from received powers; with noise, the SINR.
 
 use super::hop::Hop;
 use super::link::{Link, received_w};
@@ -22,14 +22,14 @@ impl Link {
             0.0,
             last.altitude_m,
         );
-        let noise = received_w(
+        let interference = received_w(
             self.interferer_w,
             self.mu_nlos,
             self.distance_m - self.x_i,
             self.y_i,
             0.0,
         );
-        Some(signal / noise)
+        Some(signal / (interference + self.noise_w))
     }
 
     /// SIR (linear) of the N+1 hops of a chain whose relay k stands at `x[k-1]` metres.

@@ -10,7 +10,7 @@ use super::error::{Problem, ScenarioError};
 use super::keys::number;
 use super::site::{self, RawSites};
 use super::spec::{
-    AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, Noise, RelayOverride, Scenario, Source,
 };
 
 /// `deny_unknown_fields` guards the table of keys: a key listed there and forgotten here fails at once.
@@ -24,6 +24,8 @@ pub(super) struct RawFile {
     interferer: Option<Vec<RawSource>>,
     #[serde(default)]
     relay: Vec<RawRelay>,
+    #[serde(default)]
+    noise: RawNoise,
     field: Option<RawField>,
     site: Option<RawSites>,
 }
@@ -63,6 +65,13 @@ struct RawChannel {
     excess_loss_los_db: Option<f64>,
     excess_loss_nlos_db: Option<f64>,
     air_ground: Option<RawAirGround>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct RawNoise {
+    bandwidth_hz: Option<f64>,
+    figure_db: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -152,8 +161,17 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
         uav_w: raw.power.uav_w,
         channel: channel(file, &raw.channel)?,
         interference: interference(file, raw.interferer, raw.field)?,
+        noise: noise(&raw.noise),
         relays: relays(file, raw.relay)?,
     })
+}
+
+fn noise(raw: &RawNoise) -> Noise {
+    let default = Noise::default();
+    Noise {
+        bandwidth_hz: raw.bandwidth_hz.unwrap_or(default.bandwidth_hz),
+        figure_db: raw.figure_db.unwrap_or(default.figure_db),
+    }
 }
 
 fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {

@@ -81,6 +81,7 @@ pub(super) const FILE: Keys = &[
     optional("interferer", Rule::Tables(INTERFERER, 1)),
     optional("relay", Rule::Tables(RELAY, 0)),
     optional("field", Rule::Table(FIELD)),
+    optional("noise", Rule::Table(NOISE)),
     optional("site", Rule::Table(SITES)),
 ];
 
@@ -115,6 +116,11 @@ const CHANNEL: Keys = &[
     optional("excess_loss_los_db", Number(LOSS)),
     optional("excess_loss_nlos_db", Number(LOSS)),
     optional("air_ground", LinkOrNumber(range(0.0, 1.0, ""))),
+];
+
+const NOISE: Keys = &[
+    optional("bandwidth_hz", Number(range(0.0, 1e12, "Hz"))),
+    optional("figure_db", Number(range(0.0, 60.0, "dB"))),
 ];
 
 const INTERFERER: Keys = &[

@@ -35,6 +35,8 @@ pub struct Scenario {
     pub channel: ChannelSpec,
     /// What disturbs the hops.
     pub interference: Interference,
+    /// The receivers' own noise.
+    pub noise: Noise,
     /// What differs for single relays, by relay number (1 to 1000, 1 is next to Tx).
     pub relays: BTreeMap<u16, RelayOverride>,
 }
@@ -59,6 +61,37 @@ pub struct ChannelSpec {
     pub excess_loss_nlos_db: f64,
     /// Which path loss the links between the ground and the air have.
     pub air_ground: AirGround,
+}
+
+/// The noise of every receiver, as its bandwidth and its noise figure make it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Noise {
+    /// Noise bandwidth, in hertz, 0 (its default: no noise) to 1e12.
+    pub bandwidth_hz: f64,
+    /// Noise figure, in dB, 0 to 60; 6 by default.
+    pub figure_db: f64,
+}
+
+/// Boltzmann's constant, J/K.
+const BOLTZMANN: f64 = 1.380_649e-23;
+
+/// The temperature that noise figures are for, K.
+const STANDARD_K: f64 = 290.0;
+
+impl Default for Noise {
+    fn default() -> Self {
+        Self {
+            bandwidth_hz: 0.0,
+            figure_db: 6.0,
+        }
+    }
+}
+
+impl Noise {
+    /// Noise power at the input of a receiver, in watts: k T0 B F.
+    pub fn power_w(&self) -> f64 {
+        BOLTZMANN * STANDARD_K * self.bandwidth_hz * 10_f64.powf(self.figure_db / 10.0)
+    }
 }
 
 /// The path loss eta of a link between the ground and the air.
@@ -153,6 +186,7 @@ impl Default for Scenario {
                 x_m: 500.0,
                 y_m: 400.0,
             }]),
+            noise: Noise::default(),
             relays: BTreeMap::new(),
         }
     }

@@ -16,7 +16,7 @@ pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
     nodes: Vec<f64>,
-    /// Quiet r = I^(-1/2) at the nodes, W^(-1/2).
+    /// Quiet r = (I + N)^(-1/2) at the nodes, W^(-1/2).
     quiet: Vec<f64>,
     /// Its slope there.
     slope: Vec<f64>,
@@ -63,7 +63,7 @@ impl<'a> Line<'a> {
 
     /// The quiet and its slope at `x`.
     fn quiet_and_slope(&self, x: f64) -> (f64, f64) {
-        let (mut power, mut change) = (0.0, 0.0);
+        let (mut power, mut change) = (self.scene.noise_w, 0.0);
         for source in &self.scene.sources {
             let dx = x - source.x_m;
             let squared = dx * dx + source.y_m * source.y_m + self.altitude_m * self.altitude_m;
@@ -139,7 +139,7 @@ impl<'a> Line<'a> {
     /// At least 0; `None` where it misses the target even above Rx.
     pub(super) fn last_from(&self, power_w: f64, target: f64) -> Option<f64> {
         let scene = self.scene;
-        let squared = power_w / (scene.eta * target * scene.interference_rx_w());
+        let squared = power_w / (scene.eta * target * (scene.interference_rx_w() + scene.noise_w));
         let across = squared - self.altitude_m * self.altitude_m;
         (across >= 0.0).then(|| (scene.distance_m - across.sqrt()).max(0.0))
     }

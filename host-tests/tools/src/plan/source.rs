@@ -100,6 +100,10 @@ fn third(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
         free::FreeCase::Lowest(case) => (1, format!("at the lowest altitude: {}", along_x(case))),
         free::FreeCase::Highest(case) => (2, format!("at the highest altitude: {}", along_x(case))),
         free::FreeCase::AboveRx(case) => (3, format!("right above Rx: {}", upward(case))),
+        free::FreeCase::Touching => (
+            4,
+            "between the altitudes, where the lines of equal SINR of both hops touch".to_owned(),
+        ),
     };
     Some((
         found,
@@ -140,6 +144,10 @@ fn sideways(case: aside::AsideCase) -> &'static str {
             "on an upright edge of the corridor, at Tx or Rx"
         }
         AsideCase::Level => "the interferer stands at Tx: the first hop is the same everywhere",
+        AsideCase::Inside => "within the corridor at the lowest altitude, by a search",
+        AsideCase::Wall => {
+            "on a wall of the corridor, where the lines of equal SINR of both hops touch"
+        }
         AsideCase::Drowned => "the interferer stands at Rx: nothing is heard",
     }
 }
@@ -163,6 +171,9 @@ fn along_x(case: given_altitude::PlaceCase) -> &'static str {
             "the interferer is behind Tx, and the first hop the better one even above Rx"
         }
         PlaceCase::Level => "the interferer stands at Tx: the first hop is the same everywhere",
+        PlaceCase::SecondHill => {
+            "beyond the worst place of the first hop: at its best one there, or where both have the same SINR"
+        }
         PlaceCase::Drowned => "the interferer stands at Rx: nothing is heard",
     }
 }

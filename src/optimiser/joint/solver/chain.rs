@@ -7,7 +7,7 @@ use crate::optimiser::joint::room::Room;
 use crate::optimiser::joint::site::Site;
 use crate::place::{CrossSection, Placement};
 use crate::power_ratio::PowerRatio;
-use crate::sir::Sender;
+use crate::sir::{Sender, square};
 
 use super::seat::Seat;
 
@@ -41,6 +41,14 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
                 self.mission.relay_gain(power_w)
             },
         }
+    }
+
+    /// gamma / A of the hop from `from` to relay `index`, against what is heard of interference and noise there.
+    pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
+        let m = self.interferer;
+        let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
+        let noise = self.mission.noise_at_a_metre();
+        self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
     /// The altitude that relay `index` keeps to, if it keeps to one while others choose.

@@ -107,7 +107,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 }
             }
             start @ Start::Around { .. } => {
-                let c = chain.sender(index, self.pass.from).gain.ratio(target);
+                let c = chain.loudness(index, self.pass.from, target);
                 start.around(
                     chain.distance_m(),
                     chain.interferer,

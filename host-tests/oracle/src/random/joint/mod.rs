@@ -118,6 +118,7 @@ pub fn scenario(rng: &mut impl Rng, relays: &RangeInclusive<u32>, apart: (f64, f
         mu_los,
         mu_nlos,
         eta,
+        noise_w: 0.0,
         relays: (0..n).map(|_| relay).collect(),
     };
     let most_m = log_uniform(rng, 2.0 * least_m, 0.5 * d);

@@ -6,6 +6,7 @@
 //! interval, and either way the receiver's places solve a quadratic inequality. The target is bisected. Quadratics are solved
 //! here, unlike in the rest of the reference, for speed: what comes out is judged by its SIR alone.
 
+use super::roots;
 use super::scene::{Room, Scene};
 use super::space::{Across, Triple};
 
@@ -139,7 +140,7 @@ pub(super) fn least_advance(scene: &Scene, across_2: f64) -> f64 {
     (scene.apart * scene.apart - across_2).max(0.0).sqrt()
 }
 
-/// A relay at one level that a hop is to reach: (sender to relay)^2 <= `ease` (relay to interferer)^2.
+/// A relay at one level that a hop is to reach: l <= `ease` s / (1 + nu s), with l = (sender to relay)^2 and s = (relay to interferer)^2.
 struct Landing<'a> {
     scene: &'a Scene,
     ease: f64,
@@ -153,6 +154,26 @@ impl Landing<'_> {
         let ahead = self.scene.interferer.x - from.x;
         let across_2 = self.level.apart_2(from.across());
         let rest = self.level.apart_2(self.scene.interferer.across());
+        let noise = self.scene.noise;
+        if noise > 0.0 {
+            // l (1 + nu s) - ease s, with l = z^2 + across_2 and s = z^2 - 2 ahead z + heard.
+            let heard = ahead * ahead + rest;
+            let quartic = [
+                across_2 * (1.0 + noise * heard) - self.ease * heard,
+                2.0 * ahead * (self.ease - noise * across_2),
+                1.0 + noise * (heard + across_2) - self.ease,
+                -2.0 * noise * ahead,
+                noise,
+            ];
+            let start = (from.x + advance).max(self.window.0) - from.x;
+            let found = roots::not_positive(&quartic, start, self.window.1 - from.x);
+            pieces.extend(
+                found
+                    .iter()
+                    .map(|(start, end)| (from.x + start, from.x + end)),
+            );
+            return;
+        }
         not_positive(
             1.0 - self.ease,
             self.ease * ahead,
@@ -173,10 +194,12 @@ impl Landing<'_> {
         let x_i = self.scene.interferer.x;
         for &(start, end) in set {
             // The sender just the least advance behind.
+            let nearest = advance * advance + across_2;
+            let ease = self.ease - self.scene.noise * nearest;
             not_positive(
-                -self.ease,
+                -ease,
                 0.0,
-                advance * advance + across_2 - self.ease * rest,
+                nearest - ease * rest,
                 (
                     (start + advance).max(self.window.0) - x_i,
                     (end + advance).min(self.window.1) - x_i,

@@ -2,7 +2,8 @@
 //!
 //! A hop's SIR is a constant times (receiver to interferer)^2 / (sender to receiver)^2, at Rx a constant over (sender to
 //! Rx)^2. So its logarithm is a sum of logarithms of squared distances, whose derivatives are those of ln(q), q = d^2: slope
-//! 2 d / q, curvature 2 I / q - 4 d d^T / q^2.
+//! 2 d / q, curvature 2 I / q - 4 d d^T / q^2. With noise the first of them is ln(q / w), w = 1 + nu q: slope 2 d / (q w), curvature
+//! 2 I / (q w) - (1 + 2 nu q) (2 d / (q w)) (2 d / (q w))^T.
 
 use super::scene::Scene;
 use super::space::{Square, Triple};
@@ -25,6 +26,18 @@ impl Log {
             slope: d * (2.0 * factor / q),
             even: 2.0 * factor / q,
             sharp: factor.recip(),
+        }
+    }
+
+    /// ln(q / (1 + nu q)).
+    fn in_noise(d: Triple, noise: f64) -> Self {
+        let q = d.dot(d);
+        let w = 1.0 + noise * q;
+        Self {
+            value: (q / w).ln(),
+            slope: d * (2.0 / (q * w)),
+            even: 2.0 / (q * w),
+            sharp: 1.0 + 2.0 * noise * q,
         }
     }
 
@@ -112,7 +125,7 @@ pub(super) fn limits(scene: &Scene, places: &[Triple], target: f64) -> Vec<Limit
             relay,
             constant,
             Log::of(leap, -1.0),
-            Log::of(place - scene.interferer, 1.0),
+            Log::in_noise(place - scene.interferer, scene.noise),
             Some(target),
         ));
         limits.push(Limit::margin(relay, leap.x, ahead, -ahead));

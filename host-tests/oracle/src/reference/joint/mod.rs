@@ -15,6 +15,7 @@ mod kicks;
 mod levels;
 mod limits;
 mod polish;
+mod roots;
 mod scene;
 mod space;
 mod starts;
@@ -97,7 +98,7 @@ pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
             to.altitude_m - from.altitude_m,
         );
         let (dx, dy) = (to.x_m - link.x_i, to.y_m - link.y_i);
-        signal / received_w(link.interferer_w, link.eta, dx, dy, to.altitude_m)
+        signal / (received_w(link.interferer_w, link.eta, dx, dy, to.altitude_m) + link.noise_w)
     });
     let signal = received_w(
         last.power_w,
@@ -107,7 +108,7 @@ pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
         tail.altitude_m,
     );
     let (dx, dy) = (link.distance_m - link.x_i, link.y_i);
-    let rx = signal / received_w(link.interferer_w, link.mu_nlos, dx, dy, 0.0);
+    let rx = signal / (received_w(link.interferer_w, link.mu_nlos, dx, dy, 0.0) + link.noise_w);
     Some(hops.fold(rx, f64::min))
 }
 

@@ -83,6 +83,8 @@ pub(super) struct Scene {
     pub(super) hops: Vec<f64>,
     /// ln of the constant of the hop to Rx.
     pub(super) last: f64,
+    /// The noise over what of the interferer arrives at a relay D from it.
+    pub(super) noise: f64,
 }
 
 impl Scene {
@@ -94,6 +96,7 @@ impl Scene {
         let hops = std::iter::once(link.tx_w).chain(senders);
         let rx = (link.distance_m - link.x_i).powi(2) + link.y_i.powi(2);
         let last = powers().next_back()? / link.interferer_w * link.mu_nlos / link.eta;
+        let louder = 1.0 + link.noise_w * link.mu_nlos * rx / link.interferer_w;
         let rooms: Option<Vec<Room>> = (0..link.len())
             .map(|relay| Room::of(Hold::room(held, relay, corridor), unit))
             .collect();
@@ -106,7 +109,8 @@ impl Scene {
                 .take(link.len())
                 .map(|power| (power / link.interferer_w).ln())
                 .collect(),
-            last: (last * rx * unit * unit).ln(),
+            last: (last * rx * unit * unit / louder).ln(),
+            noise: link.noise_w * link.eta / link.interferer_w / (unit * unit),
         };
         scene.last.is_finite().then_some(scene)
     }
@@ -131,7 +135,8 @@ impl Scene {
         let end = tail - Triple::new(1.0, 0.0, 0.0);
         hops.map(|(&constant, (from, &to))| {
             let (near, far) = (to - from, to - self.interferer);
-            constant + (far.dot(far) / near.dot(near)).ln()
+            let heard = far.dot(far);
+            constant + (heard / (1.0 + self.noise * heard) / near.dot(near)).ln()
         })
         .fold(self.last - end.dot(end).ln(), f64::min)
     }

@@ -14,7 +14,7 @@ use crate::times::instant;
 pub(crate) struct Uploads {
     /// The ground uploads the mission of the scenario with other parameters S virtual seconds after the start, and the chain
     /// flies it. Keys as in a scenario file: x_m, y_m and power_w of the interferer, altitude_m, altitude_min_m,
-    /// altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m, distance_m, tx_w, uav_w; and tolerance. Repeatable: versions count from 1
+    /// altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m, distance_m, tx_w, uav_w; noise_w, 0 to 1; and tolerance. Repeatable: versions count from 1
     #[arg(long, value_name = "S[:KEY=VALUE,..]", value_parser = planned)]
     upload: Vec<Planned>,
     /// Which end of the link uploads
@@ -63,11 +63,12 @@ enum Key {
     Distance,
     TxPower,
     UavPower,
+    Noise,
     Tolerance,
 }
 
-/// The names of the keys, and the ranges of their values: those of a scenario file and of `--tolerance`.
-const KEYS: [(&str, Key, f64, f64); 13] = [
+/// The names of the keys, and the ranges of their values: those of a scenario file, of a mission's noise and of `--tolerance`.
+const KEYS: [(&str, Key, f64, f64); 14] = [
     ("x_m", Key::X, -1e7, 1e7),
     ("y_m", Key::Y, -1e7, 1e7),
     ("power_w", Key::Power, 1e-6, 1e9),
@@ -80,6 +81,7 @@ const KEYS: [(&str, Key, f64, f64); 13] = [
     ("distance_m", Key::Distance, 1.0, 1e6),
     ("tx_w", Key::TxPower, 1e-6, 1e6),
     ("uav_w", Key::UavPower, 1e-6, 1e6),
+    ("noise_w", Key::Noise, 0.0, 1.0),
     ("tolerance", Key::Tolerance, 1e-6, 0.1),
 ];
 
@@ -163,6 +165,7 @@ impl Planned {
                 x_m: to(Key::X, at.x_m),
                 y_m: to(Key::Y, at.y_m),
             }),
+            noise_w: to(Key::Noise, base.noise_w),
             tolerance: to(Key::Tolerance, base.tolerance),
             ..*base
         })
