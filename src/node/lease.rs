@@ -217,7 +217,7 @@ impl Lease {
                     if current.done.is_some() {
                         self.retransmit.asked(context.now, context.way_back());
                     } else {
-                        let hop_time = context.settings().hop_time;
+                        let hop_time = context.hop_time;
                         self.retransmit.came_again(context.now, hop_time);
                     }
                     return Effects::REPEATED;
@@ -319,25 +319,37 @@ impl Lease {
     fn on_pulsed(&mut self, context: &Context<'_>, pulsed: Pulsed) -> Effects {
         let Some(current) = self
             .current
-            .filter(|current| current.number == pulsed.number && current.done.is_none())
+            .filter(|current| current.number == pulsed.number)
         else {
             return Effects::STALE;
         };
-        if pulsed.done {
-            self.finish(context);
-        } else {
-            self.retransmit.arrived(context.now, context.way_onward());
+        if current.done.is_some() {
+            return Effects {
+                took: self.retransmit.came_twice(context.now),
+                ..Effects::STALE
+            };
         }
+        let effects = if pulsed.done {
+            let hops = context.way_onward().hops;
+            let took = self.retransmit.went_through(context.now, hops);
+            self.finish(context);
+            Effects {
+                took,
+                ..Effects::NONE
+            }
+        } else {
+            self.retransmit.arrived(context.now, context.way_onward())
+        };
         Effects {
             heard_onward: Some(current.handed_on),
-            ..Effects::NONE
+            ..effects
         }
     }
 
     /// Does what is due: a pulse at the leader, one more time, or nothing any more.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let now = context.now;
-        let again = self.retransmit.take_due(now, context.settings().hop_time);
+        let again = self.retransmit.take_due(now, context.hop_time);
         let resent = again == Some(Again::Onward);
         self.due.onward |= resent;
         self.due.back |= again == Some(Again::Back);

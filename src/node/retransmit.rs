@@ -1,5 +1,7 @@
 //! How long what comes back of a message sent onward is awaited before that message is sent again.
 
+use super::context::Effects;
+use super::round_trip::Took;
 use crate::jitter::Jitter;
 use crate::time::{Duration, Instant};
 
@@ -9,6 +11,12 @@ const SLOW: u32 = 4;
 
 /// A message of which nothing is heard is repeated every eight hops' time: a run of lost frames is over the sooner.
 const LOG_MOST: u32 = 2;
+
+/// So often it is repeated before the spans between the repetitions double: that many may get lost where every other frame does.
+const FREE: u8 = 6;
+
+/// How often they double.
+const DOUBLINGS: u8 = 3;
 
 /// Within this many hops' time a neighbour that has got a message again says so.
 const SOON: u32 = 4;
@@ -21,6 +29,8 @@ const MEMORY: u8 = 8;
 pub(crate) struct Retransmit {
     /// How often it has been sent again since anything was heard of it.
     unheard: u8,
+    /// Whether it has been sent again, and what comes of that may come yet.
+    repeated: bool,
     /// Whether the neighbour has said that it has arrived.
     arrived: bool,
     /// Whether frames get lost on its way, by what this relay or the one before has seen.
@@ -29,7 +39,11 @@ pub(crate) struct Retransmit {
     doubt: u8,
     /// How often what came of it is said again unasked.
     answers: u8,
+    /// How often that was asked for.
+    asks: u8,
     jitter: Jitter,
+    /// When it was sent last, µs, wrapping.
+    sent_at: u32,
     at: Option<Instant>,
 }
 
@@ -53,15 +67,24 @@ pub(crate) enum Again {
     Back,
 }
 
+/// The time in µs, wrapping after 71 minutes.
+#[expect(clippy::cast_possible_truncation, reason = "as it says")]
+const fn micros(at: Instant) -> u32 {
+    at.as_micros() as u32
+}
+
 impl Retransmit {
     pub(crate) const fn new(seed: u32) -> Self {
         Self {
             unheard: 0,
+            repeated: false,
             arrived: false,
             lossy: false,
             doubt: 0,
             answers: 0,
+            asks: 0,
             jitter: Jitter::new(seed),
+            sent_at: 0,
             at: None,
         }
     }
@@ -69,6 +92,8 @@ impl Retransmit {
     /// There is a new message.
     pub(crate) const fn begin(&mut self) {
         self.unheard = 0;
+        self.repeated = false;
+        self.asks = 0;
         self.arrived = false;
         self.lossy = self.doubt > 0;
         self.doubt = self.doubt.saturating_sub(1);
@@ -76,17 +101,42 @@ impl Retransmit {
     }
 
     /// A neighbour has said that the message has arrived. What is missing is the answer, and that may take its time.
-    pub(crate) fn arrived(&mut self, now: Instant, trip: Trip) {
+    pub(crate) fn arrived(&mut self, now: Instant, trip: Trip) -> Effects {
+        let took = Duration::from_micros(u64::from(micros(now).wrapping_sub(self.sent_at)));
+        // Nobody says that the first one has arrived.
+        let took = match (self.unheard, self.arrived) {
+            (1, false) => Took::Exactly(took),
+            _ => Took::AtLeast(took),
+        };
         self.unheard = 0;
         self.arrived = true;
-        self.sent(now, trip);
+        self.wait(now, trip);
+        Effects {
+            took: Some(took),
+            ..Effects::NONE
+        }
+    }
+
+    /// What came of the message has come back over `hops` hops each way. Where it was sent once that says how long one takes at most.
+    pub(crate) fn went_through(&self, now: Instant, hops: u16) -> Option<Took> {
+        let clean = self.unheard == 0 && !self.arrived && self.at.is_some();
+        let took = micros(now).wrapping_sub(self.sent_at);
+        let took = took.checked_div(u32::from(hops)).filter(|_| clean)?;
+        Some(Took::AtMost(Duration::from_micros(u64::from(took))))
+    }
+
+    /// What came of the message has come once more. Where it was sent again, that is what came of the last one.
+    pub(crate) fn came_twice(&mut self, now: Instant) -> Option<Took> {
+        let took = micros(now).wrapping_sub(self.sent_at);
+        let first = core::mem::take(&mut self.repeated);
+        first.then_some(Took::AtLeast(Duration::from_micros(u64::from(took))))
     }
 
     /// The relay before has sent the message again: frames get lost on its way, and it may be lost to the next one, too.
     pub(crate) fn came_again(&mut self, now: Instant, hop_time: Duration) {
         self.lossy = true;
         let soon = now + self.jitter.spread(hop_time.times(SOON));
-        if !self.arrived && self.at.is_some_and(|at| at > soon) {
+        if self.unheard == 0 && !self.arrived && self.at.is_some_and(|at| at > soon) {
             self.at = Some(soon);
         }
     }
@@ -96,15 +146,23 @@ impl Retransmit {
     /// The answer may take as long as there and back over the hops that are left, and two to spare; [`SLOW`] times as long where relays
     /// compute on the way. The relay next to a lost frame runs out of patience first, so one loss costs one repetition. From then on it is
     /// known that frames get lost here: this message and the next ones are repeated sooner, first after four hops' time and then after
-    /// eight, until a neighbour says that it has arrived. The neighbour learns by the repetition that frames get lost, and does the same:
+    /// eight, until a neighbour says that it has arrived; after [`FREE`] of them less and less often, as the link may only be slow. The neighbour learns by the repetition that frames get lost, and does the same:
     /// so a loss is waited for the whole way once, and not at every hop of a long chain. A random eighth keeps relays on a shared channel
     /// from repeating in step.
     pub(crate) fn sent(&mut self, now: Instant, trip: Trip) {
+        self.sent_at = micros(now);
+        self.wait(now, trip);
+    }
+
+    fn wait(&mut self, now: Instant, trip: Trip) {
         let answer = (2 * u32::from(trip.hops) + 2) * if trip.slow { SLOW } else { 1 };
         let hops = match self.unheard {
             0 if self.lossy && !self.arrived => answer.min(SOON),
             0 => answer,
-            again => answer.min(2 << u32::from(again).min(LOG_MOST)),
+            again => {
+                let doublings = again.saturating_sub(FREE).min(DOUBLINGS);
+                answer.min(2 << u32::from(again).min(LOG_MOST)) << doublings
+            }
         };
         self.answers = 0;
         self.at = Some(now + self.jitter.spread(trip.hop_time.times(hops)));
@@ -127,11 +185,16 @@ impl Retransmit {
     /// The relay before asks for what came of the message: it was lost on the way back.
     pub(crate) fn asked(&mut self, now: Instant, trip: Trip) {
         self.lossy = true;
-        self.answered(now, trip);
+        // Who asks again and again may only be slow to hear.
+        if self.answers == 0 {
+            self.asks = self.asks.saturating_add(1);
+            self.answered(now, trip);
+        }
     }
 
     fn say_again(&mut self, now: Instant, hop_time: Duration) {
-        self.at = (self.answers > 0).then(|| now + self.jitter.spread(hop_time.times(SOON)));
+        let span = hop_time.times(SOON << self.asks.saturating_sub(1).min(DOUBLINGS));
+        self.at = (self.answers > 0).then(|| now + self.jitter.spread(span));
     }
 
     /// Nothing is awaited any more.
@@ -155,6 +218,7 @@ impl Retransmit {
             self.doubt = MEMORY;
         }
         self.unheard = self.unheard.saturating_add(1);
+        self.repeated = true;
         Some(Again::Onward)
     }
 
@@ -165,7 +229,12 @@ impl Retransmit {
 
 #[cfg(test)]
 mod tests {
-    use super::{Again, MEMORY, Retransmit, SOON, Trip};
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::{Again, DOUBLINGS, FREE, MEMORY, Retransmit, SOON, Trip};
+    use crate::node::round_trip::Took;
     use crate::time::{Duration, Instant};
 
     const HOP: Duration = Duration::from_millis(10);
@@ -249,6 +318,96 @@ mod tests {
         one.begin();
         one.sent(now, WAY);
         assert!(around(100).contains(&wait(&one, now)));
+    }
+
+    #[test]
+    fn what_stays_unheard_is_repeated_less_and_less_often() {
+        let (mut one, mut now) = (Retransmit::new(1), Instant::from_millis(1_000));
+        one.begin();
+        one.sent(now, WAY);
+        let spans: Vec<u64> = (0..FREE + DOUBLINGS + 2)
+            .map(|_| {
+                now = silence(&mut one, now, 1);
+                wait(&one, now)
+            })
+            .collect();
+        let expected = [4, 8, 8, 8, 8, 8, 16, 32, 64, 64, 64];
+        assert_eq!(spans.len(), expected.len());
+        for (span, hops) in spans.iter().zip(expected) {
+            assert!(around(hops).contains(span), "{spans:?}");
+        }
+        // Even where an answer would be back at once.
+        let next = Trip { hops: 1, ..WAY };
+        one.sent(now, next);
+        assert!(around(32).contains(&wait(&one, now)));
+        one.arrived(now, WAY);
+        assert!(around(100).contains(&wait(&one, now)));
+    }
+
+    #[test]
+    fn that_of_one_repetition_is_a_sample_and_that_of_several_a_bound() {
+        let after = |repetitions| {
+            let mut one = Retransmit::new(1);
+            let now = Instant::from_millis(1_000);
+            one.begin();
+            one.sent(now, WAY);
+            let now = silence(&mut one, now, repetitions);
+            (one, now + HOP)
+        };
+        let (mut one, now) = after(1);
+        assert_eq!(one.arrived(now, WAY).took, Some(Took::Exactly(HOP)));
+        // The next one may answer either.
+        assert_eq!(one.arrived(now, WAY).took, Some(Took::AtLeast(HOP)));
+        let (mut one, now) = after(2);
+        assert_eq!(one.arrived(now, WAY).took, Some(Took::AtLeast(HOP)));
+        // What came of it comes as often as it was asked for, and then as often as it is said unasked: the first one tells something.
+        assert_eq!(one.came_twice(now + HOP), Some(Took::AtLeast(HOP.times(2))));
+        assert_eq!(one.came_twice(now + HOP), None);
+        let (mut one, now) = after(0);
+        assert_eq!(one.came_twice(now), None);
+    }
+
+    #[test]
+    fn what_was_sent_once_takes_no_longer_than_until_it_came_back() {
+        let (mut one, start) = (Retransmit::new(1), Instant::from_millis(1_000));
+        assert_eq!(one.went_through(start, 49), None, "nothing was sent");
+        one.begin();
+        one.sent(start, WAY);
+        let back = start + HOP.times(98);
+        assert_eq!(one.went_through(back, 49), Some(Took::AtMost(HOP.times(2))));
+        assert_eq!(one.went_through(back, 0), None);
+        let now = silence(&mut one, start, 1);
+        assert_eq!(one.went_through(now, 49), None, "it was repeated");
+        one.arrived(now, WAY);
+        assert_eq!(one.went_through(now, 49), None, "it was repeated");
+    }
+
+    /// Who asks may only be slow to hear.
+    #[test]
+    fn who_asks_again_and_again_is_told_unasked_less_and_less_often() {
+        let (mut one, mut now) = (Retransmit::new(1), Instant::from_millis(1_000));
+        let way = Trip { hops: 1, ..WAY };
+        one.begin();
+        for hops in [4, 8, 16, 32, 32] {
+            one.asked(now, way);
+            let due = one.next_timeout();
+            one.asked(now, way);
+            assert_eq!(one.next_timeout(), due, "what is to be said stays due");
+            assert!(around(hops).contains(&wait(&one, now)), "{hops}");
+            now = due.unwrap();
+            assert_eq!(one.take_due(now, HOP), Some(Again::Back));
+        }
+    }
+
+    #[test]
+    fn what_is_repeated_already_is_repeated_no_sooner_for_coming_again() {
+        let (mut one, now) = (Retransmit::new(1), Instant::from_millis(1_000));
+        one.begin();
+        one.sent(now, WAY);
+        let now = silence(&mut one, now, 3);
+        let due = one.next_timeout();
+        one.came_again(now, HOP);
+        assert_eq!(one.next_timeout(), due);
     }
 
     #[test]
