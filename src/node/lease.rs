@@ -317,32 +317,29 @@ impl Lease {
     }
 
     fn on_pulsed(&mut self, context: &Context<'_>, pulsed: Pulsed) -> Effects {
-        let Some(current) = self
-            .current
-            .filter(|current| current.number == pulsed.number)
-        else {
+        let known = self.current.filter(|known| known.number == pulsed.number);
+        let Some(current) = known else {
             return Effects::STALE;
         };
+        let (now, way) = (context.now, context.way_onward());
         if current.done.is_some() {
+            let took = self.retransmit.came_twice(now);
             return Effects {
-                took: self.retransmit.came_twice(context.now),
+                took,
                 ..Effects::STALE
             };
         }
-        let effects = if pulsed.done {
-            let hops = context.way_onward().hops;
-            let took = self.retransmit.went_through(context.now, hops);
+        let took = if pulsed.done {
+            let took = self.retransmit.went_through(now, way.hops);
             self.finish(context);
-            Effects {
-                took,
-                ..Effects::NONE
-            }
+            took
         } else {
-            self.retransmit.arrived(context.now, context.way_onward())
+            Some(self.retransmit.arrived(now, way))
         };
         Effects {
+            took,
             heard_onward: Some(current.handed_on),
-            ..effects
+            ..Effects::NONE
         }
     }
 

@@ -11,6 +11,9 @@
 //!
 //! and at the latest after eight times `dead_after`. From there on it is asked every `probe_after`.
 //!
+//! No question is asked before the one before can have been answered: where the channel is slow or overloaded, relays ask the less. Until it
+//! is known how long an answer takes they ask less and less often, down to sixteen times from `probe_after` to `dead_after`.
+//!
 //! Relays of one view that choose their places jointly solve the same chain at the same time, and have nothing to say until they
 //! are done. So while a relay solves, the silence of a neighbour that it is in one view with is excused: both times count from the end
 //! of its own solving.
@@ -229,5 +232,57 @@ impl Liveness {
             now + tick
         };
         Silence { lost, look_again }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Liveness, Settings, tick};
+    use crate::time::{Duration, Instant};
+
+    const NOW: Instant = Instant::from_millis(60_000);
+
+    /// Of a short chain, and of one so long that nothing may be asked oftener.
+    fn ticks() -> [Duration; 2] {
+        [8, 1_000].map(|all| tick(&Settings::default(), all))
+    }
+
+    #[test]
+    fn who_does_not_answer_is_asked_less_often_and_sixteen_times_all_the_same() {
+        let settings = Settings::default();
+        for tick in ticks() {
+            let mut link = Liveness::new(NOW);
+            let mut last = Duration::from_micros(0);
+            let mut all = 0;
+            for _ in 0..16 {
+                link.ask(NOW);
+                let next = link.paced(tick, &settings);
+                assert!(next >= last.max(tick));
+                last = next;
+                all += next.as_micros();
+            }
+            // From `probe_after` to `dead_after`.
+            assert!(all <= 10_000_000, "{all}");
+            assert_eq!(last.as_micros(), 625_000);
+        }
+    }
+
+    #[test]
+    fn nobody_is_asked_again_before_the_answer_can_have_come() {
+        let settings = Settings::default();
+        for tick in ticks() {
+            for took in [10, 400, 2_000] {
+                let took = Duration::from_millis(took);
+                let mut link = Liveness::new(NOW);
+                let question = link.ask(NOW);
+                assert_eq!(link.answered(question, NOW + took), Some(NOW));
+                for _ in 0..16 {
+                    link.ask(NOW);
+                    assert_eq!(link.paced(tick, &settings), took.max(tick));
+                }
+                link.renew(NOW);
+                assert_eq!(link.paced(tick, &settings), tick, "another node");
+            }
+        }
     }
 }

@@ -96,7 +96,11 @@ impl Round {
             Message::Busy { sweep } => {
                 if computation.phase() == Phase::Waiting && *sweep == computation.number() {
                     let trip = self.trip(context);
-                    return self.retransmit.arrived(context.now, trip);
+                    let took = Some(self.retransmit.arrived(context.now, trip));
+                    return Effects {
+                        took,
+                        ..Effects::NONE
+                    };
                 }
                 return Effects::NONE;
             }

@@ -56,6 +56,10 @@ impl ViewChange {
         self.awaited()
             .filter(|proposed| proposed.view.mark() == number)?;
         let way = context.way(context.member.all);
-        Some(self.retransmit.arrived(context.now, way))
+        let took = Some(self.retransmit.arrived(context.now, way));
+        Some(Effects {
+            took,
+            ..Effects::NONE
+        })
     }
 }
