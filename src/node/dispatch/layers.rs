@@ -22,13 +22,14 @@ pub(super) struct Layers {
 impl Layers {
     /// What a layer is handed. It borrows the member alone, which stands beside the layers: any of them can be lent while it lasts.
     pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
-        let onward = Side::onward(member.mission.heading());
+        let onward = self.neighbours.at(Side::onward(member.mission.heading()));
         Context {
             now,
             member,
             latest: self.update.latest(),
-            end: self.neighbours.at(onward).has_no_peer(),
+            end: onward.has_no_peer(),
             held: self.lease.held(now),
+            hop_time: onward.hop_time(&member.settings),
         }
     }
 

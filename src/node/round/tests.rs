@@ -53,6 +53,7 @@ impl Line {
                 view: ViewId::LOADED,
                 rest: None,
             },
+            hop_time: member.settings.hop_time,
         };
         call(&mut self.rounds[at], &context)
     }

@@ -8,6 +8,7 @@
     missing_docs
 )]
 
+mod latency;
 mod least_baud;
 mod messages;
 
