@@ -8,7 +8,9 @@ use uav_relay::{
     Band, Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, Relay, Wiring,
 };
 
-use super::codec::{Fenced, Greeting, Handed, Heard, Judged, Said, Seats, Shifted, Swept, plain, wire};
+use super::codec::{
+    Fenced, Greeting, Handed, Heard, Judged, Said, Seats, Shifted, Swept, plain, wire,
+};
 use super::forming::{granted, id, proposed};
 use super::offer::{Offer, offer};
 use super::receive::{drain, relay_of};

@@ -7,8 +7,8 @@ use proptest::prelude::*;
 use uav_relay::wire::frame::Header;
 
 use super::codec::{
-    Call, Decided, Fenced, Greeting, Handed, Heard, Judged, Proposed, Said, Seats, Shifted, SizedView,
-    Swept, plain, sealed, targets, wire,
+    Call, Decided, Fenced, Greeting, Handed, Heard, Judged, Proposed, Said, Seats, Shifted,
+    SizedView, Swept, plain, sealed, targets, wire,
 };
 use super::offered::{NUMBERS, offers};
 
@@ -386,7 +386,8 @@ fn pulses() -> BoxedStrategy<Said> {
 
 /// What the relays hear and believe.
 fn hearings() -> BoxedStrategy<Heard> {
-    let powers = || prop_oneof![1 => Just(0.0), 3 => 1e-12..1e-3_f32, 1 => Just(1e-30), 1 => Just(1e6)];
+    let powers =
+        || prop_oneof![1 => Just(0.0), 3 => 1e-12..1e-3_f32, 1 => Just(1e-30), 1 => Just(1e6)];
     let sides = || {
         let any = (up_to(1e7), any::<bool>());
         any.prop_map(|(metres, below)| if below { -metres } else { metres })
@@ -403,16 +404,18 @@ fn hearings() -> BoxedStrategy<Heard> {
     })];
     let offs = prop_oneof![2 => Just(0), 2 => 1..9_u16, 1 => 0..=MAX_NODE, 1 => Just(MAX_NODE)];
     (any::<[u16; 3]>(), told, sums, (powers(), up_to(1e9)), offs)
-        .prop_map(|([number, mission, told], (kind, source), sums, (heard_w, count), off)| Heard {
-            number,
-            mission,
-            told,
-            kind,
-            source,
-            sums: sums.try_into().unwrap(),
-            receiver: [heard_w, count],
-            off,
-        })
+        .prop_map(
+            |([number, mission, told], (kind, source), sums, (heard_w, count), off)| Heard {
+                number,
+                mission,
+                told,
+                kind,
+                source,
+                sums: sums.try_into().unwrap(),
+                receiver: [heard_w, count],
+                off,
+            },
+        )
         .boxed()
 }
 

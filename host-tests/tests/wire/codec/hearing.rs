@@ -39,7 +39,8 @@ impl Heard {
     /// The message that says this, read by the crate: nobody but a relay adds sums up.
     pub(super) fn message(&self, tag: u8) -> Message {
         let message = Message::decode(&self.body(tag)).unwrap();
-        let (17, Message::Sense(hearing)) | (18, Message::Sensed(hearing)) = (tag, &message) else {
+        let ((17, Message::Sense(hearing)) | (18, Message::Sensed(hearing))) = (tag, &message)
+        else {
             panic!("{tag}: {message:?}");
         };
         assert!(self.is(hearing), "{hearing:?}");

@@ -3,7 +3,7 @@
 use uav_relay::sensing::belief::Told;
 use uav_relay::{Phase, Placement, Sample};
 
-use super::super::drones::placement;
+use super::super::drones::{Drone, placement};
 use super::super::fleet::Vehicle;
 use super::super::queue::Happening;
 use super::super::sky::Stand;
@@ -23,7 +23,7 @@ impl Chain {
                 .flight
                 .as_ref()
                 .and_then(|flight| flight.drones.get(index))
-                .map(|drone| drone.taken())
+                .map(Drone::taken)
                 .or_else(|| self.fleet.get(index).map(Vehicle::at))
                 .map(placement);
             let Some(member) = self.members.get_mut(index) else {
