@@ -4,12 +4,13 @@
 //! | file | one idea |
 //! | --- | --- |
 //! | `codec.rs` | which message a body says |
-//! | `sweep.rs`, `turn.rs`, `seats.rs`, `hello.rs`, `votes.rs` | what the longer ones say: bytes, message, ranges |
+//! | `sweep.rs`, `turn.rs`, `seats.rs`, `hearing.rs`, `hello.rs`, `votes.rs` | what the longer ones say: bytes, message, ranges |
 //! | `bytes.rs`, `reader.rs`, `limits.rs` | the parts that bodies are written of, read of, and held within |
 //! | `frame.rs` | what stands around a body |
 
 mod bytes;
 mod frame;
+mod hearing;
 mod hello;
 mod limits;
 mod reader;
@@ -24,6 +25,7 @@ use uav_relay::place::CrossSection;
 use uav_relay::wire::message::{Message, MessageError, Pulse, Pulsed};
 
 pub(crate) use frame::{header, plain, sealed, wire};
+pub(crate) use hearing::Heard;
 pub(crate) use hello::Greeting;
 pub(crate) use seats::Seats;
 pub(crate) use sweep::{Judged, Swept, narrow, targets, wide};
@@ -76,6 +78,8 @@ pub(crate) enum Said {
         mission: u16,
         done: bool,
     },
+    Sense(Heard),
+    Sensed(Heard),
 }
 
 /// How far a relay keeps off.
@@ -182,6 +186,8 @@ impl Said {
                 out.push(u8::from(*done));
                 out
             }
+            Self::Sense(heard) => heard.body(17),
+            Self::Sensed(heard) => heard.body(18),
         }
     }
 
@@ -232,6 +238,8 @@ impl Said {
                 mission,
                 done,
             }),
+            Self::Sense(ref heard) => heard.message(17),
+            Self::Sensed(ref heard) => heard.message(18),
         }
     }
 
@@ -299,6 +307,8 @@ impl Said {
                 mission: rest.word()?,
                 done: rest.bool()?,
             },
+            17 => Self::Sense(Heard::read(rest)?),
+            18 => Self::Sensed(Heard::read(rest)?),
             _ => return None,
         })
     }
@@ -322,6 +332,7 @@ impl Said {
             Self::Decision(decided) => decided.in_range(),
             Self::Fence(fenced) => fenced.in_range(),
             Self::Offer(offer) => offer.in_range(),
+            Self::Sense(heard) | Self::Sensed(heard) => heard.in_range(),
         }
     }
 }

@@ -9,7 +9,7 @@ use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message};
 
 use super::codec::{
-    self, Call, Decided, Greeting, Handed, Judged, Proposed, Said, Shifted, SizedView, Swept,
+    self, Call, Decided, Greeting, Handed, Heard, Judged, Proposed, Said, Shifted, SizedView, Swept,
 };
 use super::offer::Offer;
 
@@ -266,7 +266,7 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
         known.map(|vector| vector.wire().len()).max()
     };
     assert_eq!(longest(true), Some(100));
-    assert_eq!(longest(false), Some(105));
+    assert_eq!(longest(false), Some(122));
 }
 
 #[test]
@@ -370,6 +370,35 @@ fn the_vectors_hold_offers_of_every_extreme() {
     some(|offer| offer.noise_w > 0.0);
     some(|offer| offer.answer == 0);
     some(|offer| offer.answer == u16::MAX);
+}
+
+#[test]
+fn the_vectors_hold_hearings_of_every_belief_and_extreme() {
+    let frames = vectors().frames;
+    let some = |what: fn(&Heard) -> bool| {
+        assert!(frames.iter().any(|vector| match &vector.message {
+            Said::Sense(heard) | Said::Sensed(heard) => what(heard),
+            _ => false,
+        }));
+    };
+    some(|heard| heard.kind == 0 && heard.told == 0);
+    some(|heard| heard.kind == 1);
+    some(|heard| heard.kind == 2);
+    some(|heard| heard.kind == 3);
+    some(|heard| heard.kind == 4 && heard.source == [1e9, 1e7, -1e7, 1e6]);
+    some(|heard| heard.kind == 4 && heard.source == [1e-6, -1e7, 1e7, 1e-30]);
+    some(|heard| heard.kind == 4 && heard.source[3] == 0.0);
+    some(|heard| heard.sums == [0.0; 18]);
+    some(|heard| heard.sums.map(f32::abs) == [f32::MAX; 18] && heard.sums[2] < 0.0);
+    // Each in its place.
+    some(|heard| {
+        let mut sums = heard.sums.map(f32::to_bits);
+        sums.sort_unstable();
+        sums.windows(2).all(|two| two[0] < two[1])
+    });
+    some(|heard| heard.receiver == [1e6, 1e9] && heard.off == 4094);
+    some(|heard| heard.receiver[0] == 1e-30);
+    some(|heard| heard.receiver == [0.0, 0.0] && heard.off == 0);
 }
 
 #[test]

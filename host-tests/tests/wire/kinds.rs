@@ -8,7 +8,9 @@ use uav_relay::{
     Band, Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, Relay, Wiring,
 };
 
-use super::codec::{Fenced, Greeting, Handed, Judged, Said, Seats, Shifted, Swept, plain, wire};
+use super::codec::{
+    Fenced, Greeting, Handed, Heard, Judged, Said, Seats, Shifted, Swept, plain, wire,
+};
 use super::forming::{granted, id, proposed};
 use super::offer::{Offer, offer};
 use super::receive::{drain, relay_of};
@@ -91,6 +93,22 @@ pub(crate) fn seats(number: u16, mission: u16, index: u16) -> Seats {
         mission,
         after: 0,
         seats: vec![(index, 30.0, 0.5)],
+    }
+}
+
+/// What two relays hear of a source that all believe in.
+pub(crate) fn heard(number: u16, mission: u16) -> Heard {
+    let mut sums = [0.0; 18];
+    [sums[0], sums[14], sums[15], sums[16], sums[17]] = [2.0, 0.5, 2.0, 64.0, 3.0];
+    Heard {
+        number,
+        mission,
+        told: 1,
+        kind: 4,
+        source: [62.5, 600.0, -250.0, 1e-6],
+        sums,
+        receiver: [1e-6, 32.0],
+        off: 0,
     }
 }
 
@@ -187,6 +205,8 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             mission,
             done: true,
         },
+        Said::Sense(heard(number, mission)),
+        Said::Sensed(heard(number, mission)),
     ]
 }
 

@@ -73,6 +73,9 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
             }
         }
         Said::Offer(offer) => offer.base = as_mission,
+        Said::Sense(heard) | Said::Sensed(heard) => {
+            (heard.number, heard.mission) = (as_number, as_mission);
+        }
     }
     said
 }

@@ -22,8 +22,8 @@ fn a_message_from_the_wrong_side_for_the_heading_is_misdirected_and_nothing_else
             }
             for said in one_of_each(SECOND, digest(relay.mission())) {
                 let wrong = match said.body()[0] {
-                    0 | 4..=6 | 8 | 11 | 15 => to,
-                    1 | 2 | 7 | 9 | 12 | 16 => from,
+                    0 | 4..=6 | 8 | 11 | 15 | 17 => to,
+                    1 | 2 | 7 | 9 | 12 | 16 | 18 => from,
                     _ => continue,
                 };
                 let mut after = relay.clone();

@@ -7,8 +7,8 @@ use proptest::prelude::*;
 use uav_relay::wire::frame::Header;
 
 use super::codec::{
-    Call, Decided, Fenced, Greeting, Handed, Judged, Proposed, Said, Seats, Shifted, SizedView,
-    Swept, plain, sealed, targets, wire,
+    Call, Decided, Fenced, Greeting, Handed, Heard, Judged, Proposed, Said, Seats, Shifted,
+    SizedView, Swept, plain, sealed, targets, wire,
 };
 use super::offered::{NUMBERS, offers};
 
@@ -384,6 +384,50 @@ fn pulses() -> BoxedStrategy<Said> {
     prop_oneof![pulse, pulsed].boxed()
 }
 
+/// What the relays hear and believe.
+fn hearings() -> BoxedStrategy<Heard> {
+    let powers =
+        || prop_oneof![1 => Just(0.0), 3 => 1e-12..1e-3_f32, 1 => Just(1e-30), 1 => Just(1e6)];
+    let sides = || {
+        let any = (up_to(1e7), any::<bool>());
+        any.prop_map(|(metres, below)| if below { -metres } else { metres })
+    };
+    let sources = prop_oneof![3 => 0.1..100.0_f32, 1 => Just(1e-6), 1 => Just(1e9)];
+    let source = (sources, sides(), sides(), powers())
+        .prop_map(|(power_w, x_m, y_m, receiver_w)| (4, [power_w, x_m, y_m, receiver_w]));
+    let told = prop_oneof![1 => (0..4_u8).prop_map(|kind| (kind, [0.0; 4])), 2 => source];
+    let sums = prop_oneof![1 => Just(vec![0.0; 18]), 4 => vec((up_to(f32::MAX), any::<bool>()), 18).prop_map(|sums| {
+        let signed = |(at, (sum, below)): (usize, (f32, bool))| {
+            if below && (1..14).contains(&at) { -sum } else { sum }
+        };
+        sums.into_iter().enumerate().map(signed).collect()
+    })];
+    let offs = prop_oneof![2 => Just(0), 2 => 1..9_u16, 1 => 0..=MAX_NODE, 1 => Just(MAX_NODE)];
+    (any::<[u16; 3]>(), told, sums, (powers(), up_to(1e9)), offs)
+        .prop_map(
+            |([number, mission, told], (kind, source), sums, (heard_w, count), off)| Heard {
+                number,
+                mission,
+                told,
+                kind,
+                source,
+                sums: sums.try_into().unwrap(),
+                receiver: [heard_w, count],
+                off,
+            },
+        )
+        .boxed()
+}
+
+/// What the relays hear and believe, onward or back.
+pub(crate) fn heard() -> BoxedStrategy<Said> {
+    prop_oneof![
+        hearings().prop_map(Said::Sense),
+        hearings().prop_map(Said::Sensed),
+    ]
+    .boxed()
+}
+
 fn questions() -> impl Strategy<Value = u16> {
     prop_oneof![2 => Just(0), 3 => 0..9_u16, 1 => any::<u16>()]
 }
@@ -423,6 +467,7 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         3 => formings(),
         2 => pulses(),
         2 => offers(),
+        3 => heard(),
     ]
     .boxed()
 }
@@ -460,6 +505,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
                 9 => &[5, 9, 14],
                 10..=12 => &[5, 7],
                 14 => &NUMBERS,
+                17 | 18 => &[8, 12, 16, 20, 24, 28, 80, 84, 88, 92, 96, 100],
                 _ => &[1],
             };
             let at = starts[at.index(starts.len())];
@@ -487,6 +533,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
                 9 => &[13],
                 10..=12 => &[5, 6, 7, 8, 9, 10, 11, 12, 13],
                 14 => &[1, 2, 5, 6],
+                17 | 18 => &[7, 104, 105],
                 _ => &[0],
             };
             let at = bytes[at.index(bytes.len())];
@@ -500,7 +547,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         pad(&mut body, tag, more);
         body
     });
-    let tagged = (0..16_u8, vec(any::<u8>(), 0..=96)).prop_map(|(tag, mut body)| {
+    let tagged = (0..=18_u8, vec(any::<u8>(), 0..=120)).prop_map(|(tag, mut body)| {
         body.insert(0, tag);
         body
     });
@@ -513,7 +560,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         1 => longer.boxed(),
         1 => padded.boxed(),
         2 => tagged.boxed(),
-        1 => vec(any::<u8>(), 0..=96).boxed(),
+        1 => vec(any::<u8>(), 0..=120).boxed(),
     ]
     .boxed()
 }
@@ -542,7 +589,7 @@ pub(crate) fn pieces(heads: impl Strategy<Value = Header> + 'static) -> BoxedStr
         .prop_map(|(head, said)| wire(&plain(head, &said.body())))
         .boxed();
     let sealed_body = (heads, bodies()).prop_map(|(head, body)| wire(&plain(head, &body)));
-    let sealed_noise = vec(any::<u8>(), 0..=98).prop_map(|bytes| wire(&sealed(bytes)));
+    let sealed_noise = vec(any::<u8>(), 0..=124).prop_map(|bytes| wire(&sealed(bytes)));
     let damaged = (good.clone(), any::<proptest::sample::Index>(), 0..8_u8).prop_map(
         |(mut frame, at, bit)| {
             let at = at.index(frame.len());
