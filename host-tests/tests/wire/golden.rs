@@ -389,7 +389,7 @@ fn the_vectors_hold_hearings_of_every_belief_and_extreme() {
     some(|heard| heard.kind == 4 && heard.source == [1e-6, -1e7, 1e7, 1e-30]);
     some(|heard| heard.kind == 4 && heard.source[3] == 0.0);
     some(|heard| heard.sums == [0.0; 18]);
-    some(|heard| heard.sums.map(f32::abs) == [f32::MAX; 18] && heard.sums[1] < 0.0);
+    some(|heard| heard.sums.map(f32::abs) == [f32::MAX; 18] && heard.sums[2] < 0.0);
     // Each in its place.
     some(|heard| {
         let mut sums = heard.sums.map(f32::to_bits);
