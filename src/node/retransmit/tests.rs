@@ -131,11 +131,6 @@ fn that_of_one_repetition_is_a_sample_and_that_of_several_a_bound() {
     assert_eq!(one.arrived(now, WAY), Took::AtLeast(HOP));
     let (mut one, now) = after(2);
     assert_eq!(one.arrived(now, WAY), Took::AtLeast(HOP));
-    // What came of it comes as often as it was asked for, and then as often as it is said unasked: the first one tells something.
-    assert_eq!(one.came_twice(now + HOP), Some(Took::AtLeast(HOP.times(2))));
-    assert_eq!(one.came_twice(now + HOP), None);
-    let (mut one, now) = after(0);
-    assert_eq!(one.came_twice(now), None);
 }
 
 #[test]

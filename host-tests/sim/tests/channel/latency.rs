@@ -54,7 +54,7 @@ fn links_slower_than_hop_time_are_noticed() {
     assert!(beyond.is_empty(), "{beyond:?}");
 }
 
-/// Over ten minutes a chain that was told too short a `hop_time` says little more than one that was told the right one.
+/// Over ten minutes a chain that was told too short a `hop_time` says at most three times as much as one that was told the right one.
 #[test]
 fn slow_links_are_got_used_to() {
     for times in [2, 5, 20] {
@@ -72,7 +72,7 @@ fn slow_links_are_got_used_to() {
             };
             let (right, short) = (said(None), said(Some(HOP_TIME)));
             println!("{name}, {times} hop times: {short} messages instead of {right}");
-            assert!(4 * short <= 5 * right, "{name}, {times}: {short}, {right}");
+            assert!(short <= 3 * right, "{name}, {times}: {short}, {right}");
         }
     }
 }
