@@ -12,7 +12,7 @@ const SLOW: u32 = 4;
 const LOG_MOST: u32 = 2;
 
 /// So often it is repeated before the spans between the repetitions double: that many may get lost where every other frame does.
-const FREE: u8 = 6;
+const FREE: u8 = 8;
 
 /// How often they double.
 const DOUBLINGS: u8 = 3;

@@ -102,7 +102,7 @@ fn what_stays_unheard_is_repeated_less_and_less_often() {
             wait(&one, now)
         })
         .collect();
-    let expected = [4, 8, 8, 8, 8, 8, 16, 32, 64, 64, 64];
+    let expected = [4, 8, 8, 8, 8, 8, 8, 8, 16, 32, 64, 64, 64];
     assert_eq!(spans.len(), expected.len());
     for (span, hops) in spans.iter().zip(expected) {
         assert!(around(hops).contains(span), "{spans:?}");

@@ -13,7 +13,7 @@ const HOP_TIME: Duration = Duration::from_millis(10);
 
 /// How many times `HOP_TIME` a link takes, and how many times 2 (N - 1) messages the chain may take until it has agreed. That is what the
 /// first message says again before anything can have come back, and where it takes longer than `probe_after` questions for signs of life, too.
-const LINKS: [(u32, u64); 5] = [(1, 8), (2, 8), (5, 8), (20, 16), (100, 32)];
+const LINKS: [(u32, u64); 5] = [(1, 8), (2, 8), (5, 8), (20, 16), (100, 36)];
 
 fn slow(mut setup: Setup, times: u32) -> Setup {
     setup.hop_time_set = Some(HOP_TIME);
