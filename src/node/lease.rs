@@ -317,11 +317,18 @@ impl Lease {
     }
 
     fn on_pulsed(&mut self, context: &Context<'_>, pulsed: Pulsed) -> Effects {
-        let awaited = |known: &Current| known.number == pulsed.number && known.done.is_none();
-        let Some(current) = self.current.filter(awaited) else {
+        let known = self.current.filter(|known| known.number == pulsed.number);
+        let Some(current) = known else {
             return Effects::STALE;
         };
         let (now, way) = (context.now, context.way_onward());
+        if current.done.is_some() {
+            let took = self.retransmit.came_twice(now);
+            return Effects {
+                took,
+                ..Effects::STALE
+            };
+        }
         let took = if pulsed.done {
             let took = self.retransmit.went_through(now, way.hops);
             self.finish(context);

@@ -12,7 +12,7 @@ const SLOW: u32 = 4;
 const LOG_MOST: u32 = 2;
 
 /// So often it is repeated before the spans between the repetitions double: that many may get lost where every other frame does.
-const FREE: u8 = 8;
+const FREE: u8 = 6;
 
 /// How often they double.
 const DOUBLINGS: u8 = 3;
@@ -28,6 +28,8 @@ const MEMORY: u8 = 8;
 pub(crate) struct Retransmit {
     /// How often it has been sent again since anything was heard of it.
     unheard: u8,
+    /// Whether it has been sent again, and what comes of that may come yet.
+    repeated: bool,
     /// Whether the neighbour has said that it has arrived.
     arrived: bool,
     /// Whether frames get lost on its way, by what this relay or the one before has seen.
@@ -74,6 +76,7 @@ impl Retransmit {
     pub(crate) const fn new(seed: u32) -> Self {
         Self {
             unheard: 0,
+            repeated: false,
             arrived: false,
             lossy: false,
             doubt: 0,
@@ -88,6 +91,7 @@ impl Retransmit {
     /// There is a new message.
     pub(crate) const fn begin(&mut self) {
         self.unheard = 0;
+        self.repeated = false;
         self.asks = 0;
         self.arrived = false;
         self.lossy = self.doubt > 0;
@@ -115,6 +119,13 @@ impl Retransmit {
         let took = micros(now).wrapping_sub(self.sent_at);
         let took = took.checked_div(u32::from(hops)).filter(|_| clean)?;
         Some(Took::AtMost(Duration::from_micros(u64::from(took))))
+    }
+
+    /// What came of the message has come once more. Where it was sent again, that is what came of the last one.
+    pub(crate) fn came_twice(&mut self, now: Instant) -> Option<Took> {
+        let took = micros(now).wrapping_sub(self.sent_at);
+        let first = core::mem::take(&mut self.repeated);
+        first.then_some(Took::AtLeast(Duration::from_micros(u64::from(took))))
     }
 
     /// The relay before has sent the message again: frames get lost on its way, and it may be lost to the next one, too.
@@ -203,6 +214,7 @@ impl Retransmit {
             self.doubt = MEMORY;
         }
         self.unheard = self.unheard.saturating_add(1);
+        self.repeated = true;
         Some(Again::Onward)
     }
 

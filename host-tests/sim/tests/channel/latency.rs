@@ -13,7 +13,7 @@ const HOP_TIME: Duration = Duration::from_millis(10);
 
 /// How many times `HOP_TIME` a link takes, and how many times 2 (N - 1) messages the chain may take until it has agreed. That is what the
 /// first message says again before anything can have come back, and where it takes longer than `probe_after` questions for signs of life, too.
-const LINKS: [(u32, u64); 5] = [(1, 8), (2, 8), (5, 8), (20, 16), (100, 36)];
+const LINKS: [(u32, u64); 5] = [(1, 8), (2, 8), (5, 8), (20, 16), (100, 32)];
 
 fn slow(mut setup: Setup, times: u32) -> Setup {
     setup.hop_time_set = Some(HOP_TIME);
@@ -54,7 +54,7 @@ fn links_slower_than_hop_time_are_noticed() {
     assert!(beyond.is_empty(), "{beyond:?}");
 }
 
-/// Over ten minutes a chain that was told too short a `hop_time` says at most three times as much as one that was told the right one.
+/// Over ten minutes a chain that was told too short a `hop_time` says little more than one that was told the right one.
 #[test]
 fn slow_links_are_got_used_to() {
     for times in [2, 5, 20] {
@@ -72,7 +72,7 @@ fn slow_links_are_got_used_to() {
             };
             let (right, short) = (said(None), said(Some(HOP_TIME)));
             println!("{name}, {times} hop times: {short} messages instead of {right}");
-            assert!(short <= 3 * right, "{name}, {times}: {short}, {right}");
+            assert!(4 * short <= 5 * right, "{name}, {times}: {short}, {right}");
         }
     }
 }
