@@ -19,12 +19,15 @@ impl Body<'_, '_> {
         } else {
             self.wild();
         }
-        self.answer();
+        let choice = self.input.byte();
+        // Mostly without noise.
+        self.reals(&[if choice % 16 == 7 { 1e-12 } else { 0.0 }]);
+        self.answer(choice);
     }
 
     /// The number of the last hello that the relay said, mostly.
-    fn answer(&mut self) {
-        let answer = match self.input.byte() {
+    fn answer(&mut self, choice: u8) {
+        let answer = match choice {
             0..240 => self.known.asked,
             _ => self.input.word(),
         };
