@@ -83,7 +83,8 @@ pub struct Listen {
     /// How long after an agreement the leader asks what is heard; above 0. While nothing new comes of it, it asks less and less often,
     /// down to a 64th.
     pub every: Duration,
-    /// After so long what was heard elsewhere, or before, counts half; above 0. For an interferer that moves, a few seconds.
+    /// After so long what was heard elsewhere, or before, counts half; above 0. For an interferer that moves, a few seconds. From ten times
+    /// `every` on it is taken to stand still: after five beliefs only what chance cannot be 64 times over makes the chain move again.
     pub half_life: Duration,
     /// By how much one measurement is off, relative: 1e-3 to 1. One over the root of the independent samples in it.
     pub relative_error: f32,
@@ -109,6 +110,11 @@ impl Listen {
             half_life: Duration::from_millis(16_000 / relays + 100),
             relative_error: 0.03,
         }
+    }
+
+    /// Whether the interferer is taken to stand still.
+    pub(crate) const fn is_for_one_that_stands(&self) -> bool {
+        self.half_life.as_micros() / 10 >= self.every.as_micros()
     }
 
     fn is_valid(&self) -> bool {

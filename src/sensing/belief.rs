@@ -80,13 +80,17 @@ const CHANGE: f64 = 1e-4;
 const BEYOND_CHANCE: f64 = 8.0;
 const FOLLOWED: f64 = 1.5;
 
+/// Once a chain has settled, only what is beyond so many times is followed: then it is another world, of which all is to be learned again.
+const ANOTHER: f64 = 64.0;
+
 /// The same for the receiver alone.
 const LOUDER: f64 = 0.025;
 
 /// How many times what chance would make the track may be off what is heard.
 const ASTRAY: f64 = 4.0;
 
-/// How much more has to be known for the same again, and how often that is: a world that is still becomes silent.
+/// How much more has to be known for the same again, and how many other beliefs there are until a chain has settled: a world that is
+/// still becomes silent.
 const LEARNED: f64 = 1.1;
 const REFINED: u8 = 4;
 
@@ -103,7 +107,7 @@ pub(crate) struct Known {
     information: f64,
     /// How far off it may be by chance, relative, as a mean square.
     chance: f64,
-    /// How often the same was taken up again, because more was known.
+    /// How often another one was taken up in the same world; of an interferer that moves, because more was known.
     refined: u8,
     /// Which way the interferer goes.
     track: Track,
@@ -212,14 +216,21 @@ pub(crate) fn review(
         _ => 0.0,
     };
     let by_chance = chance + before.chance;
-    let times = if moves { FOLLOWED } else { BEYOND_CHANCE };
+    let settled = before.refined >= REFINED;
+    let again = if settled { 0 } else { before.refined + 1 };
+    let still = listen.is_for_one_that_stands();
+    let times = match (moves, still && settled) {
+        (true, _) => FOLLOWED,
+        (false, false) => BEYOND_CHANCE,
+        (false, true) => ANOTHER,
+    };
     if off > CHANGE && off > times * by_chance || receiver > LOUDER {
-        adopt(0)
+        adopt(if still { again } else { 0 })
     } else if (off > WORTH || receiver > 4.0 * WORTH)
         && information > LEARNED * before.information
-        && before.refined < REFINED
+        && !settled
     {
-        adopt(before.refined + 1)
+        adopt(again)
     } else {
         keep(unfit)
     }
