@@ -6,10 +6,10 @@
 //! | a source | another one, and more than 1 % of the SIR hangs on it | it is believed if chance would not make it so, or if a quarter more is known than when the last one was |
 //! | a source | nearly the same | nothing |
 //! | too few places | nothing yet | the next spread: the relays hear other places |
-//! | too few places | a source that what is heard contradicts | the relays spread evenly |
+//! | too few places, or no source | a source that what is heard contradicts | the relays spread evenly |
 //! | too few places, or no source | a source | it is kept |
 
-use super::fit::{Fit, Unfit, misfit};
+use super::fit::{Fit, Found, Unfit, misfit};
 use super::sums::Sums;
 use super::terms::{coefficients, terms, unit_w};
 use super::track::Track;
@@ -100,6 +100,9 @@ const FLIGHT: Duration = Duration::from_millis(1_000);
 /// A mean square of relative errors above which a belief is contradicted.
 const CONTRADICTED: f64 = 0.25;
 
+/// The same of what the mission says, in times what is expected of a measurement.
+const GUESSED: f64 = 16.0;
+
 /// How much was known when a belief was taken up.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Known {
@@ -145,43 +148,18 @@ pub(crate) fn review(
     now: Instant,
 ) -> Review {
     let known = mission.known_source();
-    let keep = |unfit| Review {
-        adopt: None,
-        known: before,
-        unfit,
-    };
-    let fit = match Fit::of(sums, listen.relative_error) {
-        Ok(fit) => fit,
-        Err(unfit) => return at_a_loss(mission, belief, sums, known, before, unfit),
-    };
-    let fit = with_receiver(mission, fit, sums, receiver, listen.relative_error);
-    let side_m = known.map_or(1.0, |source| source.y_m);
-    let found = match fit.source(mission, side_m) {
+    let (fit, found) = match fitted(mission, sums, receiver, listen) {
         Ok(found) => found,
-        Err(unfit) => return keep(Some(unfit)),
+        Err(unfit) => return at_a_loss(mission, belief, sums, listen, before, unfit),
     };
     let unfit = (!found.is_one).then_some(Unfit::NoSource);
+    let still = listen.is_for_one_that_stands();
     let mut track = before.track;
-    let mut source = found.source;
-    let mut moves = false;
-    if found.is_one {
-        let heard = Instant::from_micros(now.as_micros().saturating_sub(sums.age_us()));
-        track.take(&found, heard, listen.half_life);
-        // What is agreed on now holds until the next look, and the drones have to fly there.
-        let ahead = Duration::from_micros(listen.every.as_micros() / 2);
-        if let Some([was, will]) = track.ahead(now + ahead + FLIGHT)
-            && let Some(power_w) = fit.power_w(mission, was)
-        {
-            let at = |[x_m, y_m]: [f32; 2]| Interferer { power_w, x_m, y_m };
-            if fit.off_by(&coefficients(mission, &at(was))) <= ASTRAY * fit.chance() {
-                source = at(will);
-                moves = true;
-            } else {
-                track = Track::NONE;
-                track.take(&found, heard, listen.half_life);
-            }
-        }
-    }
+    let heard = Instant::from_micros(now.as_micros().saturating_sub(sums.age_us()));
+    let ahead = (found.is_one && !still)
+        .then(|| followed(mission, &fit, &found, &mut track, [heard, now], listen))
+        .flatten();
+    let (source, moves) = (ahead.unwrap_or(found.source), ahead.is_some());
     let receiver_w = at_receiver(mission, &fit, &source, receiver, listen.relative_error);
     let information = fit.information();
     let before = Known { track, ..before };
@@ -218,7 +196,6 @@ pub(crate) fn review(
     let by_chance = chance + before.chance;
     let settled = before.refined >= REFINED;
     let again = if settled { 0 } else { before.refined + 1 };
-    let still = listen.is_for_one_that_stands();
     let times = match (moves, still && settled) {
         (true, _) => FOLLOWED,
         (false, false) => BEYOND_CHANCE,
@@ -234,6 +211,42 @@ pub(crate) fn review(
     } else {
         keep(unfit)
     }
+}
+
+/// The fit of all that is heard, and the source that it speaks of.
+fn fitted(
+    mission: &Mission,
+    sums: &Sums,
+    receiver: Receiver,
+    listen: &Listen,
+) -> Result<(Fit, Found), Unfit> {
+    let fit = Fit::of(sums, listen.relative_error)?;
+    let fit = with_receiver(mission, fit, sums, receiver, listen.relative_error);
+    let side_m = mission.known_source().map_or(1.0, |source| source.y_m);
+    Ok((fit, fit.source(mission, side_m)?))
+}
+
+/// Where an interferer that is seen to move will be when the chain stands for it. `heard` is when what is heard was, on average.
+fn followed(
+    mission: &Mission,
+    fit: &Fit,
+    found: &Found,
+    track: &mut Track,
+    [heard, now]: [Instant; 2],
+    listen: &Listen,
+) -> Option<Interferer> {
+    track.take(found, heard, listen.half_life);
+    // What is agreed on now holds until the next look, and the drones have to fly there.
+    let ahead = Duration::from_micros(listen.every.as_micros() / 2);
+    let [was, will] = track.ahead(now + ahead + FLIGHT)?;
+    let power_w = fit.power_w(mission, was)?;
+    let at = |[x_m, y_m]: [f32; 2]| Interferer { power_w, x_m, y_m };
+    if fit.off_by(&coefficients(mission, &at(was))) <= ASTRAY * fit.chance() {
+        return Some(at(will));
+    }
+    *track = Track::NONE;
+    track.take(found, heard, listen.half_life);
+    None
 }
 
 /// The fit that counts the receiver as one place more, as far as what it hears is in line with the others: then the path loss over the ground
@@ -308,12 +321,19 @@ fn at_a_loss(
     mission: &Mission,
     belief: &Belief,
     sums: &Sums,
-    known: Option<Interferer>,
+    listen: &Listen,
     before: Known,
     unfit: Unfit,
 ) -> Review {
+    let known = mission.known_source();
+    let expected = f64::from(listen.relative_error) * f64::from(listen.relative_error);
+    let allowed = match belief {
+        // What nobody has heard is believed no more than what is heard bears out.
+        Belief::Mission => GUESSED * expected,
+        _ => CONTRADICTED,
+    };
     let contradicted =
-        known.is_none_or(|known| misfit(sums, &coefficients(mission, &known)) > CONTRADICTED);
+        known.is_none_or(|known| misfit(sums, &coefficients(mission, &known)) > allowed);
     let spread = match belief {
         Belief::Unknown(spread) => spread.next(),
         Belief::Mission if known.is_none() => Spread::Even.next(),
