@@ -2,6 +2,7 @@
 //! nothing but repetitions, and of two nodes on one side the one before.
 
 use crate::side::Side;
+use crate::sites::LineError;
 
 /// Something a firmware may want to act on. The state behind it is read from the relay.
 ///
@@ -79,21 +80,28 @@ pub enum Event {
     NoQuorum,
     /// A newer mission has come: `Relay::upload`. Store it, and hand it to `Relay::resume` when the relay is next switched on.
     Uploaded,
-    /// A newer mission was refused: it is over another distance than the one loaded, and this relay's line on earth is that of the sites it
-    /// was loaded with (`Settings::sited`). It flies on as before. Raised once for each such mission. An operator uploads one that keeps
-    /// the distance, or loads all relays anew for other sites.
-    UploadRefused,
-    /// The chain has agreed to fly it: `Relay::mission` and `Relay::version` have new values, and new places follow.
+    /// A newer mission was refused, since it has no line on earth. It flies on as before. Raised once for each such mission. An operator uploads
+    /// one with sites that are as far apart as its distance says.
+    UploadRefused {
+        /// What is wrong with it.
+        why: LineError,
+    },
+    /// The chain has agreed to fly it: `Relay::mission`, `Relay::version` and `Relay::sites` have new values, and new places follow.
     Adopted,
 }
 
 /// Events about nobody in particular, in the order in which they are told: these first, those about a node, and the others.
 const FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
-const LAST: [Event; 6] = [
+const LAST: [Event; 7] = [
     Event::Reformed,
     Event::LeaseLapsed,
     Event::NoQuorum,
-    Event::UploadRefused,
+    Event::UploadRefused {
+        why: LineError::Distance,
+    },
+    Event::UploadRefused {
+        why: LineError::Sites,
+    },
     Event::Uploaded,
     Event::Adopted,
 ];

@@ -83,7 +83,7 @@ use crate::stats::bump;
 use crate::time::Instant;
 
 use crate::jitter::Jitter;
-use config::GuardConfig;
+use config::{Geofence, GuardConfig};
 use fence::is_place;
 pub use fence::{Fence, HoldReason};
 use follower::FenceFollower;
@@ -176,6 +176,26 @@ impl Guard {
             self.owner.leave(&mut self.jitter);
         }
         true
+    }
+
+    /// Places are along another line from now on, and what was said of the one before is void: this relay begins as after a start, with the
+    /// first place that is reported once it has stopped. At `now`, or if that is `None` when it was switched on.
+    ///
+    /// Who fell silent may hover anywhere beyond where this relay is, as after a start.
+    pub fn leave_line(&mut self, now: Option<Instant>) {
+        if let Some(now) = now {
+            self.born = self.born.max(now + self.own.config.lag);
+        }
+        self.found = None;
+        self.own.target = None;
+        self.own.release(self.born);
+        self.follower.leave_line(&mut self.jitter);
+        self.owner.leave_line(&mut self.jitter);
+    }
+
+    /// No setpoint leaves `fence` from now on. Whoever is outside comes back with the next one.
+    pub fn set_box(&mut self, fence: Geofence) {
+        self.own.config.fence = fence;
     }
 
     /// What node `from` at `side` says. What is out of range is counted, what is of an earlier association or of another node ignored.

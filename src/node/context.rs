@@ -3,12 +3,14 @@
 use super::retransmit::Trip;
 use super::timing::{longest_lease, tenths};
 use super::view::electorate::Held;
+use crate::guard::config::GuardConfig;
 use crate::mission::{Band, Heading, Mission};
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
+use crate::sites::Sites;
 use crate::time::Instant;
 use crate::view::ViewId;
-use crate::wire::digest::{MissionId, digest};
+use crate::wire::digest::{MissionId, between, digest};
 
 /// The relay as a member of its chain.
 #[derive(Clone, Copy, Debug)]
@@ -22,8 +24,12 @@ pub(crate) struct Member {
     pub(crate) all: u16,
     /// The digest of that.
     pub(crate) digest: u16,
+    /// The distance of that, m.
+    pub(crate) loaded_m: f32,
     /// The mission that it flies.
     pub(crate) active: MissionId,
+    /// The sites of that, if it has its own: then places are along the line between these.
+    pub(crate) sites: Option<Sites>,
     /// The view accepted last.
     pub(crate) view: ViewId,
     /// Its place in the view, from 1 next to Tx.
@@ -38,11 +44,29 @@ impl Member {
             node,
             all: mission.relays(),
             digest,
+            loaded_m: mission.config().distance_m,
             active: MissionId { version: 0, digest },
+            sites: None,
             view: ViewId::LOADED,
             index: node,
             mission,
         }
+    }
+
+    /// The digest of the line that its places are along.
+    pub(crate) fn line(&self) -> u16 {
+        between(self.digest, self.sites)
+    }
+
+    /// The guard that its settings ask for, whose box goes along with the distance between other sites.
+    pub(crate) fn guard(&self) -> Option<GuardConfig> {
+        let mut config = self.settings.guard?;
+        if self.sites.is_some() {
+            let fence = &mut config.fence;
+            let longer_m = self.mission.config().distance_m - self.loaded_m;
+            fence.most_x_m = (fence.most_x_m + longer_m).max(fence.least_x_m);
+        }
+        Some(config)
     }
 
     /// Its place from the leader on, from 1, and how many there are, while nothing was counted.

@@ -1,6 +1,7 @@
 //! The setpoint on its way to the agreed place: with a [guard](crate::guard) as far as is safe by now, without one the place itself.
 
 use super::context::Effects;
+use crate::guard::config::GuardConfig;
 use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
 use crate::settings::Settings;
@@ -107,6 +108,22 @@ impl Steering {
             && guard.control(now, flown)
         {
             self.remind_at = Some(now + REMINDER);
+        }
+    }
+
+    /// Places are along another line, since `now` if the drone has flown along the one before.
+    pub(crate) fn leave_line(&mut self, now: Option<Instant>) {
+        if let Some(guard) = self.guard() {
+            guard.leave_line(now);
+        }
+    }
+
+    /// The box is that of `config` from now on.
+    pub(crate) fn set_box(&mut self, config: Option<GuardConfig>) {
+        if let Some(guard) = self.guard()
+            && let Some(config) = config
+        {
+            guard.set_box(config.fence);
         }
     }
 

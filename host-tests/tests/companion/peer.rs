@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 use host_tests::python;
 use serde_json::Value;
+use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::geodetic::Geodetic;
 
 use crate::process::{LIMIT, Relay, lines_of};
 

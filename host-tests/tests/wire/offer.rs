@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 use uav_relay::wire::message::Message;
-use uav_relay::{Band, Interference, Interferer, Profile, Upload};
+use uav_relay::{Band, Interference, Interferer, Profile, Sites, Upload};
 
 use super::codec::{narrow, wide};
 
@@ -31,6 +31,8 @@ pub(crate) struct Offer {
     /// How far to the left, at most 0, and to the right, at least 0.
     pub(crate) left_m: f32,
     pub(crate) right_m: f32,
+    /// Latitude, longitude and height of Tx, then of Rx; all 0 for none.
+    pub(crate) sites: [i32; 6],
     /// The number of the hello that it answers; 0 for none.
     pub(crate) answer: u16,
 }
@@ -53,11 +55,12 @@ pub(crate) const LEAST: usize = 67;
 pub(crate) const MOST: usize = 71;
 pub(crate) const LEFT: usize = 75;
 pub(crate) const RIGHT: usize = 79;
-pub(crate) const ANSWER: usize = 83;
+pub(crate) const SITES: usize = 83;
+pub(crate) const ANSWER: usize = 107;
 
 /// Bytes of the body, and how many of them are kept across a reboot.
-pub(crate) const BYTES: usize = 85;
-pub(crate) const KEPT: usize = 83;
+pub(crate) const BYTES: usize = 109;
+pub(crate) const KEPT: usize = 107;
 
 impl Offer {
     /// The bytes of the body.
@@ -83,6 +86,9 @@ impl Offer {
             out.extend(number.to_le_bytes());
         }
         for number in [self.least_m, self.most_m, self.left_m, self.right_m] {
+            out.extend(number.to_le_bytes());
+        }
+        for number in self.sites {
             out.extend(number.to_le_bytes());
         }
         out.extend(self.answer.to_le_bytes());
@@ -122,6 +128,7 @@ impl Offer {
             most_m: real(MOST),
             left_m: real(LEFT),
             right_m: real(RIGHT),
+            sites: std::array::from_fn(|k| real(SITES + 4 * k).to_bits().cast_signed()),
             answer: word(ANSWER),
         };
         Some((offer, rest))
@@ -146,6 +153,12 @@ impl Offer {
             && (self.least_m..=self.most_m).contains(&self.altitude_m)
             && (-1e5..=0.0).contains(&self.left_m)
             && (0.0..=1e5).contains(&self.right_m)
+            && [0, 3]
+                .iter()
+                .all(|at| self.sites[*at].unsigned_abs() <= 900_000_000)
+            && [1, 4]
+                .iter()
+                .all(|at| self.sites[*at].unsigned_abs() <= 1_800_000_000)
     }
 
     /// Whether the relays have room between Tx and Rx.
@@ -155,12 +168,18 @@ impl Offer {
         narrow(f64::from(self.relays - 1) * wide(step)) <= self.distance_m
     }
 
-    /// The digest of the mission that it is of: CRC-32C of all but version, base and answer.
+    /// The digest of the mission that it is of: CRC-32C of all but version, base, sites and answer; and of that and the sites, if it has any.
     pub(crate) fn digest(&self) -> u16 {
+        self.between(low_half(&self.body()[RELAYS..SITES]))
+    }
+
+    /// A digest, and its sites.
+    pub(crate) fn between(&self, digest: u16) -> u16 {
+        if self.sites == [0; 6] {
+            return digest;
+        }
         let body = self.kept();
-        let bytes = &body[RELAYS..];
-        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes);
-        u16::try_from(crc & 0xFFFF).unwrap()
+        low_half(&[&digest.to_le_bytes()[..], &body[SITES..]].concat())
     }
 
     /// The message that says this. Only the crate can make it of any numbers: each of them must be found again in it.
@@ -195,6 +214,14 @@ impl Offer {
         let factors = [channel.mu_los(), channel.mu_nlos(), channel.eta()];
         assert_eq!(factors, [self.mu_los, self.mu_nlos, self.eta]);
         assert_eq!((config.band, config.lateral), (band, lateral));
+        let sites = upload.sites().map_or([0; 6], |Sites { tx, rx }| {
+            [tx, rx]
+                .map(|at| [at.lat_e7, at.lon_e7, at.amsl_mm])
+                .as_flattened()
+                .try_into()
+                .unwrap()
+        });
+        assert_eq!(sites, self.sites);
         let mission_id = upload.id();
         assert_eq!(
             (mission_id.version, mission_id.digest),
@@ -205,6 +232,11 @@ impl Offer {
             answer: self.answer,
         }
     }
+}
+
+fn low_half(bytes: &[u8]) -> u16 {
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes);
+    u16::try_from(crc & 0xFFFF).unwrap()
 }
 
 /// One that eight relays could fly.
@@ -229,6 +261,7 @@ pub(crate) fn offer() -> Offer {
         most_m: 300.0,
         left_m: -60.0,
         right_m: 40.5,
+        sites: [0; 6],
         answer: 0,
     }
 }

@@ -7,6 +7,7 @@ use super::offer::{
     ALTITUDE, DISTANCE, ETA, INTERFERER, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, Offer, POWER, RIGHT,
     SEPARATION, TOLERANCE, TX_POWER, X, Y,
 };
+use super::sited::A_KILOMETRE;
 
 /// Where four bytes of an offer are an f32, or the upper half of an f64.
 pub(crate) const NUMBERS: [usize; 16] = [
@@ -97,6 +98,19 @@ fn beside() -> impl Strategy<Value = f32> {
     ]
 }
 
+/// None; anywhere on earth; two that are a kilometre apart.
+fn sites() -> BoxedStrategy<[i32; 6]> {
+    let site = || {
+        (
+            -900_000_000..=900_000_000_i32,
+            -1_800_000_000..=1_800_000_000_i32,
+            any::<i32>(),
+        )
+    };
+    let anywhere = (site(), site()).prop_map(|((a, b, c), (d, e, f))| [a, b, c, d, e, f]);
+    prop_oneof![2 => Just([0; 6]), 2 => anywhere, 1 => Just(A_KILOMETRE)].boxed()
+}
+
 /// An offer in range.
 pub(crate) fn offers() -> BoxedStrategy<Said> {
     let versions = prop_oneof![4 => 1..9_u16, 1 => 1..=u16::MAX];
@@ -109,7 +123,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
         scaled(1e-6, 0.1),
         factors(),
         bands(),
-        (room(), room()),
+        ((room(), room()), sites()),
     )
         .prop_map(
             |(
@@ -120,7 +134,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
                 tolerance,
                 [mu_los, mu_nlos, eta],
                 [least_m, most_m, altitude_m],
-                (left_m, right_m),
+                ((left_m, right_m), sites),
             )| {
                 Said::Offer(Offer {
                     version,
@@ -142,6 +156,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
                     most_m,
                     left_m: -left_m,
                     right_m,
+                    sites,
                     answer,
                 })
             },

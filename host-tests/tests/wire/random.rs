@@ -9,6 +9,7 @@ use uav_relay::wire::message::{MAX_BODY, Message, MessageError};
 use super::codec::{self, Said, plain, sealed, wire};
 use super::config;
 use super::golden::only_frame;
+use super::offered::offers;
 use super::strategies::{asides, bodies, headers, measured, messages, sweeps};
 
 /// Bodies are compared rather than messages: bytes tell -0 from 0.
@@ -47,12 +48,14 @@ proptest! {
     }
 
     #[test]
-    fn the_longest_sweep_fills_a_frame_but_for_its_tag(
+    fn an_offer_fills_a_frame_but_for_its_tag_and_the_longest_sweep_does_not(
+        offer in offers(),
         sweep in prop_oneof![measured(sweeps(16)), asides(sweeps(16))],
         head in headers(),
     ) {
         let mut frame = [0; MAX_FRAME];
-        prop_assert_eq!(frame::encode(head, &sweep.message(), &mut frame), MAX_FRAME - TAG);
+        prop_assert_eq!(frame::encode(head, &offer.message(), &mut frame), MAX_FRAME - TAG);
+        prop_assert_eq!(frame::encode(head, &sweep.message(), &mut frame), 104);
     }
 
     #[test]

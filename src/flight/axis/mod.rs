@@ -27,9 +27,10 @@ mod error;
 mod tests;
 mod vector;
 
-use super::geodetic::{Geodetic, to_integer};
+use crate::geodetic::{Geodetic, to_integer};
 use crate::place::Placement;
-use angle::UNIT;
+use crate::sites::Sites;
+use angle::{UNIT, turned};
 use vector::{Vector, radius};
 
 pub use error::{AxisError, LONGEST_M, SHORTEST_M};
@@ -97,6 +98,14 @@ impl Axis {
         })
     }
 
+    /// The line between both `sites`: as [`try_new`](Self::try_new).
+    ///
+    /// # Errors
+    /// As there.
+    pub fn between(sites: Sites) -> Result<Self, AxisError> {
+        Self::try_new(sites.tx, sites.rx)
+    }
+
     /// The distance D from transmitter to receiver along the ground, m.
     pub const fn distance_m(&self) -> f64 {
         self.distance_m
@@ -157,6 +166,11 @@ impl Axis {
     pub fn azimuth_rad(&self, x_m: f32) -> f32 {
         let [north, east] = self.direction(x_m);
         narrow(libm::atan2(east, north))
+    }
+
+    /// That azimuth and `aside_rad` more, from -π to π, where that is. Constant work.
+    pub(super) fn heading_rad(&self, x_m: f32, aside_rad: f32) -> f32 {
+        turned(self.azimuth_rad(x_m) + aside_rad)
     }
 
     /// A velocity along x, y and h at `x_m` as one toward north, east and down; all in m/s. Constant work.

@@ -29,8 +29,22 @@ use self::parts::{Word, read, write};
 use super::upload::Upload;
 use crate::guard::Fence;
 
-/// The longest body: a sweep of sixteen targets with what was measured, or from aside of the line.
-pub const MAX_BODY: usize = 88;
+/// The longest body of a sweep: sixteen targets with what was measured, or from aside of the line.
+const SWEEP: usize = 88;
+
+/// Bytes of an upload, as a body and as it is stored: those of an offer but its last two.
+#[cfg(feature = "upload")]
+pub use self::offer::UPLOAD;
+
+/// The longest body: an offer, or without the feature `upload` a sweep.
+#[cfg(feature = "upload")]
+pub const MAX_BODY: usize = if offer::LENGTH > SWEEP {
+    offer::LENGTH
+} else {
+    SWEEP
+};
+#[cfg(not(feature = "upload"))]
+pub const MAX_BODY: usize = SWEEP;
 
 /// One message between neighbours. *Onward* is the way a pass goes: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]
@@ -73,7 +87,8 @@ pub enum Message {
     Decision(Decision),
     /// Either way: the fence between two neighbours.
     Fence {
-        /// [`digest`](super::digest::digest) of the sender's mission, as it was loaded.
+        /// [`digest`](super::digest::digest) of the sender's mission, as it was loaded; with the sites of an upload that it flies, where
+        /// that has any.
         mission: u16,
         /// What the sender says of it.
         fence: Fence,

@@ -1,10 +1,10 @@
 //! The link to an autopilot that says anything, of a relay that wants anything.
 
+use uav_relay::Geodetic;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::geodetic::Geodetic;
 use uav_relay::pointing::Bearing;
 use uav_relay::{Duration, Instant, Placement};
 

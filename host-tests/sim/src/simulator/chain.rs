@@ -135,7 +135,7 @@ impl Chain {
             self.outcome.watched = Some(watched);
         }
         let lent = self.members.iter().map(|member| member.lent);
-        let places = self.fleet.iter().map(Vehicle::at);
+        let places = self.fleet.iter().map(Vehicle::along);
         self.outcome.fleet = places.zip(lent).collect();
         self.outcome.relays = self
             .members
@@ -151,6 +151,7 @@ impl Chain {
                 relays: member.relay.mission().relays(),
                 view: member.relay.view().number(),
                 version: member.relay.version(),
+                sites: member.relay.sites(),
                 seen: Seen::of(&member.relay, member.killed.is_none()),
             })
             .collect();

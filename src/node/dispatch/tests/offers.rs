@@ -247,7 +247,7 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
 
 #[test]
 fn what_is_stored_of_an_upload_does_not_depend_on_what_it_answers() {
-    let mut bodies = [[0; 88]; 2];
+    let mut bodies = [[0; LENGTH + 2]; 2];
     for (body, answer) in bodies.iter_mut().zip([1, 0xFFFF]) {
         assert_eq!(offered(upload(3), answer).encode(body), Some(LENGTH + 2));
     }
