@@ -30,6 +30,7 @@ impl Sites {
     }
 
     /// Of such bytes.
+    #[cfg(feature = "upload")]
     pub(crate) fn from_bytes(bytes: [u8; LENGTH]) -> Self {
         let mut numbers = [0; LENGTH / 4];
         for (number, place) in numbers.iter_mut().zip(bytes.as_chunks().0) {
@@ -48,30 +49,32 @@ impl Sites {
     }
 
     /// Whether both are on earth.
+    #[cfg(feature = "upload")]
     pub(crate) const fn are_valid(self) -> bool {
         self.tx.is_valid() && self.rx.is_valid()
     }
 
     /// Whether a mission over `distance_m` metres can be flown between them. A relay that was built without the feature `flight` flies
     /// along no line on earth, and finds nothing wrong.
-    #[cfg_attr(
-        not(feature = "flight"),
-        expect(
-            unused_variables,
-            clippy::unused_self,
-            clippy::unnecessary_wraps,
-            clippy::trivially_copy_pass_by_ref
-        )
+    #[cfg(all(feature = "upload", not(feature = "flight")))]
+    #[expect(
+        clippy::unused_self,
+        clippy::unnecessary_wraps,
+        reason = "as with a line"
     )]
-    pub(crate) fn check(&self, distance_m: f32) -> Result<(), LineError> {
-        #[cfg(feature = "flight")]
-        {
-            let axis = crate::flight::axis::Axis::between(*self).map_err(|_| LineError::Sites)?;
-            if !axis.is_of(distance_m) {
-                return Err(LineError::Distance);
-            }
-        }
+    pub(crate) const fn check(self, _: f32) -> Result<(), LineError> {
         Ok(())
+    }
+
+    /// Whether a mission over `distance_m` metres can be flown between them.
+    #[cfg(all(feature = "upload", feature = "flight"))]
+    pub(crate) fn check(self, distance_m: f32) -> Result<(), LineError> {
+        let axis = crate::flight::axis::Axis::between(self).map_err(|_| LineError::Sites)?;
+        if axis.is_of(distance_m) {
+            Ok(())
+        } else {
+            Err(LineError::Distance)
+        }
     }
 }
 

@@ -182,20 +182,7 @@ impl Report {
                     format_args!("uploaded: holds version {version} of the mission"),
                 )
             }
-            Event::Adopted => match relay.sites() {
-                Some(sites) => line(
-                    now,
-                    format_args!(
-                        "adopted: flies version {} of the mission, {}",
-                        relay.version(),
-                        Between(sites)
-                    ),
-                ),
-                None => line(
-                    now,
-                    format_args!("adopted: flies version {} of the mission", relay.version()),
-                ),
-            },
+            Event::Adopted => adopted(now, relay),
             other => line(now, format_args!("event: {other:?}")),
         }
     }
@@ -219,6 +206,15 @@ impl Report {
             _ if node > self.relays => "the receiver".to_owned(),
             _ => format!("relay {node}"),
         }
+    }
+}
+
+/// Which mission is flown, and between which sites, if they are other ones than those that were loaded.
+fn adopted(now: Instant, relay: &Relay) -> Result<(), String> {
+    let what = format_args!("adopted: flies version {} of the mission", relay.version());
+    match relay.sites() {
+        Some(sites) => line(now, format_args!("{what}, {}", Between(sites))),
+        None => line(now, what),
     }
 }
 

@@ -10,6 +10,7 @@ use stm32f4xx_hal::pac::{Interrupt, USART1, interrupt};
 use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::Serial;
 use uav_relay::flight::autopilot::Autopilot as Link;
+#[cfg(feature = "upload")]
 use uav_relay::flight::axis::Axis;
 use uav_relay::flight::mavlink::outgoing::FrameBytes;
 #[cfg(feature = "mavlink-signing")]
@@ -18,7 +19,9 @@ use uav_relay::serial::SerialPort as _;
 use uav_relay::{Duration, Event, Instant, Mission, Relay};
 
 use super::config::{self, Sites};
-use super::course::{course, ends};
+use super::course::course;
+#[cfg(feature = "upload")]
+use super::course::ends;
 use super::port::{self, OUTGOING, Port, Queues, Slot};
 use super::{board, log};
 
@@ -46,7 +49,9 @@ pub(crate) fn uart(usart: USART1, tx: PA9, rx: PA10, rcc: &mut Rcc) -> Option<Ua
 pub(crate) struct Autopilot {
     link: Link,
     /// The sites of the block, and those between which it flies.
+    #[cfg(feature = "upload")]
     loaded: uav_relay::Sites,
+    #[cfg(feature = "upload")]
     between: uav_relay::Sites,
     port: Port<OUTGOING, RECEIVED>,
     /// What the relay was told last of whether its setpoint is flown.
@@ -75,10 +80,13 @@ impl Autopilot {
         let mut link = Link::new(course.axis, course.pace, now);
         sign(&mut link, now).ok()?;
         let port = port::open(uart, Interrupt::USART1, &AUTOPILOT, &AUTOPILOT_QUEUES);
+        #[cfg(feature = "upload")]
         let loaded = ends(sites);
         cortex_m::singleton!(LINK: Autopilot = Autopilot {
             link,
+            #[cfg(feature = "upload")]
             loaded,
+            #[cfg(feature = "upload")]
             between: loaded,
             port,
             flown: None,
@@ -87,6 +95,7 @@ impl Autopilot {
     }
 
     /// Between the sites of a mission that has just been adopted, before anything is told that is along its line.
+    #[cfg(feature = "upload")]
     #[inline(never)] // its stack is given back
     fn follow(&mut self, now: Instant, relay: &Relay) {
         let sites = relay.sites().unwrap_or(self.loaded);
@@ -102,6 +111,7 @@ impl Autopilot {
 
     /// Takes what has come, and hands the relay what follows from it.
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
+        #[cfg(feature = "upload")]
         self.follow(now, relay);
         let mut bytes = [0; 64];
         // What comes meanwhile wakes the main loop again.
@@ -134,6 +144,7 @@ impl Autopilot {
 
     /// Sends what the relay wants and says when to be called again, at the latest; `now` is that of [`listen`](Self::listen).
     pub(crate) fn fly(&mut self, now: Instant, relay: &Relay) -> Instant {
+        #[cfg(feature = "upload")]
         self.follow(now, relay);
         let setpoint = relay.setpoint();
         self.link.handle_setpoint(now, setpoint);

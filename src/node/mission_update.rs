@@ -36,8 +36,7 @@ use crate::settings::Settings;
 #[cfg(feature = "upload")]
 use crate::side::Side;
 #[cfg(feature = "upload")]
-use crate::sites::LineError;
-use crate::sites::Sites;
+use crate::sites::{LineError, Sites};
 use crate::time::Instant;
 use crate::wire::digest::MissionId;
 #[cfg(feature = "upload")]
@@ -177,17 +176,6 @@ impl MissionUpdate {
         let held = None;
         held
     }
-
-    /// The sites of that, if it has its own.
-    pub(crate) fn sites_of(&self, member: &Member, id: MissionId) -> Option<Sites> {
-        if id == member.active {
-            return member.sites;
-        }
-        #[cfg(feature = "upload")]
-        return self.upload.and_then(|upload| upload.sites());
-        #[cfg(not(feature = "upload"))]
-        None
-    }
 }
 
 #[cfg(feature = "upload")]
@@ -319,6 +307,11 @@ impl MissionUpdate {
         self.latest = upload.id();
         self.upload = Some(*upload);
         Ok(mission)
+    }
+
+    /// The sites of the mission held, if it has its own.
+    pub(crate) fn sites(&self) -> Option<Sites> {
+        self.upload.and_then(|upload| upload.sites())
     }
 
     /// The newest mission held, if it was uploaded.

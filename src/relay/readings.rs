@@ -86,7 +86,7 @@ impl Relay {
     /// Between which sites the mission is flown; `None` for those that the relay was loaded with. Places are along the line between these:
     /// a firmware turns them into latitudes and longitudes, and back, by no other from the call on in which this changed.
     pub fn sites(&self) -> Option<Sites> {
-        self.node.member().sites
+        self.node.member().sites()
     }
 
     /// What the measurements at this place say so far, and `None` before they say anything.

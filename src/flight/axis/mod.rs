@@ -63,6 +63,7 @@ impl Axis {
     ///
     /// # Errors
     /// A latitude or longitude that is not on earth, sites too near to each other or too far apart.
+    #[inline(never)] // called from several places
     pub fn try_new(tx: Geodetic, rx: Geodetic) -> Result<Self, AxisError> {
         if !tx.is_valid() {
             return Err(AxisError::Tx(tx));
@@ -102,6 +103,7 @@ impl Axis {
     ///
     /// # Errors
     /// As there.
+    #[inline] // a line is returned through the stack
     pub fn between(sites: Sites) -> Result<Self, AxisError> {
         Self::try_new(sites.tx, sites.rx)
     }

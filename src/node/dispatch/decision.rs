@@ -5,7 +5,6 @@ use crate::event::Event;
 use crate::mission::{Heading, Mission};
 use crate::node::context::Decided;
 use crate::settings::Method;
-use crate::sites::Sites;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
@@ -74,27 +73,25 @@ impl Node {
             self.member.mission = mission;
             return;
         }
-        let sites = self.layers.update.sites_of(&self.member, id);
-        self.adopt(mission, id, sites, Some(now));
+        self.adopt(mission, id, Some(now));
         self.raise(Event::Adopted);
     }
 
-    /// `mission` is another one than before, flown between `sites`; since `now` if the relay has flown another one. Between other sites than
-    /// before no place is what it was: there is none to be at until the chain has agreed on new ones, and the guard begins anew.
-    pub(super) fn adopt(
-        &mut self,
-        mission: Mission,
-        id: MissionId,
-        sites: Option<Sites>,
-        now: Option<Instant>,
-    ) {
+    /// `mission` is another one than before, and the one held; since `now` if the relay has flown another one. Between other sites no place
+    /// is what it was: there is none to be at until the chain has agreed on new ones, and the guard begins anew.
+    pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
         self.member.mission = mission;
         self.member.active = id;
-        if core::mem::replace(&mut self.member.sites, sites) != sites {
-            self.layers.round.leave_line();
-            self.steering.leave_line(now);
+        #[cfg(feature = "upload")]
+        {
+            if self.member.fly_between(self.layers.update.sites()) {
+                self.layers.round.leave_line();
+                self.steering.leave_line(now);
+            }
+            self.steering.set_box(self.member.geofence());
         }
-        self.steering.set_box(self.member.guard());
+        #[cfg(not(feature = "upload"))]
+        let _ = now;
         let common = mission.config().common;
         let profile = self.member.settings.profile.unwrap_or(common);
         self.layers.round.load(profile);

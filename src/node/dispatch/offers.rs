@@ -130,7 +130,7 @@ impl Node {
     pub(crate) fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         let untouched = self.layers.view.is_untouched() && self.layers.round.is_untouched();
         let mission = self.layers.update.resume(&self.member, upload, untouched)?;
-        self.adopt(mission, upload.id(), upload.sites(), None);
+        self.adopt(mission, upload.id(), None);
         Ok(())
     }
 

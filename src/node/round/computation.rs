@@ -107,6 +107,7 @@ impl Computation {
     }
 
     /// Places are along another line from now on: it has none to be at, nor has the neighbour.
+    #[cfg(feature = "upload")]
     pub(crate) const fn leave_line(&mut self) {
         self.setpoint = None;
         self.after = None;

@@ -246,6 +246,7 @@ impl Round {
     }
 
     /// Places are along another line from now on: it has none to be at.
+    #[cfg(feature = "upload")]
     pub(crate) const fn leave_line(&mut self) {
         self.computation.leave_line();
     }

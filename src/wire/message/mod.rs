@@ -43,6 +43,7 @@ pub const MAX_BODY: usize = if offer::LENGTH > SWEEP {
 } else {
     SWEEP
 };
+/// The longest body: an offer, or without the feature `upload` a sweep.
 #[cfg(not(feature = "upload"))]
 pub const MAX_BODY: usize = SWEEP;
 

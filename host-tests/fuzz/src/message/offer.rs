@@ -29,13 +29,14 @@ impl Body<'_, '_> {
         } else {
             self.wild();
         }
-        self.sites();
-        self.answer();
+        let choice = self.input.byte();
+        self.sites(choice);
+        self.answer(choice);
     }
 
     /// The number of the last hello that the relay said, mostly.
-    fn answer(&mut self) {
-        let answer = match self.input.byte() {
+    fn answer(&mut self, choice: u8) {
+        let answer = match choice {
             0..240 => self.known.asked,
             _ => self.input.word(),
         };
@@ -43,10 +44,10 @@ impl Body<'_, '_> {
     }
 
     /// None mostly; two that are a kilometre apart, which is what the paper has; or any numbers at all.
-    fn sites(&mut self) {
-        let sites = match self.input.byte() {
-            0..192 => [0; 6],
-            192..224 => SITES,
+    fn sites(&mut self, choice: u8) {
+        let sites = match choice % 16 {
+            0..12 => [0; 6],
+            12..14 => SITES,
             _ => core::array::from_fn(|_| self.input.long().cast_signed()),
         };
         for number in sites {
