@@ -41,6 +41,10 @@
 //!
 //! | 15 | A relay that is not flown to its setpoints, since a pilot has it or it is on the ground, has none. It leaves both associations and says so until the neighbour has begun anew; flown again it begins as after a start. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 off to the separation); if the two were in order it is otherwise free, until it hears of a new association. | nobody counts on a drone that is flown by hand, and nobody comes nearer to it |
 //!
+//! Where places are along another line from one moment to the next ([`Guard::leave_line`]), a relay has no setpoint and begins as after a
+//! start, once it has stopped. Whoever says something along another line is not heard: it is counted on as before, where it was, and the
+//! relay does not move before both neighbours speak along the new one.
+//!
 //! # Why everybody arrives
 //!
 //! Let the places agreed on be the separation apart; then so are the fences' goals. A fence that has to be lowered waits for
