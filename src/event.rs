@@ -92,13 +92,15 @@ pub enum Event {
 
 /// Events about nobody in particular, in the order in which they are told: these first, those about a node, and the others.
 const FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
-const LAST: [Event; 7] = [
+const LAST: &[Event] = &[
     Event::Reformed,
     Event::LeaseLapsed,
     Event::NoQuorum,
+    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Distance,
     },
+    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Sites,
     },
@@ -163,7 +165,7 @@ impl Pending {
     fn bit(event: Event) -> u16 {
         FIRST
             .iter()
-            .chain(&LAST)
+            .chain(LAST)
             .zip(0..16)
             .find(|(known, _)| **known == event)
             .map_or(0, |(_, bit)| 1 << bit)
@@ -225,7 +227,7 @@ impl Pending {
     pub(crate) fn take(&mut self) -> Option<Event> {
         self.take_plain(&FIRST)
             .or_else(|| self.take_about())
-            .or_else(|| self.take_plain(&LAST))
+            .or_else(|| self.take_plain(LAST))
     }
 }
 

@@ -183,6 +183,15 @@ impl Report {
                 )
             }
             Event::Adopted => adopted(now, relay),
+            Event::Reformed => line(
+                now,
+                format_args!(
+                    "formed anew: relay {} of {}, view {}",
+                    relay.index(),
+                    relay.mission().relays(),
+                    relay.view().number()
+                ),
+            ),
             other => line(now, format_args!("event: {other:?}")),
         }
     }

@@ -63,7 +63,7 @@ impl Axis {
     ///
     /// # Errors
     /// A latitude or longitude that is not on earth, sites too near to each other or too far apart.
-    #[inline(never)] // called from several places
+    #[cfg_attr(feature = "upload", inline(never))] // called from several places
     pub fn try_new(tx: Geodetic, rx: Geodetic) -> Result<Self, AxisError> {
         if !tx.is_valid() {
             return Err(AxisError::Tx(tx));

@@ -74,6 +74,7 @@ impl Node {
         };
         let (active, latest) = (self.member.active, self.layers.update.latest());
         let proposes = message.is_of_a_proposal();
+        #[cfg(feature = "upload")]
         if let Message::Fence { .. } = message {
             return self.is_of_line(side, from, digest);
         }
@@ -99,6 +100,7 @@ impl Node {
     }
 
     /// Whether a place that `from` tells is along the line of this relay. It is not while one of the two flies an upload with other sites.
+    #[cfg(feature = "upload")]
     fn is_of_line(&mut self, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.member.line();
         if !same && self.layers.neighbours.at(side).holds.is_some() {
