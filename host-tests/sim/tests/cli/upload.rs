@@ -249,8 +249,42 @@ fn of_several_interferers_the_one_that_stands_for_all_is_changed() {
 }
 
 #[test]
+fn wrong_sites_of_an_upload_are_named() {
+    let site = example("site.toml");
+    for (arguments, parts) in [
+        (
+            &["--upload", "20:rx_lat_deg=91"][..],
+            &["rx_lat_deg must be a number within -90.0 to"][..],
+        ),
+        (
+            &["--upload", "20:rx_lat_deg=47.4"],
+            &["--upload 20:rx_lat_deg=47.4:", "[site]"],
+        ),
+        (
+            &["--scenario", &site, "--upload", "20:rx_lat_deg=49"],
+            &["--upload 20:rx_lat_deg=49:", "10 to 100000 m"],
+        ),
+        (
+            &[
+                "--scenario",
+                &site,
+                "--upload",
+                "20:rx_lat_deg=47.42,distance_m=1000",
+            ],
+            &["distance_m=1000:", "must be that between its sites"],
+        ),
+    ] {
+        let (status, line) = refusal(arguments);
+        assert_eq!(status, 2, "{arguments:?}: {line}");
+        for part in parts {
+            assert!(line.contains(part), "{arguments:?}: {part} not in {line}");
+        }
+    }
+}
+
+#[test]
 fn wrong_uploads_are_named_with_what_is_allowed() {
-    let (field, site) = (example("field.toml"), example("site.toml"));
+    let field = example("field.toml");
     for (arguments, parts) in [
         (
             &["--upload", "x"][..],
@@ -291,27 +325,6 @@ fn wrong_uploads_are_named_with_what_is_allowed() {
         (
             &["--upload", "20:altitude_min_m=50"],
             &["--upload 20:altitude_min_m=50:", "band must be"],
-        ),
-        (
-            &["--upload", "20:rx_lat_deg=91"],
-            &["rx_lat_deg must be a number within -90.0 to"],
-        ),
-        (
-            &["--upload", "20:rx_lat_deg=47.4"],
-            &["--upload 20:rx_lat_deg=47.4:", "[site]"],
-        ),
-        (
-            &["--scenario", &site, "--upload", "20:rx_lat_deg=49"],
-            &["--upload 20:rx_lat_deg=49:", "10 to 100000 m"],
-        ),
-        (
-            &[
-                "--scenario",
-                &site,
-                "--upload",
-                "20:rx_lat_deg=47.42,distance_m=1000",
-            ],
-            &["distance_m=1000:", "must be that between its sites"],
         ),
         (&["--upload", "20", "--no-auth"], &["--upload", "--no-auth"]),
         (&["--upload-from", "rx"], &["--upload"]),
