@@ -86,45 +86,63 @@ impl Flight {
     }
 }
 
+/// What a chain came to: whether it settled, its costliest call and its longest frame.
+struct Flown {
+    settled: u32,
+    most: u32,
+    longest: usize,
+}
+
+/// One chain: the stack has no room for several at once.
+#[inline(never)]
+fn fly(mission: Mission, settings: Settings) -> Flown {
+    let mut flight = Flight::new(mission, settings);
+    Flown {
+        settled: u32::from(flight.settle(20_000)),
+        most: flight.most,
+        longest: flight.longest,
+    }
+}
+
 #[inline(never)]
 pub(crate) fn methods() {
     let settings = Settings {
         predict: false,
         ..Settings::default()
     };
-    let mut joint = Flight::new(
+    let joint = fly(
         HIGH,
         Settings {
             method: Method::Joint,
             ..settings
         },
     );
-    hprintln!("joint_settled {}", u32::from(joint.settle(20_000)));
+    hprintln!("joint_settled {}", joint.settled);
     hprintln!("joint {}", joint.most);
     hprintln!("joint_bytes {}", joint.longest);
-    let mut predicted = Flight::new(
+    let predicted = fly(
         HIGH,
         Settings {
             method: Method::Joint,
             ..Settings::default()
         },
     );
-    hprintln!("predicted_settled {}", u32::from(predicted.settle(20_000)));
+    hprintln!("predicted_settled {}", predicted.settled);
     hprintln!("predicted {}", predicted.most);
     let adjust = Adjust {
         rounds: 2,
         ..Adjust::default()
     };
-    let mut turns = Flight::new(
+    let turns = fly(
         HIGH,
         Settings {
             method: Method::Adjust(adjust),
             ..settings
         },
     );
-    hprintln!("adjust_settled {}", u32::from(turns.settle(20_000)));
+    hprintln!("adjust_settled {}", turns.settled);
     hprintln!("adjust {}", turns.most);
-    let mut field = Flight::new(UNEVEN, Settings::default());
-    hprintln!("field_settled {}", u32::from(field.settle(20_000)));
+    let field = fly(UNEVEN, Settings::default());
+    hprintln!("field_settled {}", field.settled);
     hprintln!("field {}", field.most);
 }
