@@ -13,7 +13,7 @@ use crate::sites::LineError;
 pub enum Event {
     /// `Relay::setpoint` has a new value, or none any more: fly there, or hold the place.
     SetpointChanged,
-    /// The chain has agreed on a target, `Relay::target`: every relay knows its place for it.
+    /// The chain has agreed on places, and on a target where the interference is known, `Relay::target`: every relay knows its place.
     Converged,
     /// Raised at the leader (relay 1; in a field relay N): no places meet any target that may be tried. Every relay stays where it is.
     /// `Relay::restart`, a new view or a new mission has the leader try again.

@@ -143,9 +143,9 @@ pub struct Settings {
     /// on the air. All relays of a network are given the key, or none is.
     pub auth: Option<Auth>,
     /// The longest that a sweep (100 bytes) takes from one relay's `poll_transmit` to the next one's, its computing included;
-    /// above 0. For messages that take longer it is multiplied. A link that turns out to be slower is given its time from then on.
+    /// above 0. For messages that take longer it is multiplied.
     pub hop_time: Duration,
-    /// After this long without an answer from a neighbour the relay asks whether it is there, sixteen times until `dead_after` and no oftener than it can be answered; above 0.
+    /// After this long without an answer from a neighbour the relay asks whether it is there, sixteen times until `dead_after`; above 0.
     pub probe_after: Duration,
     /// After this long without one it counts as lost, and for this long at least a relay holds what was agreed on; above `probe_after`.
     pub dead_after: Duration,

@@ -65,7 +65,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
         let now = clock.now();
         let relay = &mut *drone.relay;
         while let Some(sample) = measured() {
-            relay.handle_sample(sample);
+            relay.handle_sample(now, sample);
         }
         if let Some(autopilot) = &mut drone.autopilot {
             autopilot.listen(now, relay);

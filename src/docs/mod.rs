@@ -5,6 +5,7 @@
 //! | [`planning`] | how many relays, where, and whether that is the best there is |
 //! | [`lost_relays`] | what happens when a relay falls silent, comes back, or the chain is split |
 //! | [`uploads`] | how a flying chain is given a new mission |
+//! | [`sensing`] | how the relays find an interferer, and follow it |
 //! | [`flight`] | how a drone flies to its place, and who flies it |
 //! | [`security`] | what signed frames protect, and what not |
 //! | [`wire_format`] | every byte on the wire, enough for another implementation |
@@ -17,6 +18,9 @@ pub mod lost_relays {}
 
 #[doc = include_str!("uploads.md")]
 pub mod uploads {}
+
+#[doc = include_str!("sensing.md")]
+pub mod sensing {}
 
 #[cfg(feature = "flight")]
 #[doc = include_str!("flight.md")]

@@ -1,7 +1,6 @@
 //! What a relay is and flies, as every layer is handed it, and what a layer asks of the others.
 
 use super::retransmit::Trip;
-use super::round_trip::Took;
 use super::timing::{longest_lease, tenths};
 use super::view::electorate::Held;
 #[cfg(feature = "upload")]
@@ -10,7 +9,7 @@ use crate::mission::{Band, Heading, Interference, Mission};
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
 use crate::sites::Sites;
-use crate::time::{Duration, Instant};
+use crate::time::Instant;
 use crate::view::ViewId;
 use crate::wire::digest::{MissionId, between, digest};
 
@@ -123,8 +122,6 @@ pub(crate) struct Context<'a> {
     pub(crate) end: bool,
     /// For how long what was agreed on may be held elsewhere.
     pub(crate) held: Held,
-    /// How long a hop onward takes.
-    pub(crate) hop_time: Duration,
 }
 
 impl<'a> Context<'a> {
@@ -189,7 +186,7 @@ impl<'a> Context<'a> {
     /// One of so many hops, on which nobody computes.
     pub(crate) const fn way(&self, hops: u16) -> Trip {
         Trip {
-            hop_time: self.hop_time,
+            hop_time: self.member.settings.hop_time,
             hops,
             slow: false,
         }
@@ -229,8 +226,6 @@ pub(crate) struct Effects {
     pub(crate) converged: bool,
     /// No target can be met.
     pub(crate) infeasible: bool,
-    /// How long it took until a message was said to have arrived.
-    pub(crate) took: Option<Took>,
     /// A new view is needed.
     pub(crate) view_needed: bool,
     /// What was agreed on is not held any more.
@@ -280,7 +275,6 @@ impl Effects {
         began: false,
         converged: false,
         infeasible: false,
-        took: None,
         view_needed: false,
         lapsed: false,
         heard_onward: None,

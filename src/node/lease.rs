@@ -217,7 +217,7 @@ impl Lease {
                     if current.done.is_some() {
                         self.retransmit.asked(context.now, context.way_back());
                     } else {
-                        let hop_time = context.hop_time;
+                        let hop_time = context.settings().hop_time;
                         self.retransmit.came_again(context.now, hop_time);
                     }
                     return Effects::REPEATED;
@@ -317,27 +317,18 @@ impl Lease {
     }
 
     fn on_pulsed(&mut self, context: &Context<'_>, pulsed: Pulsed) -> Effects {
-        let known = self.current.filter(|known| known.number == pulsed.number);
-        let Some(current) = known else {
+        let Some(current) = self
+            .current
+            .filter(|current| current.number == pulsed.number && current.done.is_none())
+        else {
             return Effects::STALE;
         };
-        let (now, way) = (context.now, context.way_onward());
-        if current.done.is_some() {
-            let took = self.retransmit.came_twice(now);
-            return Effects {
-                took,
-                ..Effects::STALE
-            };
-        }
-        let took = if pulsed.done {
-            let took = self.retransmit.went_through(now, way.hops);
+        if pulsed.done {
             self.finish(context);
-            took
         } else {
-            Some(self.retransmit.arrived(now, way))
-        };
+            self.retransmit.arrived(context.now, context.way_onward());
+        }
         Effects {
-            took,
             heard_onward: Some(current.handed_on),
             ..Effects::NONE
         }
@@ -346,7 +337,7 @@ impl Lease {
     /// Does what is due: a pulse at the leader, one more time, or nothing any more.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let now = context.now;
-        let again = self.retransmit.take_due(now, context.hop_time);
+        let again = self.retransmit.take_due(now, context.settings().hop_time);
         let resent = again == Some(Again::Onward);
         self.due.onward |= resent;
         self.due.back |= again == Some(Again::Back);

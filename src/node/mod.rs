@@ -22,7 +22,6 @@
 //! | --- | --- |
 //! | `context` | what a relay is and flies, as every layer is handed it, and what a layer asks of the others |
 //! | `retransmit` | how long an answer is awaited, and when a message is sent again |
-//! | `round_trip` | how long an answer takes |
 //! | `numbering` | what a number that is not the expected one means |
 //! | `timing` | what the layers have in common in keeping time |
 //! | [`sample`] | the interference that a relay measures |
@@ -39,7 +38,6 @@ pub(crate) mod neighbour;
 mod numbering;
 mod retransmit;
 pub(crate) mod round;
-mod round_trip;
 pub(crate) mod sample;
 mod steering;
 mod timing;

@@ -1,6 +1,5 @@
 //! How long what comes back of a message sent onward is awaited before that message is sent again.
 
-use super::round_trip::Took;
 use crate::jitter::Jitter;
 use crate::time::{Duration, Instant};
 
@@ -10,12 +9,6 @@ const SLOW: u32 = 4;
 
 /// A message of which nothing is heard is repeated every eight hops' time: a run of lost frames is over the sooner.
 const LOG_MOST: u32 = 2;
-
-/// So often it is repeated before the spans between the repetitions double: that many may get lost where every other frame does.
-const FREE: u8 = 6;
-
-/// How often they double.
-const DOUBLINGS: u8 = 3;
 
 /// Within this many hops' time a neighbour that has got a message again says so.
 const SOON: u32 = 4;
@@ -28,8 +21,6 @@ const MEMORY: u8 = 8;
 pub(crate) struct Retransmit {
     /// How often it has been sent again since anything was heard of it.
     unheard: u8,
-    /// Whether it has been sent again, and what comes of that may come yet.
-    repeated: bool,
     /// Whether the neighbour has said that it has arrived.
     arrived: bool,
     /// Whether frames get lost on its way, by what this relay or the one before has seen.
@@ -38,11 +29,7 @@ pub(crate) struct Retransmit {
     doubt: u8,
     /// How often what came of it is said again unasked.
     answers: u8,
-    /// How often that was asked for.
-    asks: u8,
     jitter: Jitter,
-    /// When it was sent last, µs, wrapping.
-    sent_at: u32,
     at: Option<Instant>,
 }
 
@@ -66,24 +53,15 @@ pub(crate) enum Again {
     Back,
 }
 
-/// The time in µs, wrapping after 71 minutes.
-#[expect(clippy::cast_possible_truncation, reason = "as it says")]
-const fn micros(at: Instant) -> u32 {
-    at.as_micros() as u32
-}
-
 impl Retransmit {
     pub(crate) const fn new(seed: u32) -> Self {
         Self {
             unheard: 0,
-            repeated: false,
             arrived: false,
             lossy: false,
             doubt: 0,
             answers: 0,
-            asks: 0,
             jitter: Jitter::new(seed),
-            sent_at: 0,
             at: None,
         }
     }
@@ -91,8 +69,6 @@ impl Retransmit {
     /// There is a new message.
     pub(crate) const fn begin(&mut self) {
         self.unheard = 0;
-        self.repeated = false;
-        self.asks = 0;
         self.arrived = false;
         self.lossy = self.doubt > 0;
         self.doubt = self.doubt.saturating_sub(1);
@@ -100,39 +76,17 @@ impl Retransmit {
     }
 
     /// A neighbour has said that the message has arrived. What is missing is the answer, and that may take its time.
-    pub(crate) fn arrived(&mut self, now: Instant, trip: Trip) -> Took {
-        let took = Duration::from_micros(u64::from(micros(now).wrapping_sub(self.sent_at)));
-        // Nobody says that the first one has arrived.
-        let took = match (self.unheard, self.arrived) {
-            (1, false) => Took::Exactly(took),
-            _ => Took::AtLeast(took),
-        };
+    pub(crate) fn arrived(&mut self, now: Instant, trip: Trip) {
         self.unheard = 0;
         self.arrived = true;
-        self.wait(now, trip);
-        took
-    }
-
-    /// What came of the message has come back over `hops` hops each way. Where it was sent once that says how long one takes at most.
-    pub(crate) fn went_through(&self, now: Instant, hops: u16) -> Option<Took> {
-        let clean = self.unheard == 0 && !self.arrived && self.at.is_some();
-        let took = micros(now).wrapping_sub(self.sent_at);
-        let took = took.checked_div(u32::from(hops)).filter(|_| clean)?;
-        Some(Took::AtMost(Duration::from_micros(u64::from(took))))
-    }
-
-    /// What came of the message has come once more. Where it was sent again, that is what came of the last one.
-    pub(crate) fn came_twice(&mut self, now: Instant) -> Option<Took> {
-        let took = micros(now).wrapping_sub(self.sent_at);
-        let first = core::mem::take(&mut self.repeated);
-        first.then_some(Took::AtLeast(Duration::from_micros(u64::from(took))))
+        self.sent(now, trip);
     }
 
     /// The relay before has sent the message again: frames get lost on its way, and it may be lost to the next one, too.
     pub(crate) fn came_again(&mut self, now: Instant, hop_time: Duration) {
         self.lossy = true;
         let soon = now + self.jitter.spread(hop_time.times(SOON));
-        if self.unheard == 0 && !self.arrived && self.at.is_some_and(|at| at > soon) {
+        if !self.arrived && self.at.is_some_and(|at| at > soon) {
             self.at = Some(soon);
         }
     }
@@ -142,23 +96,15 @@ impl Retransmit {
     /// The answer may take as long as there and back over the hops that are left, and two to spare; [`SLOW`] times as long where relays
     /// compute on the way. The relay next to a lost frame runs out of patience first, so one loss costs one repetition. From then on it is
     /// known that frames get lost here: this message and the next ones are repeated sooner, first after four hops' time and then after
-    /// eight, until a neighbour says that it has arrived; after [`FREE`] of them less and less often, as the link may only be slow. The neighbour learns by the repetition that frames get lost, and does the same:
+    /// eight, until a neighbour says that it has arrived. The neighbour learns by the repetition that frames get lost, and does the same:
     /// so a loss is waited for the whole way once, and not at every hop of a long chain. A random eighth keeps relays on a shared channel
     /// from repeating in step.
     pub(crate) fn sent(&mut self, now: Instant, trip: Trip) {
-        self.sent_at = micros(now);
-        self.wait(now, trip);
-    }
-
-    fn wait(&mut self, now: Instant, trip: Trip) {
         let answer = (2 * u32::from(trip.hops) + 2) * if trip.slow { SLOW } else { 1 };
         let hops = match self.unheard {
             0 if self.lossy && !self.arrived => answer.min(SOON),
             0 => answer,
-            again => {
-                let doublings = again.saturating_sub(FREE).min(DOUBLINGS);
-                answer.min(2 << u32::from(again).min(LOG_MOST)) << doublings
-            }
+            again => answer.min(2 << u32::from(again).min(LOG_MOST)),
         };
         self.answers = 0;
         self.at = Some(now + self.jitter.spread(trip.hop_time.times(hops)));
@@ -181,16 +127,11 @@ impl Retransmit {
     /// The relay before asks for what came of the message: it was lost on the way back.
     pub(crate) fn asked(&mut self, now: Instant, trip: Trip) {
         self.lossy = true;
-        // Who asks again and again may only be slow to hear.
-        if self.answers == 0 {
-            self.asks = self.asks.saturating_add(1);
-            self.answered(now, trip);
-        }
+        self.answered(now, trip);
     }
 
     fn say_again(&mut self, now: Instant, hop_time: Duration) {
-        let span = hop_time.times(SOON << self.asks.saturating_sub(1).min(DOUBLINGS));
-        self.at = (self.answers > 0).then(|| now + self.jitter.spread(span));
+        self.at = (self.answers > 0).then(|| now + self.jitter.spread(hop_time.times(SOON)));
     }
 
     /// Nothing is awaited any more.
@@ -214,7 +155,6 @@ impl Retransmit {
             self.doubt = MEMORY;
         }
         self.unheard = self.unheard.saturating_add(1);
-        self.repeated = true;
         Some(Again::Onward)
     }
 
@@ -224,4 +164,115 @@ impl Retransmit {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::{Again, MEMORY, Retransmit, SOON, Trip};
+    use crate::time::{Duration, Instant};
+
+    const HOP: Duration = Duration::from_millis(10);
+
+    const WAY: Trip = Trip {
+        hop_time: HOP,
+        hops: 49,
+        slow: false,
+    };
+
+    /// Hops' time from `now` until it does something again.
+    fn wait(retransmit: &Retransmit, now: Instant) -> u64 {
+        let at = retransmit.next_timeout().unwrap();
+        at.since(now).as_micros() / HOP.as_micros()
+    }
+
+    fn around(hops: u32) -> core::ops::RangeInclusive<u64> {
+        u64::from(hops)..=u64::from(hops + hops / 8)
+    }
+
+    /// A message was sent, and nothing was heard for as long as is waited: `again` in a row.
+    fn silence(retransmit: &mut Retransmit, mut now: Instant, again: u32) -> Instant {
+        for _ in 0..again {
+            now = retransmit.next_timeout().unwrap();
+            assert_eq!(retransmit.take_due(now, HOP), Some(Again::Onward));
+            retransmit.sent(now, WAY);
+        }
+        now
+    }
+
+    #[test]
+    fn the_whole_way_is_waited_for_once() {
+        let (mut one, start) = (Retransmit::new(1), Instant::from_millis(1_000));
+        one.begin();
+        one.sent(start, WAY);
+        assert!(around(100).contains(&wait(&one, start)));
+        let now = silence(&mut one, start, 1);
+        assert!(around(4).contains(&wait(&one, now)));
+        let now = silence(&mut one, now, 1);
+        assert!(around(8).contains(&wait(&one, now)));
+        // It has arrived: the answer may take its time.
+        one.arrived(now, WAY);
+        assert!(around(100).contains(&wait(&one, now)));
+        for message in 0..=MEMORY {
+            one.begin();
+            one.sent(now, WAY);
+            let hops = if message < MEMORY { SOON } else { 100 };
+            assert!(around(hops).contains(&wait(&one, now)), "{message}");
+        }
+    }
+
+    /// On a channel that loses nothing the first repetition is answered: nothing follows from it.
+    #[test]
+    fn a_repetition_that_is_answered_keeps_nobody_in_doubt() {
+        let (mut one, now) = (Retransmit::new(1), Instant::from_millis(1_000));
+        one.begin();
+        one.sent(now, WAY);
+        silence(&mut one, now, 1);
+        for message in 0..=MEMORY {
+            one.begin();
+            one.sent(now, WAY);
+            assert_eq!(one.lossy, message < MEMORY, "{message}");
+            if one.lossy {
+                let now = silence(&mut one, now, 1);
+                one.arrived(now, WAY);
+            }
+        }
+    }
+
+    #[test]
+    fn what_comes_again_may_be_lost_to_the_next_one_too() {
+        let (mut one, now) = (Retransmit::new(1), Instant::from_millis(1_000));
+        one.begin();
+        one.sent(now, WAY);
+        one.came_again(now, HOP);
+        assert!(around(SOON).contains(&wait(&one, now)));
+        one.arrived(now, WAY);
+        one.came_again(now, HOP);
+        assert!(around(100).contains(&wait(&one, now)));
+        // That is no proof of a loss of its own.
+        one.begin();
+        one.sent(now, WAY);
+        assert!(around(100).contains(&wait(&one, now)));
+    }
+
+    #[test]
+    fn an_answer_is_said_once_or_where_frames_get_lost_as_often_as_the_way_has_digits() {
+        for (hops, digits) in [(0, 0), (1, 1), (7, 3), (8, 4), (49, 6), (199, 8)] {
+            for lossy in [false, true] {
+                let (mut one, mut now) = (Retransmit::new(1), Instant::from_millis(1_000));
+                let way = Trip { hops, ..WAY };
+                one.begin();
+                if lossy {
+                    one.asked(now, way);
+                } else {
+                    one.answered(now, way);
+                }
+                let mut times = 0;
+                while let Some(at) = one.next_timeout() {
+                    assert!(around(SOON).contains(&wait(&one, now)));
+                    now = at;
+                    assert_eq!(one.take_due(now, HOP), Some(Again::Back));
+                    times += 1;
+                }
+                assert_eq!(times, if lossy { digits } else { 0 }, "{hops}");
+                assert_eq!(one.take_due(now, HOP), None);
+            }
+        }
+    }
+}

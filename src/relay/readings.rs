@@ -3,7 +3,7 @@
 use super::facade::Relay;
 use crate::field::estimate::Estimate;
 use crate::guard::HoldReason;
-use crate::mission::{Mission, Profile};
+use crate::mission::{Interference, Mission, Profile};
 use crate::node::round::state::Phase;
 use crate::place::Placement;
 use crate::sensing::belief::Told;
@@ -31,9 +31,11 @@ impl Relay {
         self.node.hold_reason(side)
     }
 
-    /// The SIR (linear) that every hop of the agreed chain meets; `None` before the first agreement.
+    /// The SIR (linear) that every hop of the agreed chain meets; `None` before the first agreement, and while nothing is known of the
+    /// interference.
     pub fn target(&self) -> Option<f32> {
-        self.node.round().target()
+        let known = !matches!(self.mission().interference(), Interference::Unknown);
+        self.node.round().target().filter(|_| known)
     }
 
     /// At the leader, after Algorithm 1 or 4: at the altitudes held no chain has an SIR of this or more, linear. `None` elsewhere, and

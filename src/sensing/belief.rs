@@ -161,8 +161,7 @@ pub(crate) fn review(
     let mut source = found.source;
     let mut moves = false;
     if found.is_one {
-        let age = (sums.age_s() * 1e6) as u64;
-        let heard = Instant::from_micros(now.as_micros().saturating_sub(age));
+        let heard = Instant::from_micros(now.as_micros().saturating_sub(sums.age_us()));
         track.take(&found, heard, listen.half_life);
         // What is agreed on now holds until the next look, and the drones have to fly there.
         let ahead = Duration::from_micros(listen.every.as_micros() / 2);

@@ -106,6 +106,7 @@ impl Fit {
         value(&self.coefficients, terms)
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "checked")]
     /// The power that a source at this place most likely has, W: k = m g / (g G g), as in `nearest`.
     pub(crate) fn power_w(&self, mission: &Mission, [x_m, y_m]: [f32; 2]) -> Option<f32> {
         let unit = Interferer {

@@ -88,6 +88,16 @@ impl Sums {
         if count > 0.0 { age / count } else { 0.0 }
     }
 
+    /// The same in microseconds.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "what is too old, or no number, is cut"
+    )]
+    pub(crate) fn age_us(&self) -> u64 {
+        (self.age_s() * 1e6) as u64
+    }
+
     /// Whether all are finite, and those of squares not negative.
     pub(crate) fn is_sound(&self) -> bool {
         let [aa, .., vv, count, measurements, age] = self.numbers;

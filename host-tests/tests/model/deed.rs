@@ -162,7 +162,8 @@ impl World<'_> {
         for sample in 0..SAMPLES {
             let spread = if sample % 2 == 0 { 0.7 } else { 1.3 };
             let power_w = agreed_w * f32::from(part) * 0.01 * spread;
-            self.relays[at].handle_sample(Sample::Interference { power_w });
+            let sample = Sample::Interference { power_w };
+            self.relays[at].handle_sample(self.now, sample);
         }
         if self.scenario.kind != Kind::Measured {
             self.ledgers[at].refuses(SAMPLES);

@@ -37,7 +37,7 @@ fn noisy(number: u64, space: bool) -> Scenario {
 
 /// The solver's target over the judge's; `None` where there is no chain.
 fn ratio(number: u64) -> Option<f64> {
-    let of = noisy(number, number % 2 == 0);
+    let of = noisy(number, number.is_multiple_of(2));
     let (mission, _) = of_link(&of.link, 1e-4)?;
     let mission = with_room(mission.config(), of.corridor)?;
     let best = joint::optimum(&of.link, of.corridor, &of.held, Effort::usual(number))?;

@@ -92,6 +92,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
             x_m: link.x_i,
             y_m: link.y_i,
         }]),
+        noise: uav_relay_sim::scenario::Noise::default(),
         relays: BTreeMap::new(),
     }
 }

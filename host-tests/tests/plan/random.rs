@@ -94,6 +94,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
             ..ChannelSpec::default()
         },
         interference,
+        noise: uav_relay_sim::scenario::Noise::default(),
         relays,
     }
 }
@@ -131,6 +132,7 @@ fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
         mu_los: channel.mu_los(),
         mu_nlos: channel.mu_nlos(),
         eta: channel.eta(),
+        noise_w: 0.0,
         relays: vec![
             Station {
                 altitude_m: scenario.altitude_m,

@@ -16,7 +16,7 @@ fn shares(
     sources: usize,
     setup: impl Fn(&Wild) -> Setup + Sync,
 ) -> [Vec<f64>; LAST + 1] {
-    let scenes: Vec<u64> = (0..count(60)).collect();
+    let scenes: Vec<u64> = (0..count(200)).collect();
     let each: Vec<Vec<f64>> = scenes
         .into_par_iter()
         .map(|seed| {
@@ -117,6 +117,6 @@ fn a_wrong_guess_is_unlearned() {
         assert!(quantile(&mut shares[3], 0.5) >= 0.98);
         assert!(quantile(&mut shares[5], 0.5) >= 0.99);
         assert!(quantile(&mut shares[LAST], 0.1) >= 0.97);
-        assert!(quantile(&mut shares[LAST], 0.0) >= 0.5);
+        assert!(quantile(&mut shares[LAST], 0.01) >= 0.5);
     }
 }

@@ -130,7 +130,7 @@ impl Node {
             Message::Heartbeat { ask, answer, .. } => {
                 let neighbour = self.layers.neighbours.at_mut(side);
                 neighbour.asked(*ask);
-                if let Some(at) = neighbour.answered(*answer, now) {
+                if let Some(at) = neighbour.answered(*answer) {
                     self.confirm(now, side, at);
                 }
                 return;
@@ -161,12 +161,9 @@ impl Node {
         let layers = &mut self.layers;
         let effects = match message {
             Message::Proposal(_) | Message::Decision(_) => layers.view.handle(&context, message),
+            Message::Busy { sweep } if layers.view.on_busy(&context, *sweep) => Effects::NONE,
             // No pass goes on while a view is proposed.
-            _ if layers.view.awaited().is_some() => match message {
-                Message::Busy { sweep } => layers.view.on_busy(&context, *sweep),
-                _ => None,
-            }
-            .unwrap_or(Effects::STALE),
+            _ if layers.view.awaited().is_some() => Effects::STALE,
             _ => {
                 if message.is_of_a_view() && message.is_onward() {
                     // What was agreed on in the view has come: all have accepted it.

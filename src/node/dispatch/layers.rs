@@ -22,14 +22,13 @@ pub(super) struct Layers {
 impl Layers {
     /// What a layer is handed. It borrows the member alone, which stands beside the layers: any of them can be lent while it lasts.
     pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
-        let onward = self.neighbours.at(Side::onward(member.mission.heading()));
+        let onward = Side::onward(member.mission.heading());
         Context {
             now,
             member,
             latest: self.update.latest(),
-            end: onward.has_no_peer(),
+            end: self.neighbours.at(onward).has_no_peer(),
             held: self.lease.held(now),
-            hop_time: onward.hop_time(&member.settings),
         }
     }
 

@@ -115,9 +115,6 @@ impl Node {
             self.layers.neighbours.at_mut(back).proposed_by(proposer);
         }
         let (back, onward) = (self.back(), self.onward());
-        if let Some(took) = effects.took {
-            self.layers.neighbours.at_mut(onward).took(took);
-        }
         for (side, at) in [(onward, effects.heard_onward), (back, effects.heard_back)] {
             if let Some(at) = at {
                 self.confirm(now, side, at);

@@ -35,7 +35,7 @@ impl Node {
                 self.silence(now, side);
             }
         }
-        if self.awaits_first() && self.may_be_on_its_way(now) {
+        if self.awaits_first() && self.is_solving(now) {
             if self.layers.view.asking.is_due(now) {
                 self.await_first(now);
             }
@@ -133,26 +133,10 @@ impl Node {
         self.layers.round.is_fresh() && !self.layers.view.asking.asks()
     }
 
-    /// Whether it would be too early to ask for a view: the relay solves, nobody has been heard yet who could be asked, or, once, the link is
-    /// slower than `hop_time` has it.
-    fn may_be_on_its_way(&mut self, now: Instant) -> bool {
-        let back = self.layers.neighbours.at(self.back());
-        let settings = &self.member.settings;
-        let slow = back.question_time(settings) > settings.hop_time;
-        let unmet = back.is_unmet();
-        let asking = &mut self.layers.view.asking;
-        unmet || slow && asking.is_due(now) && asking.waits_again() || self.is_solving(now)
-    }
-
     /// By when the first pass should have come, were this the beginning.
     pub(super) fn await_first(&mut self, now: Instant) {
         let (settings, all) = (&self.member.settings, self.member.all);
-        let hop_time = self
-            .layers
-            .neighbours
-            .at(self.back())
-            .question_time(settings);
-        let there_and_back = hop_time.times(2 * u32::from(all));
+        let there_and_back = settings.hop_time.times(2 * u32::from(all));
         let usual = now + settings.probe_after + there_and_back;
         let slow = now + first_pass(settings, all);
         self.layers.view.asking.await_first(usual.max(slow));

@@ -11,14 +11,10 @@
 //!
 //! and at the latest after eight times `dead_after`. From there on it is asked every `probe_after`.
 //!
-//! No question is asked before the one before can have been answered: where the channel is slow or overloaded, relays ask the less. Until it
-//! is known how long an answer takes they ask less and less often, down to sixteen times from `probe_after` to `dead_after`.
-//!
 //! Relays of one view that choose their places jointly solve the same chain at the same time, and have nothing to say until they
 //! are done. So while a relay solves, the silence of a neighbour that it is in one view with is excused: both times count from the end
 //! of its own solving.
 
-use crate::node::round_trip::{RoundTrip, Took};
 use crate::node::timing::longest_lease;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -40,17 +36,12 @@ pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, 3)
 }
 
-/// From `probe_after` to `dead_after`, µs.
-const fn span(settings: &Settings) -> u64 {
-    settings
-        .dead_after
-        .as_micros()
-        .saturating_sub(settings.probe_after.as_micros())
-}
-
 /// As long as a pass through the chain and back, but `least` times or more from `probe_after` to `dead_after`.
 fn paced(settings: &Settings, all: u16, least: u64) -> Duration {
-    let span = span(settings);
+    let span = settings
+        .dead_after
+        .as_micros()
+        .saturating_sub(settings.probe_after.as_micros());
     let round = settings.hop_time.times(2 * u32::from(all));
     let most = (span / least).max(1);
     Duration::from_micros(
@@ -84,9 +75,6 @@ pub(crate) struct Liveness {
     /// Questions since it was known to be there, and the most of them before an answer lately.
     unanswered: u16,
     longest: u16,
-    /// How long an answer takes, to a question and to what is sent onward.
-    pub(super) answers: RoundTrip,
-    pub(super) round_trip: RoundTrip,
 }
 
 /// What follows from a silence.
@@ -114,8 +102,6 @@ impl Liveness {
             asked: [now; OPEN],
             unanswered: 0,
             longest: QUESTIONS,
-            answers: RoundTrip::NONE,
-            round_trip: RoundTrip::NONE,
         }
     }
 
@@ -148,11 +134,6 @@ impl Liveness {
         self.longest <= QUESTIONS
     }
 
-    /// Whether it has been heard at all.
-    pub(crate) const fn is_met(&self) -> bool {
-        self.met
-    }
-
     /// A frame has come.
     pub(crate) const fn met(&mut self) {
         self.met = true;
@@ -181,27 +162,12 @@ impl Liveness {
     }
 
     /// When a question of that number was asked, if it is one of the last few.
-    pub(crate) fn answered(&mut self, number: u16, now: Instant) -> Option<Instant> {
+    pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
         if number == 0 || self.question == 0 {
             return None;
         }
         let before = self.question.wrapping_sub(number);
-        let asked = self.asked.get(usize::from(before)).copied()?;
-        self.answers.see(Took::Exactly(now.since(asked)));
-        Some(asked)
-    }
-
-    /// How long after a question the next one is asked, where that is usually `tick`: not before the answer can have come. Until it is
-    /// known how long that takes, less and less often.
-    pub(crate) fn paced(&self, tick: Duration, settings: &Settings) -> Duration {
-        let usual = self.answers.smoothed();
-        if usual.as_micros() > 0 {
-            return usual.max(tick);
-        }
-        let doublings = u32::from(self.unanswered / 2).min(4);
-        let most = span(settings) / u64::from(QUESTIONS);
-        let slower = tick.times(1 << doublings);
-        slower.min(Duration::from_micros(most)).max(tick)
+        self.asked.get(usize::from(before)).copied()
     }
 
     /// Its silence so far says nothing; whether it is not lost already.
@@ -232,57 +198,5 @@ impl Liveness {
             now + tick
         };
         Silence { lost, look_again }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{Liveness, Settings, tick};
-    use crate::time::{Duration, Instant};
-
-    const NOW: Instant = Instant::from_millis(60_000);
-
-    /// Of a short chain, and of one so long that nothing may be asked oftener.
-    fn ticks() -> [Duration; 2] {
-        [8, 1_000].map(|all| tick(&Settings::default(), all))
-    }
-
-    #[test]
-    fn who_does_not_answer_is_asked_less_often_and_sixteen_times_all_the_same() {
-        let settings = Settings::default();
-        for tick in ticks() {
-            let mut link = Liveness::new(NOW);
-            let mut last = Duration::from_micros(0);
-            let mut all = 0;
-            for _ in 0..16 {
-                link.ask(NOW);
-                let next = link.paced(tick, &settings);
-                assert!(next >= last.max(tick));
-                last = next;
-                all += next.as_micros();
-            }
-            // From `probe_after` to `dead_after`.
-            assert!(all <= 10_000_000, "{all}");
-            assert_eq!(last.as_micros(), 625_000);
-        }
-    }
-
-    #[test]
-    fn nobody_is_asked_again_before_the_answer_can_have_come() {
-        let settings = Settings::default();
-        for tick in ticks() {
-            for took in [10, 400, 2_000] {
-                let took = Duration::from_millis(took);
-                let mut link = Liveness::new(NOW);
-                let question = link.ask(NOW);
-                assert_eq!(link.answered(question, NOW + took), Some(NOW));
-                for _ in 0..16 {
-                    link.ask(NOW);
-                    assert_eq!(link.paced(tick, &settings), took.max(tick));
-                }
-                link.renew(NOW);
-                assert_eq!(link.paced(tick, &settings), tick, "another node");
-            }
-        }
     }
 }

@@ -13,8 +13,8 @@ impl Neighbour {
     }
 
     /// The neighbour has answered the question of that number: when that was asked.
-    pub(crate) fn answered(&mut self, number: u16, now: Instant) -> Option<Instant> {
-        self.liveness.answered(number, now)
+    pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
+        self.liveness.answered(number)
     }
 
     /// A heartbeat that is owed: to which node, the number of its question and that of the one it answers.

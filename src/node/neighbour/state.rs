@@ -30,7 +30,6 @@ use super::hellos::Hellos;
 use super::liveness::{Liveness, patience, tick};
 use super::signs::Signs;
 use crate::jitter::Jitter;
-use crate::node::round_trip::Took;
 use crate::node::timing::{first_pass, longest_lease};
 use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant};
@@ -185,26 +184,6 @@ impl Neighbour {
         self.liveness.is_there()
     }
 
-    /// A round trip to it was seen.
-    pub(crate) fn took(&mut self, took: Took) {
-        self.liveness.round_trip.see(took);
-    }
-
-    /// How long a hop takes of what is sent onward to it.
-    pub(crate) fn hop_time(&self, settings: &Settings) -> Duration {
-        self.liveness.round_trip.hop_time(settings.hop_time)
-    }
-
-    /// How long a hop takes of an answer to a question.
-    pub(crate) fn question_time(&self, settings: &Settings) -> Duration {
-        self.liveness.answers.hop_time(settings.hop_time)
-    }
-
-    /// Whether nothing was ever heard of a node that is taken to be here.
-    pub(crate) fn is_unmet(&self) -> bool {
-        self.is_mutual() && !self.liveness.is_met()
-    }
-
     /// The neighbour was there `at` that time or later; whether it had been lost until now.
     pub(crate) fn confirmed(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.confirmed(at);
@@ -266,8 +245,7 @@ impl Neighbour {
         searches: bool,
         asking: Option<Duration>,
     ) -> bool {
-        let usual = asking.unwrap_or(self.tick);
-        let step = self.jitter.spread(self.liveness.paced(usual, settings));
+        let step = self.jitter.spread(asking.unwrap_or(self.tick));
         let span = settings
             .dead_after
             .as_micros()

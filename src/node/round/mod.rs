@@ -104,11 +104,7 @@ impl Round {
             Message::Busy { sweep } => {
                 if computation.phase() == Phase::Waiting && *sweep == computation.number() {
                     let trip = self.trip(context);
-                    let took = Some(self.retransmit.arrived(context.now, trip));
-                    return Effects {
-                        took,
-                        ..Effects::NONE
-                    };
+                    self.retransmit.arrived(context.now, trip);
                 }
                 return Effects::NONE;
             }
@@ -124,7 +120,7 @@ impl Round {
 
     /// Does what is due. Bounded by one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
-        let hop_time = context.hop_time;
+        let hop_time = context.settings().hop_time;
         let resent = match self.retransmit.take_due(context.now, hop_time) {
             Some(Again::Onward) => self.computation.phase() == Phase::Waiting,
             Some(Again::Back) => {
@@ -211,7 +207,7 @@ impl Round {
             }
             Action::Busy => {
                 self.due.busy = true;
-                let hop_time = context.hop_time;
+                let hop_time = context.settings().hop_time;
                 self.retransmit.came_again(context.now, hop_time);
                 Effects::REPEATED
             }

@@ -53,7 +53,6 @@ impl Line {
                 view: ViewId::LOADED,
                 rest: None,
             },
-            hop_time: member.settings.hop_time,
         };
         call(&mut self.rounds[at], &context)
     }

@@ -69,13 +69,6 @@ impl Asking {
         self.at = Some(at);
     }
 
-    /// Whether the first pass is to be waited for once more.
-    pub(crate) const fn waits_again(&mut self) -> bool {
-        let first = self.tries == 0;
-        self.tries = 1;
-        first
-    }
-
     /// Whether it is time to ask.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.at.is_some_and(|at| at <= now)

@@ -184,7 +184,7 @@ impl ViewChange {
         if again {
             if self.state == ViewState::Proposed {
                 self.due.busy = true;
-                let hop_time = context.hop_time;
+                let hop_time = context.settings().hop_time;
                 self.retransmit.came_again(context.now, hop_time);
             } else {
                 self.due.decision = true;

@@ -1,7 +1,7 @@
 //! What is sent of a view change: the proposal onward, the decision back.
 
 use super::change::{ViewChange, ViewState};
-use crate::node::context::{Context, Effects};
+use crate::node::context::Context;
 use crate::wire::message::{Decision, Message, Proposal};
 
 impl ViewChange {
@@ -51,15 +51,15 @@ impl ViewChange {
         })
     }
 
-    /// A message is said to have arrived: what follows, if it is the proposal.
-    pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> Option<Effects> {
-        self.awaited()
-            .filter(|proposed| proposed.view.mark() == number)?;
-        let way = context.way(context.member.all);
-        let took = Some(self.retransmit.arrived(context.now, way));
-        Some(Effects {
-            took,
-            ..Effects::NONE
-        })
+    /// A message is said to have arrived: whether it is the proposal.
+    pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
+        let known = self
+            .awaited()
+            .is_some_and(|proposed| proposed.view.mark() == number);
+        if known {
+            let way = context.way(context.member.all);
+            self.retransmit.arrived(context.now, way);
+        }
+        known
     }
 }

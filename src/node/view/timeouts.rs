@@ -15,7 +15,7 @@ impl ViewChange {
         fresh: bool,
     ) -> Effects {
         let mut resent = false;
-        let hop_time = context.hop_time;
+        let hop_time = context.settings().hop_time;
         match self.retransmit.take_due(context.now, hop_time) {
             Some(Again::Onward) if self.state == ViewState::Proposed => {
                 self.due.proposal = true;

@@ -1,4 +1,5 @@
-//! One relay aside with noise, where the touching place of the lowest plane is outside the corridor: a search of the corridor.
+//! One relay aside with noise, where the touching place of the lowest plane is outside the corridor: a search of the corridor at one
+//! altitude.
 //!
 //! Without noise no place within the rectangle can then be the best. With noise there may be a second place at which two level lines
 //! touch from within, on the other side of the interferer's own line: next to Y = 0 it is all but the mirror image of the first. Nothing

@@ -12,6 +12,7 @@ use super::failure::error;
 use super::flown::version;
 use super::hops::{self, RelayReport, db, hop_sirs};
 use super::left::{LostReport, left, lost};
+use super::listened::ListenedReport;
 use super::recovery::{self, RecoveryReport, recoveries};
 use super::silences::{SilenceReport, silences};
 use super::timeline::{self, MomentReport, seconds};
@@ -95,6 +96,9 @@ pub struct ChainReport {
     /// What the run was like over its whole time, where that was watched.
     #[serde(flatten)]
     pub watched: WatchedReport,
+    /// What relays that had to find the interferer by themselves believe, and what it is worth.
+    #[serde(flatten)]
+    pub listened: Option<ListenedReport>,
     /// How many relays are in the chain at the end, where that is not what it began with, or might not have been.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<u16>,
@@ -184,6 +188,7 @@ impl ChainReport {
             silences: silences(outcome),
             channel: None,
             air: None,
+            listened: None,
             watched: outcome.watched.map(WatchedReport::of).unwrap_or_default(),
             left: (!timeline.is_empty()).then_some(flown),
             lost: lost(outcome, &chain),
@@ -226,6 +231,7 @@ impl ChainReport {
             silences: Vec::new(),
             channel: None,
             air: None,
+            listened: None,
             watched: WatchedReport::default(),
             left: None,
             lost: Vec::new(),
@@ -306,6 +312,9 @@ impl ChainReport {
                 faults.rejected,
                 self.seed
             );
+        }
+        if let Some(listened) = &self.listened {
+            text += &listened.text();
         }
         if let Some(air) = &self.air {
             text += &air.text(self.virtual_s);

@@ -22,7 +22,7 @@ pub struct MomentReport {
     pub relay: u16,
     /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted`, `healed`, `deaf`, `hears`, `offered`,
     /// `held`, `adopted`, `lapsed`, `unheard`, `stranger`, `other key`, `old epoch`, `namesake`,
-    /// `engaged`, `released`, `blind` or `restarted`: the last four of its autopilot.
+    /// `engaged`, `released`, `blind` or `restarted`: those four of its autopilot; `believes`, `unclear` or `off`: of relays that listen.
     pub what: &'static str,
     /// The neighbour that was lost or found, the relay that is not heard, or the one that is told of.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -169,6 +169,8 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         "silent" | "on" => one.at_s.to_bits() == moment.at_s.to_bits(),
         "held" | "adopted" => one.version == moment.version,
         "cut" | "lapsed" | "engaged" | "released" => true,
+        "believes" => !group.relays.contains(&moment.relay),
+        "off" => one.other == moment.other,
         _ => false,
     }
 }
@@ -248,6 +250,20 @@ impl Group {
             "blind" => format!("{who} does not know where its drone is"),
             "restarted" => format!("the autopilot of {who} was switched off and on"),
             "cut" => format!("{who} cut off: too few to go on without the others"),
+            "believes" => format!(
+                "{who} {} a new finding of what interferes",
+                if many { "take up" } else { "takes up" }
+            ),
+            "unclear" => format!("{who} found that what is heard is not of one source"),
+            "off" => {
+                format!("{who} found that relay {other} hears something else than all the others")
+            }
+            "converged" if one.sir.is_none() => {
+                format!(
+                    "spread evenly: {}, to hear what interferes",
+                    count(self.relays.len())
+                )
+            }
             "converged" => format!(
                 "converged: {}, SIR {:.3}",
                 count(self.relays.len()),

@@ -72,8 +72,6 @@ pub struct Setup {
     pub settings: Settings,
     /// The links.
     pub link: LinkSpec,
-    /// What the relays take for [`Setup::hop_time`], where that is another than what the links take.
-    pub hop_time_set: Option<Duration>,
     /// What happens to frames on them.
     pub faults: Faults,
     /// Relays that go silent: index from 1, and when.
@@ -127,7 +125,6 @@ impl Setup {
             held: Vec::new(),
             settings: Settings::default(),
             link: LinkSpec::default(),
-            hop_time_set: None,
             faults: Faults::default(),
             kills: Vec::new(),
             boots: Vec::new(),

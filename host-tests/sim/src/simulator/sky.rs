@@ -91,6 +91,7 @@ impl Sky {
     }
 
     /// A standard normal number of the place's own.
+    #[expect(clippy::cast_possible_truncation, reason = "a number of a cell")]
     fn shadow(&self, at: Place) -> f64 {
         use rand::SeedableRng as _;
         let cell = [at.x, at.y, at.h].map(|m| (m / SHADOW_M).round() as i64);

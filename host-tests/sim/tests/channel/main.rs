@@ -8,7 +8,6 @@
     missing_docs
 )]
 
-mod latency;
 mod least_baud;
 mod messages;
 

@@ -96,7 +96,6 @@ impl Check {
             latest: member.active,
             end: chain.after(at).is_none(),
             held: Held::NONE,
-            hop_time: member.settings.hop_time,
         }
     }
 

@@ -116,7 +116,6 @@ pub(super) fn context(member: &Member, latest: MissionId, end: bool, now: Instan
         latest,
         end,
         held: Held::NONE,
-        hop_time: member.settings.hop_time,
     }
 }
 

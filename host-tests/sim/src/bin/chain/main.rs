@@ -3,6 +3,7 @@
 mod air;
 mod flight;
 mod hostile;
+mod listening;
 mod options;
 mod times;
 mod upload;
@@ -17,7 +18,7 @@ use uav_relay::{Measure, Mission, Placement, Schedule, Sites, Wiring};
 use uav_relay_sim::beta::beta_w;
 use uav_relay_sim::command::{self, Failure, narrow};
 use uav_relay_sim::mission::{self, Refusal};
-use uav_relay_sim::report::{self, AirReport, AttackReport, ChainReport, timeline};
+use uav_relay_sim::report::{self, AirReport, AttackReport, ChainReport, ListenedReport, timeline};
 use uav_relay_sim::scenario::{Interference, Scenario};
 use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::faults::Faults;
@@ -68,11 +69,19 @@ fn run(options: &Options) -> Result<(), Failure> {
     options.hostile.flight.prepare(&mut setup, axis)?;
     setup.profiles = profiles;
     setup.held = mission::held(&scenario, options.uavs);
+    let told = setup.mission;
+    options
+        .listening
+        .prepare(&mut setup, &scenario, options.uavs)?;
     let outcome = fly(options, &scenario, setup.clone())?;
+    let listened = ListenedReport::of(&setup, &outcome);
+    // What is reported is held against what is there, whatever the relays were told.
+    setup.mission = options.listening.moved(told, outcome.ended);
     let flown = report::flown(&setup, &outcome);
     let mut report = ChainReport::new(&method, &flown, &outcome, options.seed);
     report.channel = (setup.settings.wiring == Wiring::Shared).then_some("shared");
     report.air = AirReport::of(&setup, &outcome);
+    report.listened = listened;
     if setup.attack.take().is_some() {
         let auth = setup.auth;
         let attack = AttackReport::new(auth, &outcome, &fly(options, &scenario, setup)?);

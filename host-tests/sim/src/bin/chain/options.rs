@@ -6,6 +6,7 @@ use clap::{Parser, ValueEnum};
 use uav_relay_sim::command::{narrow, number};
 
 use crate::hostile::Hostile;
+use crate::listening::Listening;
 
 /// N simulated relays exchange real frames over simulated serial links until they hold the places that make the worst hop
 /// as good as it can be.
@@ -64,6 +65,8 @@ pub(crate) struct Options {
     /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) listening: Listening,
     #[command(flatten)]
     pub(crate) hostile: Hostile,
 }

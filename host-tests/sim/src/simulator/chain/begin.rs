@@ -28,29 +28,7 @@ impl Chain {
     /// [`SetupError`] where a profile or setting is refused by the relay.
     pub(super) fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
-        let mut members = Vec::new();
-        for index in 1..=setup.mission.relays() {
-            let start = Start {
-                index,
-                number: 1,
-                seed: rng.random(),
-                now: Instant::ZERO,
-            };
-            let relay = switched_on(&setup, start, None, None)?;
-            members.push(Member {
-                node: index,
-                lines: [Line::default(); 2],
-                killed: None,
-                lent: false,
-                starts: 1,
-                swept: 0,
-                stored: None,
-                safe: None,
-                measured: None,
-                relay,
-                wake: None,
-            });
-        }
+        let members = members(&setup, &mut rng)?;
         let mut queue = Queue::default();
         let stations = stations(&setup);
         let bursts = (setup.burst > 1.0).then(|| Bursts::new(setup.faults.loss, setup.burst));
@@ -136,6 +114,34 @@ impl Chain {
         chain.look(Touched::All);
         Ok(chain)
     }
+}
+
+/// The relays, switched on at time 0.
+fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupError> {
+    let mut members = Vec::new();
+    for index in 1..=setup.mission.relays() {
+        let start = Start {
+            index,
+            number: 1,
+            seed: rng.random(),
+            now: Instant::ZERO,
+        };
+        let relay = switched_on(setup, start, None, None)?;
+        members.push(Member {
+            node: index,
+            lines: [Line::default(); 2],
+            killed: None,
+            lent: false,
+            starts: 1,
+            swept: 0,
+            stored: None,
+            safe: None,
+            measured: None,
+            relay,
+            wake: None,
+        });
+    }
+    Ok(members)
 }
 
 /// What happens to drones with autopilots; how often something does.

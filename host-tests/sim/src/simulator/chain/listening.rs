@@ -3,7 +3,8 @@
 use uav_relay::sensing::belief::Told;
 use uav_relay::{Phase, Placement, Sample};
 
-use super::super::drones::placement;
+use super::super::drones::{Drone, placement};
+use super::super::fleet::Vehicle;
 use super::super::queue::Happening;
 use super::super::sky::Stand;
 use super::state::Chain;
@@ -22,7 +23,9 @@ impl Chain {
                 .flight
                 .as_ref()
                 .and_then(|flight| flight.drones.get(index))
-                .map(|drone| placement(drone.taken()));
+                .map(Drone::taken)
+                .or_else(|| self.fleet.get(index).map(Vehicle::at))
+                .map(placement);
             let Some(member) = self.members.get_mut(index) else {
                 continue;
             };

@@ -35,7 +35,7 @@ pub(super) fn switched_on(
     let settings = Settings {
         profile: own.map(|(_, profile)| *profile),
         hold_altitude: setup.held.contains(&index),
-        hop_time: setup.hop_time_set.unwrap_or(setup.hop_time()),
+        hop_time: setup.hop_time(),
         auth: setup.proof(number).or(setup.settings.auth),
         ..setup.settings
     };

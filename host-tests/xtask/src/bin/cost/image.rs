@@ -35,27 +35,27 @@ const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",
         &["--no-default-features"],
-        [59 * 1024, 5120, 2560],
+        [64 * 1024, 5632, 2816],
     ),
     (
         "flash of that with `guard`",
         &["--no-default-features", "--features", "guard"],
-        [66 * 1024, 5120, 2560],
+        [71 * 1024, 5632, 3072],
     ),
     (
         "flash of that with `auth`",
         &["--no-default-features", "--features", "auth"],
-        [63 * 1024, 5632, 3072],
+        [68 * 1024, 6 * 1024, 3840],
     ),
     (
         "flash of that with `guard` and `upload`",
         &["--no-default-features", "--features", "guard,upload"],
-        [79 * 1024, 6 * 1024, 3584],
+        [81 * 1024, 6400, 4352],
     ),
     (
         "flash of that with `guard` and `flight`",
         &["--no-default-features", "--features", "guard,flight"],
-        [88 * 1024, 8 * 1024, 4 * 1024],
+        [92 * 1024, 8 * 1024, 4 * 1024],
     ),
     (
         "flash of that with `mavlink-signing`",
@@ -64,14 +64,15 @@ const IMAGES: &[Image] = &[
             "--features",
             "guard,mavlink-signing",
         ],
-        [90 * 1024, 8 * 1024, 4 * 1024],
+        [95 * 1024, 8 * 1024, 4 * 1024],
     ),
     (
         "flash of the relay image, everything",
         &[],
         // Of these flash 26 KiB and RAM 2.3 KiB are the autopilot's: geodesy in f64 without a unit for it, MAVLink, a port, and the guard,
         // which is on since the drone knows where it is, and 3 KiB that what is said there can be signed.
-        [141 * 1024, 10_752, 4608],
+        // Noise in every method takes 3 to 4 KiB of each image, and sensing, which solves in f64, 20 KiB of this one and the deepest stack.
+        [161 * 1024, 10_752, 5_888],
     ),
 ];
 

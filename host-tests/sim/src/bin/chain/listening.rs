@@ -1,0 +1,105 @@
+//! Relays that are not told of the interferers: that they listen, and how well.
+
+use clap::Args;
+use uav_relay::{Instant, Interference, Interferer, Listen, Mission, MissionConfig};
+use uav_relay_sim::command::{Failure, narrow, number};
+use uav_relay_sim::scenario::Scenario;
+use uav_relay_sim::scene::Scene;
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_sim::simulator::sky::Sky;
+
+/// The options for that.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Listening")]
+pub(crate) struct Listening {
+    /// The relays are not told the scenario's interferers: each measures, once a second, what it hears where it is, and together they
+    /// find one that accounts for it
+    #[arg(long)]
+    listen: bool,
+    /// Independent samples of the interference in one measurement, 1 to 1000000
+    #[arg(long, value_name = "K", default_value_t = 1_000, requires = "listen", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    samples: u32,
+    /// Standard deviation of a place's own error, dB, 0 to 20
+    #[arg(long, value_name = "DB", default_value_t = 0.0, requires = "listen", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 20.0))]
+    shadow: f64,
+    /// All interferers move from the start on, m/s along the line and to its right, each -100 to 100
+    #[arg(long, value_name = "VX,VY", requires = "listen", allow_hyphen_values = true, value_parser = velocity)]
+    move_interferer: Option<[f64; 2]>,
+    /// For how many virtual seconds they listen, 10 to 1e5
+    #[arg(long, value_name = "S", default_value_t = 120.0, requires = "listen", value_parser = |text: &str| number(text, 10.0, 1e5))]
+    listen_for: f64,
+}
+
+impl Listening {
+    /// Has the relays of `setup` find the interferers of `scenario`.
+    pub(crate) fn prepare(
+        &self,
+        setup: &mut Setup,
+        scenario: &Scenario,
+        uavs: u16,
+    ) -> Result<(), Failure> {
+        if !self.listen {
+            return Ok(());
+        }
+        if setup.soak.is_some() || !setup.uploads.is_empty() || setup.attack.is_some() {
+            let line = "--listen goes with neither --soak nor --upload nor an attacker";
+            return Err(Failure::input(line.to_owned()));
+        }
+        let Some(scene) = Scene::new(scenario, uavs) else {
+            let line = "--listen needs an [[interferer]], and the scenario has a [field]";
+            return Err(Failure::input(line.to_owned()));
+        };
+        let unknown = Mission::try_new(MissionConfig {
+            interference: Interference::Unknown,
+            ..*setup.mission.config()
+        });
+        setup.mission = unknown.map_err(|error| Failure::input(error.to_string()))?;
+        let mut listen = match self.move_interferer {
+            Some(_) => Listen::following(uavs),
+            None => Listen::default(),
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "of 1e-3 to 1")]
+        let error = (1.0 / f64::from(self.samples).sqrt()).max(1e-3) as f32;
+        listen.relative_error = error;
+        setup.settings.listen = Some(listen);
+        let mut sky = Sky::of(scene);
+        sky.samples = self.samples;
+        sky.shadow_db = self.shadow;
+        sky.velocity_mps = self.move_interferer.unwrap_or_default();
+        sky.seed = setup.seed;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "10 to 1e5"
+        )]
+        let until = (self.listen_for * 1e3) as u64;
+        sky.until = Instant::from_millis(until);
+        setup.sky = Some(sky);
+        Ok(())
+    }
+
+    /// `mission` with its interferer where it is at `then`.
+    pub(crate) fn moved(&self, mission: Mission, then: Instant) -> Mission {
+        let (Some([along, aside]), Some(source)) = (self.move_interferer, mission.known_source())
+        else {
+            return mission;
+        };
+        let seconds = then.as_micros() as f64 * 1e-6;
+        let there = Interferer {
+            x_m: narrow(f64::from(source.x_m) + along * seconds),
+            y_m: narrow(f64::from(source.y_m) + aside * seconds),
+            ..source
+        };
+        Mission::try_new(MissionConfig {
+            interference: Interference::Source(there),
+            ..*mission.config()
+        })
+        .unwrap_or(mission)
+    }
+}
+
+fn velocity(text: &str) -> Result<[f64; 2], String> {
+    let form = "must be VX,VY, m/s along the line and to its right, each -100 to 100";
+    let (along, aside) = text.split_once(',').ok_or(form)?;
+    Ok([number(along, -100.0, 100.0)?, number(aside, -100.0, 100.0)?])
+}

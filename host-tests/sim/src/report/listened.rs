@@ -1,0 +1,150 @@
+//! What came of a run whose relays had to find the interferer by themselves.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+use uav_relay::sensing::belief::Belief;
+use uav_relay::{Interference, Interferer, Mission, MissionConfig};
+
+use super::hops::db;
+use crate::command::narrow;
+use crate::scene::Scene;
+use crate::simulator::chain::run;
+use crate::simulator::outcome::Outcome;
+use crate::simulator::setup::Setup;
+use crate::simulator::sky::Sky;
+
+/// An interferer that is believed to be there.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct BelievedReport {
+    /// Transmit power, W.
+    pub power_w: f32,
+    /// Along the line, m.
+    pub x_m: f32,
+    /// To its right, m; relays that never left the line cannot tell the sides from each other.
+    pub y_m: f32,
+}
+
+/// What was found, and what it is worth.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
+pub struct ListenedReport {
+    /// What the first relay believes in the end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub believed: Option<BelievedReport>,
+    /// How often the chain has agreed on other places, the first time included.
+    pub agreements: u32,
+    /// The SIR of the chain in the end against the true interferers, linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub true_sir: Option<f64>,
+    /// That of the chain that was told of the interferer as it is in the end, linear. Of one interferer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub optimum_sir: Option<f64>,
+    /// The one over the other.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share_of_optimum: Option<f64>,
+    /// The mean of that at every measurement since the first agreement.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_share_of_optimum: Option<f64>,
+}
+
+impl ListenedReport {
+    /// Of a run of `setup`; `None` where nobody listened.
+    pub fn of(setup: &Setup, outcome: &Outcome) -> Option<Self> {
+        let sky = setup.sky.as_ref()?;
+        let believed = outcome.relays.first().map(|relay| relay.believed.belief);
+        let mut report = Self {
+            believed: match believed {
+                Some(Belief::Source { source, .. }) => Some(BelievedReport {
+                    power_w: source.power_w,
+                    x_m: source.x_m,
+                    y_m: source.y_m,
+                }),
+                _ => None,
+            },
+            ..Self::default()
+        };
+        let mut shares = Vec::new();
+        let mut still = None;
+        for stand in outcome.stands.iter().filter(|stand| stand.agreements > 0) {
+            let scene = sky.scene_at(stand.at);
+            let sir = scene.chain_sir(&stand.places);
+            report.true_sir = Some(sir);
+            report.agreements = stand.agreements;
+            // Of one that does not move it is found once.
+            let optimum = still.or_else(|| optimum(setup, &scene));
+            if !moves(sky) {
+                still = optimum;
+            }
+            report.optimum_sir = optimum;
+            report.share_of_optimum = optimum.map(|optimum| sir / optimum);
+            shares.extend(report.share_of_optimum);
+        }
+        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+        report.mean_share_of_optimum = (!shares.is_empty()).then_some(mean);
+        Some(report)
+    }
+
+    /// The same as lines of text.
+    pub(super) fn text(&self) -> String {
+        let mut text = String::new();
+        _ = match self.believed {
+            Some(believed) => writeln!(
+                text,
+                "believed: an interferer of {:.3} W at x = {:.1} m, |y| = {:.1} m, after {} agreements",
+                believed.power_w,
+                believed.x_m,
+                believed.y_m.abs(),
+                self.agreements
+            ),
+            None => writeln!(
+                text,
+                "believed: nothing, after {} agreements",
+                self.agreements
+            ),
+        };
+        if let Some(sir) = self.true_sir {
+            _ = write!(text, "true SIR {sir:.6} ({:.3} dB)", db(sir));
+            if let (Some(optimum), Some(share), Some(mean)) = (
+                self.optimum_sir,
+                self.share_of_optimum,
+                self.mean_share_of_optimum,
+            ) {
+                _ = write!(
+                    text,
+                    ", {share:.4} of the optimum {optimum:.6}; {mean:.4} of it on average since the first agreement"
+                );
+            }
+            text.push('\n');
+        }
+        text
+    }
+}
+
+fn moves(sky: &Sky) -> bool {
+    sky.velocity_mps.iter().any(|speed| speed.abs() > 0.0)
+}
+
+/// The SIR of the chain that is told of the one interferer of `scene`, linear.
+fn optimum(setup: &Setup, scene: &Scene) -> Option<f64> {
+    let [source] = scene.sources.as_slice() else {
+        return None;
+    };
+    let mission = Mission::try_new(MissionConfig {
+        interference: Interference::Source(Interferer {
+            power_w: narrow(source.power_w),
+            x_m: narrow(source.x_m),
+            y_m: narrow(source.y_m),
+        }),
+        ..*setup.mission.config()
+    })
+    .ok()?;
+    let mut told = Setup::new(mission);
+    told.settings = setup.settings;
+    told.settings.listen = None;
+    told.settings.guard = None;
+    told.profiles.clone_from(&setup.profiles);
+    told.held.clone_from(&setup.held);
+    let outcome = run(told).ok()?;
+    let places: Option<Vec<_>> = outcome.relays.iter().map(|relay| relay.setpoint).collect();
+    Some(scene.chain_sir(&places?))
+}
