@@ -90,10 +90,19 @@ pub(crate) fn judge(link: &Link, room: Corridor, chain: &[[f64; 3]]) -> Result<f
     sir(link, &places).ok_or(count)
 }
 
+/// The chain in the numbers of a set-point.
+fn rounded(chain: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    #[expect(clippy::cast_possible_truncation, reason = "what this is about")]
+    let flown = |place: &[f64; 3]| place.map(|value| f64::from(value as f32));
+    chain.iter().map(flown).collect()
+}
+
 /// What a solver's chain is worth.
 pub(crate) struct Score {
     /// SIR of the worst hop, linear.
     pub(crate) sir: f64,
+    /// The same of its places as set-points: in m, in f32.
+    pub(crate) flown: f64,
     /// When the solver first had a chain that is good enough, s; `None` if it never had.
     pub(crate) good_after_s: Option<f64>,
     /// When it first had one as good as the chain that it is compared with, s.
@@ -121,6 +130,7 @@ pub(crate) fn score(
     };
     Ok(Score {
         sir,
+        flown: judge(link, room, &rounded(&found.chain))?,
         good_after_s: after(&found.good, optimum * (1.0 - GOOD))?,
         level_after_s: after(&found.level, level)?,
     })

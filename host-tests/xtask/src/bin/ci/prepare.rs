@@ -4,7 +4,7 @@ use std::process::Command;
 
 use uav_relay_xtask::toolchain::{llvm_tool, succeeds};
 
-use super::steps::{OLDEST, TARGET};
+use super::steps::{CARGO_FUZZ, NIGHTLY, OLDEST, TARGET};
 
 /// The emulator that runs the firmware.
 const QEMU: &str = "qemu-system-arm";
@@ -33,7 +33,7 @@ const TO_EDIT: [Needed; 2] = [
     ),
 ];
 
-const FOR_THE_REST: [Needed; 3] = [
+const FOR_THE_REST: [Needed; 4] = [
     (
         TARGET,
         &["rustc", "--print", "target-libdir", "--target", TARGET],
@@ -56,7 +56,24 @@ const FOR_THE_REST: [Needed; 3] = [
             "--no-self-update",
         ],
     ),
+    (
+        "the compiler of the fuzzer and of Miri",
+        &["rustup", "run", NIGHTLY, "cargo", "miri", "--version"],
+        &[
+            "toolchain",
+            "install",
+            NIGHTLY,
+            "--profile",
+            "minimal",
+            "--component",
+            "miri,rust-src",
+            "--no-self-update",
+        ],
+    ),
 ];
+
+/// The fuzzer's version.
+const CARGO_FUZZ_VERSION: &str = "0.13.2";
 
 /// Adds what the quick steps need, or all of them, and the machine lacks; or says what to type.
 pub(crate) fn prepare(quick: bool) -> Result<(), String> {
@@ -65,7 +82,34 @@ pub(crate) fn prepare(quick: bool) -> Result<(), String> {
         return Ok(());
     }
     add(&FOR_THE_REST)?;
+    prepare_fuzzer()?;
     prepare_emulator()
+}
+
+/// cargo-fuzz is built into the target folder: what it is for is this project alone.
+fn prepare_fuzzer() -> Result<(), String> {
+    if succeeds(CARGO_FUZZ, &["fuzz", "--version"]) {
+        return Ok(());
+    }
+    let install = [
+        "install",
+        "cargo-fuzz",
+        "--version",
+        CARGO_FUZZ_VERSION,
+        "--locked",
+        "--root",
+        "target/tools",
+    ];
+    println!("ci: adding cargo-fuzz: cargo {}", install.join(" "));
+    let added = Command::new("cargo").args(install).status();
+    if added.is_ok_and(|status| status.success()) {
+        Ok(())
+    } else {
+        Err(format!(
+            "cargo-fuzz is missing and cannot be added; type: cargo {}",
+            install.join(" ")
+        ))
+    }
 }
 
 fn add(needed: &[Needed]) -> Result<(), String> {

@@ -4,8 +4,6 @@ use std::process::Command;
 
 use uav_relay_xtask::FUZZ_TARGETS;
 
-use uav_relay_xtask::toolchain::succeeds;
-
 /// The target the firmware is built for.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
@@ -42,47 +40,23 @@ pub(crate) struct Step {
     pub(crate) name: String,
     pub(crate) command: String,
     environment: &'static [(&'static str, &'static str)],
-    /// What it is left out without.
-    pub(crate) needs: Option<Tool>,
 }
 
-/// A program that is too much to add to a machine unasked.
-#[derive(Clone, Copy)]
-pub(crate) struct Tool {
-    check: &'static [&'static str],
-    pub(crate) get: &'static str,
-}
+/// The compiler of the fuzzer and of Miri: a dated one, so that a commit's verdict stays what it is.
+pub(crate) const NIGHTLY: &str = "nightly-2026-10-30";
 
-const DENY: Tool = Tool {
-    check: &["cargo", "deny", "--version"],
-    get: "cargo install cargo-deny --locked",
-};
+/// The fuzzer, where [`super::prepare`] puts it.
+pub(crate) const CARGO_FUZZ: &str = "target/tools/bin/cargo-fuzz";
 
-const FUZZ: Tool = Tool {
-    check: &["rustup", "run", "nightly", "cargo", "fuzz", "--version"],
-    get: "rustup toolchain install nightly --profile minimal && cargo install cargo-fuzz --locked",
-};
-
-const MIRI: Tool = Tool {
-    check: &["rustup", "run", "nightly", "cargo", "miri", "--version"],
-    get: "rustup toolchain install nightly --profile minimal --component miri,rust-src",
-};
-
-impl Tool {
-    pub(crate) fn is_there(self) -> bool {
-        match self.check {
-            [program, arguments @ ..] => succeeds(program, arguments),
-            [] => true,
-        }
-    }
-}
+/// Executions of each fuzz target. With their seed they are the same ones each time: this finds what a commit broke, a long run
+/// finds what is new.
+const EXECUTIONS: u32 = 10_000;
 
 fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
     Step {
         name: name.into(),
         command: command.into(),
         environment: &[],
-        needs: None,
     }
 }
 
@@ -137,16 +111,9 @@ pub(crate) fn all() -> Vec<Step> {
         ));
     }
     steps.push(step(
-        "licences",
-        "cargo run --quiet --package uav-relay-xtask --bin licences",
+        "packages: licences, sources, duplicates",
+        "cargo run --quiet --package uav-relay-xtask --bin packages",
     ));
-    steps.push(Step {
-        needs: Some(DENY),
-        ..step(
-            "advisories and duplicates",
-            "cargo deny --locked check --config .cargo/deny.toml",
-        )
-    });
     steps.extend(nightly());
     steps
 }
@@ -206,32 +173,31 @@ fn firmware() -> Vec<Step> {
     ]
 }
 
-/// What needs more than a stable compiler: every fuzz target for some seconds from its corpus on, the corpora under Miri.
+/// What needs more than a stable compiler: every fuzz target from its corpus on, the corpora under Miri.
 fn nightly() -> Vec<Step> {
     let mut steps = Vec::new();
     for target in FUZZ_TARGETS {
         // What is found goes where it is not taken for a part of the corpus; of a missing folder libFuzzer makes an error.
         let found = format!("target/fuzz/{target}");
         _ = std::fs::create_dir_all(&found);
-        let fuzz =
-            "cargo fuzz run --fuzz-dir host-tests/fuzz/harness --target-dir target/fuzz/build";
+        let fuzz = format!(
+            "rustup run {NIGHTLY} {CARGO_FUZZ} fuzz run --fuzz-dir host-tests/fuzz/harness --target-dir target/fuzz/build"
+        );
         let corpora = format!("{found} host-tests/fuzz/corpus/{target}");
         let command = format!(
-            "rustup run nightly {fuzz} --sanitizer none {target} {corpora} -- -max_total_time=10"
+            "{fuzz} --sanitizer none {target} {corpora} -- -seed=1 -runs={EXECUTIONS} -max_total_time=60"
         );
-        steps.push(Step {
-            needs: Some(FUZZ),
-            ..step(format!("fuzz smoke, {target}"), command)
-        });
+        steps.push(step(format!("fuzz smoke, {target}"), command));
     }
     // With the width of the target's pointers; for x86 libm takes square roots in assembly, which Miri does not read. Isolated,
     // it would not read the corpora either.
     steps.push(Step {
-        needs: Some(MIRI),
         environment: &[("MIRIFLAGS", "-Zmiri-disable-isolation")],
         ..step(
             "miri",
-            "rustup run nightly cargo miri test -p host-tests --test fuzz --target armv7-unknown-linux-gnueabihf --target-dir target/miri",
+            format!(
+                "rustup run {NIGHTLY} cargo miri test -p host-tests --test fuzz --target armv7-unknown-linux-gnueabihf --target-dir target/miri"
+            ),
         )
     });
     steps

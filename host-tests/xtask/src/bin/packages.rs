@@ -1,0 +1,153 @@
+//! What the workspace builds with: licences that its own goes with, one place it all comes from, nothing twice in what flies; run
+//! by `cargo ci`. Advisories are not looked up: they change without a commit, and have to be fetched.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::process::{Command, ExitCode};
+
+/// Those that ask for no more than to be named.
+const ALLOWED: [&str; 10] = [
+    "0BSD",
+    "Apache-2.0",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "BSL-1.0",
+    "ISC",
+    "MIT",
+    "Unicode-3.0",
+    "Unlicense",
+    "Zlib",
+];
+
+/// Packages of the tests alone, under a licence that binds who hands them on.
+const TESTS_ALONE: [&str; 2] = ["alterable_logger", "colored"];
+
+/// Whether each part of a licence expression that stands between `AND`s offers one of [`ALLOWED`]. An older `/` is an `OR`.
+fn is_allowed(expression: &str) -> bool {
+    let plain = expression.replace(['(', ')'], " ").replace('/', " OR ");
+    let one = |licence: &str| {
+        let name = licence.split(" WITH ").next().unwrap_or_default();
+        ALLOWED.contains(&name.trim())
+    };
+    plain.split(" AND ").all(|part| part.split(" OR ").any(one))
+}
+
+/// In the library's tree in two versions: embedded-hal 1.0 asks for the older defmt, which is the newer one under another name.
+const TWICE: [&str; 1] = ["defmt"];
+
+/// What `cargo tree` prints of the locked packages, for every target and feature.
+fn tree(arguments: &[&str]) -> Result<String, String> {
+    let output = Command::new("cargo")
+        .args([
+            "tree",
+            "--locked",
+            "--target=all",
+            "--all-features",
+            "--prefix=none",
+        ])
+        .args(arguments)
+        .output()
+        .map_err(|error| format!("cargo: {error}"))?;
+    if output.status.success() {
+        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    } else {
+        Err(String::from_utf8_lossy(&output.stderr).into_owned())
+    }
+}
+
+/// The packages whose licence is not among those allowed.
+fn licences() -> Result<Vec<String>, String> {
+    let text = tree(&[
+        "--workspace",
+        "--edges=all",
+        "--no-dedupe",
+        "--format={l}|{p}",
+    ])?;
+    let packages: BTreeSet<&str> = text.lines().filter(|line| line.contains('|')).collect();
+    println!("packages: {}", packages.len());
+    let refused = packages.into_iter().filter(|line| {
+        let (licence, package) = line.split_once('|').unwrap_or_default();
+        let name = package.split(' ').next().unwrap_or_default();
+        !is_allowed(licence) && !TESTS_ALONE.contains(&name)
+    });
+    Ok(refused.map(|line| format!("licence: {line}")).collect())
+}
+
+/// The packages that the library, not its tests or its build, needs in several versions.
+fn twice() -> Result<Vec<String>, String> {
+    let text = tree(&[
+        "--package=uav-relay",
+        "--edges=normal,no-proc-macro",
+        "--format={p}",
+    ])?;
+    let mut versions: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for line in text.lines() {
+        if let Some((name, rest)) = line.split_once(' ') {
+            let version = rest.split(' ').next().unwrap_or_default();
+            versions.entry(name).or_default().insert(version);
+        }
+    }
+    versions.retain(|name, versions| versions.len() > 1 && !TWICE.contains(name));
+    let told = |(name, versions)| format!("several versions in what flies: {name} {versions:?}");
+    Ok(versions.into_iter().map(told).collect())
+}
+
+/// The locked packages that come from elsewhere than the registry.
+fn elsewhere(lock: &str) -> Vec<String> {
+    let sources = lock.lines().filter(|line| line.starts_with("source = "));
+    let other = sources.filter(|line| !line.starts_with("source = \"registry+"));
+    other
+        .map(|line| format!("not of the registry: {line}"))
+        .collect()
+}
+
+fn refused() -> Result<Vec<String>, String> {
+    let lock =
+        std::fs::read_to_string("Cargo.lock").map_err(|error| format!("Cargo.lock: {error}"))?;
+    Ok([licences()?, twice()?, elsewhere(&lock)].concat())
+}
+
+fn main() -> ExitCode {
+    match refused() {
+        Ok(refused) if refused.is_empty() => {
+            println!("packages: all allowed");
+            ExitCode::SUCCESS
+        }
+        Ok(refused) => {
+            for line in &refused {
+                println!("packages: {line}");
+            }
+            ExitCode::FAILURE
+        }
+        Err(error) => {
+            println!("packages: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{elsewhere, is_allowed};
+
+    #[test]
+    fn what_is_not_of_the_registry_is_named() {
+        let lock = "source = \"registry+one\"\nsource = \"git+two\"\n";
+        assert_eq!(elsewhere(lock).len(), 1);
+    }
+
+    #[test]
+    fn every_part_of_an_expression_has_to_be_allowed() {
+        for licence in [
+            "MIT",
+            "MIT/Apache-2.0",
+            "Apache-2.0 WITH LLVM-exception OR Apache-2.0 OR MIT",
+            "(MIT OR Apache-2.0) AND Unicode-3.0",
+            "MIT OR Apache-2.0 OR LGPL-2.1-or-later",
+        ] {
+            assert!(is_allowed(licence), "{licence}");
+        }
+        for licence in ["", "GPL-3.0-only", "MPL-2.0", "MIT AND GPL-3.0-only"] {
+            assert!(!is_allowed(licence), "{licence}");
+        }
+    }
+}
