@@ -81,7 +81,7 @@ const SIGNED: &[Counted] = &[
     (
         "the tag of the longest body",
         "instructions",
-        &["tag_221"],
+        &["tag_longest"],
         None,
     ),
     (
@@ -143,7 +143,7 @@ const COUNTED: &[Counted] = &[
         "a full sweep, message in to message out",
         "instructions",
         &["sweep"],
-        Some(13_450),
+        Some(13_400),
     ),
     ("its frame", "bytes", &["sweep_bytes"], Some(100)),
     (
