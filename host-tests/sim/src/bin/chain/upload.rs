@@ -17,7 +17,7 @@ pub(crate) struct Uploads {
     /// The ground uploads the mission of the scenario with other parameters S virtual seconds after the start, and the chain
     /// flies it. Keys as in a scenario file: x_m, y_m and power_w of the interferer, altitude_m, altitude_min_m,
     /// altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m, distance_m, tx_w, uav_w; noise_w, 0 to 1; and tolerance. Where the
-    /// scenario has [site], tx_lat_deg, tx_lon_deg, tx_amsl_m and those of rx move an end; the distance then follows. Repeatable: versions count from 1
+    /// scenario has a site, tx_lat_deg, tx_lon_deg, tx_amsl_m and those of rx move an end; the distance then follows. Repeatable: versions count from 1
     #[arg(long, value_name = "S[:KEY=VALUE,..]", value_parser = planned)]
     upload: Vec<Planned>,
     /// Which end of the link uploads
