@@ -2,6 +2,7 @@
 //! nothing but repetitions, and of two nodes on one side the one before.
 
 use crate::side::Side;
+use crate::sites::LineError;
 
 /// Something a firmware may want to act on. The state behind it is read from the relay.
 ///
@@ -79,10 +80,12 @@ pub enum Event {
     NoQuorum,
     /// A newer mission has come: `Relay::upload`. Store it, and hand it to `Relay::resume` when the relay is next switched on.
     Uploaded,
-    /// A newer mission was refused: it is over another distance than the one loaded, and this relay's line on earth is that of the sites it
-    /// was loaded with (`Settings::sited`). It flies on as before. Raised once for each such mission. An operator uploads one that keeps
-    /// the distance, or loads all relays anew for other sites.
-    UploadRefused,
+    /// A newer mission was refused, since it has no line on earth. It flies on as before. Raised once for each such mission. An operator uploads
+    /// one with sites that are as far apart as its distance says.
+    UploadRefused {
+        /// What is wrong with it.
+        why: LineError,
+    },
     /// This relay believes something else of the interference than before: `Relay::belief`. New places follow.
     Believed,
     /// Raised at the leader: what the relays hear is not of one source on the ground, or says too little. The last belief is kept, see
@@ -94,17 +97,24 @@ pub enum Event {
         /// Which one.
         node: u16,
     },
-    /// The chain has agreed to fly it: `Relay::mission` and `Relay::version` have new values, and new places follow.
+    /// The chain has agreed to fly it: `Relay::mission`, `Relay::version` and `Relay::sites` have new values, and new places follow.
     Adopted,
 }
 
 /// Events about nobody in particular, in the order in which they are told: these first, those about a node, and the others.
 const FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
-const LAST: [Event; 8] = [
+const LAST: &[Event] = &[
     Event::Reformed,
     Event::LeaseLapsed,
     Event::NoQuorum,
-    Event::UploadRefused,
+    #[cfg(feature = "upload")]
+    Event::UploadRefused {
+        why: LineError::Distance,
+    },
+    #[cfg(feature = "upload")]
+    Event::UploadRefused {
+        why: LineError::Sites,
+    },
     Event::Uploaded,
     Event::Adopted,
     Event::Believed,
@@ -172,7 +182,7 @@ impl Pending {
     fn bit(event: Event) -> u16 {
         FIRST
             .iter()
-            .chain(&LAST)
+            .chain(LAST)
             .zip(0..16)
             .find(|(known, _)| **known == event)
             .map_or(0, |(_, bit)| 1 << bit)
@@ -234,7 +244,7 @@ impl Pending {
     pub(crate) fn take(&mut self) -> Option<Event> {
         self.take_plain(&FIRST)
             .or_else(|| self.take_about())
-            .or_else(|| self.take_plain(&LAST))
+            .or_else(|| self.take_plain(LAST))
     }
 }
 

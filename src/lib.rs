@@ -10,6 +10,7 @@ mod event;
 pub mod field;
 #[cfg(feature = "flight")]
 pub mod flight;
+mod geodetic;
 #[cfg(feature = "upload")]
 pub mod ground;
 pub mod guard;
@@ -28,6 +29,7 @@ pub mod serial;
 mod settings;
 mod side;
 pub mod sir;
+mod sites;
 mod stats;
 pub mod time;
 mod view;
@@ -38,6 +40,7 @@ pub use channel::Channel;
 pub use channel_load::ChannelLoad;
 pub use event::Event;
 pub use field::{Field, FieldPoint};
+pub use geodetic::Geodetic;
 #[cfg(feature = "upload")]
 pub use ground::{Ground, Progress};
 pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfig, Profile};
@@ -50,6 +53,7 @@ pub use place::Placement;
 pub use relay::{Port, Relay, Transmit};
 pub use settings::{Adjust, Identity, Listen, Measure, Method, Settings, SetupError, Wiring};
 pub use side::Side;
+pub use sites::{LineError, Sites};
 pub use stats::Stats;
 pub use time::{Duration, Instant};
 pub use view::{View, ViewId};

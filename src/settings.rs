@@ -164,7 +164,7 @@ pub struct Settings {
     /// then has to be told where it is: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
     /// Whether the firmware turns places into latitudes and longitudes, along the line between sites that it was loaded with: then an
-    /// upload over another distance is refused, as there would be no line for it. So are all relays of a chain set, or none is.
+    /// upload without sites of its own is refused if it is over another distance. So are all relays of a chain set, or none is.
     pub sited: bool,
 }
 

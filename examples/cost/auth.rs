@@ -11,6 +11,7 @@ use uav_relay::Relay;
 use uav_relay::Settings;
 use uav_relay::wire::auth::{Auth, Key};
 use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::wire::message::MAX_BODY;
 
 use super::counter::{instructions, relay, sends};
 use super::missions::mission;
@@ -45,7 +46,7 @@ pub(crate) fn auth() {
     const THREE: Mission = mission(3);
     hprintln!("tag_32 {}", tag(32));
     hprintln!("tag_84 {}", tag(84));
-    hprintln!("tag_221 {}", tag(221));
+    hprintln!("tag_longest {}", tag(MAX_BODY));
     let settings = Settings {
         predict: false,
         auth: Some(Auth { key: KEY, epoch: 1 }),

@@ -14,7 +14,7 @@ use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
 use uav_relay::flight::axis::Axis;
 use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Duration, Event, Instant, Relay};
+use uav_relay::{Duration, Event, Instant, Relay, Sites};
 
 use crate::line::line;
 use crate::tty::Tty;
@@ -56,11 +56,11 @@ impl fmt::Debug for SigningKey {
     }
 }
 
-/// What to reach, and along which line it flies.
+/// What to reach, and between which sites it flies.
 #[derive(Clone, Debug)]
 pub(crate) struct AutopilotPlan {
     pub(crate) place: Where,
-    pub(crate) axis: Axis,
+    pub(crate) sites: Sites,
     pub(crate) pace: Pace,
     pub(crate) key: Option<SigningKey>,
 }
@@ -76,6 +76,8 @@ enum Port {
 pub(crate) struct Companion {
     plan: AutopilotPlan,
     link: Autopilot,
+    /// Between which sites it flies.
+    between: Sites,
     port: Option<Port>,
     open_at: Instant,
     /// Whether it was said that it is gone.
@@ -90,12 +92,14 @@ impl Companion {
     /// One line that says what does not work.
     pub(crate) fn open(plan: &AutopilotPlan, now: Instant) -> Result<Self, String> {
         let port = port(&plan.place)?;
-        let mut link = Autopilot::new(plan.axis, plan.pace, now);
+        let axis = Axis::between(plan.sites).map_err(|error| error.to_string())?;
+        let mut link = Autopilot::new(axis, plan.pace, now);
         if let Some(SigningKey(key)) = plan.key {
             link.sign(Signing::new(key, LINK, stamp(), now));
         }
         Ok(Self {
             link,
+            between: plan.sites,
             plan: plan.clone(),
             port: Some(port),
             open_at: now,
@@ -144,6 +148,7 @@ impl Companion {
     /// As every line: where standard output takes it no more.
     pub(crate) fn drive(&mut self, now: Instant, relay: &mut Relay) -> Result<(), String> {
         self.reopen(now)?;
+        self.follow(now, relay);
         let mut bytes = [0; 1_024];
         while let Some(count) = self.read(&mut bytes) {
             self.link
@@ -165,6 +170,17 @@ impl Companion {
             said(now, event)?;
         }
         Ok(())
+    }
+
+    /// Between the sites of a mission that has just been adopted, before anything is told that is along its line.
+    fn follow(&mut self, now: Instant, relay: &Relay) {
+        let sites = relay.sites().unwrap_or(self.plan.sites);
+        // The relay has found that they make a line.
+        if core::mem::replace(&mut self.between, sites) != sites
+            && let Ok(axis) = Axis::between(sites)
+        {
+            self.link.fly_along(now, axis);
+        }
     }
 
     /// Has the operator's ground station show what happened.

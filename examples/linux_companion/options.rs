@@ -231,8 +231,8 @@ fn plan(options: &Options) -> Result<Plan, String> {
 
 /// The autopilot, and the line that it flies along.
 fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
-    let axis = options.sites.axis(options.mission.distance)?;
-    let (Some(name), Some(axis)) = (&options.autopilot, axis) else {
+    let sites = options.sites.of(options.mission.distance)?;
+    let (Some(name), Some(sites)) = (&options.autopilot, sites) else {
         return Ok(None);
     };
     let place = match name.strip_prefix("udp:") {
@@ -241,7 +241,7 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     };
     Ok(Some(AutopilotPlan {
         place,
-        axis,
+        sites,
         pace: Pace {
             speed_m_s: options.speed,
             ..Pace::default()

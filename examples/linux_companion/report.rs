@@ -7,6 +7,7 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Event, Identity, Instant, Mission, Placement, Relay, Side, Stats, Upload};
 
 use crate::line::line;
+use crate::site::Between;
 
 /// An f32 for people and, exactly, for programs.
 struct Exact(f32);
@@ -173,12 +174,7 @@ impl Report {
                     "no quorum: too few relays can be reached; bring the missing ones into reach, or land these"
                 ),
             ),
-            Event::UploadRefused => line(
-                now,
-                format_args!(
-                    "refused: an upload over another distance than that between --site-tx and --site-rx"
-                ),
-            ),
+            Event::UploadRefused { why } => line(now, format_args!("refused: an upload; {why}")),
             Event::Uploaded => {
                 let version = relay.upload().map_or(0, Upload::version);
                 line(
@@ -186,9 +182,15 @@ impl Report {
                     format_args!("uploaded: holds version {version} of the mission"),
                 )
             }
-            Event::Adopted => line(
+            Event::Adopted => adopted(now, relay),
+            Event::Reformed => line(
                 now,
-                format_args!("adopted: flies version {} of the mission", relay.version()),
+                format_args!(
+                    "formed anew: relay {} of {}, view {}",
+                    relay.index(),
+                    relay.mission().relays(),
+                    relay.view().number()
+                ),
             ),
             other => line(now, format_args!("event: {other:?}")),
         }
@@ -213,6 +215,15 @@ impl Report {
             _ if node > self.relays => "the receiver".to_owned(),
             _ => format!("relay {node}"),
         }
+    }
+}
+
+/// Which mission is flown, and between which sites, if they are other ones than those that were loaded.
+fn adopted(now: Instant, relay: &Relay) -> Result<(), String> {
+    let what = format_args!("adopted: flies version {} of the mission", relay.version());
+    match relay.sites() {
+        Some(sites) => line(now, format_args!("{what}, {}", Between(sites))),
+        None => line(now, what),
     }
 }
 

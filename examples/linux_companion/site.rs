@@ -1,8 +1,10 @@
 //! Where the transmitter and the receiver are on earth, as options give it.
 
+use std::fmt;
+
 use clap::Args;
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::geodetic::Geodetic;
+use uav_relay::{Geodetic, Sites};
 
 /// The two ends of the line.
 #[derive(Args, Debug)]
@@ -16,17 +18,25 @@ pub(crate) struct SiteOptions {
 }
 
 impl SiteOptions {
-    /// The line between the two, if they were given, for a mission over `distance_m` metres.
+    /// Both, if they were given.
+    pub(crate) fn sites(&self) -> Option<Sites> {
+        let (Some(tx), Some(rx)) = (self.site_tx, self.site_rx) else {
+            return None;
+        };
+        Some(Sites { tx, rx })
+    }
+
+    /// The same, for a mission over `distance_m` metres.
     ///
     /// # Errors
     /// One line that says what is wrong.
-    pub(crate) fn axis(&self, distance_m: f32) -> Result<Option<Axis>, String> {
-        let (Some(tx), Some(rx)) = (self.site_tx, self.site_rx) else {
+    pub(crate) fn of(&self, distance_m: f32) -> Result<Option<Sites>, String> {
+        let Some(sites) = self.sites() else {
             return Ok(None);
         };
-        let axis = Axis::try_new(tx, rx).map_err(|error| format!("--site-rx: {error}"))?;
+        let axis = Axis::between(sites).map_err(|error| format!("--site-rx: {error}"))?;
         if axis.is_of(distance_m) {
-            return Ok(Some(axis));
+            return Ok(Some(sites));
         }
         Err(format!(
             "--distance {distance_m}: must be {:.3} m, as --site-tx and --site-rx have it",
@@ -35,8 +45,24 @@ impl SiteOptions {
     }
 }
 
+/// Two sites for people, and for other programs: as options give them.
+pub(crate) struct Between(pub(crate) Sites);
+
+impl fmt::Display for Between {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let part = |number: i32, unit: f64| f64::from(number) / unit;
+        let Sites { tx, rx } = self.0;
+        for (name, at) in [("between", tx), (" and", rx)] {
+            let (lat, lon) = (part(at.lat_e7, 1e7), part(at.lon_e7, 1e7));
+            let amsl_m = part(at.amsl_mm, 1e3);
+            write!(f, "{name} {lat:.7},{lon:.7},{amsl_m:.3}")?;
+        }
+        Ok(())
+    }
+}
+
 /// Latitude, longitude, height.
-fn site(text: &str) -> Result<Geodetic, String> {
+pub(crate) fn site(text: &str) -> Result<Geodetic, String> {
     let form = "must be LAT,LON,AMSL: degrees within -90 to 90 and -180 to 180, and metres within -1000 to 10000";
     let numbers: Option<Vec<f64>> = text
         .split(',')

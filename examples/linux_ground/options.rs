@@ -4,8 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
+use uav_relay::flight::axis::Axis;
+use uav_relay::wire::upload::UploadError;
 use uav_relay::{
-    Band, Duration, Interference, Interferer, Mission, MissionConfig, Profile, Side, Upload, Wiring,
+    Band, Duration, Geodetic, Interference, Interferer, Mission, MissionConfig, Profile, Side,
+    Sites, Upload, Wiring,
 };
 
 use crate::command;
@@ -14,7 +17,7 @@ use crate::mission::{
     MissionOptions, altitude, band, distance, interferer, left, mission, noise, power, right,
     separation,
 };
-use crate::site::SiteOptions;
+use crate::site::{SiteOptions, site};
 
 /// Uploads a new mission to a chain of relays in flight. The options up to --min-separation say what the relays were loaded with; those
 /// that begin with --new- what is different from now on, and without any of them it is what they were loaded with. The number of
@@ -56,6 +59,13 @@ struct Options {
     loaded: MissionOptions,
     #[command(flatten)]
     sites: SiteOptions,
+    /// Where the transmitter is from now on; then the distance follows. Without it and --new-site-rx, relays fly between the sites that they
+    /// were loaded with
+    #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
+    new_site_tx: Option<Geodetic>,
+    /// Where the receiver is from now on
+    #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
+    new_site_rx: Option<Geodetic>,
     /// New distance from transmitter to receiver, m, 1 to 1e6
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = distance)]
     new_distance: Option<f32>,
@@ -118,17 +128,25 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
 fn plan(options: Options) -> Result<Plan, String> {
     let interference = Interference::Source(options.loaded.interferer);
     let loaded = mission(options.loaded.config(options.of, interference)?, "--")?;
-    let config = changed(&options, loaded.config());
-    let axis = options.sites.axis(options.loaded.distance)?;
-    if axis.is_some() && config.distance_m.to_bits() != loaded.config().distance_m.to_bits() {
+    let sited = options.sites.of(options.loaded.distance)?;
+    let (sites, along_m) = match moved(&options, sited)? {
+        Some((sites, along_m)) => (Some(sites), Some(along_m)),
+        None => (None, None),
+    };
+    let config = changed(&options, loaded.config(), along_m);
+    let keeps = sited.is_some() && sites.is_none();
+    if keeps && config.distance_m.to_bits() != loaded.config().distance_m.to_bits() {
         return Err(format!(
-            "--new-distance {}: must be that of --distance, since the relays keep their sites",
+            "--new-distance {}: must be that of --distance where the relays keep their sites; else give --new-site-tx or --new-site-rx",
             config.distance_m
         ));
     }
     mission(config, "--new-")?;
-    let upload =
-        Upload::new(&loaded, options.version, config).map_err(|error| error.to_string())?;
+    let refused = |error: UploadError| error.to_string();
+    let mut upload = Upload::new(&loaded, options.version, config).map_err(refused)?;
+    if let Some(sites) = sites {
+        upload = upload.with_sites(sites).map_err(refused)?;
+    }
     Ok(Plan {
         loaded,
         upload,
@@ -150,11 +168,36 @@ fn plan(options: Options) -> Result<Plan, String> {
     })
 }
 
-fn changed(options: &Options, loaded: &MissionConfig) -> MissionConfig {
+/// Between which sites the mission is flown from now on, and how far apart they are, m, where one has moved.
+fn moved(options: &Options, loaded: Option<Sites>) -> Result<Option<(Sites, f32)>, String> {
+    let (tx, rx) = (options.new_site_tx, options.new_site_rx);
+    let Some(loaded) = loaded.filter(|_| tx.is_some() || rx.is_some()) else {
+        return Ok(None);
+    };
+    let sites = Sites {
+        tx: tx.unwrap_or(loaded.tx),
+        rx: rx.unwrap_or(loaded.rx),
+    };
+    let name = if rx.is_some() { "rx" } else { "tx" };
+    let axis = Axis::between(sites).map_err(|error| format!("--new-site-{name}: {error}"))?;
+    #[expect(clippy::cast_possible_truncation, reason = "as a mission has it")]
+    let along_m = axis.distance_m() as f32;
+    match options.new_distance {
+        Some(given) if !axis.is_of(given) => Err(format!(
+            "--new-distance {given}: must be {along_m:.3} m, as the new sites have it, or be left out"
+        )),
+        _ => Ok(Some((sites, along_m))),
+    }
+}
+
+fn changed(options: &Options, loaded: &MissionConfig, along_m: Option<f32>) -> MissionConfig {
     let altitude_m = options.new_altitude.unwrap_or(loaded.common.altitude_m);
     let alone = Band::at(altitude_m);
     MissionConfig {
-        distance_m: options.new_distance.unwrap_or(loaded.distance_m),
+        distance_m: options
+            .new_distance
+            .or(along_m)
+            .unwrap_or(loaded.distance_m),
         min_separation_m: options
             .new_min_separation
             .unwrap_or(loaded.min_separation_m),

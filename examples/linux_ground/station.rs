@@ -13,6 +13,7 @@ use uav_relay::{Auth, Ground, Instant, Key, Progress, Side};
 use crate::epoch;
 use crate::line::line;
 use crate::options::Plan;
+use crate::site::Between;
 use crate::system::{now, on_signals};
 use crate::tty::Tty;
 
@@ -135,10 +136,19 @@ fn say(now: Instant, plan: &Plan, progress: Progress) -> Result<(), String> {
     match progress {
         Progress::Offering => {
             let digest = plan.upload.id().digest;
-            line(
-                now,
-                format_args!("offering: version {version}, mission 0x{digest:04x}"),
-            )
+            match plan.upload.sites() {
+                Some(sites) => line(
+                    now,
+                    format_args!(
+                        "offering: version {version}, mission 0x{digest:04x}, {}",
+                        Between(sites)
+                    ),
+                ),
+                None => line(
+                    now,
+                    format_args!("offering: version {version}, mission 0x{digest:04x}"),
+                ),
+            }
         }
         Progress::Held { by } => line(
             now,

@@ -10,6 +10,8 @@ use stm32f4xx_hal::pac::{Interrupt, USART1, interrupt};
 use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::Serial;
 use uav_relay::flight::autopilot::Autopilot as Link;
+#[cfg(feature = "upload")]
+use uav_relay::flight::axis::Axis;
 use uav_relay::flight::mavlink::outgoing::FrameBytes;
 #[cfg(feature = "mavlink-signing")]
 use uav_relay::flight::mavlink::signing::{Signing, Stamp};
@@ -18,6 +20,8 @@ use uav_relay::{Duration, Event, Instant, Mission, Relay};
 
 use super::config::{self, Sites};
 use super::course::course;
+#[cfg(feature = "upload")]
+use super::course::ends;
 use super::port::{self, OUTGOING, Port, Queues, Slot};
 use super::{board, log};
 
@@ -44,6 +48,11 @@ pub(crate) fn uart(usart: USART1, tx: PA9, rx: PA10, rcc: &mut Rcc) -> Option<Ua
 /// The link, and what it goes over.
 pub(crate) struct Autopilot {
     link: Link,
+    /// The sites of the block, and those between which it flies.
+    #[cfg(feature = "upload")]
+    loaded: uav_relay::Sites,
+    #[cfg(feature = "upload")]
+    between: uav_relay::Sites,
     port: Port<OUTGOING, RECEIVED>,
     /// What the relay was told last of whether its setpoint is flown.
     flown: Option<bool>,
@@ -71,16 +80,39 @@ impl Autopilot {
         let mut link = Link::new(course.axis, course.pace, now);
         sign(&mut link, now).ok()?;
         let port = port::open(uart, Interrupt::USART1, &AUTOPILOT, &AUTOPILOT_QUEUES);
+        #[cfg(feature = "upload")]
+        let loaded = ends(sites);
         cortex_m::singleton!(LINK: Autopilot = Autopilot {
             link,
+            #[cfg(feature = "upload")]
+            loaded,
+            #[cfg(feature = "upload")]
+            between: loaded,
             port,
             flown: None,
             target: None,
         })
     }
 
+    /// Between the sites of a mission that has just been adopted, before anything is told that is along its line.
+    #[cfg(feature = "upload")]
+    #[inline(never)] // its stack is given back
+    fn follow(&mut self, now: Instant, relay: &Relay) {
+        let sites = relay.sites().unwrap_or(self.loaded);
+        if sites == self.between {
+            return;
+        }
+        self.between = sites;
+        // The relay has found that they make a line.
+        if let Ok(axis) = Axis::between(sites) {
+            self.link.fly_along(now, axis);
+        }
+    }
+
     /// Takes what has come, and hands the relay what follows from it.
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
+        #[cfg(feature = "upload")]
+        self.follow(now, relay);
         let mut bytes = [0; 64];
         // What comes meanwhile wakes the main loop again.
         for _ in 0..RECEIVED / bytes.len() {
@@ -112,6 +144,8 @@ impl Autopilot {
 
     /// Sends what the relay wants and says when to be called again, at the latest; `now` is that of [`listen`](Self::listen).
     pub(crate) fn fly(&mut self, now: Instant, relay: &Relay) -> Instant {
+        #[cfg(feature = "upload")]
+        self.follow(now, relay);
         let setpoint = relay.setpoint();
         self.link.handle_setpoint(now, setpoint);
         let sir_db = relay.target().map(|target| self.decibels(target));

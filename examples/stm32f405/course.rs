@@ -1,9 +1,8 @@
 //! The line on earth that the sites of a block make, and how fast the drone flies along it.
 
-use uav_relay::Mission;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::axis::{Axis, AxisError};
-use uav_relay::flight::geodetic::Geodetic;
+use uav_relay::{Geodetic, Mission};
 
 use super::config::Sites;
 
@@ -25,18 +24,23 @@ pub enum CourseError {
     Distance(f64),
 }
 
+/// The sites of a block.
+pub fn ends(sites: &Sites) -> uav_relay::Sites {
+    let [tx, rx] = sites.ends.map(|[lat_e7, lon_e7, amsl_mm]| Geodetic {
+        lat_e7,
+        lon_e7,
+        amsl_mm,
+    });
+    uav_relay::Sites { tx, rx }
+}
+
 /// The course of a drone that flies `mission`, by sites that have been read.
 ///
 /// # Errors
 /// [`CourseError`] where the sites make no line, or not the mission's.
 #[inline(never)] // its stack is given back before the relay needs some
 pub fn course(sites: &Sites, mission: &Mission) -> Result<Course, CourseError> {
-    let [tx, rx] = sites.ends.map(|[lat_e7, lon_e7, amsl_mm]| Geodetic {
-        lat_e7,
-        lon_e7,
-        amsl_mm,
-    });
-    let axis = Axis::try_new(tx, rx).map_err(CourseError::Axis)?;
+    let axis = Axis::between(ends(sites)).map_err(CourseError::Axis)?;
     if !axis.is_of(mission.config().distance_m) {
         return Err(CourseError::Distance(axis.distance_m()));
     }

@@ -4,7 +4,7 @@
 //! another block a drone has forgotten what was uploaded before, and flies what the block says.
 //!
 //! Nothing is erased for an upload in flight, since an erase of these sectors stops the CPU for a second or two. A sector of 128 KiB has
-//! room for 1365 records, so at least as many uploads are kept from one start to the next; what comes after them is flown all the same.
+//! room for 1092 records, so at least as many uploads are kept from one start to the next; what comes after them is flown all the same.
 
 use uav_relay::Upload;
 use uav_relay::wire::upload::LENGTH;

@@ -2,7 +2,6 @@
 //!
 //! | module | one idea |
 //! | --- | --- |
-//! | [`geodetic`] | a point on earth, in the integers that autopilots speak |
 //! | [`axis`] | the line from transmitter to receiver on earth, and places along it |
 //! | [`mavlink`] | the bytes that autopilots speak |
 //! | [`autopilot`] | where to fly, who flies, and where the drone is |
@@ -10,7 +9,7 @@
 //! ```
 //! use uav_relay::Placement;
 //! use uav_relay::flight::axis::Axis;
-//! use uav_relay::flight::geodetic::Geodetic;
+//! use uav_relay::Geodetic;
 //!
 //! let tx = Geodetic::from_degrees(47.40, 8.54, 420.0).ok_or("not on earth")?;
 //! let rx = Geodetic::from_degrees(47.41, 8.55, 431.0).ok_or("not on earth")?;
@@ -27,5 +26,4 @@
 
 pub mod autopilot;
 pub mod axis;
-pub mod geodetic;
 pub mod mavlink;

@@ -104,6 +104,14 @@ impl Association {
         }
     }
 
+    /// The next one, whatever was said in this one. What it has still to say of one that it left before it says.
+    pub(super) fn renew(&self, jitter: &mut Jitter) -> Self {
+        Self {
+            parting: self.parting,
+            ..Self::new(self.node, jitter)
+        }
+    }
+
     /// Whether a message is of an association that this relay, or the neighbour, has left. The neighbour is told again until it has begun
     /// anew.
     pub(super) fn is_over(&mut self, fence: &Fence) -> bool {

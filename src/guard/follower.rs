@@ -86,6 +86,15 @@ impl FenceFollower {
         };
     }
 
+    /// Places are along another line: it begins anew, and what it knows of who is lost is that there is somebody.
+    pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
+        *self = Self {
+            keep_out: self.keep_out,
+            association: self.association.renew(jitter),
+            ..Self::new(self.association.node, jitter)
+        };
+    }
+
     /// The neighbour is not flown any more: this relay stays where it is toward it. It is otherwise free if the two were known to be in
     /// order.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {

@@ -41,6 +41,10 @@
 //!
 //! | 15 | A relay that is not flown to its setpoints, since a pilot has it or it is on the ground, has none. It leaves both associations and says so until the neighbour has begun anew; flown again it begins as after a start. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 off to the separation); if the two were in order it is otherwise free, until it hears of a new association. | nobody counts on a drone that is flown by hand, and nobody comes nearer to it |
 //!
+//! Where places are along another line from one moment to the next ([`Guard::leave_line`]), a relay has no setpoint and begins as after a
+//! start, once it has stopped. Whoever says something along another line is not heard: it is counted on as before, where it was, and the
+//! relay does not move before both neighbours speak along the new one.
+//!
 //! # Why everybody arrives
 //!
 //! Let the places agreed on be the separation apart; then so are the fences' goals. A fence that has to be lowered waits for
@@ -83,7 +87,7 @@ use crate::stats::bump;
 use crate::time::Instant;
 
 use crate::jitter::Jitter;
-use config::GuardConfig;
+use config::{Geofence, GuardConfig};
 use fence::is_place;
 pub use fence::{Fence, HoldReason};
 use follower::FenceFollower;
@@ -176,6 +180,26 @@ impl Guard {
             self.owner.leave(&mut self.jitter);
         }
         true
+    }
+
+    /// Places are along another line from now on, and what was said of the one before is void: this relay begins as after a start, with the
+    /// first place that is reported once it has stopped. At `now`, or if that is `None` when it was switched on.
+    ///
+    /// Who fell silent may hover anywhere beyond where this relay is, as after a start.
+    pub fn leave_line(&mut self, now: Option<Instant>) {
+        if let Some(now) = now {
+            self.born = self.born.max(now + self.own.config.lag);
+        }
+        self.found = None;
+        self.own.target = None;
+        self.own.release(self.born);
+        self.follower.leave_line(&mut self.jitter);
+        self.owner.leave_line(&mut self.jitter);
+    }
+
+    /// No setpoint leaves `fence` from now on. Whoever is outside comes back with the next one.
+    pub fn set_box(&mut self, fence: Geofence) {
+        self.own.config.fence = fence;
     }
 
     /// What node `from` at `side` says. What is out of range is counted, what is of an earlier association or of another node ignored.

@@ -3,12 +3,15 @@
 use super::retransmit::Trip;
 use super::timing::{longest_lease, tenths};
 use super::view::electorate::Held;
+#[cfg(feature = "upload")]
+use crate::guard::config::Geofence;
 use crate::mission::{Band, Heading, Interference, Mission};
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
+use crate::sites::Sites;
 use crate::time::Instant;
 use crate::view::ViewId;
-use crate::wire::digest::{MissionId, digest};
+use crate::wire::digest::{MissionId, between, digest};
 
 /// The relay as a member of its chain.
 #[derive(Clone, Copy, Debug)]
@@ -24,8 +27,14 @@ pub(crate) struct Member {
     pub(crate) all: u16,
     /// The digest of that.
     pub(crate) digest: u16,
+    /// The distance of that, m.
+    #[cfg(feature = "upload")]
+    pub(crate) loaded_m: f32,
     /// The mission that it flies.
     pub(crate) active: MissionId,
+    /// The sites of that, if it has its own: then places are along the line between these.
+    #[cfg(feature = "upload")]
+    sites: Option<Sites>,
     /// The view accepted last.
     pub(crate) view: ViewId,
     /// Its place in the view, from 1 next to Tx.
@@ -40,12 +49,51 @@ impl Member {
             node,
             all: mission.relays(),
             digest,
+            #[cfg(feature = "upload")]
+            loaded_m: mission.config().distance_m,
             active: MissionId { version: 0, digest },
+            #[cfg(feature = "upload")]
+            sites: None,
             view: ViewId::LOADED,
             index: node,
             interference: *mission.interference(),
             mission,
         }
+    }
+
+    /// The sites of the mission that it flies, if it has its own.
+    #[cfg(feature = "upload")]
+    pub(crate) const fn sites(&self) -> Option<Sites> {
+        self.sites
+    }
+
+    /// What is loaded has none, and nothing else is flown.
+    #[cfg(not(feature = "upload"))]
+    #[expect(clippy::unused_self, reason = "as with uploads")]
+    pub(crate) const fn sites(&self) -> Option<Sites> {
+        None
+    }
+
+    /// It flies a mission between `sites` from now on; whether places are along another line.
+    #[cfg(feature = "upload")]
+    pub(crate) fn fly_between(&mut self, sites: Option<Sites>) -> bool {
+        core::mem::replace(&mut self.sites, sites) != sites
+    }
+
+    /// The digest of the line that its places are along.
+    pub(crate) fn line(&self) -> u16 {
+        between(self.digest, self.sites())
+    }
+
+    /// The box that its settings ask for, if they ask for a guard: it goes along with the distance between other sites.
+    #[cfg(feature = "upload")]
+    pub(crate) fn geofence(&self) -> Option<Geofence> {
+        let mut fence = self.settings.guard?.fence;
+        if self.sites.is_some() {
+            let longer_m = self.mission.config().distance_m - self.loaded_m;
+            fence.most_x_m = (fence.most_x_m + longer_m).max(fence.least_x_m);
+        }
+        Some(fence)
     }
 
     /// Its place from the leader on, from 1, and how many there are, while nothing was counted.

@@ -18,6 +18,7 @@
 //! | a hello of a node that holds a newer mission | a hello, so that it is offered here |
 //! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hello; an offer to the neighbour on the other side; a request for a view |
 //! | an offer of one that is not newer | a hello |
+//! | an offer of one for which there is no line on earth | it is counted; `Event::UploadRefused`, once |
 //! | an offer that answers no hello of late | it is counted as stale; a hello, which the next one can answer |
 //! | a proposal is due, and the node after holds an older mission or has not said which | it is offered the newer one first |
 //! | an offer is owed, and the neighbour has said no hello of late | a hello that asks, and the offer answers what comes back |
@@ -34,6 +35,8 @@ use crate::mission::Mission;
 use crate::settings::Settings;
 #[cfg(feature = "upload")]
 use crate::side::Side;
+#[cfg(feature = "upload")]
+use crate::sites::{LineError, Sites};
 use crate::time::Instant;
 use crate::wire::digest::MissionId;
 #[cfg(feature = "upload")]
@@ -81,6 +84,18 @@ impl Offering {
     };
 }
 
+/// What became of a mission that was offered.
+#[cfg(feature = "upload")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Offered {
+    /// It is held from now on.
+    Held,
+    /// It would be, but there is no line on earth for it; and whether that is new.
+    Refused { why: LineError, is_new: bool },
+    /// It is not newer, or for other relays.
+    Passed,
+}
+
 /// Hop times until an offer is made again, and how often it is until they are twice as many; so often in all.
 #[cfg(feature = "upload")]
 const OFFER_HOPS: u32 = 4;
@@ -97,7 +112,7 @@ pub(crate) struct MissionUpdate {
     /// The same, if it was uploaded.
     #[cfg(feature = "upload")]
     upload: Option<Upload>,
-    /// What was refused last, for its distance.
+    /// What was refused last, for want of a line.
     #[cfg(feature = "upload")]
     refused: Option<MissionId>,
     /// The number that hellos bear now, and the one before.
@@ -245,23 +260,24 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
-    /// Holds `upload` from now on, if it is for this relay and newer than what it holds; whether it is.
-    pub(crate) fn hold(&mut self, member: &Member, upload: Upload) -> bool {
-        let newer = upload.id() > self.latest && fits(member, &upload).is_ok();
-        if newer {
-            self.latest = upload.id();
-            self.upload = Some(upload);
-        }
-        newer
-    }
-
-    /// Whether `upload` would be held, were it not for its distance; and whether that is new.
-    pub(crate) fn refuses(&mut self, member: &Member, upload: &Upload) -> Option<bool> {
+    /// Holds `upload` from now on, if it is for this relay and newer than what it holds.
+    pub(crate) fn hold(&mut self, member: &Member, upload: &Upload) -> Offered {
         let id = upload.id();
-        if id <= self.latest || fits(member, upload) != Err(UploadError::Distance) {
-            return None;
+        if id <= self.latest {
+            return Offered::Passed;
         }
-        Some(self.refused.replace(id) != Some(id))
+        match fits(member, upload) {
+            Ok(()) => {
+                self.latest = id;
+                self.upload = Some(*upload);
+                Offered::Held
+            }
+            Err(UploadError::Line(why)) => Offered::Refused {
+                why,
+                is_new: self.refused.replace(id) != Some(id),
+            },
+            Err(_) => Offered::Passed,
+        }
     }
 
     /// The same by the relay's own firmware.
@@ -270,10 +286,9 @@ impl MissionUpdate {
             return Err(UploadError::Unsigned);
         }
         fits(member, upload)?;
-        if self.hold(member, *upload) {
-            Ok(())
-        } else {
-            Err(UploadError::Old)
+        match self.hold(member, upload) {
+            Offered::Held => Ok(()),
+            _ => Err(UploadError::Old),
         }
     }
 
@@ -292,6 +307,11 @@ impl MissionUpdate {
         self.latest = upload.id();
         self.upload = Some(*upload);
         Ok(mission)
+    }
+
+    /// The sites of the mission held, if it has its own.
+    pub(crate) fn sites(&self) -> Option<Sites> {
+        self.upload.and_then(|upload| upload.sites())
     }
 
     /// The newest mission held, if it was uploaded.
@@ -316,10 +336,11 @@ fn fits(member: &Member, upload: &Upload) -> Result<(), UploadError> {
     {
         return Err(UploadError::Base);
     }
-    // What is flown has the distance of what was loaded, since no other was taken.
-    let loaded_m = member.mission.config().distance_m;
-    if member.settings.sited && config.distance_m.to_bits() != loaded_m.to_bits() {
-        return Err(UploadError::Distance);
+    let is_other = config.distance_m.to_bits() != member.loaded_m.to_bits();
+    match upload.sites() {
+        // Every relay checks that, whether it flies along a line on earth or not: all hold it, or none does.
+        Some(sites) => sites.check(config.distance_m).map_err(UploadError::Line),
+        None if member.settings.sited && is_other => Err(UploadError::Line(LineError::Distance)),
+        None => Ok(()),
     }
-    Ok(())
 }

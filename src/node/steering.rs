@@ -1,6 +1,8 @@
 //! The setpoint on its way to the agreed place: with a [guard](crate::guard) as far as is safe by now, without one the place itself.
 
 use super::context::Effects;
+#[cfg(feature = "upload")]
+use crate::guard::config::Geofence;
 use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
 use crate::settings::Settings;
@@ -107,6 +109,24 @@ impl Steering {
             && guard.control(now, flown)
         {
             self.remind_at = Some(now + REMINDER);
+        }
+    }
+
+    /// Places are along another line, since `now` if the drone has flown along the one before.
+    #[cfg(feature = "upload")]
+    pub(crate) fn leave_line(&mut self, now: Option<Instant>) {
+        if let Some(guard) = self.guard() {
+            guard.leave_line(now);
+        }
+    }
+
+    /// The box is `fence` from now on.
+    #[cfg(feature = "upload")]
+    pub(crate) fn set_box(&mut self, fence: Option<Geofence>) {
+        if let Some(guard) = self.guard()
+            && let Some(fence) = fence
+        {
+            guard.set_box(fence);
         }
     }
 

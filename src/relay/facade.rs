@@ -34,7 +34,7 @@ use crate::wire::session::Session;
 /// - *Setpoints* are finite, inside [0, D], at the altitude the relay holds or one of the mission's band, and at least the
 ///   mission's separation from those of its neighbours for the same pass. There is none before the first agreement, and
 ///   nothing moves it but a new agreement or the relay's own turn in Algorithm 2: a new mission does not, though the place that is
-///   held may be outside its limits, until the chain has agreed in it.
+///   held may be outside its limits, until the chain has agreed in it. One between other sites leaves none until then.
 ///
 /// ```
 /// use uav_relay::{Band, Channel, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};

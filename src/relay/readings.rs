@@ -9,6 +9,7 @@ use crate::place::Placement;
 use crate::sensing::belief::Told;
 use crate::sensing::fit::Unfit;
 use crate::side::Side;
+use crate::sites::Sites;
 use crate::stats::Stats;
 use crate::time::Instant;
 use crate::view::ViewId;
@@ -84,6 +85,12 @@ impl Relay {
     /// The mission the relay flies, with as many relays as are in its view.
     pub fn mission(&self) -> &Mission {
         &self.node.member().mission
+    }
+
+    /// Between which sites the mission is flown; `None` for those that the relay was loaded with. Places are along the line between these:
+    /// a firmware turns them into latitudes and longitudes, and back, by no other from the call on in which this changed.
+    pub fn sites(&self) -> Option<Sites> {
+        self.node.member().sites()
     }
 
     /// What the measurements at this place say so far, and `None` before they say anything.

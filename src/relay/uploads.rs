@@ -12,9 +12,8 @@ impl Relay {
     /// Constant work.
     ///
     /// # Errors
-    /// [`UploadError::Base`] if it was stored for another mission than the one that was loaded, [`UploadError::Distance`] if it is not for
-    /// the sites that were, [`UploadError::Begun`] if the relay
-    /// has begun to talk or to compute. Nothing has changed then.
+    /// [`UploadError::Base`] if it was stored for another mission than the one that was loaded, [`UploadError::Line`] if there is no
+    /// line on earth for it, [`UploadError::Begun`] if the relay has begun to talk or to compute. Nothing has changed then.
     pub fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         self.node.resume(upload)
     }
@@ -24,9 +23,8 @@ impl Relay {
     /// Constant work.
     ///
     /// # Errors
-    /// [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it is for other relays, [`UploadError::Distance`] if
-    /// it is for other sites,
-    /// [`UploadError::Old`] if a mission as new as that is held.
+    /// [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it is for other relays, [`UploadError::Line`] if
+    /// there is no line on earth for it, [`UploadError::Old`] if a mission as new as that is held.
     pub fn handle_upload(&mut self, now: Instant, upload: &Upload) -> Result<(), UploadError> {
         self.node.handle_upload(now, upload)
     }

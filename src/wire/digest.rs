@@ -2,6 +2,7 @@
 
 use super::crc::CRC_32C;
 use crate::mission::{Interference, Mission, MissionConfig};
+use crate::sites::Sites;
 
 /// The low half of a CRC-32C over every parameter of `mission`; `FORMAT.md` has their order.
 ///
@@ -50,7 +51,21 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
     if c.noise_w > 0.0 {
         crc.update(&c.noise_w.to_le_bytes());
     }
-    let [a, b, ..] = crc.finalize().to_le_bytes();
+    low_half(crc.finalize())
+}
+
+/// `digest` with the sites of an upload beside it, if it has any: of a mission, which then counts as another one between other sites;
+/// of the mission that was loaded, for the line that places are along.
+pub(crate) fn between(digest: u16, sites: Option<Sites>) -> u16 {
+    let Some(sites) = sites else { return digest };
+    let mut crc = CRC_32C.digest();
+    crc.update(&digest.to_le_bytes());
+    crc.update(&sites.to_bytes());
+    low_half(crc.finalize())
+}
+
+const fn low_half(crc: u32) -> u16 {
+    let [a, b, ..] = crc.to_le_bytes();
     u16::from_le_bytes([a, b])
 }
 

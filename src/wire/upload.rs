@@ -4,11 +4,10 @@
 //! flight: relays that were loaded with another one refuse it. It keeps the number of relays, because that is what nodes are
 //! numbered by, and it is of one interferer: a field does not fit into a frame.
 
-use super::digest::{MissionId, digest, of};
+use super::digest::{MissionId, between, digest, of};
+pub use super::message::UPLOAD as LENGTH;
 use crate::mission::{Interference, Mission, MissionConfig, MissionError};
-
-/// Bytes of an upload as it is stored; those of the body of an offer but its last two.
-pub const LENGTH: usize = 87;
+use crate::sites::{LineError, Sites};
 
 /// A mission with a version.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -18,6 +17,9 @@ pub struct Upload {
     base: u16,
     /// Checked: a mission can be made of it, with one interferer.
     config: MissionConfig,
+    /// Where it is flown, if not between the sites that the relays were loaded with. On earth; whether they fit the mission is for
+    /// every relay to say.
+    sites: Option<Sites>,
 }
 
 /// Why an upload was refused.
@@ -35,8 +37,8 @@ pub enum UploadError {
     Mission(MissionError),
     /// It is for relays that were loaded with another mission.
     Base,
-    /// It is over another distance than the mission loaded, at a relay whose line on earth is that one's: `Settings::sited`.
-    Distance,
+    /// There is no line on earth for it.
+    Line(LineError),
     /// A mission as new as that is held already.
     Old,
     /// Frames are not signed: `Settings::auth` is not set.
@@ -55,7 +57,7 @@ impl core::fmt::Display for UploadError {
             }
             Self::Mission(error) => return error.fmt(f),
             Self::Base => "the upload is for relays that were loaded with another mission",
-            Self::Distance => "an upload must keep the distance between the sites that the relays were loaded with",
+            Self::Line(error) => return error.fmt(f),
             Self::Old => "version must be above that of the mission held",
             Self::Unsigned => "uploads need signed frames",
             Self::Begun => "the relay has begun: it can only be handed what is newer",
@@ -79,7 +81,25 @@ impl Upload {
             return Err(UploadError::Relays);
         }
         let channel = config.channel.ordered();
-        Self::checked(version, digest(base), MissionConfig { channel, ..config })
+        let config = MissionConfig { channel, ..config };
+        Self::checked(version, digest(base), config, None)
+    }
+
+    /// The same, flown between `sites`: relays turn places into latitudes and longitudes along the line between these from then on. An
+    /// upload without sites is flown between those that the relays were loaded with, wherever they flew since.
+    ///
+    /// # Errors
+    /// [`UploadError::Line`] where they make no line, or not one as long as the mission's distance.
+    pub fn with_sites(self, sites: Sites) -> Result<Self, UploadError> {
+        let valid = sites.are_valid().then_some(sites);
+        let sites = valid.ok_or(UploadError::Line(LineError::Sites))?;
+        sites
+            .check(self.config.distance_m)
+            .map_err(UploadError::Line)?;
+        Ok(Self {
+            sites: Some(sites),
+            ..self
+        })
     }
 
     /// Of parameters as they are.
@@ -87,6 +107,7 @@ impl Upload {
         version: u16,
         base: u16,
         config: MissionConfig,
+        sites: Option<Sites>,
     ) -> Result<Self, UploadError> {
         if version == 0 {
             return Err(UploadError::Version);
@@ -99,6 +120,7 @@ impl Upload {
             version,
             base,
             config,
+            sites,
         })
     }
 
@@ -117,11 +139,16 @@ impl Upload {
         &self.config
     }
 
+    /// Between which sites it is flown; `None` for those that the relays were loaded with.
+    pub const fn sites(&self) -> Option<Sites> {
+        self.sites
+    }
+
     /// By what relays tell which mission they hold.
     pub fn id(&self) -> MissionId {
         MissionId {
             version: self.version,
-            digest: of(&self.config),
+            digest: between(of(&self.config), self.sites),
         }
     }
 }

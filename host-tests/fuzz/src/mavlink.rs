@@ -1,6 +1,7 @@
 //! Any bytes as what comes from an autopilot, and any orders to the link to it.
 
 mod link;
+mod peer;
 mod reference;
 mod wire;
 
@@ -11,19 +12,22 @@ use super::input::Input;
 use reference::Reference;
 use wire::{Placed, stream};
 
-/// Reads `data` as a stream of noise, frames and damaged frames, and then as what happens to the link to an autopilot.
+/// Reads `data` as a stream of noise, frames and damaged frames, or as what happens to the link to an autopilot, which signs or does not.
 ///
 /// # Panics
 /// Where the parser finds anything else than frames by their definition, misses one that is whole, or does more work than
 /// promised; where the link sends what is not finite, not near the line or not of its state, differs by how its bytes are cut,
-/// asks for memory, or wants to be called for nothing.
+/// asks for memory, or wants to be called for nothing; where a link with a key takes what is not signed with it or has come before, refuses
+/// anything else, or does not sign what it says, with a stamp that rises.
 pub fn mavlink(data: &[u8]) {
     let mut input = Input::new(data);
-    if input.flag() {
-        link::operate(&mut input);
-    } else {
-        let (bytes, placed) = stream(&mut input);
-        frames_by_definition(&bytes, &placed);
+    match input.below(4) {
+        1 => link::operate(&mut input, false),
+        3 => link::operate(&mut input, true),
+        _ => {
+            let (bytes, placed) = stream(&mut input);
+            frames_by_definition(&bytes, &placed);
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::wire::upload::Upload;
 use uav_relay::{
     Event, Identity, Instant, Method, Mission, MissionConfig, Placement, Port, Relay, Sample,
-    Settings, Side, Stats, ViewId,
+    Settings, Side, Sites, Stats, ViewId,
 };
 
 use super::counted::{all, intact};
@@ -54,6 +54,9 @@ pub struct Watched {
     view: ViewId,
     agreed: Option<Placement>,
     setpoint: Option<Placement>,
+    /// Between which sites it flies, as it was last; and the distance that it was loaded with, m.
+    sites: Option<Sites>,
+    loaded_m: f32,
     frames: Frames,
     /// Bytes that have come in since the last delimiter, by port.
     begun: [usize; 3],
@@ -86,6 +89,8 @@ impl Watched {
             view: ViewId::LOADED,
             agreed: None,
             setpoint: None,
+            sites: None,
+            loaded_m: mission.config().distance_m,
             frames: Frames::new(index, mission.relays()),
             begun: [0; 3],
             held: None,
@@ -254,15 +259,21 @@ impl Watched {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
         assert!(told || setpoint == self.setpoint, "moved in silence");
-        // One that stands down flies nothing.
-        let silent = self.relay.stands_down();
+        // One that stands down flies nothing, nor does one whose line has changed before the chain has agreed anew.
+        let moved = self.sites != self.relay.sites();
+        let silent = self.relay.stands_down() || moved;
         self.setpoint = setpoint.or(self.setpoint.filter(|_| !silent));
         assert_eq!(setpoint, self.setpoint, "a place that was taken away");
         let Some(place) = setpoint else {
             assert!(!told || silent, "told to fly nowhere");
             return;
         };
-        if let Some(GuardConfig { fence, .. }) = self.settings.guard {
+        if let Some(GuardConfig { mut fence, .. }) = self.settings.guard {
+            if self.relay.sites().is_some() {
+                // It goes along with the receiver.
+                let longer_m = self.relay.mission().config().distance_m - self.loaded_m;
+                fence.most_x_m += longer_m;
+            }
             let x = fence.least_x_m..=fence.most_x_m;
             let y = fence.least_y_m..=fence.most_y_m;
             let altitude = fence.least_altitude_m..=fence.most_altitude_m;
@@ -283,7 +294,12 @@ impl Watched {
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {
             self.held = Some((self.view, self.frames.number));
         }
-        assert!(agreed.is_some() || self.agreed.is_none(), "taken away");
+        let moved = core::mem::replace(&mut self.sites, self.relay.sites()) != self.relay.sites();
+        assert!(
+            agreed.is_some() || self.agreed.is_none() || moved,
+            "taken away"
+        );
+        self.agreed = self.agreed.filter(|_| !moved);
         // A place of the mission before is held until the next agreement, and may have been agreed on just before that came.
         let flown = core::mem::replace(&mut self.flown, *self.relay.mission().config());
         let Some(place) = agreed.filter(|_| agreed != self.agreed) else {

@@ -1,6 +1,6 @@
 //! A scenario that says where its ends are on earth.
 
-use uav_relay::flight::geodetic::Geodetic;
+use uav_relay::Geodetic;
 use uav_relay_sim::scenario::{Line, Problem, Scenario, ScenarioError};
 
 const REST: &str =

@@ -5,10 +5,10 @@ use mavlink::dialects::common::{
     POSITION_TARGET_GLOBAL_INT_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkReader, MavlinkVersion};
+use uav_relay::Geodetic;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind, Position};
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::geodetic::Geodetic;
 use uav_relay::flight::mavlink::table;
 use uav_relay::{Instant, Placement};
 

@@ -4,8 +4,8 @@ use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
+use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::geodetic::Geodetic;
 
 /// How far x or y may be off, by the length of the line, m.
 const ALLOWED: [(f64, f64); 3] = [(1e3, 1e-3), (1e4, 1e-3), (1e5, 5e-3)];

@@ -44,6 +44,16 @@ impl Flight {
 
     /// The two, the drone with the first key and the relay with the second.
     pub(crate) fn started(kind: &str, x_m: f64, keys: [Option<&str>; 2]) -> Self {
+        Self::started_with(kind, x_m, keys, &[])
+    }
+
+    /// The same, whose relay is given `options` more.
+    pub(crate) fn started_with(
+        kind: &str,
+        x_m: f64,
+        keys: [Option<&str>; 2],
+        options: &[&str],
+    ) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
         let file = |name: &str, key: Option<&str>| {
@@ -59,7 +69,7 @@ impl Flight {
         arguments.extend(theirs.as_deref());
         let drone = Peer::start("autopilot.py", &arguments);
         let more = ours.iter().flat_map(|file| ["--autopilot-key-file", file]);
-        let more: Vec<&str> = more.collect();
+        let more: Vec<&str> = more.chain(options.iter().copied()).collect();
         let mut relay = relay(&link, &more);
         relay.line("autopilot: by --autopilot");
         Self {

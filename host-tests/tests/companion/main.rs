@@ -8,6 +8,7 @@ mod idle;
 mod mavsdk;
 mod medium;
 mod mistrust;
+mod moved;
 mod options;
 mod peer;
 mod positions;

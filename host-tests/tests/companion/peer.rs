@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 use host_tests::python;
 use serde_json::Value;
+use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::geodetic::Geodetic;
 
 use crate::process::{LIMIT, Relay, lines_of};
 
@@ -22,19 +22,29 @@ pub(crate) const RX: Site = [47.41, 8.55, 431.0];
 
 /// The distance of the two, by the library, m.
 pub(crate) fn distance_m() -> f64 {
-    let [tx, rx] = [TX, RX].map(|[lat, lon, amsl]| Geodetic::from_degrees(lat, lon, amsl).unwrap());
+    distance_to_m(RX)
+}
+
+/// The same to a receiver at `rx`.
+pub(crate) fn distance_to_m(rx: Site) -> f64 {
+    let [tx, rx] = [TX, rx].map(|[lat, lon, amsl]| Geodetic::from_degrees(lat, lon, amsl).unwrap());
     Axis::try_new(tx, rx).unwrap().distance_m()
 }
 
 /// A place along the line on earth, by geodesics.
 pub(crate) fn on_earth(x_m: f64, altitude_m: f64) -> Site {
+    toward(RX, x_m, altitude_m)
+}
+
+/// A place along the line from the transmitter to a receiver at `rx`.
+pub(crate) fn toward(rx: Site, x_m: f64, altitude_m: f64) -> Site {
     let earth = Geodesic::wgs84();
-    let (length, azimuth, _, _): (f64, f64, f64, f64) = earth.inverse(TX[0], TX[1], RX[0], RX[1]);
+    let (length, azimuth, _, _): (f64, f64, f64, f64) = earth.inverse(TX[0], TX[1], rx[0], rx[1]);
     let (lat, lon): (f64, f64) = earth.direct(TX[0], TX[1], azimuth, x_m);
     [
         lat,
         lon,
-        TX[2] + (RX[2] - TX[2]) * x_m / length + altitude_m,
+        TX[2] + (rx[2] - TX[2]) * x_m / length + altitude_m,
     ]
 }
 
@@ -72,11 +82,16 @@ pub(crate) fn relay(autopilot: &str, more: &[&str]) -> Relay {
 
 /// Where a relay that flies alone has its place, as one without an autopilot has it.
 pub(crate) fn agreed() -> Site {
-    let distance = distance_m().to_string();
+    agreed_toward(RX)
+}
+
+/// The same where the receiver is at `rx`.
+pub(crate) fn agreed_toward(rx: Site) -> Site {
+    let distance = distance_to_m(rx).to_string();
     let mut relay = Relay::start(&["--index", "1", "--of", "1", "--distance", &distance]);
     let [x_m, y_m, altitude_m, _] = relay.settled().map(f32::from_bits);
     assert_eq!(y_m, 0.0, "it is on the line");
-    on_earth(x_m.into(), altitude_m.into())
+    toward(rx, x_m.into(), altitude_m.into())
 }
 
 /// The autopilot.

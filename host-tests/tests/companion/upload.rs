@@ -216,64 +216,108 @@ fn the_ground_gives_up_in_time_where_nobody_answers() {
 }
 
 /// Options of the ground, and what the line must have in it.
-const WRONG: &[(&[&str], &[&str])] = &[
-    (&["--version", "0"], &["--version", "'0'", "1..=65535"]),
-    (
-        &["--version", "65536"],
-        &["--version", "'65536'", "1..=65535"],
-    ),
-    (&["--end", "up"], &["--end", "'up'", "tx, rx"]),
-    (&["--timeout", "0"], &["--timeout", "'0'", "1..=86400"]),
-    (&["--baud", "1199"], &["--baud", "'1199'", "1200..=4000000"]),
-    (&["--of", "0"], &["--of", "'0'", "1..=1000"]),
-    (
-        &["--new-interferer", "80,500"],
-        &["--new-interferer", "'80,500'", "P,X,Y"],
-    ),
-    (
-        &["--new-altitude", "0"],
-        &["--new-altitude", "'0'", "0.1 to 100000.0"],
-    ),
-    (
-        &["--new-band", "30,300"],
-        &["--new-band 30,300", "LEAST to MOST", "--new-altitude 20"],
-    ),
-    (
-        &["--new-min-separation", "501"],
-        &["--new-min-separation 501", "--new-distance 1000", "--of 3"],
-    ),
-    (
-        &["--min-separation", "501"],
-        &["--min-separation 501", "--distance 1000"],
-    ),
-    (
-        &["--site-tx", "47.4,8.54,420", "--site-rx", "47.41,8.55,431"],
-        &["--distance 1000", "must be 1343.795 m"],
-    ),
-    (
-        &[
-            "--site-tx",
-            "47.4,8.54,420",
-            "--site-rx",
-            "47.41,8.55,431",
-            "--distance",
-            "1343.795",
-            "--new-distance",
-            "1343.8",
-        ],
-        &["--new-distance 1343.8", "that of --distance", "sites"],
-    ),
-    (
-        &["--key-file", "nowhere"],
-        &["--key-file nowhere", "cannot be read"],
-    ),
+fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
+    let wrong: &[(&[&str], &[&str])] = &[
+        (&["--version", "0"], &["--version", "'0'", "1..=65535"]),
+        (
+            &["--version", "65536"],
+            &["--version", "'65536'", "1..=65535"],
+        ),
+        (&["--end", "up"], &["--end", "'up'", "tx, rx"]),
+        (&["--timeout", "0"], &["--timeout", "'0'", "1..=86400"]),
+        (&["--baud", "1199"], &["--baud", "'1199'", "1200..=4000000"]),
+        (&["--of", "0"], &["--of", "'0'", "1..=1000"]),
+        (
+            &["--new-interferer", "80,500"],
+            &["--new-interferer", "'80,500'", "P,X,Y"],
+        ),
+        (
+            &["--new-altitude", "0"],
+            &["--new-altitude", "'0'", "0.1 to 100000.0"],
+        ),
+        (
+            &["--new-band", "30,300"],
+            &["--new-band 30,300", "LEAST to MOST", "--new-altitude 20"],
+        ),
+        (
+            &["--new-min-separation", "501"],
+            &["--new-min-separation 501", "--new-distance 1000", "--of 3"],
+        ),
+        (
+            &["--min-separation", "501"],
+            &["--min-separation 501", "--distance 1000"],
+        ),
+        (
+            &["--site-tx", "47.4,8.54,420", "--site-rx", "47.41,8.55,431"],
+            &["--distance 1000", "must be 1343.795 m"],
+        ),
+        (
+            &[
+                "--site-tx",
+                "47.4,8.54,420",
+                "--site-rx",
+                "47.41,8.55,431",
+                "--distance",
+                "1343.795",
+                "--new-distance",
+                "1343.8",
+            ],
+            &[
+                "--new-distance 1343.8",
+                "that of --distance",
+                "--new-site-tx",
+            ],
+        ),
+        (
+            &["--new-site-rx", "47.41,8.56,431"],
+            &["--site-tx", "not provided"],
+        ),
+        (
+            &[SITED, &["--new-site-rx", "47.41"]].concat(),
+            &["--new-site-rx", "'47.41'", "LAT,LON,AMSL"],
+        ),
+        (
+            &[SITED, &["--new-site-rx", "47.4,8.54,420"]].concat(),
+            &["--new-site-rx", "0.00 m apart", "10 to 100000 m"],
+        ),
+        (
+            &[SITED, &["--new-site-tx", "48.9,8.54,420"]].concat(),
+            &["--new-site-tx", "m apart", "10 to 100000 m"],
+        ),
+        (
+            &[
+                SITED,
+                &["--new-site-rx", "47.41,8.56,431", "--new-distance", "1000"],
+            ]
+            .concat(),
+            &["--new-distance 1000", "must be 187", "be left out"],
+        ),
+        (
+            &["--key-file", "nowhere"],
+            &["--key-file nowhere", "cannot be read"],
+        ),
+    ];
+    wrong
+        .iter()
+        .map(|(options, parts)| (options.to_vec(), parts.to_vec()))
+        .collect()
+}
+
+/// Sites, and their distance.
+const SITED: &[&str] = &[
+    "--site-tx",
+    "47.4,8.54,420",
+    "--site-rx",
+    "47.41,8.55,431",
+    "--distance",
+    "1343.795",
 ];
 
 #[test]
 fn wrong_options_of_the_ground_are_named() {
     let files = Files::new();
     let good = files.options("key", "ground");
-    for &(wrong, parts) in WRONG {
+    for (wrong, parts) in wrong() {
         let mut all = vec!["--tty", "a", "--end", "tx", "--of", "3", "--version", "1"];
         all.extend(good.iter().map(String::as_str));
         // What is given twice would be another mistake.

@@ -19,7 +19,7 @@ fn version(number: u16) -> Upload {
 fn as_many_are_kept_in_a_flight_as_the_firmware_says() {
     let mut flash = Ram::blank(SECTOR, 1);
     let mut log = Journal::new(&mut flash, WORDS, 7);
-    assert_eq!(SECTOR / (WORDS + AROUND), 1_365);
+    assert_eq!(SECTOR / (WORDS + AROUND), 1_092);
     assert!(log.keep(&kept(&version(1)), WhenFull::Refuse));
     assert!(log.keep(&kept(&version(2)), WhenFull::Refuse));
     assert_eq!(log.newest().and_then(upload), Some(version(2)));

@@ -7,6 +7,7 @@ mod closer;
 mod cuts;
 mod fleet;
 mod leave;
+mod moved;
 mod storms;
 
 use host_tests::flights::{eight_apart, end_at, in_a_row, seconds};

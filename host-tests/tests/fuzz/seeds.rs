@@ -318,18 +318,23 @@ fn mavlink() -> Vec<Vec<u8>> {
     let hurt = [
         0, 2, 1, 7, 1, 0, 3, 1, 2, 3, 20, 16, 3, 2, 7, 1, 0, 3, 9, 9, 9, 30,
     ];
-    let flight = |autopilot: u8| {
-        let begins = [1, 255, 63, 255, 63, 100, 0];
-        let heartbeat = [1, autopilot, 0, 0, 0];
-        let position = [4, 0, 128, 0, 128, 0, 64, 1];
-        let in_air = [3, 2];
+    // Without a key, and with one: then each frame that comes is followed by how it is signed.
+    let flight = |autopilot: u8, how: &[u8]| {
+        let kind = if how.is_empty() { 1 } else { 3 };
+        let begins = [&[kind, 255, 63, 255, 63, 100, 0], how].concat();
+        let heard = |what: &[u8]| [what, how].concat();
+        let heartbeat = heard(&[1, autopilot, 0, 0, 0]);
+        let position = heard(&[4, 0, 128, 0, 128, 0, 64, 1]);
+        let in_air = heard(&[3, 2]);
         let setpoint = [10, 1, 0, 0, 64, 0, 0, 128, 0, 0, 32];
         let passes = [8, 40];
         let waits = [7, 200, 0];
         let look = [11, 1, 0, 0, 64];
-        let taken = [6, 0];
-        let other_mode = [1, autopilot, 5, 3, 0, 0];
-        let parts: [&[u8]; 20] = [
+        let taken = heard(&[6, 0]);
+        let other_mode = heard(&[1, autopilot, 5, 3, 0, 0]);
+        // The receiver moves.
+        let moves = [14, 1];
+        let parts: [&[u8]; 21] = [
             &begins,
             &heartbeat,
             &position,
@@ -344,6 +349,7 @@ fn mavlink() -> Vec<Vec<u8>> {
             &passes,
             &taken,
             &waits,
+            &moves,
             &position,
             &passes,
             &heartbeat,
@@ -353,7 +359,26 @@ fn mavlink() -> Vec<Vec<u8>> {
         ];
         parts.concat()
     };
-    vec![whole, tunnel.to_vec(), hurt.to_vec(), flight(0), flight(4)]
+    // The link has the time, is without a clock, has that of the end of all stamps; replays, a clock that is set, one that jumps, another key.
+    let attacked = [
+        flight(0, &[2]),
+        vec![
+            15, 0, 15, 3, 16, 0, 1, 0, 0, 0, 0, 2, 17, 0, 0, 0, 1, 1, 0, 0, 0, 0, 2, 1, 0, 0, 0, 0,
+            200, 1, 0, 0, 0, 0, 210, 1, 0, 0, 0, 0, 245, 1,
+        ],
+    ]
+    .concat();
+    vec![
+        whole,
+        tunnel.to_vec(),
+        hurt.to_vec(),
+        flight(0, &[]),
+        flight(4, &[]),
+        flight(0, &[2]),
+        flight(4, &[0]),
+        flight(0, &[1]),
+        attacked,
+    ]
 }
 
 #[test]

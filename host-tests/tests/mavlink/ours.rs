@@ -4,7 +4,7 @@ use host_tests::python;
 use mavlink::dialects::common::MavMessage;
 use mavlink::{MavlinkReader, MavlinkVersion};
 use serde_json::Value;
-use uav_relay::flight::geodetic::Geodetic;
+use uav_relay::Geodetic;
 use uav_relay::flight::mavlink::outgoing::{Outgoing, severity};
 
 use super::*;

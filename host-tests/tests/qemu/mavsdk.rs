@@ -11,7 +11,7 @@ use rustix::fs::{Mode, OFlags, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use serde_json::Value;
-use uav_relay::flight::geodetic::Geodetic;
+use uav_relay::Geodetic;
 
 /// The process, and what it has heard.
 pub(crate) struct Mavsdk {

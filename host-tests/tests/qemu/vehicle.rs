@@ -12,10 +12,10 @@ use mavlink::dialects::common::{
     SET_POSITION_TARGET_GLOBAL_INT_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkReader, MavlinkVersion};
+use uav_relay::Geodetic;
 use uav_relay::Placement;
 use uav_relay::flight::autopilot::Kind;
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::geodetic::Geodetic;
 
 use crate::fleet::PATIENCE;
 

@@ -7,6 +7,7 @@ mod flights;
 mod hand;
 mod restarts;
 mod schedules;
+mod sites;
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -266,7 +266,7 @@ fn the_vectors_hold_every_kind_and_every_extreme() {
         known.map(|vector| vector.wire().len()).max()
     };
     assert_eq!(longest(true), Some(100));
-    assert_eq!(longest(false), Some(122));
+    assert_eq!(longest(false), Some(129));
 }
 
 #[test]
@@ -368,6 +368,11 @@ fn the_vectors_hold_offers_of_every_extreme() {
     some(|offer| offer.left_m == 0.0 && offer.right_m == 0.0);
     some(|offer| offer.left_m < 0.0 && offer.right_m == 0.0);
     some(|offer| offer.noise_w > 0.0);
+    some(|offer| [offer.interferer_w, offer.x_m, offer.y_m] == [0.0; 3]);
+    some(|offer| offer.sites == [0; 6]);
+    some(|offer| offer.sites[..3] == [900_000_000, 1_800_000_000, i32::MAX]);
+    some(|offer| offer.sites[3..] == [-900_000_000, -1_800_000_000, i32::MIN]);
+    some(|offer| offer.sites[..3] != offer.sites[3..]);
     some(|offer| offer.answer == 0);
     some(|offer| offer.answer == u16::MAX);
 }

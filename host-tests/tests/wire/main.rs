@@ -27,6 +27,7 @@ mod reject;
 mod sequence;
 mod shared;
 mod signed;
+mod sited;
 mod strategies;
 mod stream;
 mod uploads;

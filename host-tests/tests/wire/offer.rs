@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 use uav_relay::wire::message::Message;
-use uav_relay::{Band, Interference, Interferer, Profile, Upload};
+use uav_relay::{Band, Interference, Interferer, Profile, Sites, Upload};
 
 use super::codec::{narrow, wide};
 
@@ -33,6 +33,8 @@ pub(crate) struct Offer {
     pub(crate) right_m: f32,
     /// Noise power at every receiver; 0 for none.
     pub(crate) noise_w: f32,
+    /// Latitude, longitude and height of Tx, then of Rx; all 0 for none.
+    pub(crate) sites: [i32; 6],
     /// The number of the hello that it answers; 0 for none.
     pub(crate) answer: u16,
 }
@@ -56,11 +58,12 @@ pub(crate) const MOST: usize = 71;
 pub(crate) const LEFT: usize = 75;
 pub(crate) const RIGHT: usize = 79;
 pub(crate) const NOISE: usize = 83;
-pub(crate) const ANSWER: usize = 87;
+pub(crate) const SITES: usize = 87;
+pub(crate) const ANSWER: usize = 111;
 
 /// Bytes of the body, and how many of them are kept across a reboot.
-pub(crate) const BYTES: usize = 89;
-pub(crate) const KEPT: usize = 87;
+pub(crate) const BYTES: usize = 113;
+pub(crate) const KEPT: usize = 111;
 
 impl Offer {
     /// The bytes of the body.
@@ -92,6 +95,9 @@ impl Offer {
             self.right_m,
             self.noise_w,
         ] {
+            out.extend(number.to_le_bytes());
+        }
+        for number in self.sites {
             out.extend(number.to_le_bytes());
         }
         out.extend(self.answer.to_le_bytes());
@@ -132,6 +138,7 @@ impl Offer {
             left_m: real(LEFT),
             right_m: real(RIGHT),
             noise_w: real(NOISE),
+            sites: std::array::from_fn(|k| real(SITES + 4 * k).to_bits().cast_signed()),
             answer: word(ANSWER),
         };
         Some((offer, rest))
@@ -145,8 +152,7 @@ impl Offer {
             && (0.0..=1e5).contains(&self.min_separation_m)
             && self.fits()
             && powers.iter().all(|power| (1e-6..=1e6).contains(power))
-            && (1e-6..=1e9).contains(&self.interferer_w)
-            && [self.x_m, self.y_m].iter().all(|at| at.abs() <= 1e7)
+            && (self.is_unknown() || self.has_interferer())
             && (1e-6..=0.1).contains(&self.tolerance)
             && (1e-3..=1e30).contains(&self.mu_los)
             && (self.mu_los..=1e20 * self.mu_los).contains(&self.mu_nlos)
@@ -157,6 +163,22 @@ impl Offer {
             && (-1e5..=0.0).contains(&self.left_m)
             && (0.0..=1e5).contains(&self.right_m)
             && (0.0..=1.0).contains(&self.noise_w)
+            && [0, 3]
+                .iter()
+                .all(|at| self.sites[*at].unsigned_abs() <= 900_000_000)
+            && [1, 4]
+                .iter()
+                .all(|at| self.sites[*at].unsigned_abs() <= 1_800_000_000)
+    }
+
+    /// Whether nobody knows the interferer.
+    fn is_unknown(&self) -> bool {
+        [self.interferer_w, self.x_m, self.y_m].map(f32::to_bits) == [0; 3]
+    }
+
+    fn has_interferer(&self) -> bool {
+        (1e-6..=1e9).contains(&self.interferer_w)
+            && [self.x_m, self.y_m].iter().all(|at| at.abs() <= 1e7)
             && f64::from(self.noise_w) * self.eta / f64::from(self.interferer_w) <= 1e12
     }
 
@@ -167,14 +189,21 @@ impl Offer {
         narrow(f64::from(self.relays - 1) * wide(step)) <= self.distance_m
     }
 
-    /// The digest of the mission that it is of: CRC-32C of all but version, base and answer, and of the noise only where there is some.
+    /// The digest of the mission that it is of: CRC-32C of all but version, base, sites and answer, and of the noise only where there is some;
+    /// and of that and the sites, if it has any.
     pub(crate) fn digest(&self) -> u16 {
-        let body = self.kept();
         // A mission without noise is told by what there is of it.
-        let end = if self.noise_w > 0.0 { KEPT } else { NOISE };
-        let bytes = &body[RELAYS..end];
-        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes);
-        u16::try_from(crc & 0xFFFF).unwrap()
+        let end = if self.noise_w > 0.0 { SITES } else { NOISE };
+        self.between(low_half(&self.body()[RELAYS..end]))
+    }
+
+    /// A digest, and its sites.
+    pub(crate) fn between(&self, digest: u16) -> u16 {
+        if self.sites == [0; 6] {
+            return digest;
+        }
+        let body = self.kept();
+        low_half(&[&digest.to_le_bytes()[..], &body[SITES..]].concat())
     }
 
     /// The message that says this. Only the crate can make it of any numbers: each of them must be found again in it.
@@ -203,7 +232,12 @@ impl Offer {
         assert_eq!(config.distance_m, self.distance_m);
         assert_eq!(config.min_separation_m, self.min_separation_m);
         assert_eq!(config.tx_power_w, self.tx_power_w);
-        assert_eq!(config.interference, Interference::Source(interferer));
+        let interference = if self.is_unknown() {
+            Interference::Unknown
+        } else {
+            Interference::Source(interferer)
+        };
+        assert_eq!(config.interference, interference);
         assert_eq!(
             (config.tolerance, config.noise_w),
             (self.tolerance, self.noise_w)
@@ -212,6 +246,14 @@ impl Offer {
         let factors = [channel.mu_los(), channel.mu_nlos(), channel.eta()];
         assert_eq!(factors, [self.mu_los, self.mu_nlos, self.eta]);
         assert_eq!((config.band, config.lateral), (band, lateral));
+        let sites = upload.sites().map_or([0; 6], |Sites { tx, rx }| {
+            [tx, rx]
+                .map(|at| [at.lat_e7, at.lon_e7, at.amsl_mm])
+                .as_flattened()
+                .try_into()
+                .unwrap()
+        });
+        assert_eq!(sites, self.sites);
         let mission_id = upload.id();
         assert_eq!(
             (mission_id.version, mission_id.digest),
@@ -222,6 +264,11 @@ impl Offer {
             answer: self.answer,
         }
     }
+}
+
+fn low_half(bytes: &[u8]) -> u16 {
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes);
+    u16::try_from(crc & 0xFFFF).unwrap()
 }
 
 /// One that eight relays could fly.
@@ -247,6 +294,7 @@ pub(crate) fn offer() -> Offer {
         left_m: -60.0,
         right_m: 40.5,
         noise_w: 0.0,
+        sites: [0; 6],
         answer: 0,
     }
 }

@@ -7,6 +7,7 @@ use super::offer::{
     ALTITUDE, DISTANCE, ETA, INTERFERER, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, NOISE, Offer, POWER,
     RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y,
 };
+use super::sited::A_KILOMETRE;
 
 /// Where four bytes of an offer are an f32, or the upper half of an f64.
 pub(crate) const NUMBERS: [usize; 17] = [
@@ -103,6 +104,19 @@ fn beside() -> impl Strategy<Value = f32> {
     ]
 }
 
+/// None; anywhere on earth; two that are a kilometre apart.
+fn sites() -> BoxedStrategy<[i32; 6]> {
+    let site = || {
+        (
+            -900_000_000..=900_000_000_i32,
+            -1_800_000_000..=1_800_000_000_i32,
+            any::<i32>(),
+        )
+    };
+    let anywhere = (site(), site()).prop_map(|((a, b, c), (d, e, f))| [a, b, c, d, e, f]);
+    prop_oneof![2 => Just([0; 6]), 2 => anywhere, 1 => Just(A_KILOMETRE)].boxed()
+}
+
 /// An offer in range.
 pub(crate) fn offers() -> BoxedStrategy<Said> {
     let versions = prop_oneof![4 => 1..9_u16, 1 => 1..=u16::MAX];
@@ -111,23 +125,34 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
         (versions, any::<u16>(), any::<u16>()),
         rooms(),
         powers,
-        (beside(), beside()),
+        (beside(), beside(), prop::bool::weighted(0.1)),
         (scaled(1e-6, 0.1), noises()),
         factors(),
         bands(),
-        (room(), room()),
+        ((room(), room()), sites()),
     )
         .prop_map(
             |(
                 (version, base, answer),
                 (relays, distance_m, min_separation_m),
                 (tx_power_w, power_w, interferer_w),
-                (x_m, y_m),
+                (x_m, y_m, unknown),
                 (tolerance, noise),
                 [mu_los, mu_nlos, eta],
                 [least_m, most_m, altitude_m],
-                (left_m, right_m),
+                ((left_m, right_m), sites),
             )| {
+                let most_w = if unknown {
+                    1.0
+                } else {
+                    // No louder than 1e12 times the interferer at a metre.
+                    (9e11 * f64::from(interferer_w) / eta).min(1.0)
+                };
+                let [interferer_w, x_m, y_m] = if unknown {
+                    [0.0; 3]
+                } else {
+                    [interferer_w, x_m, y_m]
+                };
                 Said::Offer(Offer {
                     version,
                     base,
@@ -148,8 +173,8 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
                     most_m,
                     left_m: -left_m,
                     right_m,
-                    // No louder than 1e12 times the interferer at a metre.
-                    noise_w: (noise * (9e11 * f64::from(interferer_w) / eta).min(1.0)) as f32,
+                    noise_w: (noise * most_w) as f32,
+                    sites,
                     answer,
                 })
             },

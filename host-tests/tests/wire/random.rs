@@ -9,6 +9,7 @@ use uav_relay::wire::message::{MAX_BODY, Message, MessageError};
 use super::codec::{self, Said, plain, sealed, wire};
 use super::config;
 use super::golden::only_frame;
+use super::offered::offers;
 use super::strategies::{asides, bodies, headers, heard, measured, messages, sweeps};
 
 /// Bodies are compared rather than messages: bytes tell -0 from 0.
@@ -47,18 +48,16 @@ proptest! {
     }
 
     #[test]
-    fn the_longest_sweep_takes_104_bytes(
+    fn an_offer_fills_a_frame_but_for_its_tag_and_the_longest_others_do_not(
+        offer in offers(),
+        heard in heard(),
         sweep in prop_oneof![measured(sweeps(16)), asides(sweeps(16))],
         head in headers(),
     ) {
         let mut frame = [0; MAX_FRAME];
+        prop_assert_eq!(frame::encode(head, &offer.message(), &mut frame), MAX_FRAME - TAG);
+        prop_assert_eq!(frame::encode(head, &heard.message(), &mut frame), 122);
         prop_assert_eq!(frame::encode(head, &sweep.message(), &mut frame), 104);
-    }
-
-    #[test]
-    fn what_relays_hear_fills_a_frame_but_for_its_tag(heard in heard(), head in headers()) {
-        let mut frame = [0; MAX_FRAME];
-        prop_assert_eq!(frame::encode(head, &heard.message(), &mut frame), MAX_FRAME - TAG);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig,
 
 use super::offer::{
     ALTITUDE, BYTES, DISTANCE, ETA, INTERFERER, KEPT, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, NOISE,
-    Offer, POWER, RELAYS, RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y, offer,
+    Offer, POWER, RELAYS, RIGHT, SEPARATION, SITES, TOLERANCE, TX_POWER, X, Y, offer,
 };
 
 /// Whether a body is taken; out of range is the only other thing that it may be.
@@ -129,6 +129,25 @@ fn the_losses_of_an_offer_are_in_order_and_in_range() {
 }
 
 #[test]
+fn sites_are_taken_wherever_they_are_on_earth() {
+    for (at, most) in [(0, 900_000_000), (1, 1_800_000_000_i32)] {
+        for at in [SITES + 4 * at, SITES + 12 + 4 * at] {
+            for good in [-most, most, 1] {
+                assert!(taken(&with(&offer(), at, &good.to_le_bytes())), "{good}");
+            }
+            for bad in [-most - 1, most + 1, i32::MIN, i32::MAX] {
+                assert!(!taken(&with(&offer(), at, &bad.to_le_bytes())), "{bad}");
+            }
+        }
+    }
+    for at in [SITES + 8, SITES + 20] {
+        for good in [i32::MIN, i32::MAX] {
+            assert!(taken(&with(&offer(), at, &good.to_le_bytes())), "{good}");
+        }
+    }
+}
+
+#[test]
 fn any_version_but_0_is_taken_and_up_to_a_thousand_relays() {
     let close = Offer {
         min_separation_m: 0.0,
@@ -242,6 +261,7 @@ fn an_upload_is_written_as_its_mission_has_it_and_read_back() {
             left_m: -35.0,
             right_m: 45.0,
             noise_w: 1e-12,
+            sites: [0; 6],
             answer: 77,
         };
         let mut bytes = [0; KEPT];

@@ -5,8 +5,8 @@ use host_tests::fixtures::paper;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::upload::UploadError;
 use uav_relay::{
-    Duration, Event, Instant, Interference, Mission, MissionConfig, Port, Relay, Settings, Upload,
-    ViewId, Wiring,
+    Duration, Event, Instant, Interference, LineError, Mission, MissionConfig, Port, Relay,
+    Settings, Upload, ViewId, Wiring,
 };
 
 use super::codec::{Greeting, Said};
@@ -20,8 +20,12 @@ use super::signed::{Peer, said, set, with_key};
 
 pub(crate) const NOW: Instant = Instant::ZERO;
 
+const REFUSED: Event = Event::UploadRefused {
+    why: LineError::Distance,
+};
+
 /// Relay 4 of eight, which has nothing to say, the nodes beside it, and the digest of its mission.
-fn relay_4() -> (Relay, [Peer; 2], u16) {
+pub(crate) fn relay_4() -> (Relay, [Peer; 2], u16) {
     let mut relay = with_key(4, Wiring::Pair);
     let peers = [(3, Port::Upstream), (5, Port::Downstream)]
         .map(|(node, port)| Peer::meets(&mut relay, 4, node, port));
@@ -182,7 +186,7 @@ fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
     let mut peer = Peer::meets(&mut relay, 4, 5, Port::Downstream);
     said(&mut relay, NOW);
     events(&mut relay);
-    for (times, told) in [(1, vec![Event::UploadRefused]), (2, vec![])] {
+    for (times, told) in [(1, vec![REFUSED]), (2, vec![])] {
         peer.says(&mut relay, NOW, &Said::Offer(longer));
         assert_eq!((events(&mut relay), relay.stats().mission), (told, times));
         assert_eq!((said(&mut relay, NOW), held(&relay)), (vec![], None));
@@ -192,7 +196,7 @@ fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
         ..longer
     };
     peer.says(&mut relay, NOW, &Said::Offer(next));
-    assert_eq!(events(&mut relay), [Event::UploadRefused]);
+    assert_eq!(events(&mut relay), [REFUSED]);
     // By hand, and after a reboot.
     let by_hand = Upload::new(
         &mission,
@@ -203,7 +207,7 @@ fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
         },
     );
     let by_hand = by_hand.unwrap();
-    let refused = Err(UploadError::Distance);
+    let refused = Err(UploadError::Line(LineError::Distance));
     assert_eq!(relay.handle_upload(NOW, &by_hand), refused);
     let mut begins = Relay::new(mission, identity, sited, 1, NOW).unwrap();
     assert_eq!(begins.resume(&by_hand), refused);
@@ -322,21 +326,27 @@ fn the_node_after_is_offered_the_mission_before_the_proposal() {
 fn adopted() -> (Relay, [Peer; 2], u16, Offer) {
     let (mut relay, mut peers, base) = relay_4();
     let newer = upload(2, base);
-    peers[0].says(&mut relay, NOW, &Said::Offer(newer));
-    peers[1].says(&mut relay, NOW, &hello(base, 4, mission_id(&newer), 0));
-    both(&mut relay);
-    peers[0].says(&mut relay, NOW, &forming(11, 1, mission_id(&newer), 3));
+    adopts(&mut relay, &mut peers, &newer);
+    (relay, peers, base, newer)
+}
+
+/// Relay 4 takes `newer`, and flies it in view 1 of all eight.
+pub(crate) fn adopts(relay: &mut Relay, peers: &mut [Peer; 2], newer: &Offer) {
+    let base = newer.base;
+    peers[0].says(relay, NOW, &Said::Offer(*newer));
+    peers[1].says(relay, NOW, &hello(base, 4, mission_id(newer), 0));
+    both(relay);
+    peers[0].says(relay, NOW, &forming(11, 1, mission_id(newer), 3));
     assert_eq!(
-        said(&mut relay, NOW),
-        [(5, forming(11, 1, mission_id(&newer), 4))]
+        said(relay, NOW),
+        [(5, forming(11, 1, mission_id(newer), 4))]
     );
     assert_eq!((relay.version(), relay.view()), (0, ViewId::LOADED));
-    peers[1].says(&mut relay, NOW, &forming(12, 1, mission_id(&newer), 5));
+    peers[1].says(relay, NOW, &forming(12, 1, mission_id(newer), 5));
     assert_eq!(
-        said(&mut relay, NOW),
-        [(3, forming(12, 1, mission_id(&newer), 4))]
+        said(relay, NOW),
+        [(3, forming(12, 1, mission_id(newer), 4))]
     );
-    (relay, peers, base, newer)
 }
 
 #[test]

@@ -11,12 +11,12 @@ use super::trust::Trust;
 use super::vehicle::{Kind, Position, Vehicle, VehicleUpdate};
 use crate::event::Event;
 use crate::flight::axis::Axis;
-use crate::flight::geodetic::Geodetic;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing, severity};
 use crate::flight::mavlink::parser::{Counters, Parser, Received};
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::Signing;
+use crate::geodetic::Geodetic;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::time::{Duration, Instant};
@@ -129,6 +129,28 @@ impl Autopilot {
             }
         }
         self.review(now);
+    }
+
+    /// The drone flies along `axis` from now on: between the sites of a new mission. Call it when `Relay::sites` has changed, before the next
+    /// [`handle_setpoint`](Self::handle_setpoint). The drone stays where it is until a setpoint is given: what was given before is of the
+    /// other line. Constant work; the same line again has no effect.
+    pub fn fly_along(&mut self, now: Instant, axis: Axis) {
+        if axis == self.axis {
+            return;
+        }
+        let before = core::mem::replace(&mut self.axis, axis);
+        let moved = |place| before.point(place).and_then(|point| axis.place(point));
+        self.vehicle.move_places(moved);
+        (self.setpoint, self.look) = (None, None);
+        // It was measured before the relay knew of the line.
+        self.position = None;
+        self.target = self.target.and_then(|target| {
+            let at = moved(target.carrot.place);
+            at.map(|place| Target::at(place, now))
+        });
+        if self.target.is_none() && self.state.is_flown() {
+            self.target = self.at_own_place(now);
+        }
     }
 
     /// Where to fly: what `Relay::setpoint` says; `None` to hold the place, and so is one that is not finite or not near the line.
@@ -285,7 +307,7 @@ impl Autopilot {
         let velocity_m_s = (!carrot.stands()).then(|| self.axis.to_ned(x_m, carrot.velocity_m_s));
         let yaw_rad = self
             .look
-            .map(|look| turned(self.axis.azimuth_rad(x_m) + look.azimuth_rad));
+            .map(|look| self.axis.heading_rad(x_m, look.azimuth_rad));
         Some(self.frame(Outgoing::SetPosition {
             boot_ms: self.boot_ms(now),
             at,
@@ -371,17 +393,5 @@ impl Autopilot {
     /// Whole frames that were not taken, because of their signatures.
     pub const fn refused(&self) -> u32 {
         self.trust.refused()
-    }
-}
-
-/// The same angle from -π to π.
-fn turned(angle: f32) -> f32 {
-    use core::f32::consts::{PI, TAU};
-    if angle > PI {
-        angle - TAU
-    } else if angle < -PI {
-        angle + TAU
-    } else {
-        angle
     }
 }

@@ -27,7 +27,7 @@ pub(super) const fn line_of(event: Event) -> Option<&'static str> {
         Event::Reformed => "relay: the chain formed anew",
         Event::NoQuorum => "relay: too few others, holds its place",
         Event::LeaseLapsed => "relay: not certain of the others, holds",
-        Event::UploadRefused => "relay: refused a mission for other sites",
+        Event::UploadRefused { .. } => "relay: refused a mission without a line",
         Event::IndexTaken { .. } => "relay: its number is used twice",
         _ => return None,
     })

@@ -3,10 +3,10 @@
 use super::clock::RemoteClock;
 use super::state::Observed;
 use crate::flight::axis::Axis;
-use crate::flight::geodetic::Geodetic;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::incoming::Incoming;
 use crate::flight::mavlink::parser::Received;
+use crate::geodetic::Geodetic;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
@@ -196,6 +196,14 @@ impl Vehicle {
         self.armed = false;
         self.in_air = false;
         self.position = None;
+    }
+
+    /// Places are along another line.
+    pub(super) fn move_places(&mut self, moved: impl Fn(Placement) -> Option<Placement>) {
+        self.position = self.position.and_then(|position| {
+            let place = moved(position.place)?;
+            Some(Position { place, ..position })
+        });
     }
 
     pub(super) fn address(&self) -> Option<Address> {

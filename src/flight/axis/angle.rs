@@ -25,6 +25,18 @@ pub(super) fn sine_and_cosine(units: i32) -> [f64; 2] {
     }
 }
 
+/// The same angle, which is one turn off at most, from -π to π.
+pub(super) fn turned(angle: f32) -> f32 {
+    use core::f32::consts::{PI, TAU};
+    if angle > PI {
+        angle - TAU
+    } else if angle < -PI {
+        angle + TAU
+    } else {
+        angle
+    }
+}
+
 /// fdlibm's coefficients for up to an eighth of a turn, the highest power first.
 const SINE: [f64; 6] = [
     1.589_690_995_211_55e-10,

@@ -1,6 +1,6 @@
 //! What is wrong with a pair of sites.
 
-use crate::flight::geodetic::Geodetic;
+use crate::geodetic::Geodetic;
 
 /// The shortest line: the units of a latitude turn it by a thousandth.
 pub const SHORTEST_M: f64 = 10.0;

@@ -27,9 +27,10 @@ mod error;
 mod tests;
 mod vector;
 
-use super::geodetic::{Geodetic, to_integer};
+use crate::geodetic::{Geodetic, to_integer};
 use crate::place::Placement;
-use angle::UNIT;
+use crate::sites::Sites;
+use angle::{UNIT, turned};
 use vector::{Vector, radius};
 
 pub use error::{AxisError, LONGEST_M, SHORTEST_M};
@@ -62,6 +63,7 @@ impl Axis {
     ///
     /// # Errors
     /// A latitude or longitude that is not on earth, sites too near to each other or too far apart.
+    #[cfg_attr(feature = "upload", inline(never))] // called from several places
     pub fn try_new(tx: Geodetic, rx: Geodetic) -> Result<Self, AxisError> {
         if !tx.is_valid() {
             return Err(AxisError::Tx(tx));
@@ -95,6 +97,15 @@ impl Axis {
             distance_m: 2.0 * arc(half_chord_m, radius_m),
             ends_amsl_m: [tx, rx].map(|site| f64::from(site.amsl_mm) / 1e3),
         })
+    }
+
+    /// The line between both `sites`: as [`try_new`](Self::try_new).
+    ///
+    /// # Errors
+    /// As there.
+    #[inline] // a line is returned through the stack
+    pub fn between(sites: Sites) -> Result<Self, AxisError> {
+        Self::try_new(sites.tx, sites.rx)
     }
 
     /// The distance D from transmitter to receiver along the ground, m.
@@ -157,6 +168,11 @@ impl Axis {
     pub fn azimuth_rad(&self, x_m: f32) -> f32 {
         let [north, east] = self.direction(x_m);
         narrow(libm::atan2(east, north))
+    }
+
+    /// That azimuth and `aside_rad` more, from -π to π, where that is. Constant work.
+    pub(super) fn heading_rad(&self, x_m: f32, aside_rad: f32) -> f32 {
+        turned(self.azimuth_rad(x_m) + aside_rad)
     }
 
     /// A velocity along x, y and h at `x_m` as one toward north, east and down; all in m/s. Constant work.

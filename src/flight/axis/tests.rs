@@ -1,7 +1,7 @@
 //! The line where there is something special about it: at its ends, over a pole, across the antimeridian, turning with the earth.
 
 use super::{Axis, AxisError, LONGEST_M};
-use crate::flight::geodetic::Geodetic;
+use crate::geodetic::Geodetic;
 use crate::place::Placement;
 
 fn site(lat_deg: f64, lon_deg: f64, amsl_m: f64) -> Geodetic {

@@ -1,7 +1,7 @@
 //! Points and directions in earth-centred coordinates, and the ellipsoid through them.
 
 use super::angle::sine_and_cosine;
-use crate::flight::geodetic::Geodetic;
+use crate::geodetic::Geodetic;
 
 /// WGS84: the semi-axis at the equator, m, and the squared eccentricity.
 const A_M: f64 = 6_378_137.0;

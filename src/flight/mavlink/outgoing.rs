@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use super::frame::{Address, CHECKSUM, HEADER, MAGIC, SIGNATURE, checksum};
 use super::table::{self, id};
-use crate::flight::geodetic::Geodetic;
+use crate::geodetic::Geodetic;
 
 /// The longest payload of what is said.
 const LONGEST: usize = 54;

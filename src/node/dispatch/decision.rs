@@ -43,7 +43,7 @@ impl Node {
             Heading::TowardTx => relays.saturating_sub(place).saturating_add(1),
         };
         self.member.view = proposed.view;
-        self.fly(mission, id);
+        self.fly(now, mission, id);
         self.layers.view.heard_of(proposed.view);
         let (back, onward) = (self.back(), self.onward());
         self.layers.neighbours.at_mut(back).agree_with_proposer();
@@ -67,21 +67,32 @@ impl Node {
     }
 
     /// Flies `mission` from now on, which is that of `id`.
-    fn fly(&mut self, mission: Mission, id: MissionId) {
+    fn fly(&mut self, now: Instant, mission: Mission, id: MissionId) {
         if id == self.member.active {
             // With other relays.
             self.member.mission = mission;
             return;
         }
-        self.adopt(mission, id);
+        self.adopt(mission, id, Some(now));
         self.raise(Event::Adopted);
     }
 
-    /// `mission` is another one than before.
-    pub(super) fn adopt(&mut self, mission: Mission, id: MissionId) {
+    /// `mission` is another one than before, and the one held; since `now` if the relay has flown another one. Between other sites no place
+    /// is what it was: there is none to be at until the chain has agreed on new ones, and the guard begins anew.
+    pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
         self.member.mission = mission;
         self.member.interference = *mission.interference();
         self.member.active = id;
+        #[cfg(feature = "upload")]
+        {
+            if self.member.fly_between(self.layers.update.sites()) {
+                self.layers.round.leave_line();
+                self.steering.leave_line(now);
+            }
+            self.steering.set_box(self.member.geofence());
+        }
+        #[cfg(not(feature = "upload"))]
+        let _ = now;
         let common = mission.config().common;
         let profile = self.member.settings.profile.unwrap_or(common);
         self.layers.round.load(profile);

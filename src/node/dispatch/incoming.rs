@@ -74,6 +74,10 @@ impl Node {
         };
         let (active, latest) = (self.member.active, self.layers.update.latest());
         let proposes = message.is_of_a_proposal();
+        #[cfg(feature = "upload")]
+        if let Message::Fence { .. } = message {
+            return self.is_of_line(side, from, digest);
+        }
         if !proposes && !message.is_of_a_view() {
             return self.is_of_mission(side, from, digest);
         }
@@ -93,6 +97,18 @@ impl Node {
             }
         }
         known
+    }
+
+    /// Whether a place that `from` tells is along the line of this relay. It is not while one of the two flies an upload with other sites.
+    #[cfg(feature = "upload")]
+    fn is_of_line(&mut self, side: Side, from: u16, digest: u16) -> bool {
+        let same = digest == self.member.line();
+        if !same && self.layers.neighbours.at(side).holds.is_some() {
+            bump(&mut self.telemetry.stats.stale);
+        } else if !same {
+            self.refuse_mission(side, from);
+        }
+        same
     }
 
     fn is_of_mission(&mut self, side: Side, from: u16, digest: u16) -> bool {

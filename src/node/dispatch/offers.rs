@@ -2,7 +2,7 @@
 
 use super::state::Node;
 use crate::event::Event;
-use crate::node::mission_update::takes_uploads;
+use crate::node::mission_update::{Offered, takes_uploads};
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
@@ -90,15 +90,17 @@ impl Node {
         }
     }
 
-    /// Holds `upload` from now on, if it is newer than what is held. One that is not for the sites of this relay is counted, and told once.
+    /// Holds `upload` from now on, if it is newer than what is held. One that has no line on earth is counted, and told once.
     fn hold(&mut self, now: Instant, upload: &Upload) {
-        if let Some(is_new) = self.layers.update.refuses(&self.member, upload) {
-            bump(&mut self.telemetry.stats.mission);
-            if is_new {
-                self.raise(Event::UploadRefused);
+        match self.layers.update.hold(&self.member, upload) {
+            Offered::Held => self.held(now),
+            Offered::Refused { why, is_new } => {
+                bump(&mut self.telemetry.stats.mission);
+                if is_new {
+                    self.raise(Event::UploadRefused { why });
+                }
             }
-        } else if self.layers.update.hold(&self.member, *upload) {
-            self.held(now);
+            Offered::Passed => {}
         }
     }
 
@@ -128,7 +130,7 @@ impl Node {
     pub(crate) fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         let untouched = self.layers.view.is_untouched() && self.layers.round.is_untouched();
         let mission = self.layers.update.resume(&self.member, upload, untouched)?;
-        self.adopt(mission, upload.id());
+        self.adopt(mission, upload.id(), None);
         Ok(())
     }
 

@@ -39,6 +39,7 @@ impl Node {
             }
         }
         let (side, to, fence) = self.steering.poll_transmit()?;
+        let mission = self.member.line();
         Some((side, to, Message::Fence { mission, fence }))
     }
 

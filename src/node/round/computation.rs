@@ -115,6 +115,13 @@ impl Computation {
         }
     }
 
+    /// Places are along another line from now on: it has none to be at, nor has the neighbour.
+    #[cfg(feature = "upload")]
+    pub(crate) const fn leave_line(&mut self) {
+        self.setpoint = None;
+        self.after = None;
+    }
+
     /// The leader begins from the start: with Algorithm 1 or 4, at the altitudes the relays were given.
     pub(crate) fn restart(&mut self) {
         self.task.rest();

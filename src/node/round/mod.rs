@@ -287,6 +287,12 @@ impl Round {
         self.computation.load(profile);
     }
 
+    /// Places are along another line from now on: it has none to be at.
+    #[cfg(feature = "upload")]
+    pub(crate) const fn leave_line(&mut self) {
+        self.computation.leave_line();
+    }
+
     /// What could not be said to the neighbour after can be now.
     pub(crate) fn resend(&mut self) {
         self.due.onward |= self.computation.phase() == Phase::Waiting;

@@ -8,6 +8,9 @@ use crate::sensing::belief::{Belief, Spread, Told};
 use crate::sensing::sums::{SUMS, Sums};
 use crate::wire::frame::MAX_NODE;
 
+/// Bytes of the body: the tag, the pass, what is believed, the sums, what the receiver hears and who is off.
+pub(super) const LENGTH: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
+
 /// What the receiver hears.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Receiver {

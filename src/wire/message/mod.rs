@@ -31,8 +31,30 @@ use self::parts::{Word, read, write};
 use super::upload::Upload;
 use crate::guard::Fence;
 
-/// The longest body: what relays hear.
-pub const MAX_BODY: usize = 106;
+/// The longest body of a sweep: sixteen targets with what was measured, or from aside of the line.
+const SWEEP: usize = 88;
+
+/// The longest body but an offer: what relays hear, or without the feature `sensing` a sweep.
+const LONG: usize = if cfg!(feature = "sensing") {
+    hearing::LENGTH
+} else {
+    SWEEP
+};
+
+/// Bytes of an upload, as a body and as it is stored: those of an offer but its last two.
+#[cfg(feature = "upload")]
+pub use self::offer::UPLOAD;
+
+/// The longest body: an offer, or without the feature `upload` what relays hear, or a sweep.
+#[cfg(feature = "upload")]
+pub const MAX_BODY: usize = if offer::LENGTH > LONG {
+    offer::LENGTH
+} else {
+    LONG
+};
+/// The longest body: an offer, or without the feature `upload` what relays hear, or a sweep.
+#[cfg(not(feature = "upload"))]
+pub const MAX_BODY: usize = LONG;
 
 /// One message between neighbours. *Onward* is the way a pass goes: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]
@@ -79,7 +101,8 @@ pub enum Message {
     Decision(Decision),
     /// Either way: the fence between two neighbours.
     Fence {
-        /// [`digest`](super::digest::digest) of the sender's mission, as it was loaded.
+        /// [`digest`](super::digest::digest) of the sender's mission, as it was loaded; with the sites of an upload that it flies, where
+        /// that has any.
         mission: u16,
         /// What the sender says of it.
         fence: Fence,

@@ -6,7 +6,14 @@ use super::parts::{MessageError, PassId, Word, read, write};
 use super::tag;
 use crate::channel::Channel;
 use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
+use crate::sites::{self, Sites};
 use crate::wire::upload::Upload;
+
+/// Bytes of an upload: its tag, and what the fields of its wire form take, each of them always the same.
+pub const UPLOAD: usize = size_of::<u8>() + size_of::<OfferBody>();
+
+/// Bytes of the body.
+pub(super) const LENGTH: usize = UPLOAD + size_of::<Word>();
 
 pub(super) fn encode(upload: &Upload, answer: u16, buffer: &mut [u8]) -> Option<usize> {
     let body = (tag::OFFER, OfferBody::of(upload), Word::new(answer));
@@ -36,8 +43,11 @@ impl Upload {
     }
 }
 
-/// The wire form: version and base, and the numbers in the order of the digest.
-#[derive(Serialize, Deserialize)]
+/// The wire form: version and base, and the numbers in the order of the digest, the sites last.
+///
+/// Packed, it takes as many bytes in memory as on the wire, which is where [`UPLOAD`] comes from.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[repr(C, packed)]
 struct OfferBody {
     /// The number is the version, the mission the base.
     pass: PassId,
@@ -46,7 +56,13 @@ struct OfferBody {
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
+    /// As [`Sites::to_bytes`] has them; all 0 for none.
+    sites: SitesBody,
 }
+
+type SitesBody = [u8; sites::LENGTH];
+
+const NO_SITES: SitesBody = [0; sites::LENGTH];
 
 impl OfferBody {
     fn of(upload: &Upload) -> Self {
@@ -77,6 +93,7 @@ impl OfferBody {
                 c.lateral.most_m,
             ],
             noise_w: c.noise_w,
+            sites: upload.sites().map_or(NO_SITES, Sites::to_bytes),
         }
     }
 
@@ -95,7 +112,7 @@ impl OfferBody {
             tolerance,
         ] = self.numbers;
         let config = MissionConfig {
-            relays: self.relays.number(),
+            relays: { self.relays }.number(),
             distance_m,
             min_separation_m,
             tx_power_w,
@@ -121,6 +138,12 @@ impl OfferBody {
             noise_w: self.noise_w,
             tolerance,
         };
-        Upload::checked(self.pass.number(), self.pass.mission(), config).ok()
+        let pass = self.pass;
+        let sites = Some(self.sites).filter(|bytes| *bytes != NO_SITES);
+        let sites = sites.map(Sites::from_bytes);
+        if sites.is_some_and(|sites| !sites.are_valid()) {
+            return None;
+        }
+        Upload::checked(pass.number(), pass.mission(), config, sites).ok()
     }
 }

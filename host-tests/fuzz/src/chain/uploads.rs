@@ -1,9 +1,23 @@
 //! A newer mission for the chain.
 
-use uav_relay::{Interference, Interferer, MissionConfig, Upload};
+use uav_relay::{Geodetic, Interference, Interferer, MissionConfig, Sites, Upload};
 
 use super::super::input::Input;
 use super::Chain;
+
+/// A kilometre apart.
+const SITES: Option<Sites> = Some(Sites {
+    tx: Geodetic {
+        lat_e7: 474_000_000,
+        lon_e7: 85_400_000,
+        amsl_mm: 420_000,
+    },
+    rx: Geodetic {
+        lat_e7: 474_000_000,
+        lon_e7: 85_532_474,
+        amsl_mm: 431_000,
+    },
+});
 
 impl Chain {
     /// A relay's firmware hands it a mission that is newer than all before, with the interferer somewhere else.
@@ -25,6 +39,11 @@ impl Chain {
         let Ok(upload) = Upload::new(&self.mission, self.version, config) else {
             return;
         };
+        // One time in four between sites of its own, if it is as long as these are apart.
+        let sited = SITES.filter(|_| moved.x_m.to_bits() % 4 == 3);
+        let upload = sited
+            .and_then(|sites| upload.with_sites(sites).ok())
+            .unwrap_or(upload);
         if let Some(member) = self.members.get_mut(at) {
             member.watched.upload(self.now, &upload);
         }

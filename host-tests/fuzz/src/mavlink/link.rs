@@ -1,15 +1,16 @@
 //! The link to an autopilot that says anything, of a relay that wants anything.
 
+use uav_relay::Geodetic;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::geodetic::Geodetic;
 use uav_relay::pointing::Bearing;
 use uav_relay::{Duration, Instant, Placement};
 
+use super::peer::Peer;
 use super::wire::{
-    EXTENDED_STATE, GLOBAL_POSITION, HEARTBEAT, POSITION_TARGET, SENT, SET_POSITION, VALUE,
+    ACK, EXTENDED_STATE, GLOBAL_POSITION, HEARTBEAT, POSITION_TARGET, SENT, SET_POSITION, VALUE,
     checksum, frame,
 };
 use crate::heap::without;
@@ -28,12 +29,18 @@ const AROUND_M: f64 = 5_040.0;
 const TX: [f64; 3] = [47.40, 8.54, 420.0];
 const RX: [f64; 3] = [47.41, 8.55, 431.0];
 
+/// Where the receiver may move to.
+const MOVED: [f64; 3] = [47.408, 8.556, 440.0];
+
 /// A degree of latitude and one of longitude there, m.
 const DEGREE_M: [f64; 2] = [111_180.0, 75_470.0];
 
 struct Link {
     autopilot: Autopilot,
+    /// The other end, where frames are signed.
+    peer: Option<Peer>,
     axis: Axis,
+    rx: [f64; 3],
     now: Instant,
     /// When the autopilot was switched on.
     began: Instant,
@@ -42,9 +49,14 @@ struct Link {
     told: [i32; 2],
 }
 
+fn line_to(rx: [f64; 3]) -> Option<Axis> {
+    let site = |[lat, lon, amsl]: [f64; 3]| Geodetic::from_degrees(lat, lon, amsl);
+    Axis::try_new(site(TX)?, site(rx)?).ok()
+}
+
 /// Reads what is left as what is said to a link.
-pub(super) fn operate(input: &mut Input<'_>) {
-    let Some(mut link) = Link::new(input) else {
+pub(super) fn operate(input: &mut Input<'_>, signs: bool) {
+    let Some(mut link) = Link::new(input, signs) else {
         return;
     };
     link.settle();
@@ -58,17 +70,24 @@ pub(super) fn operate(input: &mut Input<'_>) {
 }
 
 impl Link {
-    fn new(input: &mut Input<'_>) -> Option<Self> {
-        let site = |[lat, lon, amsl]: [f64; 3]| Geodetic::from_degrees(lat, lon, amsl);
-        let axis = Axis::try_new(site(TX)?, site(RX)?).ok()?;
+    fn new(input: &mut Input<'_>, signs: bool) -> Option<Self> {
+        let axis = line_to(RX)?;
         let pace = Pace {
             speed_m_s: input.even(0.1, 20.0),
             acceleration_m_s2: input.even(0.1, 5.0),
         };
         let now = Instant::from_millis(u64::from(input.word()));
+        let mut autopilot = Autopilot::new(axis, pace, now);
+        let peer = signs.then(|| {
+            let (peer, signing) = Peer::new(input, now);
+            autopilot.sign(signing);
+            peer
+        });
         Some(Self {
-            autopilot: Autopilot::new(axis, pace, now),
+            autopilot,
+            peer,
             axis,
+            rx: RX,
             now,
             began: now,
             kind: None,
@@ -77,7 +96,7 @@ impl Link {
     }
 
     fn operate(&mut self, input: &mut Input<'_>) {
-        match input.below(14) {
+        match input.below(if self.peer.is_some() { 19 } else { 15 }) {
             0 => {
                 let lengths = input.word();
                 self.hear(input.piece(), lengths);
@@ -85,15 +104,15 @@ impl Link {
             1 | 2 => self.heartbeat(input),
             3 => {
                 let landed = input.below(6);
-                self.hear(&frame(EXTENDED_STATE, [1, 1], &[0, landed], 0), 0);
+                self.says(input, &frame(EXTENDED_STATE, [1, 1], &[0, landed], 0));
             }
             4 => {
                 let place = near(input);
-                self.position(place, input.byte());
+                self.position(input, place);
             }
             5 => {
                 let raw = input.piece().to_vec();
-                self.hear(&frame(GLOBAL_POSITION, [1, 1], &sized(raw, 28), 0), 0);
+                self.says(input, &frame(GLOBAL_POSITION, [1, 1], &sized(raw, 28), 0));
             }
             6 => {
                 let mut payload = vec![0; 4];
@@ -101,7 +120,10 @@ impl Link {
                 let off = i32::from(input.byte() / 8);
                 payload.extend(lat.wrapping_add(off).to_le_bytes());
                 payload.extend(lon.to_le_bytes());
-                self.hear(&frame(POSITION_TARGET, [1, 1], &sized(payload, 51), 0), 0);
+                self.says(
+                    input,
+                    &frame(POSITION_TARGET, [1, 1], &sized(payload, 51), 0),
+                );
             }
             7 => self.now = self.now + Duration::from_millis(u64::from(input.word())),
             8 | 9 => {
@@ -129,10 +151,43 @@ impl Link {
                         .handle_values(self.now, Some(sir), Some(place));
                 });
             }
-            _ => {
+            13 => {
                 let text = String::from_utf8_lossy(input.piece()).into_owned();
                 without(|| self.autopilot.say(&text));
             }
+            14 => {
+                self.rx = if input.flag() { MOVED } else { RX };
+                if let Some(axis) = line_to(self.rx) {
+                    self.axis = axis;
+                    without(|| self.autopilot.fly_along(self.now, axis));
+                }
+            }
+            15 => {
+                let before = self.peer.as_ref().and_then(|peer| peer.before(input));
+                self.hear(&before.unwrap_or_default(), 0);
+            }
+            16 => {
+                if let Some(peer) = &mut self.peer {
+                    peer.set_clock(input);
+                }
+            }
+            // The own clock jumps, by up to 50 days.
+            17 => self.now = self.now + Duration::from_millis(u64::from(input.long())),
+            _ => {
+                let frame = frame(ACK, [1, 1], &sized(input.piece().to_vec(), 10), 0);
+                self.says(input, &frame);
+            }
+        }
+    }
+
+    /// A frame comes, signed as it is chosen where frames are.
+    fn says(&mut self, input: &mut Input<'_>, frame: &[u8]) {
+        match &mut self.peer {
+            Some(peer) => {
+                let signed = peer.signs(input, frame);
+                self.hear(&signed, 0);
+            }
+            None => self.hear(frame, 0),
         }
     }
 
@@ -156,6 +211,10 @@ impl Link {
             (sent, link.poll_position(), link.state(), link.counters())
         });
         assert_eq!(one, other, "by how the bytes are cut");
+        if let Some(peer) = &mut self.peer {
+            peer.heard(self.now, bytes);
+            assert_eq!(self.autopilot.refused(), peer.refused, "of {bytes:?}");
+        }
     }
 
     /// Of a PX4, an ArduCopter or something else, in any mode.
@@ -175,11 +234,12 @@ impl Link {
         let armed = if input.below(4) == 3 { 0 } else { 128 };
         let mut payload = mode.to_le_bytes().to_vec();
         payload.extend([2, autopilot, armed | 1, 4, 3]);
-        self.hear(&frame(HEARTBEAT, [1, component], &payload, 0), 0);
+        self.says(input, &frame(HEARTBEAT, [1, component], &payload, 0));
     }
 
     /// Where the drone is, said late or by a clock that is off.
-    fn position(&mut self, place: Placement, clock: u8) {
+    fn position(&mut self, input: &mut Input<'_>, place: Placement) {
+        let clock = input.byte();
         let Some(point) = self.axis.point(place) else {
             return;
         };
@@ -193,7 +253,10 @@ impl Link {
         for number in [point.lat_e7, point.lon_e7, point.amsl_mm] {
             payload.extend(number.to_le_bytes());
         }
-        self.hear(&frame(GLOBAL_POSITION, [1, 1], &sized(payload, 28), 0), 0);
+        self.says(
+            input,
+            &frame(GLOBAL_POSITION, [1, 1], &sized(payload, 28), 0),
+        );
     }
 
     /// What a firmware's loop does, and a look at all that comes of it.
@@ -201,7 +264,15 @@ impl Link {
         without(|| self.autopilot.handle_timeout(self.now));
         let mut frames = 0;
         while let Some(frame) = without(|| self.autopilot.poll_transmit(self.now)) {
-            self.look_at(&frame);
+            match &mut self.peer {
+                Some(peer) => {
+                    assert_eq!(frame.get(2), Some(&1));
+                    let unsigned = peer.sent(self.now, &frame);
+                    // Its checksum covers the flag.
+                    self.look_at(&unsigned, 1);
+                }
+                None => self.look_at(&frame, 0),
+            }
             frames += 1;
             assert!(frames <= MOST_FRAMES, "it never ends");
         }
@@ -220,7 +291,8 @@ impl Link {
                 assert_eq!(self.kind.replace(kind), None, "found twice");
             }
             events += 1;
-            assert!(events <= 4, "it never ends");
+            // Four, and four kinds of mistrust.
+            assert!(events <= 8, "it never ends");
         }
         assert_eq!(
             self.autopilot.is_flown(),
@@ -230,7 +302,8 @@ impl Link {
         assert!(wakes > self.now, "it wants to be called for nothing");
     }
 
-    fn look_at(&mut self, frame: &[u8]) {
+    /// A frame without its signature; `covered_flags` are those that its checksum is of.
+    fn look_at(&mut self, frame: &[u8], covered_flags: u8) {
         let Some((&[magic, length, flags, _, _, _, component, a, b, c], rest)) =
             frame.split_first_chunk()
         else {
@@ -244,8 +317,14 @@ impl Link {
         let Some((payload, sum)) = rest.split_at_checked(usize::from(length)) else {
             unreachable!("{frame:?}");
         };
-        let covered = frame.get(1..10 + payload.len()).unwrap_or_default();
-        assert_eq!(sum, checksum(covered, extra).to_le_bytes());
+        let mut covered = frame
+            .get(1..10 + payload.len())
+            .unwrap_or_default()
+            .to_vec();
+        if let Some(flags) = covered.get_mut(1) {
+            *flags = covered_flags;
+        }
+        assert_eq!(sum, checksum(&covered, extra).to_le_bytes());
         let payload = sized(payload.to_vec(), longest);
         if id == SET_POSITION.0 {
             self.look_at_target(&payload);
@@ -276,7 +355,7 @@ impl Link {
         let [north_m, east_m] = DEGREE_M;
         let toward =
             |[to_lat, to_lon, _]: [f64; 3]| [(to_lat - TX[0]) * north_m, (to_lon - TX[1]) * east_m];
-        let ([n, e], [rn, re]) = (toward([lat, lon, 0.0]), toward(RX));
+        let ([n, e], [rn, re]) = (toward([lat, lon, 0.0]), toward(self.rx));
         let length = rn.hypot(re);
         let along = (n * rn + e * re) / length;
         let aside = (e * rn - n * re) / length;
@@ -285,7 +364,7 @@ impl Link {
             (-AROUND_M..=length + AROUND_M).contains(&along),
             "{along} m along"
         );
-        let datum = TX[2] + (RX[2] - TX[2]) * along / length;
+        let datum = TX[2] + (self.rx[2] - TX[2]) * along / length;
         assert!((amsl - datum).abs() <= AROUND_M, "{amsl} m high");
     }
 }

@@ -25,6 +25,33 @@ pub(super) const COMMAND: Kind = (76, 152, 33);
 pub(super) const TEXT: Kind = (253, 83, 54);
 pub(super) const VALUE: Kind = (251, 170, 18);
 
+/// The number of the message in a frame.
+pub(super) fn id(frame: &[u8]) -> u32 {
+    let id = frame.get(7..).and_then(<[u8]>::first_chunk);
+    let [a, b, c] = id.copied().unwrap_or_default();
+    u32::from_le_bytes([a, b, c, 0])
+}
+
+/// The byte that is added to the checksum of such a message; 0 for one that is not known here.
+pub(super) fn extra(id: u32) -> u8 {
+    let known = [
+        HEARTBEAT,
+        GLOBAL_POSITION,
+        POSITION_TARGET,
+        EXTENDED_STATE,
+        ACK,
+        TUNNEL,
+        SET_POSITION,
+        COMMAND,
+        TEXT,
+        VALUE,
+    ];
+    let mut known = known.into_iter();
+    known
+        .find(|(number, ..)| *number == id)
+        .map_or(0, |(_, extra, _)| extra)
+}
+
 /// What the link may send.
 pub(super) const SENT: [Kind; 5] = [HEARTBEAT, COMMAND, SET_POSITION, TEXT, VALUE];
 

@@ -9,6 +9,16 @@ const PAPER: [f32; 5] = [1000.0, 4.0, 80.0, 20.0, 1.0];
 /// The paper's path-loss factors, with and without line of sight.
 const LOSSES: [f64; 2] = [7_191.8, 884_786.1];
 
+/// Tx and Rx 1000 m apart, to the millimetre.
+const SITES: [i32; 6] = [
+    474_000_000,
+    85_400_000,
+    420_000,
+    474_000_000,
+    85_532_474,
+    431_000,
+];
+
 impl Body<'_, '_> {
     pub(super) fn offer(&mut self) {
         self.version();
@@ -22,6 +32,7 @@ impl Body<'_, '_> {
         let choice = self.input.byte();
         // Mostly without noise.
         self.reals(&[if choice % 16 == 7 { 1e-12 } else { 0.0 }]);
+        self.sites(choice);
         self.answer(choice);
     }
 
@@ -32,6 +43,18 @@ impl Body<'_, '_> {
             _ => self.input.word(),
         };
         self.word(answer);
+    }
+
+    /// None mostly; two that are a kilometre apart, which is what the paper has; or any numbers at all.
+    fn sites(&mut self, choice: u8) {
+        let sites = match choice % 16 {
+            0..12 => [0; 6],
+            12..14 => SITES,
+            _ => core::array::from_fn(|_| self.input.long().cast_signed()),
+        };
+        for number in sites {
+            self.bytes.extend_from_slice(&number.to_le_bytes());
+        }
     }
 
     /// The version that the relay holds, one of the next, or any.

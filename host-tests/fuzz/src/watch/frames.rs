@@ -65,8 +65,9 @@ impl Frames {
             let off = self.node.abs_diff(header.destination) <= far;
             let upstream = off && header.destination < self.node;
             let downstream = off && header.destination > self.node;
-            // One that stands down says so to the other node of its number.
-            let own = header.destination == self.node && relay.stands_down();
+            // One that stands down says so to the other node of its number, and one that defends its number does; neither where frames
+            // are signed.
+            let own = header.destination == self.node && !signs;
             let right = own
                 || match (settings.wiring, port) {
                     (Wiring::Pair, Port::Upstream) => upstream,

@@ -1,8 +1,8 @@
 //! Where the ground's two ends are on earth, and the distance that follows from it.
 
 use serde::Deserialize;
+use uav_relay::Geodetic;
 use uav_relay::flight::axis::{Axis, AxisError};
-use uav_relay::flight::geodetic::Geodetic;
 
 use super::check::mistake;
 use super::error::{Problem, ScenarioError};

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::geodetic::Geodetic;
 
 /// Everything a host tool has to know about a flight, in SI units, with x along the line from Tx (x = 0) to Rx and y to the
 /// right of it as seen from above.

@@ -137,7 +137,7 @@ impl Chain {
             self.outcome.watched = Some(watched);
         }
         let lent = self.members.iter().map(|member| member.lent);
-        let places = self.fleet.iter().map(Vehicle::at);
+        let places = self.fleet.iter().map(Vehicle::along);
         self.outcome.fleet = places.zip(lent).collect();
         self.outcome.relays = self
             .members
@@ -154,6 +154,7 @@ impl Chain {
                 view: member.relay.view().number(),
                 version: member.relay.version(),
                 believed: member.relay.belief(),
+                sites: member.relay.sites(),
                 seen: Seen::of(&member.relay, member.killed.is_none()),
             })
             .collect();

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use uav_relay::sensing::belief::Told;
-use uav_relay::{Duration, Instant, Placement, Profile, Side, Stats};
+use uav_relay::{Duration, Instant, Placement, Profile, Side, Sites, Stats};
 
 use super::attack::Struck;
 use super::drones::{Nearest, Point};
@@ -141,6 +141,8 @@ pub struct RelayEnd {
     pub version: u16,
     /// What it believes of the interference.
     pub believed: Told,
+    /// Between which sites it flies that, if not between those that it was loaded with.
+    pub sites: Option<Sites>,
     /// What it showed.
     pub seen: Seen,
 }
@@ -192,7 +194,7 @@ pub struct Outcome {
     pub nearest_lent: Option<Nearest>,
     /// Targets that an autopilot was told for more than a second after it had said that none may be sent. Anything but 0 is a bug.
     pub stray_targets: u64,
-    /// Where the drones with an autopilot are in the end, and whether their relays fly them.
+    /// Where the drones with an autopilot are in the end, along the line of the mission that their relays fly, and whether these fly them.
     pub fleet: Vec<(Point, bool)>,
     /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.
     pub unsafe_setpoints: u64,

@@ -249,6 +249,40 @@ fn of_several_interferers_the_one_that_stands_for_all_is_changed() {
 }
 
 #[test]
+fn wrong_sites_of_an_upload_are_named() {
+    let site = example("site.toml");
+    for (arguments, parts) in [
+        (
+            &["--upload", "20:rx_lat_deg=91"][..],
+            &["rx_lat_deg must be a number within -90.0 to"][..],
+        ),
+        (
+            &["--upload", "20:rx_lat_deg=47.4"],
+            &["--upload 20:rx_lat_deg=47.4:", "[site]"],
+        ),
+        (
+            &["--scenario", &site, "--upload", "20:rx_lat_deg=49"],
+            &["--upload 20:rx_lat_deg=49:", "10 to 100000 m"],
+        ),
+        (
+            &[
+                "--scenario",
+                &site,
+                "--upload",
+                "20:rx_lat_deg=47.42,distance_m=1000",
+            ],
+            &["distance_m=1000:", "must be that between its sites"],
+        ),
+    ] {
+        let (status, line) = refusal(arguments);
+        assert_eq!(status, 2, "{arguments:?}: {line}");
+        for part in parts {
+            assert!(line.contains(part), "{arguments:?}: {part} not in {line}");
+        }
+    }
+}
+
+#[test]
 fn wrong_uploads_are_named_with_what_is_allowed() {
     let field = example("field.toml");
     for (arguments, parts) in [
@@ -330,4 +364,35 @@ fn wrong_uploads_are_named_with_what_is_allowed() {
             assert!(line.contains(part), "{arguments:?}: {part} not in {line}");
         }
     }
+}
+
+/// Drones that hover where they are to be, along the line that there is then.
+#[test]
+fn drones_fly_to_a_receiver_that_moves() {
+    let site = example("site.toml");
+    let report = json(&[
+        "--scenario",
+        &site,
+        "--uavs",
+        "4",
+        "--fly",
+        "--upload",
+        "60:rx_lat_deg=47.412,rx_lon_deg=8.552",
+    ]);
+    assert_eq!(report["version"].as_u64(), Some(1));
+    assert_eq!(whats(&report, "adopted"), 4);
+    for drone in report["drones"].as_array().unwrap() {
+        assert!(drone["flown"].as_bool().unwrap(), "{drone}");
+        assert!(drone["off_m"].as_f64().unwrap() < 1.0, "{drone}");
+    }
+    // As a chain that takes off with the distance of the new sites.
+    let longer = json(&[
+        "--uavs",
+        "4",
+        "--scenario",
+        &site,
+        "--upload",
+        "1:rx_lat_deg=47.412,rx_lon_deg=8.552",
+    ]);
+    assert_eq!(places(&report), places(&longer));
 }

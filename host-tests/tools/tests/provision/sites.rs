@@ -1,7 +1,7 @@
 //! The sites in a block, the line that a drone makes of them, and where `cargo provision` has them from.
 
+use uav_relay::Geodetic;
 use uav_relay::flight::axis::AxisError;
-use uav_relay::flight::geodetic::Geodetic;
 use uav_relay_sim::scenario::Scenario;
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Block, ConfigError, Sites, autopilot_key};

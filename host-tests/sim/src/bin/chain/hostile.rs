@@ -1,7 +1,7 @@
 //! What may happen to the chain in the air: relays that go silent, parts that do not hear each other, an attacker, a new mission.
 
 use clap::Args;
-use uav_relay::{Instant, Wiring};
+use uav_relay::{Instant, Sites, Wiring};
 use uav_relay_sim::command::Failure;
 use uav_relay_sim::simulator::attack::Attack;
 use uav_relay_sim::simulator::setup::{Partition, Setup};
@@ -135,7 +135,7 @@ impl Hostile {
     }
 
     /// Puts all of it into a run.
-    pub(crate) fn prepare(&self, setup: &mut Setup) -> Result<(), Failure> {
+    pub(crate) fn prepare(&self, setup: &mut Setup, sites: Option<Sites>) -> Result<(), Failure> {
         let pairs = |ones: &[One]| ones.iter().map(|one| (one.index, one.at)).collect();
         setup.kills = pairs(&self.kill);
         setup.boots = pairs(&self.boot);
@@ -154,7 +154,7 @@ impl Hostile {
         }
         let asks = self.is_attack() || self.uploads.are_planned();
         setup.auth = self.auth || asks && !self.no_auth;
-        setup.uploads = self.uploads.of(&setup.mission)?;
+        setup.uploads = self.uploads.of(&setup.mission, sites)?;
         if !self.uploads.are_stored() {
             setup.forgetful = (1..=setup.mission.relays()).collect();
         }

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Parser as _, ValueEnum as _};
 use indicatif::{ProgressBar, ProgressStyle};
-use uav_relay::{Measure, Mission, Placement, Schedule, Wiring};
+use uav_relay::{Measure, Mission, Placement, Schedule, Sites, Wiring};
 use uav_relay_sim::beta::beta_w;
 use uav_relay_sim::command::{self, Failure, narrow};
 use uav_relay_sim::mission::{self, Refusal};
@@ -60,7 +60,11 @@ fn run(options: &Options) -> Result<(), Failure> {
             return Err(Failure::input(format!("{file}: {refusal}")));
         }
     };
-    let mut setup = setup(options, mission)?;
+    let sites = scenario.line.map(|line| Sites {
+        tx: line.sites[0],
+        rx: line.sites[1],
+    });
+    let mut setup = setup(options, mission, sites)?;
     let axis = scenario.line.map(|line| line.axis);
     options.hostile.flight.prepare(&mut setup, axis)?;
     setup.profiles = profiles;
@@ -140,7 +144,7 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
 }
 
 /// What the options say of the run.
-fn setup(options: &Options, mission: Mission) -> Result<Setup, Failure> {
+fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Setup, Failure> {
     let mut setup = Setup::new(mission);
     setup.settings.schedule = match options.method {
         Method::AlignStep | Method::StochasticStep => Schedule::FixedStep {
@@ -159,7 +163,7 @@ fn setup(options: &Options, mission: Mission) -> Result<Setup, Failure> {
     };
     setup.settings.predict = !options.no_predict;
     setup.seed = options.seed;
-    options.hostile.prepare(&mut setup)?;
+    options.hostile.prepare(&mut setup, sites)?;
     options.hostile.air.prepare(&mut setup, options.loss)?;
     setup.faults = Faults {
         loss: options.loss,

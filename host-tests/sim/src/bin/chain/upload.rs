@@ -1,8 +1,10 @@
 //! Missions that the ground uploads in flight: what the options say of them.
 
 use clap::{Args, ValueEnum};
+use uav_relay::flight::axis::Axis;
 use uav_relay::{
-    Band, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Side, Upload,
+    Band, Geodetic, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Side,
+    Sites, Upload,
 };
 use uav_relay_sim::command::{Failure, narrow, number};
 use uav_relay_sim::simulator::setup::UploadSpec;
@@ -14,7 +16,8 @@ use crate::times::instant;
 pub(crate) struct Uploads {
     /// The ground uploads the mission of the scenario with other parameters S virtual seconds after the start, and the chain
     /// flies it. Keys as in a scenario file: x_m, y_m and power_w of the interferer, altitude_m, altitude_min_m,
-    /// altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m, distance_m, tx_w, uav_w; noise_w, 0 to 1; and tolerance. Repeatable: versions count from 1
+    /// altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m, distance_m, tx_w, uav_w; noise_w, 0 to 1; and tolerance. Where the
+    /// scenario has a site, tx_lat_deg, tx_lon_deg, tx_amsl_m and those of rx move an end; the distance then follows. Repeatable: versions count from 1
     #[arg(long, value_name = "S[:KEY=VALUE,..]", value_parser = planned)]
     upload: Vec<Planned>,
     /// Which end of the link uploads
@@ -65,10 +68,16 @@ enum Key {
     UavPower,
     Noise,
     Tolerance,
+    TxLatitude,
+    TxLongitude,
+    TxHeight,
+    RxLatitude,
+    RxLongitude,
+    RxHeight,
 }
 
 /// The names of the keys, and the ranges of their values: those of a scenario file, of a mission's noise and of `--tolerance`.
-const KEYS: [(&str, Key, f64, f64); 14] = [
+const KEYS: [(&str, Key, f64, f64); 20] = [
     ("x_m", Key::X, -1e7, 1e7),
     ("y_m", Key::Y, -1e7, 1e7),
     ("power_w", Key::Power, 1e-6, 1e9),
@@ -83,6 +92,12 @@ const KEYS: [(&str, Key, f64, f64); 14] = [
     ("uav_w", Key::UavPower, 1e-6, 1e6),
     ("noise_w", Key::Noise, 0.0, 1.0),
     ("tolerance", Key::Tolerance, 1e-6, 0.1),
+    ("tx_lat_deg", Key::TxLatitude, -90.0, 90.0),
+    ("tx_lon_deg", Key::TxLongitude, -180.0, 180.0),
+    ("tx_amsl_m", Key::TxHeight, -1e3, 1e4),
+    ("rx_lat_deg", Key::RxLatitude, -90.0, 90.0),
+    ("rx_lon_deg", Key::RxLongitude, -180.0, 180.0),
+    ("rx_amsl_m", Key::RxHeight, -1e3, 1e4),
 ];
 
 impl Uploads {
@@ -101,8 +116,12 @@ impl Uploads {
         self.upload.iter().map(|one| one.at)
     }
 
-    /// All of them, in the order of their times, for relays that are loaded with `base`.
-    pub(crate) fn of(&self, base: &Mission) -> Result<Vec<UploadSpec>, Failure> {
+    /// All of them, in the order of their times, for relays that are loaded with `base`, between `sites` if it is known where these are.
+    pub(crate) fn of(
+        &self,
+        base: &Mission,
+        sites: Option<Sites>,
+    ) -> Result<Vec<UploadSpec>, Failure> {
         let end = match self.upload_from {
             End::Tx => Side::Upstream,
             End::Rx => Side::Downstream,
@@ -113,8 +132,18 @@ impl Uploads {
             let refused = |why: &dyn std::fmt::Display| {
                 Failure::input(format!("--upload {}: {why}", one.text))
             };
-            let config = one.changed(base.config()).map_err(|why| refused(&why))?;
-            let upload = Upload::new(base, version, config).map_err(|why| refused(&why))?;
+            let moved = one.moved(sites).map_err(|why| refused(&why))?;
+            let mut config = one.changed(base.config()).map_err(|why| refused(&why))?;
+            if let Some(sites) = moved
+                && !one.changes.iter().any(|(key, _)| *key == Key::Distance)
+            {
+                let axis = Axis::between(sites).map_err(|why| refused(&why))?;
+                config.distance_m = narrow(axis.distance_m());
+            }
+            let mut upload = Upload::new(base, version, config).map_err(|why| refused(&why))?;
+            if let Some(sites) = moved {
+                upload = upload.with_sites(sites).map_err(|why| refused(&why))?;
+            }
             Ok(UploadSpec {
                 end,
                 at: one.at,
@@ -126,6 +155,36 @@ impl Uploads {
 }
 
 impl Planned {
+    /// Between which sites the mission is flown from then on, if an end of `sites` moves.
+    fn moved(&self, sites: Option<Sites>) -> Result<Option<Sites>, &'static str> {
+        let of = |key| {
+            let mut changes = self.changes.iter();
+            changes.find(|(of, _)| *of == key).map(|(_, value)| *value)
+        };
+        let new = [
+            [Key::TxLatitude, Key::TxLongitude, Key::TxHeight],
+            [Key::RxLatitude, Key::RxLongitude, Key::RxHeight],
+        ]
+        .map(|keys| keys.map(of));
+        if new.as_flattened().iter().all(Option::is_none) {
+            return Ok(None);
+        }
+        let sites = sites.ok_or("an end can be moved only where the scenario has [site]")?;
+        let to = |at: Geodetic, [lat, lon, amsl]: [Option<f64>; 3]| {
+            Geodetic::from_degrees(
+                lat.unwrap_or(f64::from(at.lat_e7) / 1e7),
+                lon.unwrap_or(f64::from(at.lon_e7) / 1e7),
+                amsl.unwrap_or(f64::from(at.amsl_mm) / 1e3),
+            )
+            .unwrap_or(at)
+        };
+        let [tx, rx] = new;
+        Ok(Some(Sites {
+            tx: to(sites.tx, tx),
+            rx: to(sites.rx, rx),
+        }))
+    }
+
     /// `base` with what is to be changed.
     fn changed(&self, base: &MissionConfig) -> Result<MissionConfig, &'static str> {
         let Interference::Source(at) = base.interference else {

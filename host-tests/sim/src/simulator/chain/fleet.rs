@@ -5,7 +5,7 @@ use uav_relay::flight::autopilot::state::State;
 use uav_relay::guard::HoldReason;
 use uav_relay::{Duration, Instant, Side};
 
-use super::super::drones::{Nearest, Point, apart, point};
+use super::super::drones::{Nearest, Point, apart};
 use super::super::fleet::Vehicle;
 use super::super::outcome::Turning;
 use super::super::queue::Happening;
@@ -77,6 +77,7 @@ impl Chain {
             }
             return;
         }
+        vehicle.follow(now, member.relay.sites());
         vehicle.link.handle_timeout(now);
         // Before it hears where the drone is: flown again it begins with the next place.
         let is_flown = vehicle.link.is_flown();
@@ -175,7 +176,8 @@ impl Chain {
         lent.filter(|(member, vehicle)| member.killed.is_none() && vehicle.is_lent(self.now))
             .all(|(member, vehicle)| {
                 let agreed = member.relay.final_setpoint();
-                let there = agreed.is_some_and(|place| apart(point(place), vehicle.at()) < THERE_M);
+                let there = agreed.and_then(|place| vehicle.there(place));
+                let there = there.is_some_and(|place| apart(place, vehicle.at()) < THERE_M);
                 vehicle.link.is_flown() && there
             })
     }

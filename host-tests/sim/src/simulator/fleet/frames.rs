@@ -1,6 +1,6 @@
 //! The bytes of an autopilot: what it says, and what it makes of what it hears.
 
-use uav_relay::flight::geodetic::Geodetic;
+use uav_relay::Geodetic;
 use uav_relay::flight::mavlink::frame::{CHECKSUM, HEADER, MAGIC, checksum};
 use uav_relay::flight::mavlink::table::{self, id};
 

@@ -1,9 +1,9 @@
 //! How drones with autopilots fly, and what their pilots do.
 
+use uav_relay::Geodetic;
 use uav_relay::Instant;
 use uav_relay::flight::autopilot::Kind;
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::geodetic::Geodetic;
 
 /// The pilot of a drone has the sticks for a time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -4,8 +4,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::{Autopilot, Kind};
+use uav_relay::flight::axis::Axis;
 use uav_relay::flight::mavlink::table::id;
-use uav_relay::{Duration, Instant};
+use uav_relay::{Duration, Instant, Placement, Sites};
 
 use super::frames::{Heard, Says, heard};
 use super::pilot::{Mode, Pilot};
@@ -52,6 +53,8 @@ pub(in crate::simulator) struct Vehicle {
     kind: Kind,
     spec: FleetSpec,
     pub(in crate::simulator) link: Autopilot,
+    /// Between which its relay flies, if that is not the line of this run.
+    sites: Option<Sites>,
     pilot: Pilot,
     body: Body,
     gust: Point,
@@ -83,6 +86,7 @@ impl Vehicle {
         Self {
             kind: FleetSpec::kind(index),
             link: Autopilot::new(spec.axis, Pace::default(), Instant::ZERO),
+            sites: None,
             pilot: Pilot::new(index, &spec.takeovers),
             body: Body::hovering(at),
             gust: [0.0; 3],
@@ -117,6 +121,36 @@ impl Vehicle {
             interval,
             due: now,
         })
+    }
+
+    /// Its relay flies between `sites` from now on; `None` for the ends of the line of this run.
+    pub(in crate::simulator) fn follow(&mut self, now: Instant, sites: Option<Sites>) {
+        if self.sites != sites {
+            self.sites = sites;
+            self.link.fly_along(now, self.line());
+        }
+    }
+
+    /// The line that the relay's places are along.
+    fn line(&self) -> Axis {
+        let moved = self.sites.and_then(|sites| Axis::between(sites).ok());
+        moved.unwrap_or(self.spec.axis)
+    }
+
+    /// Where it is, along the line of its relay.
+    pub(in crate::simulator) fn along(&self) -> Point {
+        if self.sites.is_none() {
+            return self.body.at;
+        }
+        let on_earth = self.spec.axis.point(placement(self.body.at));
+        let along = on_earth.and_then(|at| self.line().place(at));
+        along.map_or([f64::NAN; 3], point)
+    }
+
+    /// Where a place of the relay is, along the line of this run.
+    pub(in crate::simulator) fn there(&self, place: Placement) -> Option<Point> {
+        let on_earth = self.line().point(place)?;
+        self.spec.axis.place(on_earth).map(point)
     }
 
     /// Where it is.

@@ -81,7 +81,7 @@ const SIGNED: &[Counted] = &[
     (
         "the tag of the longest body",
         "instructions",
-        &["tag_221"],
+        &["tag_longest"],
         None,
     ),
     (
@@ -107,7 +107,7 @@ const UPLOADED: &[Counted] = &[
         &["offer"],
         None,
     ),
-    ("its frame", "bytes", &["offer_bytes"], Some(116)),
+    ("its frame", "bytes", &["offer_bytes"], Some(140)),
 ];
 
 /// A row of what the counting image reports: the largest of the figures with these names.

@@ -50,7 +50,7 @@ const IMAGES: &[Image] = &[
     (
         "flash of that with `guard` and `upload`",
         &["--no-default-features", "--features", "guard,upload"],
-        [81 * 1024, 6400, 4352],
+        [84 * 1024, 6400, 4352],
     ),
     (
         "flash of that with `guard` and `flight`",
@@ -72,7 +72,8 @@ const IMAGES: &[Image] = &[
         // Of these flash 26 KiB and RAM 2.3 KiB are the autopilot's: geodesy in f64 without a unit for it, MAVLink, a port, and the guard,
         // which is on since the drone knows where it is, and 3 KiB that what is said there can be signed.
         // Noise in every method takes 3 to 4 KiB of each image, and sensing, which solves in f64, 20 KiB of this one and the deepest stack.
-        [161 * 1024, 10_752, 5_888],
+        // That uploads may move the sites takes 3.5 KiB of it.
+        [164 * 1024, 11_008, 5_888],
     ),
 ];
 

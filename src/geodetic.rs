@@ -37,7 +37,7 @@ impl Geodetic {
     reason = "saturates, and callers hand in what fits"
 )]
 #[inline(never)] // called from several places
-pub(super) fn to_integer(value: f64) -> i32 {
+pub(crate) fn to_integer(value: f64) -> i32 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 

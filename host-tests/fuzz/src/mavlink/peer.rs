@@ -1,0 +1,252 @@
+//! An autopilot that signs what it says, somebody who does not have its key, and what a link with a key has to make of either, by the
+//! definition of MAVLink's signatures.
+
+use sha2::{Digest as _, Sha256};
+use uav_relay::Instant;
+use uav_relay::flight::mavlink::incoming::Incoming;
+use uav_relay::flight::mavlink::parser::{Parser, Received};
+use uav_relay::flight::mavlink::signing::{Signing, Stamp};
+
+use crate::input::Input;
+
+const KEY: [u8; 32] = *b"the key is the autopilot's alone";
+const OTHER: [u8; 32] = *b"somebody without it has this one";
+
+/// Bytes behind the checksum: link, stamp, tag.
+const SIGNATURE: usize = 13;
+
+/// The last stamp, a minute, and so many senders are remembered.
+const LAST: u64 = (1 << 48) - 1;
+const MINUTE: u64 = 6_000_000;
+const SENDERS: usize = 8;
+
+/// 2015-01-01, µs since 1970; and 2026-11-22 in stamps since then.
+const BEGIN_US: u64 = 1_420_070_400_000_000;
+const TODAY: u64 = 37_527_840_000_000;
+
+/// Frames that are kept, to be played again.
+const HISTORY: usize = 32;
+
+/// A sender: system, component, link; and the stamp of its last frame that was taken.
+type Sender = ((u8, u8, u8), u64);
+
+/// Both ends of a link whose frames are signed.
+#[derive(Debug)]
+pub(super) struct Peer {
+    /// The autopilot's stamp, and what it has signed.
+    stamp: u64,
+    history: Vec<Vec<u8>>,
+    /// What the link knows: the time by stamps at a time of its clock, whom it has heard, and what it last signed.
+    time: u64,
+    at: Instant,
+    senders: Vec<Sender>,
+    sent: u64,
+    parser: Parser,
+    /// Frames that it has to refuse.
+    pub(super) refused: u32,
+}
+
+impl Peer {
+    /// Both, and what the link signs with: it has the time or has not.
+    pub(super) fn new(input: &mut Input<'_>, now: Instant) -> (Self, Signing) {
+        let time = match input.below(4) {
+            0 => 0,
+            1 => LAST - u64::from(input.word()),
+            _ => TODAY,
+        };
+        let stamp = match time {
+            0 => Stamp::UNKNOWN,
+            time => Stamp::of_unix_micros(BEGIN_US + 10 * time),
+        };
+        let peer = Self {
+            stamp: TODAY,
+            history: Vec::new(),
+            time,
+            at: now,
+            senders: Vec::new(),
+            sent: 0,
+            parser: Parser::new(),
+            refused: 0,
+        };
+        (peer, Signing::new(KEY, 3, stamp, now))
+    }
+
+    /// The frame as it comes: signed mostly, and else not, by somebody else, with an old stamp, hurt, or one of before in its place.
+    pub(super) fn signs(&mut self, input: &mut Input<'_>, frame: &[u8]) -> Vec<u8> {
+        let how = input.byte();
+        let (key, link) = match how {
+            // As many links as one more than are remembered.
+            160..192 => (KEY, how % 10),
+            192..208 => (OTHER, 0),
+            208..216 => return frame.to_vec(),
+            _ => (KEY, 0),
+        };
+        self.stamp = match how {
+            216..224 => self.stamp.saturating_sub(u64::from(input.long())),
+            224..232 => self.stamp.saturating_add(u64::from(input.long())),
+            _ => self.stamp.saturating_add(u64::from(how % 4) * 10_000 + 1),
+        }
+        .min(LAST);
+        let mut frame = signed(key, frame, link, self.stamp);
+        match how {
+            232..240 => {
+                let at = frame.len() - 1 - usize::from(input.byte()) % SIGNATURE;
+                if let Some(byte) = frame.get_mut(at) {
+                    *byte ^= input.byte().max(1);
+                }
+            }
+            240..=255 => {
+                if let Some(old) = self.before(input) {
+                    return old;
+                }
+            }
+            _ => {}
+        }
+        if self.history.len() == HISTORY {
+            self.history.remove(0);
+        }
+        self.history.push(frame.clone());
+        frame
+    }
+
+    /// A frame that was signed before.
+    pub(super) fn before(&self, input: &mut Input<'_>) -> Option<Vec<u8>> {
+        let at = usize::from(input.byte()) % self.history.len().max(1);
+        self.history.get(at).cloned()
+    }
+
+    /// The autopilot's clock is set: by a day, to the link's, to the end of all stamps.
+    pub(super) fn set_clock(&mut self, input: &mut Input<'_>) {
+        const DAY: u64 = 8_640_000_000;
+        self.stamp = match input.below(6) {
+            0 => self.stamp.saturating_sub(DAY),
+            1 => self.stamp.saturating_add(DAY).min(LAST),
+            2 => self.time,
+            3 => self.time.saturating_sub(MINUTE),
+            4 => self.time.saturating_sub(MINUTE + 1),
+            _ => LAST,
+        };
+    }
+
+    /// The link hears those bytes: counts what it has to refuse.
+    pub(super) fn heard(&mut self, now: Instant, bytes: &[u8]) {
+        let mut parser = self.parser.clone();
+        for &byte in bytes {
+            parser.push(byte);
+            while let Some(taken) =
+                parser.next_frame(|received, frame| self.takes(now, &received, frame))
+            {
+                self.refused = self.refused.saturating_add(u32::from(!taken));
+            }
+        }
+        self.parser = parser;
+    }
+
+    /// Whether a frame counts.
+    fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
+        match received.message {
+            // Nothing of use, or of a radio.
+            None | Some(Incoming::RadioStatus { .. }) => return true,
+            Some(_) => {}
+        }
+        if !received.is_signed {
+            return false;
+        }
+        self.advance(now);
+        let Some((_, [link, stamp @ ..])) = frame.split_last_chunk::<SIGNATURE>() else {
+            return false;
+        };
+        let stamp = read(stamp);
+        let sender = (received.from.system, received.from.component, *link);
+        let last = self.senders.iter().position(|(known, _)| *known == sender);
+        let is_new = match last.and_then(|at| self.senders.get(at)) {
+            Some((_, last)) => stamp > *last,
+            None => stamp + MINUTE >= self.time,
+        };
+        let unsigned = frame.get(..frame.len() - SIGNATURE).unwrap_or_default();
+        if frame != sealed(KEY, unsigned, *link, stamp) || !is_new {
+            return false;
+        }
+        if let Some(at) = last {
+            self.senders.remove(at);
+        } else if self.senders.len() == SENDERS
+            && let Some((at, _)) = (0..).zip(&self.senders).min_by_key(|(_, (_, last))| *last)
+        {
+            self.senders.remove(at);
+        }
+        self.senders.push((sender, stamp));
+        self.time = self.time.max(stamp);
+        true
+    }
+
+    /// The time goes on: by 71 minutes at most from one look at it to the next.
+    fn advance(&mut self, now: Instant) {
+        let passed = now.since(self.at).as_micros().min(u64::from(u32::MAX)) / 10;
+        self.time = self.time.saturating_add(passed).min(LAST);
+        self.at = self.at + uav_relay::Duration::from_micros(10 * passed);
+    }
+
+    /// Looks at what the link has sent at `now`, and gives the same without its signature.
+    ///
+    /// # Panics
+    /// Where it is not signed as it should be.
+    pub(super) fn sent(&mut self, now: Instant, frame: &[u8]) -> Vec<u8> {
+        self.advance(now);
+        let Some((unsigned, [link, stamp @ ..])) = frame.split_last_chunk::<SIGNATURE>() else {
+            unreachable!("{frame:?}");
+        };
+        let stamp = read(stamp);
+        assert_eq!(frame, sealed(KEY, unsigned, 3, stamp), "link {link}");
+        assert!(stamp > self.sent || stamp == LAST, "{stamp}");
+        assert!(
+            stamp >= self.time || stamp == LAST,
+            "{stamp} is of the past"
+        );
+        // No faster than one of them for each frame, where its own clock stands.
+        assert!(
+            stamp <= self.time.max(self.sent + 1),
+            "{stamp} is of the future"
+        );
+        self.sent = stamp;
+        let mut unsigned = unsigned.to_vec();
+        if let Some(flags) = unsigned.get_mut(2) {
+            *flags &= !1;
+        }
+        unsigned
+    }
+}
+
+fn read(bytes: &[u8]) -> u64 {
+    let mut stamp = [0; 8];
+    for (to, from) in stamp.iter_mut().zip(bytes.iter().take(6)) {
+        *to = *from;
+    }
+    u64::from_le_bytes(stamp)
+}
+
+/// A frame of an autopilot that does not sign, signed: the flag that says so is covered by its checksum.
+fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
+    let mut frame = frame.to_vec();
+    frame.truncate(frame.len() - 2);
+    if let Some(flags) = frame.get_mut(2) {
+        *flags |= 1;
+    }
+    let id = super::wire::id(&frame);
+    let covered = frame.get(1..).unwrap_or_default();
+    let sum = super::wire::checksum(covered, super::wire::extra(id));
+    frame.extend(sum.to_le_bytes());
+    sealed(key, &frame, link, stamp)
+}
+
+/// A frame with its checksum, and behind that link, stamp and tag.
+fn sealed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
+    let mut frame = frame.to_vec();
+    frame.push(link);
+    frame.extend(stamp.to_le_bytes().iter().take(6));
+    let hash = Sha256::new()
+        .chain_update(key)
+        .chain_update(&frame)
+        .finalize();
+    frame.extend(hash.iter().take(6));
+    frame
+}

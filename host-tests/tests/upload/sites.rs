@@ -1,0 +1,134 @@
+//! Uploads that move the receiver: flown by all relays or by none, whatever is lost and whoever is rebooted meanwhile.
+
+use uav_relay::flight::axis::Axis;
+use uav_relay::{Placement, Sites, Wiring};
+use uav_relay_sim::simulator::fleet::spec::somewhere;
+
+use super::*;
+
+/// The ends of the line of `base`, with the receiver so far on and to the right.
+fn ends(base: &Mission, on_m: f32, right_m: f32) -> Sites {
+    let distance_m = base.config().distance_m;
+    let axis = somewhere(f64::from(distance_m)).unwrap();
+    let at = |x_m, y_m| {
+        let place = Placement {
+            x_m,
+            y_m,
+            altitude_m: 0.0,
+        };
+        axis.point(place).unwrap()
+    };
+    Sites {
+        tx: at(0.0, 0.0),
+        rx: at(distance_m + on_m, right_m),
+    }
+}
+
+/// A mission of that version to the receiver at another place.
+fn to_another_place(base: &Mission, at: Instant, version: u16, end: Side) -> UploadSpec {
+    let sites = ends(base, 150.0, 200.0);
+    let mut config = moved(base, 700.0, -300.0);
+    config.distance_m = Axis::between(sites).unwrap().distance_m() as f32;
+    let spec = upload(base, end, at, version, config);
+    UploadSpec {
+        upload: spec.upload.with_sites(sites).unwrap(),
+        ..spec
+    }
+}
+
+fn sited(relays: u16, shared: bool) -> (Mission, Setup) {
+    let base = mission(relays);
+    let mut setup = signed(base, shared);
+    setup.settings.sited = true;
+    setup.deadline = seconds(300);
+    (base, setup)
+}
+
+/// As [`judge`]; and all relays fly between the sites of that mission, `None` for those they were loaded with.
+fn judge_between(setup: &Setup, outcome: &Outcome, version: u16) -> Result<(), String> {
+    let spec = setup
+        .uploads
+        .iter()
+        .find(|spec| spec.upload.version() == version);
+    let config = spec.map_or(*setup.mission.config(), |spec| *spec.upload.config());
+    judge(setup, outcome, version, config)?;
+    let sites = spec.and_then(|spec| spec.upload.sites());
+    match outcome.relays.iter().find(|relay| relay.sites != sites) {
+        Some(relay) => Err(format!("{:?} is between {:?}", relay.index, relay.sites)),
+        None => Ok(()),
+    }
+}
+
+#[test]
+fn a_receiver_that_moves_is_flown_to_by_all_and_back_again() {
+    for shared in [false, true] {
+        for end in [Side::Upstream, Side::Downstream] {
+            let (base, mut setup) = sited(8, shared);
+            setup.uploads = vec![to_another_place(&base, seconds(20), 1, end)];
+            let outcome = run(setup.clone()).unwrap();
+            judge_between(&setup, &outcome, 1).unwrap();
+            // The next one has no sites: it is flown between those that were loaded.
+            let back = moved(&base, 300.0, 250.0);
+            setup.uploads.push(upload(&base, end, seconds(40), 2, back));
+            let outcome = run(setup.clone()).unwrap();
+            judge_between(&setup, &outcome, 2).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_receiver_that_moves_is_flown_to_by_all_or_by_none_whatever_is_lost() {
+    for seed in 1..=60 {
+        let (base, mut setup) = sited(8, seed % 2 == 0);
+        setup.seed = seed;
+        setup.faults.loss = 0.3;
+        setup.faults.corrupt = 0.1;
+        let end = if seed % 3 == 0 {
+            Side::Upstream
+        } else {
+            Side::Downstream
+        };
+        setup.uploads = vec![to_another_place(&base, seconds(20), 1, end)];
+        let outcome = run(setup.clone()).unwrap();
+        judge_between(&setup, &outcome, 1).unwrap_or_else(|what| panic!("SEED={seed}: {what}"));
+    }
+}
+
+#[test]
+fn whoever_is_rebooted_while_the_receiver_moves_flies_to_it_with_the_others() {
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        for relay in 1..=5 {
+            for ms in (0..400).step_by(40) {
+                for forgetful in [vec![], vec![relay]] {
+                    let (base, mut setup) = sited(5, wiring == Wiring::Shared);
+                    setup.uploads = vec![to_another_place(&base, seconds(20), 1, Side::Upstream)];
+                    setup.kills = vec![(relay, Instant::from_millis(20_000 + ms))];
+                    setup.boots = vec![(relay, Instant::from_millis(20_100 + ms))];
+                    setup.forgetful.clone_from(&forgetful);
+                    let outcome = run(setup.clone()).unwrap();
+                    judge_between(&setup, &outcome, 1).unwrap_or_else(|what| {
+                        panic!("{wiring:?} {relay} at {ms} {forgetful:?}: {what}")
+                    });
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_chain_that_is_rebooted_as_a_whole_flies_to_the_receiver_where_it_was_last() {
+    for shared in [false, true] {
+        let (base, mut setup) = sited(8, shared);
+        setup.uploads = vec![to_another_place(&base, seconds(20), 1, Side::Upstream)];
+        for relay in 1..=8 {
+            setup.kills.push((relay, seconds(40)));
+            setup.boots.push((relay, seconds(41)));
+        }
+        let outcome = run(setup.clone()).unwrap();
+        judge_between(&setup, &outcome, 1).unwrap();
+        // Those that have forgotten it have forgotten the sites with it.
+        setup.forgetful = (1..=8).collect();
+        let outcome = run(setup.clone()).unwrap();
+        judge_between(&setup, &outcome, 0).unwrap();
+    }
+}

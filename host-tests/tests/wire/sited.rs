@@ -1,0 +1,270 @@
+//! Uploads with sites of their own: which are refused, what a relay flies between, and that no place along one line is taken for one
+//! along another.
+
+use host_tests::fixtures::paper;
+use uav_relay::guard::config::GuardConfig;
+use uav_relay::wire::digest::digest;
+use uav_relay::wire::upload::UploadError;
+use uav_relay::{
+    Duration, Event, Geodetic, Instant, LineError, Mission, Placement, Port, Relay, Settings,
+    Sites, Upload, Wiring,
+};
+
+use super::codec::{Fenced, Said};
+use super::forming::events;
+use super::offer::Offer;
+use super::signed::{Peer, said, set};
+use super::uploads::{NOW, adopts, held, hello, mission_id, relay_4, upload};
+
+/// Sites a kilometre apart, to the millimetre.
+pub(crate) const A_KILOMETRE: [i32; 6] = [
+    474_000_000,
+    85_400_000,
+    420_000,
+    474_000_000,
+    85_532_474,
+    431_000,
+];
+
+fn sites([a, b, c, d, e, f]: [i32; 6]) -> Sites {
+    let at = |lat_e7, lon_e7, amsl_mm| Geodetic {
+        lat_e7,
+        lon_e7,
+        amsl_mm,
+    };
+    Sites {
+        tx: at(a, b, c),
+        rx: at(d, e, f),
+    }
+}
+
+/// An upload between those.
+fn sited(version: u16, base: u16) -> Offer {
+    Offer {
+        sites: A_KILOMETRE,
+        ..upload(version, base)
+    }
+}
+
+/// The same with the receiver's longitude so much farther east, 1e-7 degrees.
+fn farther(offer: Offer, east: i32) -> Offer {
+    let mut sites = offer.sites;
+    sites[4] += east;
+    Offer { sites, ..offer }
+}
+
+const DISTANCE: Event = Event::UploadRefused {
+    why: LineError::Distance,
+};
+const SITES: Event = Event::UploadRefused {
+    why: LineError::Sites,
+};
+
+/// Whether it flies along a line on earth or not, so that all of a chain hold a mission or none does.
+#[test]
+fn an_upload_whose_sites_disagree_with_its_distance_is_refused_and_the_event_says_so() {
+    for by_autopilot in [false, true] {
+        let (identity, settings) = set(4, Wiring::Pair);
+        let mission = Mission::try_new(paper(8)).unwrap();
+        let settings = Settings {
+            sited: by_autopilot,
+            ..settings
+        };
+        let mut relay = Relay::new(mission, identity, settings, 1, NOW).unwrap();
+        let mut peer = Peer::meets(&mut relay, 4, 5, Port::Downstream);
+        said(&mut relay, NOW);
+        events(&mut relay);
+        let base = digest(&mission);
+        let near = |east| farther(sited(2, base), east);
+        // 7.5 mm a unit: 4.5 cm are a distance, 6 cm another one.
+        let mut none = sited(2, base);
+        none.sites = [474_000_000, 85_400_000, 0, 474_000_000, 85_400_900, 0];
+        let longer = Offer {
+            distance_m: 1100.0,
+            ..sited(2, base)
+        };
+        let mut refused = 0;
+        for (offer, why) in [
+            (near(8), DISTANCE),
+            (near(-8), DISTANCE),
+            (longer, DISTANCE),
+            (none, SITES),
+        ] {
+            refused += 1;
+            for told in [vec![why], vec![]] {
+                peer.says(&mut relay, NOW, &Said::Offer(offer));
+                assert_eq!(events(&mut relay), told, "{offer:?}");
+                assert_eq!((said(&mut relay, NOW), held(&relay)), (vec![], None));
+            }
+            assert_eq!(relay.stats().mission, 2 * refused);
+            let upload = Upload::decode(&offer.kept()).unwrap();
+            let Event::UploadRefused { why } = why else {
+                unreachable!()
+            };
+            let line = Err(UploadError::Line(why));
+            assert_eq!(relay.clone().handle_upload(NOW, &upload), line);
+            let mut begins = Relay::new(mission, identity, settings, 1, NOW).unwrap();
+            assert_eq!(begins.resume(&upload), line);
+            // Nor does the ground make one.
+            let plain = Upload::decode(
+                &Offer {
+                    sites: [0; 6],
+                    ..offer
+                }
+                .kept(),
+            )
+            .unwrap();
+            assert_eq!(plain.with_sites(sites(offer.sites)).map(|_| ()), line);
+        }
+        for good in [near(6), near(-6)] {
+            let mut after = relay.clone();
+            peer.clone().says(&mut after, NOW, &Said::Offer(good));
+            assert_eq!(events(&mut after), [Event::Uploaded]);
+            assert_eq!(held(&after), Some(mission_id(&good)));
+        }
+    }
+}
+
+#[test]
+fn the_sites_are_those_of_the_mission_that_is_flown() {
+    let (mut relay, mut peers, base) = relay_4();
+    let first = sited(2, base);
+    assert_ne!(
+        mission_id(&first),
+        mission_id(&upload(2, base)),
+        "it is another mission"
+    );
+    peers[0].says(&mut relay, NOW, &Said::Offer(first));
+    assert_eq!(
+        (relay.sites(), held(&relay)),
+        (None, Some(mission_id(&first)))
+    );
+    adopts(&mut relay, &mut peers, &first);
+    assert_eq!(relay.sites(), Some(sites(A_KILOMETRE)));
+    // A newer one that is held is not flown.
+    peers[0].says(&mut relay, NOW, &Said::Offer(upload(3, base)));
+    assert_eq!(relay.sites(), Some(sites(A_KILOMETRE)));
+    // After a reboot with what was kept.
+    let (identity, settings) = set(4, Wiring::Pair);
+    let mission = Mission::try_new(paper(8)).unwrap();
+    for (kept, expected) in [(first, Some(sites(A_KILOMETRE))), (upload(3, base), None)] {
+        let mut again = Relay::new(mission, identity, settings, 1, NOW).unwrap();
+        let upload = Upload::decode(&kept.kept()).unwrap();
+        assert_eq!(again.resume(&upload), Ok(()));
+        assert_eq!(again.sites(), expected);
+    }
+}
+
+/// Relay 4, guarded, with the neighbours it has met, and the digest of its mission.
+fn guarded() -> (Relay, [Peer; 2], u16) {
+    let (identity, settings) = set(4, Wiring::Pair);
+    let mission = Mission::try_new(paper(8)).unwrap();
+    let settings = Settings {
+        guard: Some(GuardConfig::of(&mission, mission.config().common)),
+        ..settings
+    };
+    let mut relay = Relay::new(mission, identity, settings, 1, NOW).unwrap();
+    let mut peers = [(3, Port::Upstream), (5, Port::Downstream)]
+        .map(|(node, port)| Peer::meets(&mut relay, 4, node, port));
+    let base = digest(&mission);
+    for peer in &mut peers {
+        peer.says(&mut relay, NOW, &hello(base, 4, (base, 0), 0));
+    }
+    said(&mut relay, NOW);
+    events(&mut relay);
+    (relay, peers, base)
+}
+
+#[test]
+fn a_fence_along_another_line_is_stale_and_has_no_effect() {
+    let (mut relay, mut peers, base) = guarded();
+    let fence = |mission| {
+        Said::Fence(Fenced {
+            number: 700,
+            mission,
+            echo: 0,
+            fence: 0,
+            places: [300.0, 310.0, 0.0, 20.0, 0.0],
+            flags: 0,
+        })
+    };
+    let first = sited(2, base);
+    let line = first.between(base);
+    assert_ne!(line, base);
+    let stale = |relay: &Relay, peers: &[Peer; 2], mission| {
+        let (mut after, before) = (relay.clone(), *relay.stats());
+        peers[0].clone().says(&mut after, NOW, &fence(mission));
+        let stats = after.stats();
+        assert_eq!(events(&mut after.clone()), []);
+        (stats.stale - before.stale, stats.mission - before.mission)
+    };
+    assert_eq!(stale(&relay, &peers, base), (0, 0));
+    assert_eq!(stale(&relay, &peers, line), (1, 0));
+    adopts(&mut relay, &mut peers, &first);
+    events(&mut relay);
+    assert_eq!(stale(&relay, &peers, base), (1, 0));
+    assert_eq!(stale(&relay, &peers, line), (0, 0));
+    // One without them is flown along the line that was loaded.
+    let (mut relay, mut peers, base) = guarded();
+    adopts(&mut relay, &mut peers, &upload(2, base));
+    events(&mut relay);
+    assert_eq!(stale(&relay, &peers, base), (0, 0));
+    assert_eq!(stale(&relay, &peers, line), (1, 0));
+}
+
+/// The relay that is alone has no neighbour to wait for: it has a place, and the guard's first setpoint, until the line is another one.
+#[test]
+fn a_relay_has_no_place_along_a_new_line_before_it_has_stopped_and_the_chain_has_agreed() {
+    let config = paper(1);
+    let mission = Mission::try_new(config).unwrap();
+    let (identity, settings) = set(1, Wiring::Pair);
+    let guard = GuardConfig::of(&mission, config.common);
+    let settings = Settings {
+        guard: Some(guard),
+        ..settings
+    };
+    let mut relay = Relay::new(mission, identity, settings, 1, NOW).unwrap();
+    let mut now = NOW;
+    let mut until = |relay: &mut Relay, end: Instant, x_m: f32| {
+        while now < end {
+            now = now + Duration::from_millis(100);
+            relay.handle_position(now, now, Placement::on_line(x_m, 20.0));
+            relay.handle_timeout(now);
+            let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];
+            while relay.poll_transmit(now, &mut frame).is_some() {}
+        }
+        now
+    };
+    let at = until(&mut relay, Instant::from_millis(2_000), 300.0);
+    let place = relay.setpoint().unwrap();
+    assert!((place.x_m - 349.8).abs() < 0.1);
+    // 2 km, along another line.
+    let longer = Upload::new(
+        &mission,
+        1,
+        uav_relay::MissionConfig {
+            distance_m: 2000.0,
+            ..config
+        },
+    );
+    let mut to = A_KILOMETRE;
+    to[4] += to[4] - to[1];
+    let longer = longer.unwrap().with_sites(sites(to)).unwrap();
+    relay.handle_upload(at, &longer).unwrap();
+    let adopted = until(&mut relay, Instant::from_millis(3_000), 1_700.0);
+    assert_eq!(relay.sites(), Some(sites(to)));
+    assert!(events(&mut relay).contains(&Event::SetpointChanged));
+    let agreed = relay.final_setpoint().unwrap();
+    assert_eq!(relay.setpoint(), None, "it may still be braking");
+    until(
+        &mut relay,
+        adopted + guard.lag + Duration::from_millis(500),
+        1_700.0,
+    );
+    assert_eq!(
+        relay.setpoint(),
+        Some(agreed),
+        "beyond the old box, it is found there and sent on"
+    );
+    assert_eq!(relay.final_setpoint(), Some(agreed));
+}

@@ -1,0 +1,102 @@
+//! Where the transmitter and the receiver are on earth: the line that a mission is flown along.
+
+use crate::geodetic::Geodetic;
+
+/// The two ends of the line, on the ground.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sites {
+    /// Where the transmitter is.
+    pub tx: Geodetic,
+    /// Where the receiver is.
+    pub rx: Geodetic,
+}
+
+/// Bytes of both.
+pub(crate) const LENGTH: usize = 24;
+
+impl Sites {
+    /// Both as bytes: latitude, longitude and height of the transmitter, then of the receiver, each in four bytes, the lowest first.
+    pub(crate) fn to_bytes(self) -> [u8; LENGTH] {
+        let Self { tx, rx } = self;
+        let numbers = [
+            tx.lat_e7, tx.lon_e7, tx.amsl_mm, rx.lat_e7, rx.lon_e7, rx.amsl_mm,
+        ];
+        let mut bytes = [0; LENGTH];
+        for (place, number) in bytes.chunks_exact_mut(4).zip(numbers) {
+            place.copy_from_slice(&number.to_le_bytes());
+        }
+        bytes
+    }
+
+    /// Of such bytes.
+    #[cfg(feature = "upload")]
+    pub(crate) fn from_bytes(bytes: [u8; LENGTH]) -> Self {
+        let mut numbers = [0; LENGTH / 4];
+        for (number, place) in numbers.iter_mut().zip(bytes.as_chunks().0) {
+            *number = i32::from_le_bytes(*place);
+        }
+        let [tx_lat, tx_lon, tx_amsl, rx_lat, rx_lon, rx_amsl] = numbers;
+        let site = |lat_e7, lon_e7, amsl_mm| Geodetic {
+            lat_e7,
+            lon_e7,
+            amsl_mm,
+        };
+        Self {
+            tx: site(tx_lat, tx_lon, tx_amsl),
+            rx: site(rx_lat, rx_lon, rx_amsl),
+        }
+    }
+
+    /// Whether both are on earth.
+    #[cfg(feature = "upload")]
+    pub(crate) const fn are_valid(self) -> bool {
+        self.tx.is_valid() && self.rx.is_valid()
+    }
+
+    /// Whether a mission over `distance_m` metres can be flown between them. A relay that was built without the feature `flight` flies
+    /// along no line on earth, and finds nothing wrong.
+    #[cfg(all(feature = "upload", not(feature = "flight")))]
+    #[expect(
+        clippy::unused_self,
+        clippy::unnecessary_wraps,
+        reason = "as with a line"
+    )]
+    pub(crate) const fn check(self, _: f32) -> Result<(), LineError> {
+        Ok(())
+    }
+
+    /// Whether a mission over `distance_m` metres can be flown between them.
+    #[cfg(all(feature = "upload", feature = "flight"))]
+    pub(crate) fn check(self, distance_m: f32) -> Result<(), LineError> {
+        let axis = crate::flight::axis::Axis::between(self).map_err(|_| LineError::Sites)?;
+        if axis.is_of(distance_m) {
+            Ok(())
+        } else {
+            Err(LineError::Distance)
+        }
+    }
+}
+
+/// Why a newer mission cannot be flown along a line on earth.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum LineError {
+    /// Its distance is not that between its sites; or it has none, and its distance is not the one that was loaded, at a relay whose
+    /// line was loaded: `Settings::sited`.
+    Distance,
+    /// Its sites are nearer to each other than 10 m or farther apart than 100 km.
+    Sites,
+}
+
+impl core::fmt::Display for LineError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Distance => "its distance must be that between its sites; without sites of its own, between those that the relays were loaded with",
+            Self::Sites => "its sites must be on earth, 10 m to 100 km apart",
+        })
+    }
+}
+
+impl core::error::Error for LineError {}
