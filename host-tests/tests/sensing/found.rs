@@ -1,43 +1,25 @@
 //! Still sources: how much of the optimum after how many agreements.
 
-use rayon::prelude::*;
 use uav_relay::{Interference, Interferer};
-use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_tools::figures::trouble::Trouble;
+use uav_relay_tools::listening::found::{
+    self, LAST, Shares, hypothetical, quantile, shadowed, unknown,
+};
+use uav_relay_tools::listening::wild::Wild;
 
-use crate::scenes::{Wild, by_agreement, count, quantile};
+use crate::count;
 
-/// The agreements that are told of.
-const LAST: usize = 8;
-
-/// Shares of the optimum after 0, 1, 2, .. agreements that followed what was heard, of every scene.
+/// Shares in as many scenes as are asked for.
 fn shares(
     relays: u16,
     sources: usize,
-    setup: impl Fn(&Wild) -> Setup + Sync,
-) -> [Vec<f64>; LAST + 1] {
-    let scenes: Vec<u64> = (0..count(200)).collect();
-    let each: Vec<Vec<f64>> = scenes
-        .into_par_iter()
-        .map(|seed| {
-            let wild = Wild::new(seed, relays, sources);
-            let outcome = run(setup(&wild)).unwrap();
-            let best = wild.optimum();
-            let sirs = by_agreement(&wild.scene(), &outcome.stands);
-            assert!(!sirs.is_empty(), "{seed}");
-            (0..=LAST)
-                .map(|at| sirs.get(at).or(sirs.last()).unwrap() / best)
-                .collect()
-        })
-        .collect();
-    std::array::from_fn(|at| each.iter().map(|one| one[at]).collect())
+    setup: impl Fn(&Wild) -> Result<Setup, Trouble> + Sync,
+) -> Shares {
+    found::shares(count(200), relays, sources, setup).unwrap()
 }
 
-fn unknown(wild: &Wild) -> Setup {
-    wild.setup(Interference::Unknown)
-}
-
-fn print(what: &str, shares: &mut [Vec<f64>; LAST + 1]) {
+fn print(what: &str, shares: &mut Shares) {
     for at in [0, 1, 2, 3, 5, LAST] {
         let shares = &mut shares[at];
         let [least, tenth, median] = [0.0, 0.1, 0.5].map(|part| quantile(shares, part));
@@ -68,16 +50,12 @@ fn one_or_two_relays_fly_to_learn() {
 
 #[test]
 fn places_with_a_shadow_of_their_own() {
-    let mut hovering = shares(8, 1, |wild| {
-        let mut setup = unknown(wild);
-        setup.sky.as_mut().unwrap().shadow_db = 1.0;
-        setup
-    });
+    let mut hovering = shares(8, 1, shadowed);
     print("N = 8, 1 dB, hovering alone", &mut hovering);
     let mut flown = shares(8, 1, |wild| {
-        let mut setup = wild.flown(Interference::Unknown);
+        let mut setup = wild.flown(Interference::Unknown)?;
         setup.sky.as_mut().unwrap().shadow_db = 1.0;
-        setup
+        Ok(setup)
     });
     print("N = 8, 1 dB, on their way too", &mut flown);
     assert!(quantile(&mut hovering[5], 0.5) >= 0.94);
@@ -88,14 +66,7 @@ fn places_with_a_shadow_of_their_own() {
 fn two_sources_are_met_by_the_one_that_comes_nearest() {
     let mut heard = shares(8, 2, unknown);
     print("N = 8, two sources", &mut heard);
-    let mut told = shares(8, 2, |wild| {
-        let mut setup = unknown(wild);
-        // The paper's hypothetical interferer.
-        setup.mission = uav_relay_sim::mission::mission(&wild.scenario, wild.relays, 1e-4)
-            .map_or(setup.mission, |it| it.0);
-        setup.settings.listen = None;
-        setup
-    });
+    let mut told = shares(8, 2, hypothetical);
     print("N = 8, two sources, the paper's way", &mut told);
     assert!(quantile(&mut heard[5], 0.5) >= 0.98);
     assert!(quantile(&mut heard[5], 0.1) >= 0.9);
@@ -106,7 +77,7 @@ fn a_wrong_guess_is_unlearned() {
     for relays in [3, 8] {
         let mut shares = shares(relays, 1, |wild| {
             // Mirrored about the middle, a hundred times as strong, and nearer.
-            let source = &wild.scene().sources[0];
+            let source = wild.scene()?.sources[0].clone();
             wild.setup(Interference::Source(Interferer {
                 power_w: (100.0 * source.power_w) as f32,
                 x_m: (1_000.0 - source.x_m) as f32,

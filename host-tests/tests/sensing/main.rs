@@ -2,8 +2,12 @@
 //!
 //! `COUNT=1000` flies as many scenes a row, `SEED` begins elsewhere.
 
-mod scenes;
-
 mod following;
 mod found;
 mod steady;
+
+/// How many scenes a row: `COUNT`, or `usual`.
+fn count(usual: u64) -> u64 {
+    let count = std::env::var("COUNT").ok();
+    count.and_then(|count| count.parse().ok()).unwrap_or(usual)
+}

@@ -1,12 +1,15 @@
 //! What must not happen: a still world that is not left in peace, relays that believe different things, a broken sensor that is believed.
 
 use rayon::prelude::*;
-use uav_relay::{Instant, Interference};
+use uav_relay::{Duration, Instant, Interference};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Turning;
 
-use crate::scenes::{Wild, count, quantile, sir};
+use uav_relay_tools::listening::found::quantile;
+use uav_relay_tools::listening::wild::Wild;
+
+use crate::count;
 
 /// An hour of a still world, measured every second.
 #[test]
@@ -17,9 +20,9 @@ fn a_still_world_becomes_silent() {
         .map(|seed| {
             let relays = [3, 5, 8, 20][seed as usize % 4];
             let wild = Wild::new(seed, relays, 1);
-            let mut setup = wild.setup(Interference::Unknown);
+            let mut setup = wild.setup(Interference::Unknown).unwrap();
             let sky = setup.sky.as_mut().unwrap();
-            sky.period = crate::scenes::seconds(1);
+            sky.period = Duration::from_millis(1_000);
             sky.until = Instant::from_millis(3_600_000);
             setup.deadline = Instant::from_millis(3_700_000);
             let outcome = run(setup).unwrap();
@@ -44,7 +47,7 @@ fn under_faults_all_believe_the_same_to_the_bit() {
         .into_par_iter()
         .map(|seed| {
             let wild = Wild::new(seed, 8, 1);
-            let mut setup = wild.setup(Interference::Unknown);
+            let mut setup = wild.setup(Interference::Unknown).unwrap();
             setup.faults = Faults::BAD_DAY;
             let outcome = run(setup).unwrap();
             assert!(outcome.injected.lost > 0 && outcome.injected.corrupted > 0);
@@ -59,7 +62,10 @@ fn under_faults_all_believe_the_same_to_the_bit() {
                 numbered.clone().filter(same).count() == numbered.count()
             });
             assert!(alike, "{seed}: {told:?}");
-            sir(&wild.scene(), last.goals.as_ref().unwrap()) / wild.optimum()
+            wild.scene()
+                .unwrap()
+                .chain_sir(last.goals.as_ref().unwrap())
+                / wild.optimum().unwrap()
         })
         .collect();
     assert!(quantile(&mut shares, 0.5) >= 0.98, "{shares:?}");
@@ -76,7 +82,7 @@ fn a_broken_sensor_is_named_and_left_out() {
             .map(|seed| {
                 let wild = Wild::new(seed, 8, 1);
                 let broken = 1 + (seed % 8) as u16;
-                let mut setup = wild.setup(Interference::Unknown);
+                let mut setup = wild.setup(Interference::Unknown).unwrap();
                 setup.sky.as_mut().unwrap().broken =
                     vec![(broken, off_db, Instant::from_millis(since_s * 1_000))];
                 let outcome = run(setup).unwrap();
@@ -89,7 +95,11 @@ fn a_broken_sensor_is_named_and_left_out() {
                     .iter()
                     .any(|moment| moment.what == Turning::Off && moment.other != Some(broken));
                 let last = outcome.stands.last().unwrap();
-                let share = sir(&wild.scene(), last.goals.as_ref().unwrap()) / wild.optimum();
+                let share = wild
+                    .scene()
+                    .unwrap()
+                    .chain_sir(last.goals.as_ref().unwrap())
+                    / wild.optimum().unwrap();
                 (named, wrong, share)
             })
             .collect();

@@ -6,10 +6,12 @@
 //! | [`multi_interferer`] | the best chain against several interferers whose powers add up |
 //! | [`provision`] | the configuration block of one drone |
 //! | [`figures`] | every figure of the paper's evaluation, and this project's own |
+//! | [`listening`] | chains that find their interferer, in random scenes |
 //! | [`baseline`] | the placements that figures compare with |
 
 pub mod baseline;
 pub mod figures;
+pub mod listening;
 pub mod multi_interferer;
 pub mod plan;
 pub mod provision;

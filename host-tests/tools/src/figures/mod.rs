@@ -10,6 +10,7 @@
 //! | [`fewest`], [`convergence`], [`gain`], [`cost`] | chains at one altitude |
 //! | [`beta`], [`stochastic`] | fields of interference |
 //! | [`altitude`], [`adjust`], [`joint`] | altitudes |
+//! | [`sensing`] | an interferer that nobody told of |
 //! | [`paper`] | the paper's scenarios, as missions |
 //! | [`walk`], [`flight`] | a chain without a message, for figures that need thousands; one that is flown |
 //! | [`chart`], [`scale`], [`draw`] | what a chart shows, its axes, its SVG |
@@ -32,6 +33,7 @@ pub mod locus;
 pub mod page;
 pub mod paper;
 pub mod scale;
+pub mod sensing;
 pub mod sheet;
 mod signs;
 pub mod single;
@@ -54,7 +56,7 @@ pub struct Figure {
 }
 
 /// Every figure, in the order of the paper, then this project's own.
-pub const ALL: [Figure; 15] = [
+pub const ALL: [Figure; 16] = [
     figure("locus", locus::sheet),
     figure("single", single_sheet::sheet),
     figure("fewest-by-place", fewest::by_place_sheet),
@@ -70,6 +72,7 @@ pub const ALL: [Figure; 15] = [
     figure("joint", joint::sheet),
     figure("aside", aside::places_sheet),
     figure("aside-gain", aside::gains_sheet),
+    figure("sensing", sensing::sheet),
 ];
 
 const fn figure(name: &'static str, make: fn() -> Result<Sheet, Trouble>) -> Figure {

@@ -33,7 +33,7 @@ fn every_figure_is_written_and_the_page_names_every_file() {
             figure.name
         );
     }
-    assert_eq!(files.len(), ALL.len() + 17, "{files:?}");
+    assert_eq!(files.len(), ALL.len() + 19, "{files:?}");
     let page = fs::read_to_string(written().join("index.html")).unwrap();
     let named = |attribute: &str, ending: &str| -> BTreeSet<String> {
         let opening = format!("{attribute}=\"");
@@ -67,10 +67,21 @@ fn no_file_has_a_number_that_is_none() {
 #[test]
 fn tables_say_what_was_taken_and_their_heads_have_units() {
     let bare = [
-        "relays", "relay", "round", "sweep", "field", "alpha", "beta", "density", "reading",
+        "relays",
+        "relay",
+        "round",
+        "sweep",
+        "scene",
+        "agreements",
+        "field",
+        "alpha",
+        "beta",
+        "density",
+        "reading",
     ];
     let units = [
         "_m",
+        "_mps",
         "_w",
         "_linear",
         "_db",

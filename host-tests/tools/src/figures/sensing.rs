@@ -1,0 +1,184 @@
+//! What a chain reaches that nobody told of its interferer: by agreement, and while the interferer moves.
+
+use serde::Serialize;
+
+use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::sheet::{Sheet, Table};
+use super::trouble::Trouble;
+use crate::listening::followed::{self, mean};
+use crate::listening::found::{self, LAST, hypothetical, quantile, shadowed, shares, unknown};
+use crate::listening::wild::Wild;
+use uav_relay_sim::simulator::setup::Setup;
+
+/// Random scenes of each line, and of each speed.
+pub const SCENES: u64 = 60;
+/// The same while the interferer moves.
+pub const PASSES: u64 = 6;
+
+/// Speeds of the interferer, m/s.
+pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
+
+/// One kind of scene after one more agreement.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Found {
+    /// What is flown.
+    pub scene: &'static str,
+    /// Number of relays.
+    pub relays: u16,
+    /// Agreements that followed what was heard.
+    pub agreements: usize,
+    /// Share of the optimum, linear, the median of the scenes.
+    pub median_linear: f64,
+    /// The same that nine of ten scenes reach.
+    pub tenth_linear: f64,
+}
+
+/// One speed.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Followed {
+    /// Number of relays.
+    pub relays: u16,
+    /// Speed of the interferer, m/s.
+    pub speed_mps: f64,
+    /// Mean share of the optimum of each moment, of the chain that follows.
+    pub followed_linear: f64,
+    /// The same of the chain that stays where it was best at first.
+    pub stayed_linear: f64,
+}
+
+type Run = fn(&Wild) -> Result<Setup, Trouble>;
+
+/// What is flown: its name, relays, sources, how.
+const KINDS: [(&str, u16, usize, Run); 6] = [
+    ("3 relays, one source", 3, 1, unknown),
+    ("8 relays, one source", 8, 1, unknown),
+    ("20 relays, one source", 20, 1, unknown),
+    ("8 relays, places 1 dB off", 8, 1, shadowed),
+    ("8 relays, two sources", 8, 2, unknown),
+    ("8, two sources, told the paper's", 8, 2, hypothetical),
+];
+
+/// The share by agreement, in `scenes` scenes each.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, Trouble> {
+    let mut rows = Vec::new();
+    for (what, relays, sources, run) in KINDS {
+        let each: found::Shares = shares(scenes, relays, sources, run)?;
+        for (agreements, mut shares) in each.into_iter().enumerate() {
+            rows.push(Found {
+                scene: what,
+                relays,
+                agreements,
+                median_linear: quantile(&mut shares, 0.5),
+                tenth_linear: quantile(&mut shares, 0.1),
+            });
+        }
+    }
+    Ok(rows)
+}
+
+/// The share by speed, in `scenes` scenes each.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, Trouble> {
+    let mut rows = Vec::new();
+    for relays in [3, 8] {
+        for speed_mps in SPEEDS_MPS {
+            let shares = followed::shares(scenes, relays, speed_mps)?;
+            rows.push(Followed {
+                relays,
+                speed_mps,
+                followed_linear: mean(&shares.followed),
+                stayed_linear: mean(&shares.stayed),
+            });
+        }
+    }
+    Ok(rows)
+}
+
+/// The figure.
+///
+/// # Errors
+/// Never in practice: see [`Trouble`].
+pub fn sheet() -> Result<Sheet, Trouble> {
+    let (found, followed) = (by_agreement(SCENES)?, by_speed(PASSES)?);
+    let lines = KINDS.iter().enumerate().map(|(index, (what, ..))| {
+        let of = found.iter().filter(|row| row.scene == *what);
+        #[expect(clippy::cast_precision_loss, reason = "a few")]
+        let points = of.map(|row| (row.agreements as f64, 1.0 - row.median_linear));
+        Line::new(what, Look::number(index), points)
+    });
+    let speeds = |relays: u16, index: usize, name: &str, value: fn(&Followed) -> f64| {
+        let of = followed.iter().filter(|row| row.relays == relays);
+        let points = of.map(|row| (row.speed_mps, value(row)));
+        Line::new(name, Look::number(index), points)
+    };
+    let mut shown = vec![
+        [
+            "",
+            "before",
+            "after 1",
+            "after 3",
+            "after 5",
+            "10 % after 5",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    ];
+    for (what, ..) in KINDS {
+        let at = |agreements: usize| {
+            let mut of = found.iter().filter(|row| row.scene == what);
+            of.find(|row| row.agreements == agreements)
+        };
+        let median = |agreements| at(agreements).map_or(f64::NAN, |row| row.median_linear);
+        let mut cells = vec![what.to_owned()];
+        cells.extend([0, 1, 3, 5].map(|agreements| format!("{:.3}", median(agreements))));
+        cells.push(at(5).map_or_else(String::new, |row| format!("{:.3}", row.tenth_linear)));
+        shown.push(cells);
+    }
+    Ok(Sheet {
+        name: "sensing",
+        title: "An interferer that nobody told the chain of: found, and followed",
+        says: vec![
+            "Not in the paper, which takes the interferer as known. The share of the SIR of the chain that was told everything; of two sources, \
+             of the exact optimum for their sum, beside the chain that was told the paper's hypothetical interferer."
+                .to_owned(),
+        ],
+        taken: vec![
+            format!(
+                "{SCENES} random scenes a line: D = 1000 m, sources of 1 to 100 W at x from -200 to 1200 m and 50 to 800 m aside; \
+                 measurements 3 % off every 5 s; medians"
+            ),
+            format!(
+                "{PASSES} scenes a speed: the interferer passes at 300 m, drones of 10 m/s measure every second; means from a minute after the begin on"
+            ),
+        ],
+        chart: Chart {
+            panels: vec![
+                Panel {
+                    heading: "still sources".to_owned(),
+                    #[expect(clippy::cast_precision_loss, reason = "a few")]
+                    x: Axis::linear("agreements that followed what was heard").between(0.0, LAST as f64),
+                    y: Axis::log("short of the optimum, share of it"),
+                    lines: lines.collect(),
+                },
+                Panel {
+                    heading: "an interferer that moves".to_owned(),
+                    x: Axis::linear("its speed, m/s").between(0.0, 10.0),
+                    y: Axis::linear("share of the optimum").between(0.5, 1.0),
+                    lines: vec![
+                        speeds(3, 0, "3 relays follow", |row| row.followed_linear),
+                        speeds(8, 1, "8 relays follow", |row| row.followed_linear),
+                        speeds(3, 5, "3 relays stay", |row| row.stayed_linear),
+                        speeds(8, 6, "8 relays stay", |row| row.stayed_linear),
+                    ],
+                },
+            ],
+        },
+        tables: vec![Table::new("sensing", &found)?, Table::new("following", &followed)?],
+        shown,
+    })
+}

@@ -1,0 +1,81 @@
+//! An interferer that passes, against the chain that stays where it was best.
+
+use rayon::prelude::*;
+use uav_relay::{Instant, Interference, Listen};
+use uav_relay_sim::simulator::chain::run;
+
+use super::wild::Wild;
+use crate::figures::trouble::Trouble;
+
+/// From then on, that long after the begin, it counts.
+const BEGUN_S: u32 = 60;
+
+/// Of every scene the mean share of the optimum of that moment, from a minute after the begin on.
+#[derive(Clone, Debug, Default)]
+pub struct Shares {
+    /// Of the chain that follows.
+    pub followed: Vec<f64>,
+    /// Of one that stays where it was best at first.
+    pub stayed: Vec<f64>,
+}
+
+/// The shares in `scenes` scenes, while the one interferer passes at 300 m.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn shares(scenes: u64, relays: u16, speed_mps: f64) -> Result<Shares, Trouble> {
+    let each: Result<Vec<(f64, f64)>, Trouble> = (0..scenes)
+        .into_par_iter()
+        .map(|seed| one(seed, relays, speed_mps))
+        .collect();
+    let (followed, stayed) = each?.into_iter().unzip();
+    Ok(Shares { followed, stayed })
+}
+
+fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), Trouble> {
+    let mut wild = Wild::new(seed, relays, 1);
+    // It is beside the middle half way.
+    let span_s = 600.0 / speed_mps.max(3.0) + f64::from(BEGUN_S);
+    let half_s = 0.5 * (span_s + f64::from(BEGUN_S));
+    wild.place(500.0 - speed_mps * half_s, 300.0);
+    let mut setup = wild.flown(Interference::Unknown)?;
+    setup.settings.listen = Some(Listen::following(relays));
+    let none = Trouble::Unsettled("an interferer that moves");
+    let Some(sky) = &mut setup.sky else {
+        return Err(none);
+    };
+    sky.velocity_mps = [speed_mps, 0.0];
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "some minutes"
+    )]
+    let span_ms = (span_s * 1e3) as u64;
+    sky.until = Instant::from_millis(span_ms);
+    let sky = sky.clone();
+    let outcome = run(setup)?;
+    let begun = Instant::from_millis(u64::from(BEGUN_S) * 1_000);
+    let (mut followed, mut stayed, mut moments) = (0.0, 0.0, 0.0);
+    let mut first = None;
+    for stand in outcome.stands.iter().filter(|stand| stand.at >= begun) {
+        let scene = sky.scene_at(stand.at);
+        let places = wild.with(&scene).told()?;
+        let best = scene.chain_sir(&places);
+        let first = first.get_or_insert(places);
+        followed += scene.chain_sir(&stand.places) / best;
+        stayed += scene.chain_sir(first) / best;
+        moments += 1.0;
+    }
+    // Once a second for a minute at least.
+    if moments > 50.0 {
+        Ok((followed / moments, stayed / moments))
+    } else {
+        Err(none)
+    }
+}
+
+/// The mean.
+#[expect(clippy::cast_precision_loss, reason = "a few")]
+pub fn mean(shares: &[f64]) -> f64 {
+    shares.iter().sum::<f64>() / shares.len() as f64
+}

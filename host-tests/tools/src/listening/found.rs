@@ -1,0 +1,87 @@
+//! Still sources: how much of the optimum after how many agreements.
+
+use rayon::prelude::*;
+use uav_relay::Interference;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::setup::Setup;
+
+use super::wild::{Wild, by_agreement};
+use crate::figures::trouble::Trouble;
+
+/// The agreements that are told of.
+pub const LAST: usize = 8;
+
+/// Shares of the optimum after 0, 1, 2, .. agreements that followed what was heard, of every scene of these seeds.
+pub type Shares = [Vec<f64>; LAST + 1];
+
+/// The shares in `scenes` scenes, run as `setup` says.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn shares(
+    scenes: u64,
+    relays: u16,
+    sources: usize,
+    setup: impl Fn(&Wild) -> Result<Setup, Trouble> + Sync,
+) -> Result<Shares, Trouble> {
+    let one = |seed| {
+        let wild = Wild::new(seed, relays, sources);
+        let outcome = run(setup(&wild)?)?;
+        let best = wild.optimum()?;
+        let sirs = by_agreement(&wild.scene()?, &outcome.stands);
+        let last = *sirs
+            .last()
+            .ok_or(Trouble::Unsettled("a chain that listens"))?;
+        let share = |at: usize| sirs.get(at).unwrap_or(&last) / best;
+        Ok((0..=LAST).map(share).collect())
+    };
+    let each: Result<Vec<Vec<f64>>, Trouble> = (0..scenes).into_par_iter().map(one).collect();
+    let each = each?;
+    Ok(std::array::from_fn(|at| {
+        each.iter().filter_map(|one| one.get(at).copied()).collect()
+    }))
+}
+
+/// Nothing is known of the interference.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn unknown(wild: &Wild) -> Result<Setup, Trouble> {
+    wild.setup(Interference::Unknown)
+}
+
+/// The same, and every place is off by 1 dB by itself.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn shadowed(wild: &Wild) -> Result<Setup, Trouble> {
+    let mut setup = unknown(wild)?;
+    if let Some(sky) = &mut setup.sky {
+        sky.shadow_db = 1.0;
+    }
+    Ok(setup)
+}
+
+/// Nobody listens; of several sources all are told the paper's hypothetical one.
+///
+/// # Errors
+/// [`Trouble`].
+pub fn hypothetical(wild: &Wild) -> Result<Setup, Trouble> {
+    let mut setup = unknown(wild)?;
+    (setup.mission, _) = uav_relay_sim::mission::mission(&wild.scenario, wild.relays, 1e-4)?;
+    setup.settings.listen = None;
+    Ok(setup)
+}
+
+/// The part-quantile of numbers; NaN of none.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "an index"
+)]
+pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    let at = (numbers.len().saturating_sub(1) as f64 * part).round() as usize;
+    numbers.get(at).copied().unwrap_or(f64::NAN)
+}

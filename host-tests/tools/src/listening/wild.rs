@@ -1,0 +1,160 @@
+//! A random scene, and the runs in it.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::{Duration, Instant, Interference, Listen, Mission, MissionConfig, Placement};
+use uav_relay_sim::mission::mission;
+use uav_relay_sim::scenario::{Interference as Known, Scenario, Source};
+use uav_relay_sim::scene::Scene;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::drones::FlightSpec;
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_sim::simulator::sky::{Sky, Stand};
+
+use crate::figures::trouble::Trouble;
+use crate::multi_interferer::optimum;
+
+/// What a scene without sources is.
+const NO_SCENE: Trouble = Trouble::Unsettled("a scene");
+
+/// A scene: 1 km, interferers of 1 to 100 W at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D.
+#[derive(Clone, Debug)]
+pub struct Wild {
+    /// Where it is.
+    pub scenario: Scenario,
+    /// How many relays.
+    pub relays: u16,
+    /// What everything random in it comes of.
+    pub seed: u64,
+}
+
+impl Wild {
+    /// With so many relays and sources.
+    pub fn new(seed: u64, relays: u16, sources: usize) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut scenario = Scenario::default();
+        let d = scenario.distance_m;
+        let sources = (0..sources)
+            .map(|_| {
+                let side = if rng.random() { 1.0 } else { -1.0 };
+                Source {
+                    power_w: 10_f64.powf(rng.random_range(0.0..2.0)),
+                    x_m: rng.random_range(-0.2..1.2) * d,
+                    y_m: side * rng.random_range(0.05..0.8) * d,
+                }
+            })
+            .collect();
+        scenario.interference = Known::Sources(sources);
+        Self {
+            scenario,
+            relays,
+            seed,
+        }
+    }
+
+    /// The one source is there, m.
+    pub fn place(&mut self, x_m: f64, y_m: f64) {
+        if let Known::Sources(sources) = &mut self.scenario.interference
+            && let Some(source) = sources.first_mut()
+        {
+            (source.x_m, source.y_m) = (x_m, y_m);
+        }
+    }
+
+    /// The same with the sources of `scene`.
+    pub fn with(&self, scene: &Scene) -> Self {
+        let mut wild = self.clone();
+        wild.scenario.interference = Known::Sources(scene.sources.clone());
+        wild
+    }
+
+    /// What is true.
+    ///
+    /// # Errors
+    /// [`Trouble::Unsettled`]: it has no sources.
+    pub fn scene(&self) -> Result<Scene, Trouble> {
+        Scene::new(&self.scenario, self.relays).ok_or(NO_SCENE)
+    }
+
+    /// What the relays are told of it.
+    ///
+    /// # Errors
+    /// [`Trouble::Mission`].
+    pub fn mission(&self, guess: Interference) -> Result<Mission, Trouble> {
+        let (told, _) = mission(&self.scenario, self.relays, 1e-4)?;
+        let config = MissionConfig {
+            interference: guess,
+            ..*told.config()
+        };
+        Mission::try_new(config).map_err(|_| NO_SCENE)
+    }
+
+    /// The SIR of the chain that knows everything, linear: of one source the chain that was told, of several the exact optimum.
+    ///
+    /// # Errors
+    /// [`Trouble`].
+    pub fn optimum(&self) -> Result<f64, Trouble> {
+        let scene = self.scene()?;
+        if scene.sources.len() > 1 {
+            return Ok(optimum(&scene).ok_or(NO_SCENE)?.sir);
+        }
+        Ok(scene.chain_sir(&self.told()?))
+    }
+
+    /// Where the chain stands that was told of everything; of several sources by the paper's hypothetical one.
+    ///
+    /// # Errors
+    /// [`Trouble`].
+    pub fn told(&self) -> Result<Vec<Placement>, Trouble> {
+        let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
+        let outcome = run(Setup::new(told))?;
+        let places: Option<_> = outcome.relays.iter().map(|relay| relay.setpoint).collect();
+        places.ok_or(Trouble::Unsettled("a chain that was told"))
+    }
+
+    /// A run in which relays are at their places at once, and measure every five seconds.
+    ///
+    /// # Errors
+    /// [`Trouble`].
+    pub fn setup(&self, guess: Interference) -> Result<Setup, Trouble> {
+        let mut setup = Setup::new(self.mission(guess)?);
+        setup.seed = self.seed;
+        setup.settings.listen = Some(Listen::default());
+        let mut sky = Sky::of(self.scene()?);
+        sky.seed = self.seed;
+        sky.period = Duration::from_millis(5_000);
+        sky.until = Instant::from_millis(120_000);
+        setup.deadline = Instant::from_millis(200_000);
+        setup.sky = Some(sky);
+        Ok(setup)
+    }
+
+    /// The same with drones of 10 m/s, which start beside the transmitter and measure once a second on their way.
+    ///
+    /// # Errors
+    /// [`Trouble`].
+    pub fn flown(&self, guess: Interference) -> Result<Setup, Trouble> {
+        let mut setup = self.setup(guess)?;
+        let start = (1..=self.relays)
+            .map(|index| [5.0 * f64::from(index), 0.0, 20.0])
+            .collect();
+        setup.flight = Some(FlightSpec::multicopters(start, 0.0, 0.0));
+        if let Some(sky) = &mut setup.sky {
+            sky.period = Duration::from_millis(1_000);
+        }
+        Ok(setup)
+    }
+}
+
+/// The SIR after each agreement, linear; the first is that before anything was heard.
+pub fn by_agreement(scene: &Scene, stands: &[Stand]) -> Vec<f64> {
+    let mut sirs = Vec::new();
+    for stand in stands {
+        if stand.agreements as usize > sirs.len()
+            && let Some(goals) = &stand.goals
+        {
+            sirs.push(scene.chain_sir(goals));
+        }
+    }
+    sirs
+}
