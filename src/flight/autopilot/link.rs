@@ -6,17 +6,20 @@ use super::event::{AutopilotEvent, Events};
 use super::report::{Report, line_of};
 use super::state::State;
 use super::streams::Streams;
-use super::target::Target;
+use super::target::{Target, turned};
 use super::trust::Trust;
 use super::vehicle::{Kind, Position, Vehicle, VehicleUpdate};
 use crate::event::Event;
 use crate::flight::axis::Axis;
 use crate::flight::geodetic::Geodetic;
 use crate::flight::mavlink::frame::Address;
+use crate::flight::mavlink::incoming::Incoming;
 use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing, severity};
 use crate::flight::mavlink::parser::{Counters, Parser, Received};
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::Signing;
+use crate::flight::mavlink::sik::noise_w;
+use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::time::{Duration, Instant};
@@ -26,6 +29,9 @@ const COMPONENT: u8 = 191;
 
 /// The system to send as before the autopilot has said its own: the one that autopilots have unless told otherwise.
 const SYSTEM: u8 = 1;
+
+/// Whether this crate was built to make anything of what a radio hears.
+const SENSING: bool = cfg!(feature = "sensing");
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
@@ -54,6 +60,8 @@ pub struct Autopilot {
     fell: bool,
     report: Report,
     position: Option<Position>,
+    /// What a radio has heard where the drone was, W.
+    heard: Option<(Placement, f32)>,
     events: Events,
     sequence: u8,
     heartbeat_at: Instant,
@@ -77,6 +85,7 @@ impl Autopilot {
             fell: false,
             report: Report::default(),
             position: None,
+            heard: None,
             events: Events::default(),
             sequence: 0,
             heartbeat_at: now,
@@ -88,6 +97,10 @@ impl Autopilot {
         for byte in bytes {
             self.parser.push(*byte);
             while let Some(received) = self.next_received(now) {
+                if SENSING && let Some(Incoming::RadioStatus { noise, .. }) = received.message {
+                    let place = self.vehicle.place_in_air(now);
+                    self.heard = place.zip(noise_w(noise)).or(self.heard);
+                }
                 let heard = self.vehicle.hear(now, &received, &self.axis);
                 if heard != VehicleUpdate::Nothing {
                     self.streams.hear(received.id);
@@ -324,6 +337,13 @@ impl Autopilot {
         self.position.take()
     }
 
+    /// What a SiK radio has heard between frames, by its RADIO_STATUS, and where the drone was in the air: for `Relay::handle_sample`. Of
+    /// several since the last call the newest; without the feature `sensing` none.
+    pub fn poll_sample(&mut self) -> Option<Sample> {
+        let (at, power_w) = self.heard.take().filter(|_| SENSING)?;
+        Some(Sample::Heard { at, power_w })
+    }
+
     /// The next event.
     pub fn poll_event(&mut self) -> Option<AutopilotEvent> {
         let mistrusted = || self.trust.take_event().map(AutopilotEvent::Mistrusted);
@@ -371,17 +391,5 @@ impl Autopilot {
     /// Whole frames that were not taken, because of their signatures.
     pub const fn refused(&self) -> u32 {
         self.trust.refused()
-    }
-}
-
-/// The same angle from -π to π.
-fn turned(angle: f32) -> f32 {
-    use core::f32::consts::{PI, TAU};
-    if angle > PI {
-        angle - TAU
-    } else if angle < -PI {
-        angle + TAU
-    } else {
-        angle
     }
 }

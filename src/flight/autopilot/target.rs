@@ -86,3 +86,15 @@ impl Target {
         self.told == REFUSED_AFTER + 1
     }
 }
+
+/// The same angle from -π to π.
+pub(super) fn turned(angle: f32) -> f32 {
+    use core::f32::consts::{PI, TAU};
+    if angle > PI {
+        angle - TAU
+    } else if angle < -PI {
+        angle + TAU
+    } else {
+        angle
+    }
+}
