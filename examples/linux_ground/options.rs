@@ -116,7 +116,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
 }
 
 fn plan(options: Options) -> Result<Plan, String> {
-    let interference = Interference::Source(options.loaded.interferer);
+    let interference = options.loaded.interferer;
     let loaded = mission(options.loaded.config(options.of, interference)?, "--")?;
     let config = changed(&options, loaded.config());
     let axis = options.sites.axis(options.loaded.distance)?;

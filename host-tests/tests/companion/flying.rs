@@ -30,6 +30,14 @@ impl Flight {
         Self::found_by(kind, x_m, None)
     }
 
+    /// The same, with a relay that has those options, too.
+    pub(crate) fn listening(kind: &str, more: &[&str]) -> Self {
+        let mut flight = Self::started_with(kind, START_M, [None; 2], more);
+        flight.relay.line("autopilot: found a");
+        flight.relay.line("autopilot: on the ground, or not armed");
+        flight
+    }
+
     /// Of which both sign with that key, where there is one.
     fn found_by(kind: &str, x_m: f64, key: Option<&str>) -> Self {
         let mut flight = Self::started(kind, x_m, [key; 2]);
@@ -44,6 +52,10 @@ impl Flight {
 
     /// The two, the drone with the first key and the relay with the second.
     pub(crate) fn started(kind: &str, x_m: f64, keys: [Option<&str>; 2]) -> Self {
+        Self::started_with(kind, x_m, keys, &[])
+    }
+
+    fn started_with(kind: &str, x_m: f64, keys: [Option<&str>; 2], options: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
         let file = |name: &str, key: Option<&str>| {
@@ -59,7 +71,7 @@ impl Flight {
         arguments.extend(theirs.as_deref());
         let drone = Peer::start("autopilot.py", &arguments);
         let more = ours.iter().flat_map(|file| ["--autopilot-key-file", file]);
-        let more: Vec<&str> = more.collect();
+        let more: Vec<&str> = more.chain(options.iter().copied()).collect();
         let mut relay = relay(&link, &more);
         relay.line("autopilot: by --autopilot");
         Self {
