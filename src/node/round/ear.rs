@@ -69,11 +69,13 @@ impl Sensing {
     }
 
     pub(super) const fn ear(&self) -> Option<&Ear> {
-        self.0.as_slice().first()
+        let ears: &[Ear] = &self.0;
+        ears.first()
     }
 
     pub(super) const fn ear_mut(&mut self) -> Option<&mut Ear> {
-        self.0.as_mut_slice().first_mut()
+        let ears: &mut [Ear] = &mut self.0;
+        ears.first_mut()
     }
 
     /// A new view: the leader tells what it believes before anything is agreed on.
