@@ -117,7 +117,8 @@ impl Listen {
         self.half_life.as_micros() / 10 >= self.every.as_micros()
     }
 
-    fn is_valid(&self) -> bool {
+    /// Whether all is within its range.
+    pub fn is_valid(&self) -> bool {
         let timed = self.every.as_micros() > 0 && self.half_life.as_micros() > 0;
         timed && (1e-3..=1.0).contains(&self.relative_error)
     }

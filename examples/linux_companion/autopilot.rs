@@ -159,6 +159,9 @@ impl Companion {
         while let Some(position) = self.link.poll_position() {
             relay.handle_position(now, position.at, position.place);
         }
+        while let Some(sample) = self.link.poll_sample() {
+            relay.handle_sample(now, sample);
+        }
         self.link.handle_setpoint(now, relay.setpoint());
         let sir_db = relay.target().map(|target| 10.0 * target.log10());
         self.link.handle_values(now, sir_db, relay.setpoint());

@@ -24,10 +24,11 @@
 //! | --- | --- |
 //! | `options.rs` | the command line, checked |
 //! | `mission.rs`, `command.rs` | the part of it that is the mission; what is said of a mistake |
+//! | `listen.rs` | the part of it that is how the chain finds its interferer |
 //! | `tty.rs` | a tty that never blocks, as a `SerialPort` |
 //! | `ports.rs` | the ttys of either wiring, and sleep until one of them or a timer needs the relay |
 //! | `site.rs`, `autopilot.rs` | where the line is on earth; the autopilot, opened again whenever it vanishes |
-//! | `positions.rs` | where the drone is, from a FIFO |
+//! | `positions.rs` | where the drone is, and what is heard there, from a FIFO |
 //! | `relay.rs` | the loop |
 //! | `report.rs`, `line.rs` | the lines it prints |
 //! | `key.rs`, `epoch.rs` | what frames are signed with, from files |
@@ -53,6 +54,8 @@ mod keep;
 mod key;
 #[cfg(unix)]
 mod line;
+#[cfg(unix)]
+mod listen;
 #[cfg(unix)]
 mod mission;
 #[cfg(unix)]

@@ -31,9 +31,10 @@ pub(crate) struct MissionOptions {
     /// Power of every relay, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = power)]
     pub(crate) uav_power: f32,
-    /// Interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7)
-    #[arg(long, value_name = "P,X,Y", default_value = "80,500,400", allow_hyphen_values = true, value_parser = interferer)]
-    pub(crate) interferer: Interferer,
+    /// Interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7); or `unknown`, to relays
+    /// that listen
+    #[arg(long, value_name = "P,X,Y", default_value = "80,500,400", allow_hyphen_values = true, value_parser = guess)]
+    pub(crate) interferer: Interference,
     /// Noise power at every receiver, W, 0 to 1
     #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = noise)]
     pub(crate) noise: f32,
@@ -135,6 +136,14 @@ pub(crate) fn noise(text: &str) -> Result<f32, String> {
 /// m, 0 to 1e5.
 pub(crate) fn separation(text: &str) -> Result<f32, String> {
     number(text, 0.0, 1e5)
+}
+
+/// `unknown`, or power, W, and place, m.
+pub(crate) fn guess(text: &str) -> Result<Interference, String> {
+    if text == "unknown" {
+        return Ok(Interference::Unknown);
+    }
+    interferer(text).map(Interference::Source)
 }
 
 /// Power, W, and place, m.

@@ -16,6 +16,7 @@ use uav_relay::{
 use crate::autopilot::{AutopilotPlan, SigningKey, Where};
 use crate::command::{self, named};
 use crate::key;
+use crate::listen::ListenOptions;
 use crate::mission::{self, MissionOptions};
 use crate::site::SiteOptions;
 
@@ -72,7 +73,7 @@ struct Options {
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
     dead_after_ms: u64,
     /// FIFO with a line `x_m y_m altitude_m` whenever the autopilot knows better where the drone is, twice a second or more often:
-    /// setpoints then keep drones apart on their way
+    /// setpoints then keep drones apart on their way. With --listen a line may end with the interference that was heard there, W
     #[arg(long, value_name = "FIFO")]
     positions: Option<PathBuf>,
     /// The drone's PX4 or ArduCopter: a tty, or `udp:HOST:PORT`. It is told where to fly, and tells where the drone is
@@ -108,6 +109,8 @@ struct Options {
     /// (m, -1e7 to 1e7), X rising
     #[arg(long, value_name = "X:UPSILON,X:UPSILON,..", conflicts_with = "interferer", allow_hyphen_values = true, value_parser = field)]
     field: Option<Field>,
+    #[command(flatten)]
+    listen: ListenOptions,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -206,6 +209,7 @@ fn plan(options: &Options) -> Result<Plan, String> {
             Method::Joint => uav_relay::Method::Joint,
             Method::Adjust => uav_relay::Method::Adjust(Adjust::default()),
         },
+        listen: options.listen.listen(options.of),
         wiring,
         sited: options.autopilot.is_some(),
         hop_time: Duration::from_micros(turns.as_micros() + LATENCY.as_micros()),
@@ -334,9 +338,10 @@ fn ttys(options: &Options) -> Result<Ttys, String> {
 
 fn mission(options: &Options) -> Result<Mission, String> {
     let given = &options.mission;
-    let interference = options
-        .field
-        .map_or(Interference::Source(given.interferer), Interference::Field);
+    let interference = options.field.map_or(given.interferer, Interference::Field);
+    if interference == Interference::Unknown && !options.listen.is_on() {
+        return Err("--interferer unknown: must be P,X,Y without --listen".to_owned());
+    }
     mission::mission(given.config(options.of, interference)?, "--")
 }
 

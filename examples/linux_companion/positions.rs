@@ -1,4 +1,5 @@
-//! Where the drone is, line by line from a FIFO: the autopilot's side writes `x_m y_m altitude_m` as often as it knows better.
+//! Where the drone is, line by line from a FIFO: the autopilot's side writes `x_m y_m altitude_m` as often as it knows better, and behind
+//! that the interference that was heard there, W, if it was measured. `receiver power_w` is what the ground receiver hears.
 
 use std::fmt;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
@@ -6,7 +7,7 @@ use std::path::Path;
 
 use rustix::fs::{FileType, Mode, OFlags, fstat, open};
 use rustix::io::{Errno, read};
-use uav_relay::{Instant, Placement};
+use uav_relay::{Instant, Placement, Sample};
 
 use crate::line::line;
 
@@ -20,6 +21,8 @@ pub(crate) struct Positions {
     name: String,
     /// What has come of a line so far; one byte more than the longest for one that is too long.
     begun: Vec<u8>,
+    /// Whether a line may have a power, too.
+    listens: bool,
     /// Lines that were none.
     bad: u64,
 }
@@ -29,7 +32,7 @@ impl Positions {
     ///
     /// # Errors
     /// One line that says what does not work.
-    pub(crate) fn open(path: &Path) -> Result<Self, String> {
+    pub(crate) fn open(path: &Path, listens: bool) -> Result<Self, String> {
         let name = format!("--positions {}", path.display());
         // With an end of its own to write to it is never at its end, whoever comes and goes.
         let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
@@ -42,6 +45,7 @@ impl Positions {
             fd,
             name,
             begun: Vec::new(),
+            listens,
             bad: 0,
         })
     }
@@ -50,11 +54,15 @@ impl Positions {
         self.fd.as_fd()
     }
 
-    /// The newest of the positions that have come since; the first line that is none is said.
+    /// The newest of the positions that have come since, and every measurement is handed to `heard`; the first line that is neither is said.
     ///
     /// # Errors
     /// One line if it can not be read, or standard output takes no more.
-    pub(crate) fn newest(&mut self, now: Instant) -> Result<Option<Placement>, String> {
+    pub(crate) fn newest(
+        &mut self,
+        now: Instant,
+        heard: &mut impl FnMut(Sample),
+    ) -> Result<Option<Placement>, String> {
         let mut newest = None;
         let mut buffer = [0; 4096];
         loop {
@@ -71,9 +79,12 @@ impl Positions {
                     }
                     continue;
                 }
-                match placement(&self.begun) {
-                    Some(place) => newest = Some(place),
-                    None => self.refuse(now)?,
+                match news(&self.begun) {
+                    Some((place, sample)) if self.listens || sample.is_none() => {
+                        newest = place.or(newest);
+                        sample.into_iter().for_each(&mut *heard);
+                    }
+                    _ => self.refuse(now)?,
                 }
                 self.begun.clear();
             }
@@ -89,7 +100,12 @@ impl Positions {
         line(
             now,
             format_args!(
-                "position: {text:?} is not x_m y_m altitude_m; more of these are only counted"
+                "position: {text:?} is not x_m y_m altitude_m{}; more of these are only counted",
+                if self.listens {
+                    " [power_w] or receiver power_w, a power within 1e-30 to 1e6"
+                } else {
+                    ""
+                }
             ),
         )
     }
@@ -123,17 +139,33 @@ pub(crate) fn started(positions: Option<&Positions>) -> Result<(), String> {
     }
 }
 
-/// Three numbers.
-fn placement(text: &[u8]) -> Option<Placement> {
+/// Three numbers, a fourth where a power was measured there; or the word `receiver`, and the power that was measured at that.
+fn news(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
     let text = std::str::from_utf8(text)
         .ok()
         .filter(|_| text.len() <= LONGEST)?;
-    let mut numbers = text.split_whitespace().map(|word| word.parse::<f32>().ok());
-    let mut number = || numbers.next()?.filter(|number| number.is_finite());
-    let place = Placement {
-        x_m: number()?,
-        y_m: number()?,
-        altitude_m: number()?,
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let number = |word: &str| word.parse::<f32>().ok().filter(|number| number.is_finite());
+    let power = |word: &str| number(word).filter(|power_w| (1e-30..=1e6).contains(power_w));
+    if let ["receiver", power_w] = words[..] {
+        let power_w = power(power_w)?;
+        return Some((None, Some(Sample::Receiver { power_w })));
+    }
+    let [x, y, altitude, rest @ ..] = &words[..] else {
+        return None;
     };
-    numbers.next().is_none().then_some(place)
+    let at = Placement {
+        x_m: number(x)?,
+        y_m: number(y)?,
+        altitude_m: number(altitude)?,
+    };
+    let sample = match rest {
+        [] => None,
+        [power_w] => Some(Sample::Heard {
+            at,
+            power_w: power(power_w)?,
+        }),
+        _ => return None,
+    };
+    Some((Some(at), sample))
 }

@@ -23,7 +23,12 @@ use crate::{epoch, positions, uploads};
 pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
     let stop = on_signals()?;
     let mut ports = Ports::open(&plan.ttys, plan.baud)?;
-    let mut positions = plan.positions.as_deref().map(Positions::open).transpose()?;
+    let listens = plan.settings.listen.is_some();
+    let mut positions = plan
+        .positions
+        .as_deref()
+        .map(|path| Positions::open(path, listens))
+        .transpose()?;
     let clock = Clock::now();
     let mut autopilot = plan
         .autopilot
@@ -64,7 +69,9 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
     }
     loop {
         if let Some(positions) = &mut positions
-            && let Some(place) = positions.newest(now(clock))?
+            && let Some(place) = positions.newest(now(clock), &mut |sample| {
+                relay.handle_sample(now(clock), sample);
+            })?
         {
             relay.handle_position(now(clock), now(clock), place);
         }

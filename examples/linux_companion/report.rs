@@ -3,6 +3,7 @@
 
 use std::fmt;
 
+use uav_relay::sensing::belief::{Belief, Told};
 use uav_relay::wire::digest::digest;
 use uav_relay::{Event, Identity, Instant, Mission, Placement, Relay, Side, Stats, Upload};
 
@@ -192,6 +193,7 @@ impl Report {
                     relay.view().number()
                 ),
             ),
+            Event::Believed => believed(now, relay.belief()),
             other => line(now, format_args!("event: {other:?}")),
         }
     }
@@ -231,6 +233,26 @@ const fn stream(side: Side) -> &'static str {
     match side {
         Side::Upstream => "upstream",
         Side::Downstream => "downstream",
+    }
+}
+
+/// What is believed of the interference from now on.
+fn believed(now: Instant, told: Told) -> Result<(), String> {
+    match told.belief {
+        Belief::Source { source, receiver_w } => line(
+            now,
+            format_args!(
+                "believed: interferer {} W, x {} m, y {} m; at the receiver {receiver_w:.3e} W",
+                Exact(source.power_w),
+                Exact(source.x_m),
+                Exact(source.y_m)
+            ),
+        ),
+        Belief::Unknown(spread) => line(
+            now,
+            format_args!("believed: nothing is known; spread {spread:?}"),
+        ),
+        Belief::Mission => line(now, format_args!("believed: what the mission says")),
     }
 }
 

@@ -126,7 +126,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
 }
 
 fn plan(options: Options) -> Result<Plan, String> {
-    let interference = Interference::Source(options.loaded.interferer);
+    let interference = options.loaded.interferer;
     let loaded = mission(options.loaded.config(options.of, interference)?, "--")?;
     let sited = options.sites.of(options.loaded.distance)?;
     let (sites, along_m) = match moved(&options, sited)? {

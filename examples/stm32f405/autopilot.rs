@@ -135,6 +135,9 @@ impl Autopilot {
         while let Some(position) = self.link.poll_position() {
             relay.handle_position(now, position.at, position.place);
         }
+        while let Some(sample) = self.link.poll_sample() {
+            relay.handle_sample(now, sample);
+        }
     }
 
     /// Has the operator's ground station show what happened.

@@ -152,6 +152,7 @@ fn switch_on(
         hold_altitude: config.hold_altitude,
         method: config.method,
         measure: config.measure,
+        listen: config.listen,
         wiring,
         guard: (Autopilot::FLIES && config.sites.is_some()).then(|| GuardConfig {
             hover_m: Autopilot::POSITION_ERROR_M,
@@ -211,8 +212,8 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
     Err(CannotSign)
 }
 
-/// Replace this by what your receiver has measured since it was asked last, if the configuration has the relay measure.
-/// Once that says enough, `Relay::restart` at the leader has the chain agree again.
+/// Replace this by what your receiver has measured since it was asked last, if the configuration has the relay measure, or listen: then with
+/// where the drone was. Of a field, once that says enough, `Relay::restart` at the leader has the chain agree again.
 const fn measured() -> Option<Sample> {
     None
 }

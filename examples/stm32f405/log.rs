@@ -8,6 +8,7 @@ use uav_relay::flight::autopilot::AutopilotEvent;
 use uav_relay::flight::autopilot::state::State;
 #[cfg(feature = "flight")]
 use uav_relay::flight::autopilot::trust::Mistrust;
+use uav_relay::sensing::belief::Belief;
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
 
@@ -135,6 +136,9 @@ pub(crate) fn refused(error: ConfigError) {
         ConfigError::Measure => {
             defmt::error!("configuration refused: samples or most interference");
         }
+        ConfigError::Listen => {
+            defmt::error!("configuration refused: how it listens, out of range or in a field");
+        }
         ConfigError::Interferer => {
             defmt::error!("configuration refused: interferer and field at once");
         }
@@ -234,6 +238,19 @@ pub(crate) fn event(event: Event, relay: &Relay) {
     #[cfg(feature = "upload")]
     if event == Event::Adopted {
         defmt::info!("mission version {=u16} is flown", relay.version());
+    }
+    if event == Event::Believed
+        && let Belief::Source { source, .. } = relay.belief().belief
+    {
+        defmt::info!(
+            "believed: interferer {=f32} W ({=u32:#010x}) x {=f32} m ({=u32:#010x}) y {=f32} m ({=u32:#010x})",
+            source.power_w,
+            source.power_w.to_bits(),
+            source.x_m,
+            source.x_m.to_bits(),
+            source.y_m,
+            source.y_m.to_bits(),
+        );
     }
     if event == Event::SetpointChanged
         && let Some(place) = relay.setpoint()

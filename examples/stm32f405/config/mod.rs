@@ -20,9 +20,9 @@
 //! | 32 | f32 | power that the relays have in common, W |
 //! | 36 | f32 | altitude of this relay, m |
 //! | 40 | f32 | power of this relay, W |
-//! | 44 | f32 | power of the interferer, W; 0 in a field |
-//! | 48 | f32 | x of the interferer, m; 0 in a field |
-//! | 52 | f32 | y of the interferer, m; 0 in a field |
+//! | 44 | f32 | power of the interferer, W; 0 in a field, and where the relays listen and are told of none |
+//! | 48 | f32 | x of the interferer, m; 0 then |
+//! | 52 | f32 | y of the interferer, m; 0 then |
 //! | 56 | f32 | tolerance |
 //! | 60 | f64 | carrier, Hz |
 //! | 68 | f64 | excess loss with line of sight, as a factor |
@@ -34,7 +34,7 @@
 //! | 104 | f32 | y of its right edge, m: 0 or more |
 //! | 108 | f32 | adjust: how far a relay may go up or down in one turn, m; 0 with another method |
 //! | 112 | u16 | adjust: rounds at most, 1 to 65535; 0 with another method |
-//! | 114 | u16 | points of the field, 1 to [`MAX_POINTS`]; 0 where there is an interferer |
+//! | 114 | u16 | points of the field, 1 to [`MAX_POINTS`]; 0 where there is none |
 //! | 116 | f32 | the most interference that may be measured, W; 0 without samples |
 //! | 120 | u32 | samples to take at a place; 0 where nothing is measured |
 //! | 124 + 8 k | f32 | x of point k of the field, counted from 0, m; 0 behind the last one |
@@ -50,9 +50,12 @@
 //! | 312 | f32 | the drone's greatest speed, m/s: 0.1 to 20; 0 is 5 m/s, and is what stands here without sites |
 //! | 316 | 32 bytes | the key that the autopilot signs with; all 0 where it does not, or there are no sites |
 //! | 348 | f32 | noise power at every receiver, W: 0 to 1 |
-//! | 352 | u32 | CRC-32C of bytes 0 to 351 |
+//! | 352 | u64 | how long after an agreement the leader asks what is heard, us; this and the next two are 0 where the relays do not listen |
+//! | 360 | u64 | half-life of what was heard, us |
+//! | 368 | f32 | relative error of one measurement, 1e-3 to 1 |
+//! | 372 | u32 | CRC-32C of bytes 0 to 371 |
 //!
-//! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Field` and, by `course.rs`, `Axis`.
+//! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Listen`, `Field` and, by `course.rs`, `Axis`.
 //!
 //! | file | one idea |
 //! | --- | --- |
@@ -81,10 +84,10 @@ pub const ADDRESS: u32 = 0x080E_0000;
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// The version of the table above.
-pub const VERSION: u16 = 7;
+pub const VERSION: u16 = 8;
 
 /// Bytes of a block.
-pub const LEN: usize = 356;
+pub const LEN: usize = 376;
 
 /// Points of a field that a block has room for.
 pub const MAX_POINTS: usize = 16;
@@ -104,8 +107,11 @@ const AUTOPILOT_KEY: usize = SITES + 28;
 /// Where the noise is.
 const NOISE: usize = AUTOPILOT_KEY + 32;
 
+/// Where what is said of listening begins.
+const LISTEN: usize = NOISE + 4;
+
 /// [`LEN`] as the block states it.
-const LEN_FIELD: u16 = 356;
+const LEN_FIELD: u16 = 376;
 
 /// A block as it is stored.
 pub type Block = [u8; LEN];
@@ -167,7 +173,12 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     let method = rest.method(method)?;
     let points = rest.u16();
     let measure = rest.measure()?;
-    let interference = rest.interference(points, interferer, room)?;
+    let (_, listen) = block.split_at(LISTEN);
+    let listen = Reader(listen).listen()?;
+    if listen.is_some() && points > 0 {
+        return Err(ConfigError::Listen);
+    }
+    let interference = rest.interference(points, interferer, listen.is_some(), room)?;
     let (_, sites) = block.split_at(SITES);
     let sites = Reader(sites).sites()?;
     if sites.is_none() && autopilot_key(block).is_some() {
@@ -209,6 +220,7 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
         hold_altitude: hold == 1,
         method,
         measure,
+        listen,
         sites,
     })
 }

@@ -1,7 +1,8 @@
 //! Numbers out of bytes.
 
 use uav_relay::{
-    Adjust, Band, Field, FieldPoint, Interference, Interferer, Local, Measure, Method, Profile,
+    Adjust, Band, Duration, Field, FieldPoint, Interference, Interferer, Listen, Local, Measure,
+    Method, Profile,
 };
 
 use super::{ConfigError, Room, Sites};
@@ -24,6 +25,10 @@ impl Reader<'_> {
 
     pub(super) fn u32(&mut self) -> u32 {
         u32::from_le_bytes(self.take())
+    }
+
+    pub(super) fn u64(&mut self) -> u64 {
+        u64::from_le_bytes(self.take())
     }
 
     pub(super) fn f32(&mut self) -> f32 {
@@ -77,6 +82,20 @@ impl Reader<'_> {
         }
     }
 
+    /// How the relays listen, if they do; else all is 0.
+    pub(super) fn listen(&mut self) -> Result<Option<Listen>, ConfigError> {
+        let listen = Listen {
+            every: Duration::from_micros(self.u64()),
+            half_life: Duration::from_micros(self.u64()),
+            relative_error: self.f32(),
+        };
+        match (listen.every.as_micros(), listen.half_life.as_micros()) {
+            (0, 0) if listen.relative_error.to_bits() == 0 => Ok(None),
+            _ if listen.is_valid() => Ok(Some(listen)),
+            _ => Err(ConfigError::Listen),
+        }
+    }
+
     /// The sites of a drone that has an autopilot to tell; else all is 0.
     pub(super) fn sites(&mut self) -> Result<Option<Sites>, ConfigError> {
         let mut site = || core::array::from_fn(|_| i32::from_le_bytes(self.take()));
@@ -93,11 +112,12 @@ impl Reader<'_> {
         }
     }
 
-    /// The field of `count` points, or `interferer` if there are none.
+    /// The field of `count` points, or `interferer` if there are none; if that is all 0, too, it is unknown to relays that listen.
     pub(super) fn interference(
         &mut self,
         count: u16,
         interferer: Interferer,
+        listens: bool,
         room: &'static mut Room,
     ) -> Result<Interference, ConfigError> {
         for place in &mut *room {
@@ -117,11 +137,16 @@ impl Reader<'_> {
         {
             return Err(ConfigError::Unused);
         }
-        if points.is_empty() {
-            return Ok(Interference::Source(interferer));
-        }
         let Interferer { power_w, x_m, y_m } = interferer;
-        if !is_zero(&[power_w, x_m, y_m]) {
+        let is_none = is_zero(&[power_w, x_m, y_m]);
+        if points.is_empty() {
+            return Ok(if is_none && listens {
+                Interference::Unknown
+            } else {
+                Interference::Source(interferer)
+            });
+        }
+        if !is_none {
             return Err(ConfigError::Interferer);
         }
         let field = Field::try_new(points).map_err(ConfigError::Field)?;

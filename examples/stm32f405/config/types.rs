@@ -3,7 +3,7 @@
 use uav_relay::channel::{AirGround, Channel, ChannelError};
 use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
-use uav_relay::{Identity, Measure, Method, Mission, Profile};
+use uav_relay::{Identity, Listen, Measure, Method, Mission, Profile};
 
 /// What the block says, checked.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -20,6 +20,8 @@ pub struct Config {
     pub method: Method,
     /// Whether and how the interference is measured.
     pub measure: Option<Measure>,
+    /// Whether and how the chain finds its interferer.
+    pub listen: Option<Listen>,
     /// Where the ends of the line are on earth. `course.rs` checks whether they make one.
     pub sites: Option<Sites>,
 }
@@ -100,6 +102,8 @@ pub enum ConfigError {
     Adjust,
     /// What is said of measuring is out of range, or not 0 without samples.
     Measure,
+    /// What is said of listening is out of range, or there is a field.
+    Listen,
     /// There is a field, and the interferer is not 0.
     Interferer,
     /// There are more points than a block has room for.

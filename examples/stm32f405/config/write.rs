@@ -102,6 +102,11 @@ pub fn write(
     bytes.resize(AUTOPILOT_KEY, 0);
     bytes.extend(autopilot_key.unwrap_or_default());
     bytes.extend(mission.noise_w.to_le_bytes());
+    if let Some(listen) = config.listen {
+        bytes.extend(listen.every.as_micros().to_le_bytes());
+        bytes.extend(listen.half_life.as_micros().to_le_bytes());
+        bytes.extend(listen.relative_error.to_le_bytes());
+    }
     bytes.resize(CHECKED, 0);
     let check = crc(&bytes);
     bytes.extend(check.to_le_bytes());

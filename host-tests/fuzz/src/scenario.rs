@@ -68,7 +68,7 @@ fn look_at(scenario: &Scenario) {
     }
     match &scenario.interference {
         Interference::Sources(sources) => {
-            assert!(!sources.is_empty());
+            assert!(!sources.is_empty() || scenario.listen.is_some());
             for source in sources {
                 within(source.power_w, 1e-6, 1e9);
                 within(source.x_m, -1e7, 1e7);

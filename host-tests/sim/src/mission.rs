@@ -52,6 +52,9 @@ pub fn mission(
     tolerance: f64,
 ) -> Result<(Mission, Vec<(u16, Profile)>), Refusal> {
     let interference = match &scenario.interference {
+        Interference::Sources(sources) if sources.is_empty() && scenario.listen.is_some() => {
+            uav_relay::Interference::Unknown
+        }
         Interference::Sources(sources) => {
             let one = if let [source] = sources.as_slice() {
                 interferer(source)

@@ -3,6 +3,7 @@
 mod any;
 mod arducopter;
 mod px4;
+mod radio;
 mod signed;
 mod vehicle;
 

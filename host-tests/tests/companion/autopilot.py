@@ -10,6 +10,7 @@ JSON object a line, with the drone's own place and mode; standard input has an o
     sticks NORTH EAST            m/s, in the mode `pilot`
     refuse, accept               targets, as outside a fence
     reboot, mute, speak          begins anew on the ground; says nothing; says something
+    noise 150                    a SiK radio hears so much between frames
     unplug, plug                 the tty vanishes; another one is there
 """
 
@@ -96,12 +97,19 @@ class Drone:
                 self.start()
             case ["mute" | "speak" as word]:
                 self.silent = word == "mute"
+            case ["noise", noise]:
+                self.noise(int(noise))
             case ["unplug"]:
                 self.unplug()
             case ["plug"]:
                 self.plug()
             case _:
                 raise ValueError(words)
+
+    def noise(self, noise):
+        """What a SiK radio says on the same link: it cannot sign."""
+        radio = common.MAVLink(None, ord("3"), ord("D"))
+        os.write(self.tty, common.MAVLink_radio_status_message(200, 190, 100, noise, 60, 0, 0).pack(radio))
 
     def step(self):
         now = time.monotonic()

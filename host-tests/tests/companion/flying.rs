@@ -30,6 +30,14 @@ impl Flight {
         Self::found_by(kind, x_m, None)
     }
 
+    /// The same, with a relay that has those options, too.
+    pub(crate) fn listening(kind: &str, more: &[&str]) -> Self {
+        let mut flight = Self::started_with(kind, START_M, [None; 2], more);
+        flight.relay.line("autopilot: found a");
+        flight.relay.line("autopilot: on the ground, or not armed");
+        flight
+    }
+
     /// Of which both sign with that key, where there is one.
     fn found_by(kind: &str, x_m: f64, key: Option<&str>) -> Self {
         let mut flight = Self::started(kind, x_m, [key; 2]);

@@ -5,6 +5,7 @@ mod binary;
 mod ending;
 mod flying;
 mod idle;
+mod listening;
 mod mavsdk;
 mod medium;
 mod mistrust;

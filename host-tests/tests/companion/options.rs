@@ -87,6 +87,27 @@ const WRONG: &[(&[&str], &[&str])] = &[
         &["--interferer", "'80,500'", "P,X,Y"],
     ),
     (
+        &["--interferer", "unknown"],
+        &["--interferer unknown", "P,X,Y without --listen"],
+    ),
+    (&["--following"], &["--listen", "not provided"]),
+    (
+        &["--listen", "--listen-every", "0"],
+        &["--listen-every", "'0'", "0.01 to 100000.0"],
+    ),
+    (
+        &["--listen", "--listen-half-life", "-1"],
+        &["--listen-half-life", "'-1'", "0.01 to 1000000.0"],
+    ),
+    (
+        &["--listen", "--listen-error", "1.5"],
+        &["--listen-error", "'1.5'", "0.001 to 1.0"],
+    ),
+    (
+        &["--listen", "--field", "0:1e9"],
+        &["--listen", "--field", "cannot be used with"],
+    ),
+    (
         &["--interferer", "-1,5,4"],
         &["--interferer", "'-1,5,4'", "P ", "1e-6 to 1000000000.0"],
     ),

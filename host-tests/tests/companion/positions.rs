@@ -12,13 +12,13 @@ use crate::Chain;
 use crate::medium::QUIET;
 use crate::process::{Ended, LIMIT, Relay, bits};
 
-fn fifo(folder: &Path, name: &str) -> PathBuf {
+pub(crate) fn fifo(folder: &Path, name: &str) -> PathBuf {
     let path = folder.join(name);
     mkfifoat(CWD, &path, Mode::RUSR | Mode::WUSR).unwrap();
     path
 }
 
-fn write(path: &Path, text: &str) {
+pub(crate) fn write(path: &Path, text: &str) {
     let mut file = File::options().write(true).open(path).unwrap();
     file.write_all(text.as_bytes()).unwrap();
 }

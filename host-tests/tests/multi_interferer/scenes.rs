@@ -72,6 +72,7 @@ pub(crate) fn scenario(
     };
     let scenario = Scenario {
         line: None,
+        listen: None,
         distance_m: d,
         altitude_m,
         altitude_min_m: altitude_m,

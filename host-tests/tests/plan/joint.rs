@@ -72,6 +72,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
     Scenario {
         line: None,
+        listen: None,
         distance_m: link.distance_m,
         altitude_m: corridor.least_m,
         altitude_min_m: corridor.least_m,

@@ -9,6 +9,7 @@ mod chain;
 mod fleet;
 mod flight;
 mod golden;
+mod listening;
 mod log;
 mod mavsdk;
 mod methods;

@@ -9,7 +9,7 @@ use host_tests::firmware::emulator::Life;
 use mavlink::dialects::common::{
     EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot,
     MavLandedState, MavMessage, MavModeFlag, MavType, POSITION_TARGET_GLOBAL_INT_DATA,
-    SET_POSITION_TARGET_GLOBAL_INT_DATA,
+    RADIO_STATUS_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkReader, MavlinkVersion};
 use uav_relay::Geodetic;
@@ -136,6 +136,22 @@ impl Vehicle {
         }
     }
 
+    /// Says where it is, and that a SiK radio in it hears so much between frames.
+    pub(crate) fn hears(&mut self, noise: u8) {
+        self.say(POSITION, self.now());
+        let radio = MavHeader {
+            system_id: u32::from(b'3'),
+            component_id: b'D',
+            sequence: 0,
+        };
+        let said = RADIO_STATUS_DATA {
+            rssi: 200,
+            noise,
+            ..RADIO_STATUS_DATA::DEFAULT
+        };
+        self.send(radio, &MavMessage::RADIO_STATUS(said));
+    }
+
     /// Whether it was told a target since `at`.
     pub(crate) fn was_told_since(&self, at: u64) -> bool {
         self.told.last().is_some_and(|told| told.at > at)
@@ -225,8 +241,12 @@ impl Vehicle {
             sequence: self.number,
         };
         self.number = self.number.wrapping_add(1);
+        self.send(header, &message);
+    }
+
+    fn send(&mut self, header: MavHeader, message: &MavMessage) {
         let mut raw = MAVLinkV2MessageRaw::new();
-        raw.serialize_message(header, &message);
+        raw.serialize_message(header, message);
         self.socket.write_all(raw.raw_bytes()).unwrap();
     }
 

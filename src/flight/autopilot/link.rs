@@ -3,6 +3,7 @@
 use super::carrot::{Carrot, Pace};
 use super::clock::millis;
 use super::event::{AutopilotEvent, Events};
+use super::noise::Noise;
 use super::report::{Report, line_of};
 use super::state::State;
 use super::streams::Streams;
@@ -13,10 +14,11 @@ use crate::event::Event;
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing, severity};
-use crate::flight::mavlink::parser::{Counters, Parser, Received};
+use crate::flight::mavlink::parser::{Counters, Parser};
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::Signing;
 use crate::geodetic::Geodetic;
+use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::time::{Duration, Instant};
@@ -54,6 +56,8 @@ pub struct Autopilot {
     fell: bool,
     report: Report,
     position: Option<Position>,
+    /// What a radio has heard where the drone was, W.
+    noise: Noise,
     events: Events,
     sequence: u8,
     heartbeat_at: Instant,
@@ -77,6 +81,7 @@ impl Autopilot {
             fell: false,
             report: Report::default(),
             position: None,
+            noise: Noise::NONE,
             events: Events::default(),
             sequence: 0,
             heartbeat_at: now,
@@ -87,25 +92,13 @@ impl Autopilot {
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         for byte in bytes {
             self.parser.push(*byte);
-            while let Some(received) = self.next_received(now) {
+            while let Some(received) = self.trust.next_received(now, &mut self.parser) {
+                self.noise.hear(now, &received, &self.vehicle);
                 let heard = self.vehicle.hear(now, &received, &self.axis);
                 if heard != VehicleUpdate::Nothing {
                     self.streams.hear(received.id);
                 }
                 self.take(now, heard);
-            }
-        }
-    }
-
-    /// The next message of what has come that is to be taken.
-    fn next_received(&mut self, now: Instant) -> Option<Received> {
-        let trust = &mut self.trust;
-        loop {
-            let taken = self.parser.next_frame(|received, frame| {
-                trust.takes(now, &received, frame).then_some(received)
-            })?;
-            if taken.is_some() {
-                return taken;
             }
         }
     }
@@ -344,6 +337,12 @@ impl Autopilot {
     /// The next place where the drone was, and when: for `Relay::handle_position`. Of several since the last call the newest.
     pub const fn poll_position(&mut self) -> Option<Position> {
         self.position.take()
+    }
+
+    /// What a SiK radio has heard between frames, by its RADIO_STATUS, and where the drone was in the air: for `Relay::handle_sample`. Of
+    /// several since the last call the newest; without the feature `sensing` none.
+    pub fn poll_sample(&mut self) -> Option<Sample> {
+        self.noise.take()
     }
 
     /// The next event.

@@ -10,6 +10,7 @@
 //! | `target` | what it is told to fly to, and how often |
 //! | [`carrot`] | the target on its way to the setpoint |
 //! | `event` | what the firmware is told |
+//! | `noise` | what a radio hears between frames |
 //! | `report` | what the operator reads |
 //! | [`trust`] | whom it believes: signatures |
 //!
@@ -19,6 +20,7 @@ pub mod carrot;
 mod clock;
 mod event;
 mod link;
+mod noise;
 mod report;
 pub mod state;
 mod streams;

@@ -7,7 +7,7 @@
 use super::vehicle::{AUTOPILOT, Kind};
 use crate::flight::mavlink::incoming::Incoming;
 use crate::flight::mavlink::outgoing::FrameBytes;
-use crate::flight::mavlink::parser::Received;
+use crate::flight::mavlink::parser::{Parser, Received};
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::{Flaw, Signing};
 use crate::time::Instant;
@@ -64,8 +64,20 @@ pub(super) struct Trust {
 }
 
 impl Trust {
+    /// The next message of what has come that is to be taken.
+    pub(super) fn next_received(&mut self, now: Instant, parser: &mut Parser) -> Option<Received> {
+        loop {
+            let taken = parser.next_frame(|received, frame| {
+                self.takes(now, &received, frame).then_some(received)
+            })?;
+            if taken.is_some() {
+                return taken;
+            }
+        }
+    }
+
     /// Whether a frame counts.
-    pub(super) fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
+    fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         let (takes, wrong) = self.judge(now, received, frame);
         if !takes {
             self.refused = self.refused.saturating_add(1);

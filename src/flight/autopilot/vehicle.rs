@@ -235,6 +235,12 @@ impl Vehicle {
         }
     }
 
+    /// Where the drone is, if that is known by now and it is in the air.
+    pub(super) fn place_in_air(&self, now: Instant) -> Option<Placement> {
+        let position = self.position(now)?;
+        (self.armed && self.in_air).then_some(position.place)
+    }
+
     /// When what is known is too old, unless it is said again.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);

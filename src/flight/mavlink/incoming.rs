@@ -101,7 +101,7 @@ pub enum Incoming {
         /// `MAV_RESULT`: 0 accepted.
         result: u8,
     },
-    /// RADIO_STATUS, of a SiK radio: dBm are v / 1.9 - 127, 255 is unknown.
+    /// RADIO_STATUS, of a SiK radio, in the units of [`sik`](super::sik): 255 is unknown.
     RadioStatus {
         /// What was heard at the last frame.
         rssi: u8,

@@ -7,6 +7,7 @@
 //! | [`parser`] | frames out of a stream of bytes |
 //! | [`incoming`] | what an autopilot says |
 //! | [`outgoing`] | what a companion says |
+//! | [`sik`] | the units of a SiK radio |
 //! | `signing` | with the feature `mavlink-signing`, who has the key |
 //!
 //! A number that no enum has, and a message that the table has not, cost nothing but their bytes. MAVLink 1 is not read; an autopilot
@@ -18,4 +19,5 @@ pub mod outgoing;
 pub mod parser;
 #[cfg(feature = "mavlink-signing")]
 pub mod signing;
+pub mod sik;
 pub mod table;

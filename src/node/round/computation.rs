@@ -1,7 +1,8 @@
 //! What a relay holds while it does its share of an algorithm: the pass that is under way, its place, its targets.
 
+use super::ear::Sensing;
 use super::seats::Seats;
-use super::sense::{Sense, Sensing};
+use super::sense::Sense;
 use super::state::{Action, Phase, RoundState};
 use super::sweeping::Sweeping;
 use super::task::LeaderTask;

@@ -8,6 +8,7 @@
 //! | `chosen` | a relay's own solution of the chain by the joint method |
 //! | `seats`, `gathering` | what it has to know of the others for that, and the pass that gathers it |
 //! | `turn`, `turning` | a turn of Algorithm 2 |
+//! | `sense`, `ear` | the pass that adds up what is heard, and what a relay keeps of that |
 //! | `leader`, `task` | what comes before a pass begins: which one, and what for |
 //!
 //! What answers a relay is a sign of life, from when the relay said what is answered: what came of a pass, by the neighbour onward, as of
@@ -16,6 +17,7 @@
 
 mod chosen;
 mod computation;
+mod ear;
 mod gathering;
 mod leader;
 mod seats;
@@ -42,7 +44,7 @@ use crate::time::Instant;
 use crate::wire::message::Message;
 
 use computation::{ADJUST, ALTITUDE, Computation, SENSING};
-use sense::Found;
+use ear::Found;
 use state::{Action, Phase};
 
 /// What is to be sent.
@@ -372,12 +374,10 @@ impl Round {
         &self.computation.meter
     }
 
-    /// What it believes of the interference.
     pub(crate) const fn told(&self) -> Told {
-        self.computation.sensing.told
+        self.computation.sensing.told()
     }
 
-    /// Why nothing was made of what was heard last.
     pub(crate) const fn unfit(&self) -> Option<Unfit> {
         self.computation.sensing.unfit()
     }

@@ -91,7 +91,7 @@ impl Check<'_> {
             (Whole(range), Value::Integer(whole)) if !range.holds(*whole as f64) => {
                 fail(Problem::OutOfRange)
             }
-            (Whole(_), _) => Ok(()),
+            (Whole(_) | Rule::Flag, _) => Ok(()),
             (Rule::Table(keys), Value::Table(table)) => self.table(path, table, keys),
             (Rule::Tables(_, least), Value::Array(list)) if list.len() < *least => {
                 fail(Problem::EmptyList)

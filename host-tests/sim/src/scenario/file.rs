@@ -10,7 +10,8 @@ use super::error::{Problem, ScenarioError};
 use super::keys::number;
 use super::site::{self, RawSites};
 use super::spec::{
-    AirGround, BetaPoint, ChannelSpec, Field, Interference, Noise, RelayOverride, Scenario, Source,
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, ListenSpec, Noise, RelayOverride,
+    Scenario, Source,
 };
 
 /// `deny_unknown_fields` guards the table of keys: a key listed there and forgotten here fails at once.
@@ -28,6 +29,17 @@ pub(super) struct RawFile {
     noise: RawNoise,
     field: Option<RawField>,
     site: Option<RawSites>,
+    listen: Option<RawListen>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawListen {
+    #[serde(default)]
+    following: bool,
+    every_s: Option<f64>,
+    half_life_s: Option<f64>,
+    relative_error: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -160,7 +172,13 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
         tx_w: raw.power.tx_w,
         uav_w: raw.power.uav_w,
         channel: channel(file, &raw.channel)?,
-        interference: interference(file, raw.interferer, raw.field)?,
+        interference: interference(file, raw.interferer, raw.field, raw.listen.is_some())?,
+        listen: raw.listen.map(|raw| ListenSpec {
+            following: raw.following,
+            every_s: raw.every_s,
+            half_life_s: raw.half_life_s,
+            relative_error: raw.relative_error,
+        }),
         noise: noise(&raw.noise),
         relays: relays(file, raw.relay)?,
     })
@@ -219,9 +237,18 @@ fn interference(
     file: &str,
     sources: Option<Vec<RawSource>>,
     field: Option<RawField>,
+    listens: bool,
 ) -> Result<Interference, ScenarioError> {
     let one = || "either one [field] or one or more [[interferer]]".to_owned();
     match (sources, field) {
+        (None, None) if listens => Ok(Interference::Sources(Vec::new())),
+        (None, Some(_)) if listens => Err(mistake(
+            file,
+            "listen",
+            Some("[listen] beside a [field]".to_owned()),
+            Problem::TwoInterferences,
+            "[listen] alone or beside [[interferer]]".to_owned(),
+        )),
         (None, None) => Err(mistake(
             file,
             "interferer",

@@ -17,6 +17,8 @@ pub(super) enum Rule {
     Whole(Range),
     /// "los", "nlos" or a number.
     LinkOrNumber(Range),
+    /// true or false.
+    Flag,
     Table(Keys),
     /// An array of tables with at least so many entries.
     Tables(Keys, usize),
@@ -83,6 +85,7 @@ pub(super) const FILE: Keys = &[
     optional("field", Rule::Table(FIELD)),
     optional("noise", Rule::Table(NOISE)),
     optional("site", Rule::Table(SITES)),
+    optional("listen", Rule::Table(LISTEN)),
 ];
 
 const GEOMETRY: Keys = &[
@@ -93,6 +96,13 @@ const GEOMETRY: Keys = &[
     optional("lateral_min_m", Number(range(-1e5, 0.0, "m"))),
     optional("lateral_max_m", Number(range(0.0, 1e5, "m"))),
     optional("min_separation_m", Number(range(0.0, 1e5, "m"))),
+];
+
+const LISTEN: Keys = &[
+    optional("following", Rule::Flag),
+    optional("every_s", Number(range(0.01, 1e5, "s"))),
+    optional("half_life_s", Number(range(0.01, 1e12, "s"))),
+    optional("relative_error", Number(range(1e-3, 1.0, ""))),
 ];
 
 const SITES: Keys = &[
@@ -189,6 +199,7 @@ impl fmt::Display for Rule {
             Number(range) => write!(f, "a number, {range}"),
             Whole(range) => write!(f, "a whole number, {range}"),
             LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
+            Rule::Flag => f.write_str("true or false"),
             Rule::Table(keys) => write!(f, "a table with the keys {}", names(keys)),
             Rule::Tables(keys, 0) => write!(f, "a list of tables with the keys {}", names(keys)),
             Rule::Tables(keys, least) => write!(

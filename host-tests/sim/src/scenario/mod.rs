@@ -17,8 +17,8 @@ use std::path::Path;
 
 pub use error::{Problem, ScenarioError};
 pub use spec::{
-    AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, Noise, RelayOverride, Scenario,
-    Source,
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, ListenSpec, Noise, RelayOverride,
+    Scenario, Source,
 };
 
 impl Scenario {

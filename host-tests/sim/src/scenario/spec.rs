@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;
+use uav_relay::{Duration, Geodetic, Listen};
+
+use crate::command::narrow;
 
 /// Everything a host tool has to know about a flight, in SI units, with x along the line from Tx (x = 0) to Rx and y to the
 /// right of it as seen from above.
@@ -35,6 +37,8 @@ pub struct Scenario {
     pub channel: ChannelSpec,
     /// What disturbs the hops.
     pub interference: Interference,
+    /// How the relays listen, where they are to find the interferer; then [`Self::interference`] is what they are told at first, if anything.
+    pub listen: Option<ListenSpec>,
     /// The receivers' own noise.
     pub noise: Noise,
     /// What differs for single relays, by relay number (1 to 1000, 1 is next to Tx).
@@ -61,6 +65,41 @@ pub struct ChannelSpec {
     pub excess_loss_nlos_db: f64,
     /// Which path loss the links between the ground and the air have.
     pub air_ground: AirGround,
+}
+
+/// How the relays listen: what is not said is that of [`Listen`].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ListenSpec {
+    /// Whether the interferer moves: what is not said is that of [`Listen::following`].
+    pub following: bool,
+    /// How long after an agreement the leader asks what is heard, in seconds, 0.01 to 1e5.
+    pub every_s: Option<f64>,
+    /// After so long what was heard counts half, in seconds, 0.01 to 1e12.
+    pub half_life_s: Option<f64>,
+    /// By how much one measurement is off, relative, 1e-3 to 1.
+    pub relative_error: Option<f64>,
+}
+
+impl ListenSpec {
+    /// As `uavs` relays are told.
+    pub fn of(&self, uavs: u16) -> Listen {
+        let default = if self.following {
+            Listen::following(uavs)
+        } else {
+            Listen::default()
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "1e4 to 1e18"
+        )]
+        let micros = |seconds: f64| Duration::from_micros((seconds * 1e6).round() as u64);
+        Listen {
+            every: self.every_s.map_or(default.every, micros),
+            half_life: self.half_life_s.map_or(default.half_life, micros),
+            relative_error: self.relative_error.map_or(default.relative_error, narrow),
+        }
+    }
 }
 
 /// The noise of every receiver, as its bandwidth and its noise figure make it.
@@ -108,7 +147,7 @@ pub enum AirGround {
 /// What disturbs the hops: known transmitters, or a random field along x.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Interference {
-    /// One interferer or more; never empty when it was read from a file.
+    /// One interferer or more; none only where the relays listen and know of none.
     Sources(Vec<Source>),
     /// An interference power known only by its distribution.
     Field(Field),
@@ -186,6 +225,7 @@ impl Default for Scenario {
                 x_m: 500.0,
                 y_m: 400.0,
             }]),
+            listen: None,
             noise: Noise::default(),
             relays: BTreeMap::new(),
         }
@@ -193,6 +233,11 @@ impl Default for Scenario {
 }
 
 impl Scenario {
+    /// Whether it says what disturbs the hops; one whose relays are to find that out may not.
+    pub fn knows_interference(&self) -> bool {
+        !matches!(&self.interference, Interference::Sources(sources) if sources.is_empty())
+    }
+
     /// Every interferer, as a picture wants it: power in watts, place along x and offset y in metres; none in a field.
     pub fn sources(&self) -> Vec<(f64, f64, f64)> {
         match &self.interference {

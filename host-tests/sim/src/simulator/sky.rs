@@ -4,7 +4,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Gamma, StandardNormal};
 use uav_relay::sensing::belief::Told;
-use uav_relay::{Duration, Instant, Placement};
+use uav_relay::{Duration, Instant, Placement, Sample};
 
 use crate::scene::{Place, Scene};
 
@@ -23,6 +23,8 @@ pub struct Sky {
     pub period: Duration,
     /// Whether it measures once at a place, and then no more.
     pub once: bool,
+    /// What relays are handed instead of what is heard where they are, once, at the first measurement: index from 1, and what.
+    pub handed: Vec<(u16, Sample)>,
     /// Relays whose receiver says something else: index from 1, by how many dB too much, and since when.
     pub broken: Vec<(u16, f64, Instant)>,
     /// The run goes on until then.
@@ -44,6 +46,7 @@ impl Sky {
             shadow_db: 0.0,
             period: Duration::from_millis(1_000),
             once: false,
+            handed: Vec::new(),
             broken: Vec::new(),
             until: Instant::from_millis(600_000),
             seed: 1,

@@ -10,6 +10,7 @@
 
 mod air;
 mod hostile;
+mod listen;
 mod upload;
 
 use std::process::{Command, Output};

@@ -162,7 +162,7 @@ pub fn sheet() -> Result<Sheet, Trouble> {
                     heading: "still sources".to_owned(),
                     #[expect(clippy::cast_precision_loss, reason = "a few")]
                     x: Axis::linear("agreements that followed what was heard").between(0.0, LAST as f64),
-                    y: Axis::log("short of the optimum, share of it"),
+                    y: Axis::log("short of the optimum"),
                     lines: lines.collect(),
                 },
                 Panel {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use uav_relay::{Identity, Interference, Measure, Method, Mission, Profile};
+use uav_relay::{Identity, Interference, Listen, Measure, Method, Mission, Profile};
 
 use super::config::{
     Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, Secret, Sites, autopilot_key,
@@ -49,6 +49,9 @@ impl fmt::Display for BlockError {
             Self::Config(ConfigError::Measure) => {
                 f.write_str("samples must be within 100 to 1000000, i_max_w within 1e-30 to 1e6")
             }
+            Self::Config(ConfigError::Listen) => f.write_str(
+                "listen: is for a scenario with [[interferer]] or none, not with a [field]",
+            ),
             Self::Config(ConfigError::Secret) => {
                 f.write_str("the key must not be all 0, the epoch within 1 to 4294967294")
             }
@@ -83,6 +86,7 @@ pub struct Flight {
     held: Vec<u16>,
     method: Method,
     measure: Option<Measure>,
+    listen: Option<Listen>,
     secret: Option<Secret>,
     sites: Option<Sites>,
     autopilot_key: Option<[u8; 32]>,
@@ -114,6 +118,7 @@ impl Flight {
             held: mission::held(scenario, uavs),
             method: Method::Align,
             measure: None,
+            listen: scenario.listen.map(|listen| listen.of(uavs)),
             secret: None,
             sites: scenario.line.map(|line| line.sites).map(|ends| Sites {
                 ends: ends.map(|at| [at.lat_e7, at.lon_e7, at.amsl_mm]),
@@ -180,6 +185,11 @@ impl Flight {
         self.method
     }
 
+    /// How the relays listen, if they do.
+    pub const fn listen(&self) -> Option<Listen> {
+        self.listen
+    }
+
     /// The block of relay `index`, read back to be sure.
     ///
     /// # Errors
@@ -196,6 +206,7 @@ impl Flight {
             hold_altitude: self.held.contains(&index),
             method: self.method,
             measure: self.measure,
+            listen: self.listen,
             sites: self.sites,
         };
         let block = write(&config, &self.numbers, self.secret, self.autopilot_key);

@@ -11,7 +11,7 @@ use super::{example, field, in_a_field, paper, reads};
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;
-    let mut bytes: Vec<u8> = b"UAVR\x07\0\x64\x01\x03\0\x07\0\x05\0".to_vec();
+    let mut bytes: Vec<u8> = b"UAVR\x08\0\x78\x01\x03\0\x07\0\x05\0".to_vec();
     bytes.extend([method, u8::from(hold)]);
     for number in [1000.0_f32, 4.0, 80.0, 20.0, 1.0, 20.0, 1.0] {
         bytes.extend(number.to_le_bytes());
@@ -27,7 +27,7 @@ fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8]
     }
     bytes.extend(rounds.to_le_bytes());
     bytes.extend(rest);
-    bytes.resize(352, 0);
+    bytes.resize(372, 0);
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
     bytes.extend(crc.to_le_bytes());
     bytes

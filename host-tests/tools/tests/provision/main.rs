@@ -10,6 +10,7 @@
 
 mod block;
 mod command;
+mod listen;
 mod ranges;
 mod secret;
 mod sites;

@@ -85,6 +85,10 @@ fn a_number_out_of_range_is_named() {
         (120, &[100, 0], ConfigError::Measure),
         (124, &[1], ConfigError::Unused),
         (251, &[0x80], ConfigError::Unused),
+        // Nobody listens.
+        (352, &[1], ConfigError::Listen),
+        (360, &[1], ConfigError::Listen),
+        (368, &0.1_f32.to_le_bytes(), ConfigError::Listen),
         // There are no sites.
         (312, &1.0_f32.to_le_bytes(), ConfigError::Speed),
         (312, &(-0.0_f32).to_le_bytes(), ConfigError::Speed),
@@ -184,6 +188,7 @@ fn flies(config: &Config) {
         hold_altitude: config.hold_altitude,
         method: config.method,
         measure: config.measure,
+        listen: config.listen,
         ..Settings::default()
     };
     Relay::new(config.mission, config.identity, settings, 1, Instant::ZERO).unwrap();

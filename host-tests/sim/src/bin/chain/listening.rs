@@ -13,7 +13,7 @@ use uav_relay_sim::simulator::sky::Sky;
 #[command(next_help_heading = "Listening")]
 pub(crate) struct Listening {
     /// The relays are not told the scenario's interferers: each measures, once a second, what it hears where it is, and together they
-    /// find one that accounts for it
+    /// find one that accounts for it. How they listen is the scenario's [listen], if it has one
     #[arg(long)]
     listen: bool,
     /// Independent samples of the interference in one measurement, 1 to 1000000
@@ -54,13 +54,17 @@ impl Listening {
             ..*setup.mission.config()
         });
         setup.mission = unknown.map_err(|error| Failure::input(error.to_string()))?;
-        let mut listen = match self.move_interferer {
-            Some(_) => Listen::following(uavs),
-            None => Listen::default(),
+        let mut listen = match (scenario.listen, self.move_interferer) {
+            (Some(spec), _) => spec.of(uavs),
+            (None, Some(_)) => Listen::following(uavs),
+            (None, None) => Listen::default(),
         };
         #[expect(clippy::cast_possible_truncation, reason = "of 1e-3 to 1")]
         let error = (1.0 / f64::from(self.samples).sqrt()).max(1e-3) as f32;
-        listen.relative_error = error;
+        let said = scenario.listen.and_then(|spec| spec.relative_error);
+        if said.is_none() {
+            listen.relative_error = error;
+        }
         setup.settings.listen = Some(listen);
         let mut sky = Sky::of(scene);
         sky.samples = self.samples;

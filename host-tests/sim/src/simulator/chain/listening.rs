@@ -1,7 +1,7 @@
 //! Relays that measure the interference where they are.
 
 use uav_relay::sensing::belief::Told;
-use uav_relay::{Phase, Placement, Sample};
+use uav_relay::{Instant, Phase, Placement, Sample};
 
 use super::super::drones::{Drone, placement};
 use super::super::fleet::Vehicle;
@@ -18,6 +18,14 @@ impl Chain {
         let now = self.now;
         let scene = sky.scene_at(now);
         let mut places = Vec::new();
+        if now == Instant::ZERO + sky.period {
+            for (node, sample) in &sky.handed {
+                let mut members = self.members.iter_mut();
+                if let Some(member) = members.find(|member| member.node == *node) {
+                    member.relay.handle_sample(now, *sample);
+                }
+            }
+        }
         for index in 0..self.members.len() {
             let flown = self
                 .flight
@@ -36,7 +44,7 @@ impl Chain {
                 continue;
             }
             places.push(at);
-            if sky.once && member.measured == Some(at) {
+            if !sky.handed.is_empty() || sky.once && member.measured == Some(at) {
                 continue;
             }
             member.measured = Some(at);

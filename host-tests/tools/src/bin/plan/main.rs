@@ -25,6 +25,10 @@ fn run(options: &Options) -> Result<(), Failure> {
         Some(file) => Scenario::load(file).map_err(|error| Failure::input(error.to_string()))?,
         None => Scenario::default(),
     };
+    if !scenario.knows_interference() {
+        let line = "interferer: is missing: without [[interferer]] a scenario with [listen] is for cargo provision alone";
+        return Err(Failure::input(line.to_owned()));
+    }
     let number = options.number()?;
     let ask = Ask {
         number,

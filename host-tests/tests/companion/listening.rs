@@ -1,0 +1,72 @@
+//! Relays that find their interferer: by a FIFO, and by a SiK radio on the autopilot's link.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use uav_relay::Placement;
+use uav_relay_sim::scenario::Scenario;
+use uav_relay_sim::scene::Scene;
+
+use crate::flying::Flight;
+use crate::positions::{fifo, write};
+use crate::process::{Relay, bits};
+
+const LISTENING: [&str; 5] = [
+    "--listen",
+    "--interferer",
+    "unknown",
+    "--listen-every",
+    "0.5",
+];
+
+/// One relay is told where it is and what is heard there, by places that a pilot flew to.
+#[test]
+fn one_finds_the_interferer_by_its_fifo() {
+    let scene = Scene::new(&Scenario::default(), 1).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let fifo = fifo(folder.path(), "positions");
+    let path = fifo.to_str().unwrap();
+    let more = ["--index", "1", "--of", "1", "--positions", path];
+    let mut relay = Relay::start(&[&more[..], &LISTENING].concat());
+    relay.line("guarded: ");
+    let mut lines = String::from("1 2 3 0\nreceiver\nreceiver -1\n");
+    for [x_m, y_m, altitude_m] in [
+        [100.0, 30.0, 20.0],
+        [300.0, -40.0, 30.0],
+        [500.0, 50.0, 40.0],
+        [700.0, -30.0, 20.0],
+        [900.0, 40.0, 50.0],
+    ] {
+        let at = Placement {
+            x_m,
+            y_m,
+            altitude_m,
+        };
+        let power_w = scene.interference_w(at);
+        writeln!(lines, "{x_m} {y_m} {altitude_m} {power_w:e}").unwrap();
+    }
+    writeln!(lines, "receiver {:e}", scene.interference_rx_w()).unwrap();
+    write(&fifo, &lines);
+    relay.line("position: \"1 2 3 0\" is not x_m y_m altitude_m [power_w] or receiver power_w, a power within 1e-30 to 1e6");
+    let believed = relay.line("believed: interferer ");
+    let [power_w, x_m, y_m] = bits(&believed)[..3] else {
+        panic!("{believed}");
+    };
+    let found = [power_w, x_m, y_m].map(f32::from_bits);
+    for (found, true_) in found.into_iter().zip([80.0_f32, 500.0, 400.0]) {
+        assert!((found / true_ - 1.0).abs() < 0.02, "{believed}");
+    }
+    assert!(!believed.ends_with("0.000e0 W"), "{believed}");
+}
+
+/// What a radio hears counts in the air, and one place is not enough: the relay goes elsewhere to hear more.
+#[test]
+fn a_radio_on_the_autopilots_link_is_heard() {
+    let mut flight = Flight::listening("arducopter", &LISTENING);
+    flight.takes_off();
+    flight.drone.order("noise 150");
+    flight
+        .relay
+        .line("believed: nothing is known; spread TowardTx");
+    assert!(flight.targets_for(Duration::from_millis(100)).is_empty());
+}

@@ -1,0 +1,196 @@
+//! What one relay has heard and believes, between the passes.
+
+use super::computation::SENSING;
+use crate::node::context::Member;
+use crate::node::sample::Sample;
+use crate::place::Placement;
+use crate::sensing::average::{Average, left};
+use crate::sensing::belief::{Belief, Known, Told};
+use crate::sensing::fit::{Unfit, expected_at};
+use crate::sensing::listener::Listener;
+use crate::sensing::terms::unit_w;
+use crate::settings::Listen;
+use crate::time::{Duration, Instant};
+use crate::wire::message::Receiver;
+
+/// What a relay hears, and what it believes of it: nothing, and no room for it, where this crate was built without `sensing`.
+#[derive(Clone, Debug)]
+pub(crate) struct Sensing([Ear; SENSING as usize]);
+
+/// What a relay that listens hears, and what it believes of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ear {
+    pub(super) listener: Listener,
+    pub(super) told: Told,
+    /// What the receiver hears, as far as it has told this relay.
+    pub(super) receiver: Average,
+    /// Whether this relay hears something else than all the others.
+    pub(super) off: bool,
+    /// Who does, as of the last pass.
+    pub(super) named: u16,
+    /// At the leader: whether it has told the relays of the view what it believes.
+    pub(super) has_told: bool,
+    /// How much was known when that was taken up.
+    pub(super) known: Known,
+    /// Why nothing was made of the last sums.
+    pub(super) unfit: Option<Unfit>,
+    /// How long to wait for the next pass, and until when.
+    pub(super) wait: u32,
+    pub(super) kept: u8,
+    pub(super) at: Option<Instant>,
+}
+
+/// What is believed before anything is found.
+const AS_LOADED: Told = Told {
+    number: 0,
+    belief: Belief::Mission,
+};
+
+impl Sensing {
+    pub(super) const fn new(listen: Option<Listen>, now: Instant) -> Self {
+        let half_life = match listen {
+            Some(listen) => listen.half_life,
+            None => Duration::from_micros(0),
+        };
+        let ear = Ear {
+            listener: Listener::new(half_life, now),
+            told: AS_LOADED,
+            receiver: Average::NONE,
+            off: false,
+            named: 0,
+            has_told: false,
+            known: Known::NOTHING,
+            unfit: None,
+            wait: 1,
+            kept: 0,
+            at: None,
+        };
+        Self([ear; SENSING as usize])
+    }
+
+    pub(super) const fn ear(&self) -> Option<&Ear> {
+        let ears: &[Ear] = &self.0;
+        ears.first()
+    }
+
+    pub(super) const fn ear_mut(&mut self) -> Option<&mut Ear> {
+        let ears: &mut [Ear] = &mut self.0;
+        ears.first_mut()
+    }
+
+    /// A new view: the leader tells what it believes before anything is agreed on.
+    pub(super) const fn renew(&mut self) {
+        if let Some(ear) = self.ear_mut() {
+            ear.has_told = false;
+            ear.at = None;
+        }
+    }
+
+    /// Another mission is flown.
+    pub(super) const fn load(&mut self) {
+        if let Some(ear) = self.ear_mut() {
+            ear.told.belief = Belief::Mission;
+            ear.told.number = ear.told.number.wrapping_add(1);
+            ear.known = Known::NOTHING;
+            ear.wait = 1;
+        }
+    }
+
+    pub(super) fn next_timeout(&self) -> Option<Instant> {
+        self.ear()?.at
+    }
+
+    /// Whether its time has come; once.
+    pub(super) fn take_due(&mut self, now: Instant) -> bool {
+        self.ear_mut()
+            .is_some_and(|ear| ear.at.take_if(|at| *at <= now).is_some())
+    }
+
+    pub(super) const fn told(&self) -> Told {
+        match self.ear() {
+            Some(ear) => ear.told,
+            None => AS_LOADED,
+        }
+    }
+
+    pub(super) const fn unfit(&self) -> Option<Unfit> {
+        match self.ear() {
+            Some(ear) => ear.unfit,
+            None => None,
+        }
+    }
+
+    /// What has come of it so far.
+    pub(super) fn found(&self) -> Found {
+        Found {
+            told: self.told(),
+            unfit: self.unfit(),
+            off: self.ear().map_or(0, |ear| ear.named),
+        }
+    }
+
+    /// One measurement; whether it was of use.
+    pub(super) fn take(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
+        self.ear_mut()
+            .is_some_and(|ear| ear.take(now, member, sample))
+    }
+}
+
+impl Ear {
+    pub(super) fn heard_at_receiver(&self, now: Instant) -> Receiver {
+        let Average {
+            mean, weight, last, ..
+        } = self.receiver;
+        Receiver {
+            power_w: mean,
+            count: weight * left(now.since(last), self.listener.half_life()),
+        }
+    }
+
+    /// One measurement; whether it was of use.
+    fn take(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
+        let noise_w = member.mission.config().noise_w;
+        // What is left above the receiver's own noise.
+        let heard = |power_w: f32| {
+            let heard_w = power_w - noise_w;
+            (1e-30..=1e6).contains(&heard_w).then_some(heard_w)
+        };
+        match sample {
+            Sample::Heard { at, power_w } if is_near(at) => {
+                let Some(heard_w) = heard(power_w) else {
+                    return false;
+                };
+                let unit = unit_w(&member.mission);
+                let distance_m = member.mission.config().distance_m;
+                let expected = expected_at(&member.mission);
+                self.listener
+                    .take(now, distance_m, at, heard_w / unit, expected);
+                true
+            }
+            Sample::Receiver { power_w } => {
+                let heard = heard(power_w);
+                if let Some(heard_w) = heard {
+                    self.receiver.take(now, self.listener.half_life(), heard_w);
+                }
+                heard.is_some()
+            }
+            _ => false,
+        }
+    }
+}
+
+/// What has come of listening so far.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    pub(super) told: Told,
+    pub(super) unfit: Option<Unfit>,
+    /// Who hears something else than all the others, as of the last pass.
+    pub(super) off: u16,
+}
+
+/// Whether a drone may be there.
+fn is_near(at: Placement) -> bool {
+    [at.x_m, at.y_m, at.altitude_m]
+        .iter()
+        .all(|metres| (-1e7..=1e7).contains(metres))
+}
