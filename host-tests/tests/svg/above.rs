@@ -37,7 +37,7 @@ fn gallery() -> Vec<Picture> {
             (5.0, 900.0, -3000.0),
             (1.0, 5000.0, 20.0),
         ],
-        replaced: vec![(30.0, 200.0, -100.0)],
+        others: vec![(30.0, 200.0, -100.0)],
         lost: vec![3],
         left_out: vec![5],
         events: vec![(5.0, "relay 3 silent".to_owned())],

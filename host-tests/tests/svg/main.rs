@@ -3,8 +3,8 @@
 mod above;
 mod hops;
 mod lost;
+mod others;
 mod plot;
-mod replaced;
 
 use roxmltree::{Document, Node};
 use uav_relay_sim::svg::{Picture, draw};
@@ -72,7 +72,7 @@ fn gallery() -> Vec<Picture> {
         ..level(8)
     });
     pictures.push(Picture {
-        replaced: vec![(30.0, 200.0, -100.0), (5.0, -150.0, 1.0)],
+        others: vec![(30.0, 200.0, -100.0), (5.0, -150.0, 1.0)],
         ..level(8)
     });
     pictures

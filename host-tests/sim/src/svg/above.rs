@@ -58,7 +58,7 @@ fn upright(seen: &Picture, room: &Room) -> Scale {
     let (mut low, mut high) = (room.least_m.min(0.0), room.most_m.max(0.0));
     let reach = FARTHEST * high.max(-low).max(1e-3);
     let relays = seen.nodes.iter().map(|(_, y)| *y);
-    let interferers = seen.interferers.iter().chain(&seen.replaced);
+    let interferers = seen.interferers.iter().chain(&seen.others);
     let sources = interferers.map(|(_, _, y)| *y);
     for y in relays.chain(sources).filter(|y| y.abs() <= reach) {
         (low, high) = (low.min(y), high.max(y));

@@ -18,7 +18,7 @@ use axis::{Frame, Scale};
 use canvas::Canvas;
 use labels::Labels;
 use picture::{BOTTOM, LEFT, RIGHT, TOP, WIDTH, bottom, decibels, length, placed, worst};
-pub use picture::{Picture, Room, room};
+pub use picture::{Others, Picture, Room, room};
 
 /// Draws the chain as an SVG document.
 ///
@@ -35,11 +35,11 @@ pub fn draw(picture: &Picture) -> String {
     axis::draw(&mut canvas, &frame, "h (m)");
     hops::draw(&mut canvas, &mut labels, &hops);
     nodes::relays(&mut canvas, &mut labels, &frame, picture, "h");
-    sources::replaced(&mut canvas, &mut labels, &frame, picture);
+    sources::others(&mut canvas, &mut labels, &frame, picture);
     sources::draw(&mut canvas, &mut labels, &frame, picture);
     nodes::ends(&mut canvas, &mut labels, &frame, length(picture));
     sources::label(&mut canvas, &mut labels, &frame, picture);
-    sources::label_replaced(&mut canvas, &mut labels, &frame, picture);
+    sources::label_others(&mut canvas, &mut labels, &frame, picture);
     hops::label(&mut canvas, &mut labels, &hops);
     nodes::label(&mut canvas, &mut labels, &frame, picture);
     if let Some(room) = &picture.room {
@@ -59,7 +59,7 @@ fn frame(picture: &Picture) -> Frame {
         let x = x.clamp(-distance, 2.0 * distance);
         (low, high, top) = (low.min(x), high.max(x), top.max(h));
     }
-    for (_, x, _) in picture.interferers.iter().chain(&picture.replaced) {
+    for (_, x, _) in picture.interferers.iter().chain(&picture.others) {
         if sources::near(*x, distance) {
             (low, high) = (low.min(*x), high.max(*x));
         }

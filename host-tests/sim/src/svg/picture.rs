@@ -24,8 +24,10 @@ pub struct Picture {
     pub distance_m: f64,
     /// Every interferer: transmit power in watts, place along x and offset y on the ground, both in metres.
     pub interferers: Vec<(f64, f64, f64)>,
-    /// Those of the mission that was flown before, if there was another one: drawn faint, where the plot holds them.
-    pub replaced: Vec<(f64, f64, f64)>,
+    /// Those that are not there: drawn faint, where the plot holds them.
+    pub others: Vec<(f64, f64, f64)>,
+    /// What these are.
+    pub others_are: Others,
     /// The relays from Tx to Rx: place along x and altitude, both in metres. One that is not finite is left out.
     pub nodes: Vec<(f64, f64)>,
     /// Where relays may stand beside the line: the chain is drawn from above, too.
@@ -38,6 +40,34 @@ pub struct Picture {
     pub left_out: Vec<usize>,
     /// What happened to the chain: when, s, and in a few words. In order.
     pub events: Vec<(f64, String)>,
+}
+
+/// Interferers that are not there.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Others {
+    /// Those of the mission that was flown before.
+    #[default]
+    Before,
+    /// The one that the relays believe in.
+    Believed,
+}
+
+impl Others {
+    /// What stands beside the marker.
+    pub(super) const fn word(self) -> &'static str {
+        match self {
+            Self::Before => "before",
+            Self::Believed => "believed",
+        }
+    }
+
+    /// What the marker says of itself.
+    pub(super) const fn tip(self) -> &'static str {
+        match self {
+            Self::Before => "interferer of the mission before",
+            Self::Believed => "interferer that the relays believe in",
+        }
+    }
 }
 
 /// The room beside the line, and who stands where in it; y is to the right of x as seen from above, in metres.

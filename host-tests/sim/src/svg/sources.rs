@@ -3,7 +3,7 @@
 use super::axis::Frame;
 use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
-use super::picture::{LEFT, Picture, RIGHT, TOP, length};
+use super::picture::{LEFT, Others, Picture, RIGHT, TOP, length};
 
 /// Height of the words, and from one line of them to the next.
 const SIZE: f64 = 10.0;
@@ -61,42 +61,43 @@ fn whole((power, x, y): Source) -> String {
     format!("{} W, x = {} m, y = {} m", plain(power), plain(x), plain(y))
 }
 
-/// Where the plot holds interferers of the mission before, and no marker of the present one covers them.
+/// Where the plot holds interferers that are not there; those of the mission before as far as no marker of the present one covers them.
 fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
     let (inside, _) = sorted(&picture.interferers, length(picture));
-    let (before, _) = sorted(&picture.replaced, length(picture));
+    let (before, _) = sorted(&picture.others, length(picture));
     let all = before
         .into_iter()
         .map(|source| (frame.x.at(source.1), source));
     all.filter(|(at, _)| {
         let covers = |(_, x, _): &Source| (frame.x.at(*x) - at).abs() < 12.0;
-        !inside.iter().any(covers)
+        picture.others_are == Others::Believed || !inside.iter().any(covers)
     })
     .collect()
 }
 
-/// Draws the markers of interferers of the mission before.
-pub(super) fn replaced(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
+/// Draws the markers of interferers that are not there.
+pub(super) fn others(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let ground = frame.h.at(0.0);
     for (at, source) in gone(picture, frame) {
-        let tip = format!("interferer of the mission before: {}", whole(source));
+        let tip = format!("{}: {}", picture.others_are.tip(), whole(source));
         canvas.marked(&diamond((at, ground)), "before", &tip);
         labels.take(Area::around((at, ground - 3.0), (12.0, 6.0)));
     }
 }
 
 /// Says what they are, where there is room.
-pub(super) fn label_replaced(
+pub(super) fn label_others(
     canvas: &mut Canvas,
     labels: &mut Labels,
     frame: &Frame,
     picture: &Picture,
 ) {
     let ground = frame.h.at(0.0);
+    let word = picture.others_are.word();
     for (at, _) in gone(picture, frame) {
         let place = (at, ground - 13.0);
-        if labels.try_take(Area::around(place, (width("before", SIZE) + 2.0, LINE))) {
-            canvas.text((place.0, place.1 + 0.36 * SIZE), "faint halo", "before");
+        if labels.try_take(Area::around(place, (width(word, SIZE) + 2.0, LINE))) {
+            canvas.text((place.0, place.1 + 0.36 * SIZE), "faint halo", word);
         }
     }
 }
@@ -168,11 +169,7 @@ pub(super) fn from_above(
 ) -> Seen {
     let mut seen = Vec::new();
     for (all, class, tip) in [
-        (
-            &picture.replaced,
-            "before",
-            "interferer of the mission before",
-        ),
+        (&picture.others, "before", picture.others_are.tip()),
         (&picture.interferers, "source", "interferer"),
     ] {
         let (inside, _) = sorted(all, length(picture));
@@ -186,7 +183,7 @@ pub(super) fn from_above(
                 format!(", y = {} m", plain(y))
             };
             seen.push(if class == "before" {
-                (at, "before".to_owned(), "faint halo")
+                (at, picture.others_are.word().to_owned(), "faint halo")
             } else {
                 (at, format!("{} W{beyond}", plain(power)), "halo")
             });

@@ -24,7 +24,7 @@ use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::{Outcome, RelayEnd};
 use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_sim::svg::{self, Picture, room};
+use uav_relay_sim::svg::{self, Others, Picture, room};
 
 use options::{Method, Options};
 
@@ -270,18 +270,22 @@ fn picture(
         outcome.relays.iter().map(place).collect()
     };
     let before = scenario.sources();
-    let (interferers, replaced) = match (report.version, mission.interference()) {
-        (Some(1..), uav_relay::Interference::Source(at)) => {
+    let believed = report.listened.and_then(|listened| listened.believed);
+    let uploaded = report.version.is_some_and(|version| version > 0);
+    let (interferers, others, others_are) =
+        if let (true, uav_relay::Interference::Source(at)) = (uploaded, mission.interference()) {
             let now = [at.power_w, at.x_m, at.y_m].map(f64::from);
-            (vec![now.into()], before)
-        }
-        _ => (before, Vec::new()),
-    };
+            (vec![now.into()], before, Others::Before)
+        } else {
+            let believed = believed.map(|at| [at.power_w, at.x_m, at.y_m].map(f64::from).into());
+            (before, believed.into_iter().collect(), Others::Believed)
+        };
     Picture {
         title_method: report.method.clone(),
         distance_m: f64::from(mission.config().distance_m),
         interferers,
-        replaced,
+        others,
+        others_are,
         nodes,
         room: room(mission, aside),
         hop_sir,

@@ -1,7 +1,7 @@
-//! The interferer of a mission that was replaced in flight.
+//! Interferers that are not there: of a mission that was replaced in flight, and one that is only believed in.
 
 use roxmltree::{Document, Node};
-use uav_relay_sim::svg::{Picture, draw};
+use uav_relay_sim::svg::{Others, Picture, draw};
 
 use super::{all, level, number, tip};
 
@@ -9,7 +9,7 @@ use super::{all, level, number, tip};
 fn the_interferer_of_the_mission_before_is_faint_and_said_to_be_that() {
     let mut picture = level(8);
     let without = draw(&picture);
-    picture.replaced = vec![(30.0, 200.0, -100.0)];
+    picture.others = vec![(30.0, 200.0, -100.0)];
     let svg = draw(&picture);
     let document = Document::parse(&svg).unwrap();
     let [before] = all(&document, "path", "before").try_into().unwrap();
@@ -41,16 +41,37 @@ fn the_interferer_of_the_mission_before_is_faint_and_said_to_be_that() {
 #[test]
 fn where_its_marker_would_only_be_in_the_way_it_is_left_out() {
     let same = level(8).interferers;
-    for replaced in [
+    for others in [
         same,
         vec![(80.0, 5000.0, 0.0)],
         vec![(80.0, f64::NAN, 0.0)],
         Vec::new(),
     ] {
         let picture = Picture {
-            replaced: replaced.clone(),
+            others: others.clone(),
             ..level(8)
         };
-        assert_eq!(draw(&picture), draw(&level(8)), "{replaced:?}");
+        assert_eq!(draw(&picture), draw(&level(8)), "{others:?}");
+    }
+}
+
+/// Next to the true one, too: that is what the picture is looked at for.
+#[test]
+fn what_is_believed_is_drawn_beside_what_is_true() {
+    for (x, y) in [(200.0, -100.0), (500.5, 399.0)] {
+        let picture = Picture {
+            others: vec![(30.0, x, y)],
+            others_are: Others::Believed,
+            ..level(8)
+        };
+        let svg = draw(&picture);
+        let document = Document::parse(&svg).unwrap();
+        let [believed] = all(&document, "path", "before").try_into().unwrap();
+        let tip = tip(&believed);
+        assert!(
+            tip.starts_with("interferer that the relays believe in: 30 W"),
+            "{tip}"
+        );
+        assert_eq!(all(&document, "path", "source").len(), 1 + 1);
     }
 }
