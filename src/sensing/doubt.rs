@@ -1,7 +1,7 @@
 //! A relay that hears something else than all the others: its receiver is broken, or it lies.
 //!
-//! What came of a pass tells every relay the sums of all. Each takes its own from them, fits a source to the rest, and holds what it hears
-//! against that. Where one relay is wrong, it alone finds the others of one mind; all the others find the wrong one among the rest.
+//! A pass tells every relay the sums of those before it, and what comes back those of the ones after it. Each fits a source to both, and
+//! holds what it hears against that. Where one relay is wrong, it alone finds the others of one mind; all the others find the wrong one among the rest.
 
 use super::fit::Fit;
 use super::listener::Place;
@@ -16,12 +16,25 @@ const DEVIATIONS: f64 = 49.0;
 /// The others are of one mind up to this variance of their relative errors (some 1.5 dB).
 const OF_ONE_MIND: f64 = 0.1;
 
-/// Whether a relay that hears `place` is off all the others, whose sums are `others`.
+/// A place that counts so many times less than the others' on average is lost in the rounding of their sums, and one of them may be what is
+/// wrong: nothing is said then. Where something is believed all places count alike.
+const LOST: f32 = 3e3;
+
+/// Whether a relay that hears `place`, where what is believed makes `expected`, is off all the others, whose sums are `others`.
 ///
 /// The difference of v and what the others make of it, e, is (v / e - e / v) / 2, which grows alike in both directions.
-pub(crate) fn is_off(others: &Sums, place: &Place, relative_error: f32) -> bool {
+pub(crate) fn is_off(
+    others: &Sums,
+    place: &Place,
+    expected: Option<f32>,
+    relative_error: f32,
+) -> bool {
     // With fewer the others could be as wrong.
     if others.count() < 3.5 {
+        return false;
+    }
+    let weight = 1.0 / expected.unwrap_or(place.v);
+    if others.weight() > LOST * weight * weight * others.count() {
         return false;
     }
     let Ok(fit) = Fit::of(others, relative_error) else {

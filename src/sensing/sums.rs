@@ -58,15 +58,6 @@ impl Sums {
         }
     }
 
-    /// What is left without `other`.
-    pub(crate) fn without(&self, other: &Self) -> Self {
-        let mut rest = *self;
-        for (sum, number) in rest.numbers.iter_mut().zip(other.numbers) {
-            *sum -= number;
-        }
-        rest
-    }
-
     /// They are `seconds` older, and count `share` of what they did.
     pub(crate) fn fade(&mut self, share: f32, seconds: f32) {
         let [.., count, _, age] = &mut self.numbers;
@@ -80,6 +71,12 @@ impl Sums {
     pub fn count(&self) -> f32 {
         let [.., count, _, _] = self.numbers;
         count
+    }
+
+    /// The weights of all places.
+    pub(crate) fn weight(&self) -> f32 {
+        let [weight, ..] = self.numbers;
+        weight
     }
 
     /// How old they are on average, s.

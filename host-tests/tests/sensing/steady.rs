@@ -71,11 +71,22 @@ fn under_faults_all_believe_the_same_to_the_bit() {
     assert!(quantile(&mut shares, 0.5) >= 0.98, "{shares:?}");
 }
 
-/// One relay of eight measures 20 dB too much or too little from the beginning, or breaks altogether later. More than that from the
-/// beginning, while nothing is believed, outweighs all the others: see the limits in RESULTS.
+/// One relay of eight measures something else than it should from the beginning, while nothing is believed, or from later on.
 #[test]
 fn a_broken_sensor_is_named_and_left_out() {
-    for (off_db, since_s) in [(20.0, 0), (-20.0, 0), (60.0, 40), (-60.0, 40)] {
+    for (off_db, since_s) in [
+        (10.0, 0),
+        (-10.0, 0),
+        (20.0, 0),
+        (-20.0, 0),
+        (30.0, 0),
+        (-30.0, 0),
+        (60.0, 0),
+        (-60.0, 0),
+        (100.0, 0),
+        (60.0, 40),
+        (-60.0, 40),
+    ] {
         let seeds: Vec<u64> = (0..count(20)).collect();
         let outcomes: Vec<(bool, bool, f64)> = seeds
             .into_par_iter()

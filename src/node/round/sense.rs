@@ -134,6 +134,9 @@ impl Computation {
         });
         self.state.wait();
         if context.is_last() {
+            if let PassKind::Sense(sense) = &mut self.pass {
+                sense.hearing.sums = Sums::NONE;
+            }
             return self.conclude_sense(context);
         }
         Action::Forward
@@ -213,25 +216,29 @@ impl Computation {
         true
     }
 
-    /// Whether this relay hears something else than all the others do: then its share is left out, and it is named.
+    /// Whether this relay hears something else than all the others do: then its share is not added to what those after it hear, and it is
+    /// named.
     fn doubt(&mut self, context: &Context<'_>) {
-        let (Some(listen), Some(ear), PassKind::Sense(Sense { hearing, own, .. })) = (
+        let (Some(listen), Some(ear), PassKind::Sense(sense)) = (
             context.settings().listen,
             self.sensing.ear_mut(),
             &mut self.pass,
         ) else {
             return;
         };
-        let distance_m = context.mission().config().distance_m;
-        let Some(place) = ear.listener.place(distance_m) else {
-            return;
-        };
-        let others = hearing.sums.without(own);
-        let off = is_off(&others, &place, listen.relative_error);
+        let mission = context.mission();
+        let mut others = sense.from;
+        others.merge(&sense.hearing.sums);
+        let place = ear.listener.place(mission.config().distance_m);
+        let off = place.is_some_and(|place| {
+            let expected = expected_at(mission)(&place.terms);
+            is_off(&others, &place, expected, listen.relative_error)
+        });
         if off {
-            hearing.sums = others;
-            hearing.off = context.member.node;
+            sense.hearing.off = context.member.node;
             ear.listener.forget_past();
+        } else {
+            sense.hearing.sums.merge(&sense.own);
         }
         ear.off = off;
     }

@@ -26,7 +26,7 @@ impl Receiver {
     }
 }
 
-/// Onward: what is believed of the interference, and what the relays up to the sender hear. Back: what all of them do.
+/// Onward: what is believed of the interference, and what the relays up to the sender hear. Back: what those from the sender on do.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hearing {
     /// Number of the pass, wrapping.

@@ -83,7 +83,7 @@ pub enum Message {
     Gathered(Roster),
     /// Onward: what is believed of the interference, and what the relays up to the sender hear.
     Sense(Hearing),
-    /// Back: what those along the whole chain do.
+    /// Back: what the relays from the sender on hear.
     Sensed(Hearing),
     /// Onward: whose turn it is to move.
     Token(Token),
