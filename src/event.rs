@@ -1,8 +1,8 @@
 //! What the firmware is told. An event is a flag with the node that it is about beside it, so a firmware that does not listen loses
 //! nothing but repetitions, and of two nodes on one side the one before.
 
+use crate::line::LineError;
 use crate::side::Side;
-use crate::sites::LineError;
 
 /// Something a firmware may want to act on. The state behind it is read from the relay.
 ///

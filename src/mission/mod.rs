@@ -5,6 +5,7 @@
 //! | `config`, `parts` | its parameters as plain numbers |
 //! | `error` | which of them was refused |
 //! | `validated` | a mission whose parameters have been checked |
+//! | `believed`, `unknown` | what the relays have found instead of its interference; nothing at all |
 //! | `gains` | what transmit powers are worth on its hops |
 //! | `steps` | the least steps between its relays |
 
@@ -16,6 +17,7 @@ mod parts;
 mod steps;
 #[cfg(test)]
 pub(crate) mod tests;
+mod unknown;
 mod validated;
 
 pub use config::{MAX_RELAYS, MissionConfig};

@@ -1,9 +1,9 @@
 //! A mission whose parameters have been checked, and what is asked of it.
 
-use super::believed::{FAR, even_gains};
 use super::config::MissionConfig;
 use super::error::MissionError;
 use super::parts::{Heading, Interference, Interferer, within};
+use super::unknown::{FAR, even_gains};
 use crate::field::{Field, InNoise};
 use crate::power_ratio::PowerRatio;
 

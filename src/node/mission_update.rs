@@ -30,17 +30,19 @@ use super::context::Member;
 use super::timing::earliest;
 #[cfg(feature = "upload")]
 use crate::jitter::Jitter;
+#[cfg(feature = "upload")]
+use crate::line::LineError;
 use crate::mission::Mission;
 #[cfg(feature = "upload")]
 use crate::settings::Settings;
 #[cfg(feature = "upload")]
 use crate::side::Side;
-#[cfg(feature = "upload")]
-use crate::sites::{LineError, Sites};
 use crate::time::Instant;
 use crate::wire::digest::MissionId;
 #[cfg(feature = "upload")]
 use crate::wire::upload::{Upload, UploadError};
+#[cfg(feature = "upload")]
+use crate::{line, sites::Sites};
 
 /// Whether this crate was built to take a newer mission in flight.
 const UPLOAD: bool = cfg!(feature = "upload");
@@ -339,7 +341,7 @@ fn fits(member: &Member, upload: &Upload) -> Result<(), UploadError> {
     let is_other = config.distance_m.to_bits() != member.loaded_m.to_bits();
     match upload.sites() {
         // Every relay checks that, whether it flies along a line on earth or not: all hold it, or none does.
-        Some(sites) => sites.check(config.distance_m).map_err(UploadError::Line),
+        Some(sites) => line::check(sites, config.distance_m).map_err(UploadError::Line),
         None if member.settings.sited && is_other => Err(UploadError::Line(LineError::Distance)),
         None => Ok(()),
     }

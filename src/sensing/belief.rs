@@ -9,7 +9,8 @@
 //! | too few places, or no source | a source that what is heard contradicts | the relays spread evenly |
 //! | too few places, or no source | a source | it is kept |
 
-use super::fit::{Fit, Found, Unfit, misfit};
+use super::fit::{Fit, FoundSource, Unfit, misfit};
+use super::receiver::Receiver;
 use super::sums::Sums;
 use super::terms::{coefficients, terms, unit_w};
 use super::track::Track;
@@ -17,7 +18,6 @@ use crate::mission::{Interferer, Mission};
 use crate::place::Placement;
 use crate::settings::Listen;
 use crate::time::{Duration, Instant};
-use crate::wire::message::Receiver;
 
 /// What the chain believes of the interference.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -105,7 +105,7 @@ const GUESSED: f64 = 16.0;
 
 /// How much was known when a belief was taken up.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Known {
+pub(crate) struct Knowledge {
     /// Places over the variance of one.
     information: f64,
     /// How far off it may be by chance, relative, as a mean square.
@@ -116,7 +116,7 @@ pub(crate) struct Known {
     track: Track,
 }
 
-impl Known {
+impl Knowledge {
     pub(crate) const NOTHING: Self = Self {
         information: 0.0,
         chance: 0.0,
@@ -131,7 +131,7 @@ pub(crate) struct Review {
     /// What is to be believed instead.
     pub(crate) adopt: Option<Belief>,
     /// How much was known by then.
-    pub(crate) known: Known,
+    pub(crate) known: Knowledge,
     /// Why there is no source.
     pub(crate) unfit: Option<Unfit>,
 }
@@ -144,7 +144,7 @@ pub(crate) fn review(
     sums: &Sums,
     receiver: Receiver,
     listen: &Listen,
-    before: Known,
+    before: Knowledge,
     now: Instant,
 ) -> Review {
     let known = mission.known_source();
@@ -162,7 +162,7 @@ pub(crate) fn review(
     let (source, moves) = (ahead.unwrap_or(found.source), ahead.is_some());
     let receiver_w = at_receiver(mission, &fit, &source, receiver, listen.relative_error);
     let information = fit.information();
-    let before = Known { track, ..before };
+    let before = Knowledge { track, ..before };
     let keep = |unfit| Review {
         adopt: None,
         known: before,
@@ -170,7 +170,7 @@ pub(crate) fn review(
     };
     let adopt = |refined| Review {
         adopt: Some(Belief::Source { source, receiver_w }),
-        known: Known {
+        known: Knowledge {
             information,
             chance: fit.chance(),
             refined,
@@ -219,7 +219,7 @@ fn fitted(
     sums: &Sums,
     receiver: Receiver,
     listen: &Listen,
-) -> Result<(Fit, Found), Unfit> {
+) -> Result<(Fit, FoundSource), Unfit> {
     let fit = Fit::of(sums, listen.relative_error)?;
     let fit = with_receiver(mission, fit, sums, receiver, listen.relative_error);
     let side_m = mission.known_source().map_or(1.0, |source| source.y_m);
@@ -230,7 +230,7 @@ fn fitted(
 fn followed(
     mission: &Mission,
     fit: &Fit,
-    found: &Found,
+    found: &FoundSource,
     track: &mut Track,
     [heard, now]: [Instant; 2],
     listen: &Listen,
@@ -322,7 +322,7 @@ fn at_a_loss(
     belief: &Belief,
     sums: &Sums,
     listen: &Listen,
-    before: Known,
+    before: Knowledge,
     unfit: Unfit,
 ) -> Review {
     let known = mission.known_source();
@@ -342,7 +342,11 @@ fn at_a_loss(
     let heard = sums.count() > 0.0;
     Review {
         adopt: (heard && contradicted).then_some(Belief::Unknown(spread)),
-        known: if contradicted { Known::NOTHING } else { before },
+        known: if contradicted {
+            Knowledge::NOTHING
+        } else {
+            before
+        },
         unfit: Some(unfit),
     }
 }

@@ -29,7 +29,7 @@ const SIDES: f64 = 2.5e-5;
 /// A source that was found.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Found {
+pub struct FoundSource {
     /// It.
     pub source: Interferer,
     /// The variance of its place, along the line and to its right, m^2.
@@ -164,7 +164,7 @@ impl Fit {
         clippy::cast_possible_truncation,
         reason = "the mission checks the range of what comes of it"
     )]
-    pub fn source(&self, mission: &Mission, side_m: f32) -> Result<Found, Unfit> {
+    pub fn source(&self, mission: &Mission, side_m: f32) -> Result<FoundSource, Unfit> {
         let [a, b, k, d] = self.coefficients;
         let [aa, _, _, ad, ..] = self.products;
         let half = 0.5 * f64::from(mission.config().distance_m);
@@ -194,7 +194,7 @@ impl Fit {
                 let aside = [side, side * x, side * (2.0 * x * x - above), side * t];
                 let variance =
                     |slopes| (self.variance * self.factor.variance(slopes) * half * half) as f32;
-                return Ok(Found {
+                return Ok(FoundSource {
                     source: found,
                     variance_m2: [variance(along), variance(aside)],
                     is_one: true,
@@ -207,7 +207,7 @@ impl Fit {
         let found = source(found.map(f64::from));
         found
             .is_valid()
-            .then_some(Found {
+            .then_some(FoundSource {
                 source: found,
                 variance_m2: [0.0; 2],
                 is_one: false,

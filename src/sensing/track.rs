@@ -4,7 +4,7 @@
 //! the age of its sums; and two fits share what has not faded between them, so each counts as much as the time between them is of a
 //! half-life.
 
-use super::fit::Found;
+use super::fit::FoundSource;
 use crate::time::{Duration, Instant};
 
 /// The velocity that an interferer may have, m/s, before anything is known of it.
@@ -84,7 +84,7 @@ impl Track {
     };
 
     /// Takes a fit of what was heard at `at`, with this half-life.
-    pub(crate) fn take(&mut self, found: &Found, at: Instant, half_life: Duration) {
+    pub(crate) fn take(&mut self, found: &FoundSource, at: Instant, half_life: Duration) {
         let half_life = half_life.as_micros() as f32 * 1e-6;
         let fits = [found.source.x_m, found.source.y_m]
             .into_iter()

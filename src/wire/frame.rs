@@ -3,6 +3,7 @@
 use super::auth::{Signer, TAG};
 use super::crc::CRC_32C;
 use super::message::{MAX_BODY, Message, MessageError};
+pub use super::node_number::MAX_NODE;
 
 /// Version of the format, in the top four bits of the first word.
 pub const VERSION: u8 = 1;
@@ -27,9 +28,6 @@ const SIGNED: u16 = 0x1000;
 
 /// Flag: the body is a handshake. Only with a tag.
 const HELLO: u16 = 0x2000;
-
-/// The largest node number an address can hold; 4095 is kept for a broadcast.
-pub const MAX_NODE: u16 = 4094;
 
 /// Room for one frame on its way to the link.
 pub type FrameBuf = [u8; MAX_FRAME];

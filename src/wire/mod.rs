@@ -1,6 +1,6 @@
 //! Bytes on the link: [`deframe`] cuts the byte stream at delimiters and undoes COBS, [`frame`] checks integrity and holds
 //! the addresses, [`message`] is what neighbours say, [`digest`] how they tell missions apart, [`auth`] how they tell
-//! members from others, `upload` how a newer mission is told. `FORMAT.md` beside this file has byte tables and examples.
+//! members from others, `upload` how a newer mission is told, [`node_number`] which nodes there can be. `FORMAT.md` beside this file has byte tables and examples.
 
 pub mod auth;
 #[cfg(feature = "auth")]
@@ -10,6 +10,7 @@ pub mod deframe;
 pub mod digest;
 pub mod frame;
 pub mod message;
+pub mod node_number;
 #[cfg(feature = "auth")]
 pub(crate) mod session;
 #[cfg(feature = "upload")]

@@ -6,8 +6,9 @@
 
 use super::digest::{MissionId, between, digest, of};
 pub use super::message::UPLOAD as LENGTH;
+use crate::line::{self, LineError};
 use crate::mission::{Interference, Mission, MissionConfig, MissionError};
-use crate::sites::{LineError, Sites};
+use crate::sites::Sites;
 
 /// A mission with a version.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -93,9 +94,7 @@ impl Upload {
     pub fn with_sites(self, sites: Sites) -> Result<Self, UploadError> {
         let valid = sites.are_valid().then_some(sites);
         let sites = valid.ok_or(UploadError::Line(LineError::Sites))?;
-        sites
-            .check(self.config.distance_m)
-            .map_err(UploadError::Line)?;
+        line::check(sites, self.config.distance_m).map_err(UploadError::Line)?;
         Ok(Self {
             sites: Some(sites),
             ..self

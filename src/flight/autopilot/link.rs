@@ -3,7 +3,7 @@
 use super::carrot::{Carrot, Pace};
 use super::clock::millis;
 use super::event::{AutopilotEvent, Events};
-use super::noise::Noise;
+use super::noise::RadioNoise;
 use super::report::{Report, line_of};
 use super::state::State;
 use super::streams::Streams;
@@ -57,7 +57,7 @@ pub struct Autopilot {
     report: Report,
     position: Option<Position>,
     /// What a radio has heard where the drone was, W.
-    noise: Noise,
+    noise: RadioNoise,
     events: Events,
     sequence: u8,
     heartbeat_at: Instant,
@@ -81,7 +81,7 @@ impl Autopilot {
             fell: false,
             report: Report::default(),
             position: None,
-            noise: Noise::NONE,
+            noise: RadioNoise::NONE,
             events: Events::default(),
             sequence: 0,
             heartbeat_at: now,

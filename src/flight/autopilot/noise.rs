@@ -13,9 +13,9 @@ const SENSING: bool = cfg!(feature = "sensing");
 
 /// The newest that nobody has taken.
 #[derive(Clone, Debug)]
-pub(super) struct Noise(Option<(Placement, f32)>);
+pub(super) struct RadioNoise(Option<(Placement, f32)>);
 
-impl Noise {
+impl RadioNoise {
     pub(super) const NONE: Self = Self(None);
 
     /// Takes what was received, if it is of that.

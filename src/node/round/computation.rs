@@ -1,8 +1,7 @@
 //! What a relay holds while it does its share of an algorithm: the pass that is under way, its place, its targets.
 
-use super::ear::Sensing;
+use super::ear::{SENSING, Sense, Sensing};
 use super::seats::Seats;
-use super::sense::Sense;
 use super::state::{Action, Phase, RoundState};
 use super::sweeping::Sweeping;
 use super::task::LeaderTask;
@@ -23,7 +22,6 @@ pub(super) const PLACES_AT_ONCE: u16 = 600;
 /// Whether this crate was built with the methods beyond Algorithm 1. Without one, none of its code is reached.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
 pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
-pub(crate) const SENSING: bool = cfg!(feature = "sensing");
 
 /// What the current pass carries.
 #[derive(Clone, Debug)]

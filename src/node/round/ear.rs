@@ -1,17 +1,21 @@
 //! What one relay has heard and believes, between the passes.
 
-use super::computation::SENSING;
 use crate::node::context::Member;
 use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::sensing::average::{Average, left};
-use crate::sensing::belief::{Belief, Known, Told};
+use crate::sensing::belief::{Belief, Knowledge, Told};
 use crate::sensing::fit::{Unfit, expected_at};
 use crate::sensing::listener::Listener;
+use crate::sensing::receiver::Receiver;
+use crate::sensing::sums::Sums;
 use crate::sensing::terms::unit_w;
 use crate::settings::Listen;
 use crate::time::{Duration, Instant};
-use crate::wire::message::Receiver;
+use crate::wire::message::Heard;
+
+/// Whether this crate was built to listen. If not, none of its code is reached.
+pub(crate) const SENSING: bool = cfg!(feature = "sensing");
 
 /// What a relay hears, and what it believes of it: nothing, and no room for it, where this crate was built without `sensing`.
 #[derive(Clone, Debug)]
@@ -31,7 +35,7 @@ pub(super) struct Ear {
     /// At the leader: whether it has told the relays of the view what it believes.
     pub(super) has_told: bool,
     /// How much was known when that was taken up.
-    pub(super) known: Known,
+    pub(super) known: Knowledge,
     /// Why nothing was made of the last sums.
     pub(super) unfit: Option<Unfit>,
     /// How long to wait for the next pass, and until when.
@@ -59,7 +63,7 @@ impl Sensing {
             off: false,
             named: 0,
             has_told: false,
-            known: Known::NOTHING,
+            known: Knowledge::NOTHING,
             unfit: None,
             wait: 1,
             kept: 0,
@@ -91,7 +95,7 @@ impl Sensing {
         if let Some(ear) = self.ear_mut() {
             ear.told.belief = Belief::Mission;
             ear.told.number = ear.told.number.wrapping_add(1);
-            ear.known = Known::NOTHING;
+            ear.known = Knowledge::NOTHING;
             ear.wait = 1;
         }
     }
@@ -121,8 +125,8 @@ impl Sensing {
     }
 
     /// What has come of it so far.
-    pub(super) fn found(&self) -> Found {
-        Found {
+    pub(super) fn found(&self) -> Findings {
+        Findings {
             told: self.told(),
             unfit: self.unfit(),
             off: self.ear().map_or(0, |ear| ear.named),
@@ -179,9 +183,21 @@ impl Ear {
     }
 }
 
+/// A pass on which relays add up what they hear, as one of them sees it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sense {
+    pub(super) hearing: Heard,
+    /// What came from the relay before.
+    pub(super) from: Sums,
+    /// Its own share.
+    pub(super) own: Sums,
+    /// Whether places were agreed on by what is believed.
+    pub(super) holds: bool,
+}
+
 /// What has come of listening so far.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Found {
+pub(super) struct Findings {
     pub(super) told: Told,
     pub(super) unfit: Option<Unfit>,
     /// Who hears something else than all the others, as of the last pass.

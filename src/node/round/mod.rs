@@ -43,8 +43,8 @@ use crate::settings::Settings;
 use crate::time::Instant;
 use crate::wire::message::Message;
 
-use computation::{ADJUST, ALTITUDE, Computation, SENSING};
-use ear::Found;
+use computation::{ADJUST, ALTITUDE, Computation};
+use ear::{Findings, SENSING};
 use state::{Action, Phase};
 
 /// What is to be sent.
@@ -164,7 +164,7 @@ impl Round {
     }
 
     /// As [`proceed`](Self::proceed), and says what has been found since `before`.
-    fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Found) -> Effects {
+    fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
             return effects;

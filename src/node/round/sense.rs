@@ -10,32 +10,22 @@
 //! A relay that has missed such a pass can take no part in the next one: its number is not the one that follows. So whoever agrees on
 //! places believes what all do.
 
-use super::computation::{Computation, PassKind, SENSING};
+use super::computation::{Computation, PassKind};
+use super::ear::{SENSING, Sense};
 use super::state::{Action, Phase};
 use crate::node::context::Context;
 use crate::sensing::belief::{Told, review};
 use crate::sensing::doubt::is_off;
 use crate::sensing::fit::expected_at;
+use crate::sensing::receiver::Receiver;
 use crate::sensing::sums::Sums;
-use crate::wire::message::{Hearing, Receiver};
+use crate::wire::message::Heard;
 
 /// The time between passes grows up to so many times the least.
 const RAREST: u32 = 64;
 
 /// and doubles when so many passes in a row have changed nothing.
 const PATIENCE: u8 = 4;
-
-/// A pass of that kind, as one relay sees it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sense {
-    pub(super) hearing: Hearing,
-    /// What came from the relay before.
-    from: Sums,
-    /// Its own share.
-    own: Sums,
-    /// Whether places were agreed on by what is believed.
-    holds: bool,
-}
 
 impl Computation {
     /// Whether the chain finds its interferer by itself.
@@ -75,7 +65,7 @@ impl Computation {
         let has_told = core::mem::replace(&mut ear.has_told, true);
         let holds = has_told && self.state.phase() == Phase::Holding;
         self.begin();
-        let hearing = Hearing {
+        let hearing = Heard {
             number: self.state.number(),
             mission: context.digest(),
             told: self.sensing.told(),
@@ -87,7 +77,7 @@ impl Computation {
     }
 
     /// One from the relay before.
-    pub(crate) fn on_sense(&mut self, context: &Context<'_>, hearing: &Hearing) -> Action {
+    pub(crate) fn on_sense(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         let same = matches!(&self.pass, PassKind::Sense(known)
             if known.hearing.told == hearing.told && known.from == hearing.sums);
         let arrival = self.state.arrival(hearing.number, same);
@@ -102,7 +92,7 @@ impl Computation {
         self.sense(context, *hearing, holds)
     }
 
-    fn sense(&mut self, context: &Context<'_>, hearing: Hearing, holds: bool) -> Action {
+    fn sense(&mut self, context: &Context<'_>, hearing: Heard, holds: bool) -> Action {
         let Some(ear) = self.sensing.ear_mut() else {
             return Action::Stale;
         };
@@ -143,7 +133,7 @@ impl Computation {
     }
 
     /// What came of it, from the relay after.
-    pub(crate) fn on_sensed(&mut self, context: &Context<'_>, hearing: &Hearing) -> Action {
+    pub(crate) fn on_sensed(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         if let PassKind::Sense(known) = &mut self.pass
             && self.state.awaits(hearing.number)
             && hearing.told == known.hearing.told
@@ -186,7 +176,7 @@ impl Computation {
     }
 
     /// Whether the leader believes something else from now on.
-    fn reconsiders(&mut self, context: &Context<'_>, hearing: &Hearing) -> bool {
+    fn reconsiders(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(ear)) = (context.settings().listen, self.sensing.ear_mut()) else {
             return false;
         };

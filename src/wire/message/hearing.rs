@@ -5,30 +5,16 @@ use serde::{Deserialize, Serialize};
 use super::parts::{MessageError, PassId, Word, read, write};
 use crate::mission::Interferer;
 use crate::sensing::belief::{Belief, Spread, Told};
+use crate::sensing::receiver::{Receiver, is_power};
 use crate::sensing::sums::{SUMS, Sums};
-use crate::wire::frame::MAX_NODE;
+use crate::wire::node_number::MAX_NODE;
 
 /// Bytes of the body: the tag, the pass, what is believed, the sums, what the receiver hears and who is off.
 pub(super) const LENGTH: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// What the receiver hears.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub struct Receiver {
-    /// Mean interference, W; 0 if it has not said.
-    pub power_w: f32,
-    /// Of how many measurements, as far as they have not faded.
-    pub count: f32,
-}
-
-impl Receiver {
-    fn is_sound(self) -> bool {
-        is_power(self.power_w) && (0.0..=1e9).contains(&self.count)
-    }
-}
-
 /// Onward: what is believed of the interference, and what the relays up to the sender hear. Back: what those from the sender on do.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Hearing {
+pub struct Heard {
     /// Number of the pass, wrapping.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
@@ -101,15 +87,10 @@ impl BeliefBody {
     }
 }
 
-/// Whether a receiver may hear that, W; 0 if it has not said.
-fn is_power(power_w: f32) -> bool {
-    power_w.to_bits() == 0 || (1e-30..=1e6).contains(&power_w)
-}
-
 /// The sums in two parts: postcard has no longer tuples.
 type Parts = ([f32; 9], [f32; SUMS - 9]);
 
-impl Hearing {
+impl Heard {
     /// The message of this tag, onward or back.
     pub(super) fn encode(&self, tag: u8, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.mission);

@@ -17,7 +17,7 @@ mod tag;
 mod turn;
 mod view;
 
-pub use self::hearing::{Hearing, Receiver};
+pub use self::hearing::Heard;
 pub use self::hello::Hello;
 pub use self::parts::MessageError;
 pub use self::pulse::{Pulse, Pulsed};
@@ -82,9 +82,9 @@ pub enum Message {
     /// Back: what those along the whole chain do.
     Gathered(Roster),
     /// Onward: what is believed of the interference, and what the relays up to the sender hear.
-    Sense(Hearing),
+    Sense(Heard),
     /// Back: what the relays from the sender on hear.
-    Sensed(Hearing),
+    Sensed(Heard),
     /// Onward: whose turn it is to move.
     Token(Token),
     /// Back: who has moved where.
@@ -248,8 +248,8 @@ impl Message {
             tag::PULSED => Pulsed::decode(body).map(Self::Pulsed),
             tag::GATHER => Roster::decode(body).map(Self::Gather),
             tag::GATHERED => Roster::decode(body).map(Self::Gathered),
-            tag::SENSE => Hearing::decode(body).map(Self::Sense),
-            tag::SENSED => Hearing::decode(body).map(Self::Sensed),
+            tag::SENSE => Heard::decode(body).map(Self::Sense),
+            tag::SENSED => Heard::decode(body).map(Self::Sensed),
             tag::TOKEN => Token::decode(body).map(Self::Token),
             tag::MOVED => Moved::decode(body).map(Self::Moved),
             tag::HELLO => Hello::decode(body).map(Self::Hello),

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use uav_relay::Interferer;
 use uav_relay::sensing::belief::{Belief, Spread, Told};
-use uav_relay::wire::message::{Hearing, Message};
+use uav_relay::wire::message::{Heard as Taken, Message};
 
 use super::bytes::{pass, reals, words};
 use super::reader::Reader;
@@ -48,7 +48,7 @@ impl Heard {
     }
 
     /// Whether that is what the crate has read.
-    fn is(&self, hearing: &Hearing) -> bool {
+    fn is(&self, hearing: &Taken) -> bool {
         let [power_w, x_m, y_m, receiver_w] = self.source;
         let source = Interferer { power_w, x_m, y_m };
         let belief = match self.kind {

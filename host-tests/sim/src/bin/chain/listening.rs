@@ -13,7 +13,7 @@ use uav_relay_sim::simulator::sky::Sky;
 #[command(next_help_heading = "Listening")]
 pub(crate) struct Listening {
     /// The relays are not told the scenario's interferers: each measures, once a second, what it hears where it is, and together they
-    /// find one that accounts for it. How they listen is the scenario's [listen], if it has one
+    /// find one that accounts for it. How they listen is what the scenario says of it, if it does
     #[arg(long)]
     listen: bool,
     /// Independent samples of the interference in one measurement, 1 to 1000000
