@@ -56,13 +56,9 @@ fn tree(arguments: &[&str]) -> Result<String, String> {
 
 /// The packages whose licence is not among those allowed.
 fn licences() -> Result<Vec<String>, String> {
-    let text = tree(&[
-        "--workspace",
-        "--edges=all",
-        "--no-dedupe",
-        "--format={l}|{p}",
-    ])?;
-    let packages: BTreeSet<&str> = text.lines().filter(|line| line.contains('|')).collect();
+    let text = tree(&["--workspace", "--edges=all", "--format={l}|{p}"])?;
+    let lines = text.lines().filter(|line| line.contains('|'));
+    let packages: BTreeSet<&str> = lines.map(|line| line.trim_end_matches(" (*)")).collect();
     println!("packages: {}", packages.len());
     let refused = packages.into_iter().filter(|line| {
         let (licence, package) = line.split_once('|').unwrap_or_default();
