@@ -3,8 +3,8 @@
 use uav_relay::{Identity, Instant, Mission, MissionConfig, Relay, Settings, ViewRecord};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
-use uav_relay_sim::mission;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::mission;
 
 /// The network of [`relay`].
 pub const NETWORK: u16 = 7;

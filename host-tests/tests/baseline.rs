@@ -6,7 +6,7 @@ use uav_relay_oracle::cases;
 use uav_relay_oracle::mission::scene_of;
 use uav_relay_oracle::random::{self, Chain, Style};
 use uav_relay_oracle::reference::Link;
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::scene::Scene;
 use uav_relay_tools::baseline::random::mean;
 use uav_relay_tools::baseline::{blind, equal};
 

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use uav_relay_oracle::reference::joint::Corridor;
 use uav_relay_oracle::reference::{Link, Station, path_loss_factor};
-use uav_relay_sim::scenario::{Interference, Scenario};
+use uav_relay_scenario::{Interference, Scenario};
 
 /// What relays choose.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 //!
 //! A read past the end gives zeros, so every byte string is an input, and one that is cut short means nearly the same.
 
-use uav_relay_sim::command::narrow;
+use uav_relay_scenario::number::narrow;
 
 /// The bytes that are left to read.
 #[derive(Clone, Debug)]

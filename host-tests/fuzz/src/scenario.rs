@@ -2,8 +2,8 @@
 
 use uav_relay::Mission;
 
-use uav_relay_sim::mission;
-use uav_relay_sim::scenario::{AirGround, Field, Interference, Scenario};
+use uav_relay_scenario::mission;
+use uav_relay_scenario::{AirGround, Field, Interference, Scenario};
 
 /// Numbers of relays for which a mission is asked.
 const RELAYS: [u16; 4] = [1, 3, 8, 1000];

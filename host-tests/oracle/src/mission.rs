@@ -2,9 +2,9 @@
 
 use uav_relay::channel::AirGround;
 use uav_relay::{Band, Channel, Field, FieldPoint, Interferer, Mission, MissionConfig, Profile};
-use uav_relay_sim::command::narrow;
-use uav_relay_sim::scenario::Source;
-use uav_relay_sim::scene::{Corridor, Relay, Scene};
+use uav_relay_scenario::Source;
+use uav_relay_scenario::number::narrow;
+use uav_relay_scenario::scene::{Corridor, Relay, Scene};
 
 use crate::reference::stochastic::StochasticLink;
 use crate::reference::{Link, Station};

@@ -122,12 +122,3 @@ pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
         Err(range())
     }
 }
-
-/// The nearest f32: what a relay works with.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "the ranges of options and scenarios lie well inside those of an f32"
-)]
-pub fn narrow(value: f64) -> f32 {
-    value as f32
-}

@@ -1,7 +1,7 @@
 //! A scenario that says where its ends are on earth.
 
 use uav_relay::Geodetic;
-use uav_relay_sim::scenario::{Line, Problem, Scenario, ScenarioError};
+use uav_relay_scenario::{Line, Problem, Scenario, ScenarioError};
 
 const REST: &str =
     "[power]\ntx_w = 80\nuav_w = 1\n[[interferer]]\npower_w = 80\nx_m = 500\ny_m = 400\n";

@@ -5,8 +5,8 @@ use uav_relay::{
     Adjust, Auth, Identity, Instant, Key, Method, Phase, Relay, Settings, Stats, Wiring,
 };
 use uav_relay_oracle::random::seed;
-use uav_relay_sim::mission::mission as of_scenario;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::mission::mission as of_scenario;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};

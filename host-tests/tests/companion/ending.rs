@@ -4,7 +4,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 
 use crate::binary::companion;
 use crate::process::{Ended, Relay};

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use uav_relay::Placement;
-use uav_relay_sim::scenario::Scenario;
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::scene::Scene;
 
 use crate::flying::Flight;
 use crate::positions::{fifo, write};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use rustix::process::Signal;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 
 use crate::medium::{Noise, QUIET};
 use crate::process::{Ended, Relay};

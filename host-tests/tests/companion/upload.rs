@@ -3,8 +3,8 @@
 use rustix::process::Signal;
 use uav_relay::Upload;
 use uav_relay::wire::upload::LENGTH;
-use uav_relay_sim::mission;
-use uav_relay_sim::scenario::{Interference, Scenario, Source};
+use uav_relay_scenario::mission;
+use uav_relay_scenario::{Interference, Scenario, Source};
 
 use crate::medium::{Medium, Noise, QUIET};
 use crate::process::{Ended, Relay};

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use host_tests::fixtures::voted;
 use uav_relay::wire::digest::digest;
 use uav_relay::{Mission, ViewRecord};
-use uav_relay_sim::mission;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::mission;
 
 use crate::medium::{Medium, QUIET};
 use crate::process::{Ended, Relay};

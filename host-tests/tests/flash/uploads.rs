@@ -4,7 +4,7 @@ use host_tests::firmware::journal::{AROUND, Journal, WhenFull};
 use host_tests::firmware::ram::Ram;
 use host_tests::firmware::uploads::{WORDS, kept, upload};
 use uav_relay::Upload;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::Flight;
 
 /// Words of a sector of 128 KiB.

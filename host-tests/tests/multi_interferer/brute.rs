@@ -2,7 +2,7 @@
 //!
 //! It shares no formula with what it judges. A chain of a grid is a real chain, so what is found is never above the optimum.
 
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::scene::Scene;
 
 /// Cells of the first grid.
 const CELLS: u32 = 600;

@@ -6,10 +6,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::cases::{self, Case};
 use uav_relay_oracle::random::seed;
-use uav_relay_sim::hypothetical::{Raster, fit, hypothetical};
-use uav_relay_sim::mission;
-use uav_relay_sim::scenario::{Interference, Scenario, Source};
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::hypothetical::{Raster, fit, hypothetical};
+use uav_relay_scenario::mission;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::{Interference, Scenario, Source};
 
 use super::above;
 use super::scenes::{level, scene};

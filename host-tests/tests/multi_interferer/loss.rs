@@ -7,10 +7,10 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::plan::{place, solve};
 use uav_relay::{Profile, Schedule};
 use uav_relay_oracle::random::seed;
-use uav_relay_sim::hypothetical::hypothetical;
-use uav_relay_sim::mission;
-use uav_relay_sim::scenario::{Interference, Scenario};
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::hypothetical::hypothetical;
+use uav_relay_scenario::mission;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::{Interference, Scenario};
 use uav_relay_tools::multi_interferer::optimum;
 
 use super::scenes::{Sources, scenario};

@@ -6,8 +6,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{self, Chain, Style, seed};
 use uav_relay_oracle::reference::Link;
-use uav_relay_sim::scene::Corridor;
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::scene::Corridor;
+use uav_relay_scenario::scene::Scene;
 use uav_relay_tools::multi_interferer::{self, best_common_altitude, optimum};
 
 use super::scenes::{level, of_link, scene};

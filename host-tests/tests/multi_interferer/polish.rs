@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::joint::{CROWDED, scenario};
 use uav_relay_oracle::random::seed;
 use uav_relay_oracle::reference::joint::{self, Effort};
-use uav_relay_sim::scene::{Corridor, Place, Scene};
+use uav_relay_scenario::scene::{Corridor, Place, Scene};
 use uav_relay_tools::multi_interferer::{Polished, best_common_altitude, optimum, polish};
 
 use super::above;

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{log_uniform, seed};
-use uav_relay_sim::hypothetical::{Raster, fit};
+use uav_relay_scenario::hypothetical::{Raster, fit};
 
 use super::above;
 use super::scenes::scene;

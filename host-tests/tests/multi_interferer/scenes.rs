@@ -24,10 +24,10 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::mission::scene_of;
 use uav_relay_oracle::random::log_uniform;
 use uav_relay_oracle::reference::Link;
-use uav_relay_sim::scenario::{
+use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::{
     AirGround, ChannelSpec, Interference, Noise, RelayOverride, Scenario, Source,
 };
-use uav_relay_sim::scene::Scene;
 
 /// Where sources stand.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,8 +4,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{log_uniform, seed};
 use uav_relay_oracle::reference::{Link, Station};
-use uav_relay_sim::scenario::{Field, Interference, RelayOverride, Scenario, Source};
-use uav_relay_sim::scene::{Relay, Scene};
+use uav_relay_scenario::scene::{Relay, Scene};
+use uav_relay_scenario::{Field, Interference, RelayOverride, Scenario, Source};
 
 use super::above;
 use super::scenes::scene;

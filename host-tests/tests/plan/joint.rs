@@ -7,11 +7,9 @@ use uav_relay_oracle::random::joint::Scenario as Drawn;
 use uav_relay_oracle::random::joint::judged::{COUNT, numbered, optima};
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Corridor, Effort};
-use uav_relay_sim::mission;
+use uav_relay_scenario::mission;
+use uav_relay_scenario::{AirGround, ChannelSpec, Interference, RelayOverride, Scenario, Source};
 use uav_relay_sim::report::hop_sirs;
-use uav_relay_sim::scenario::{
-    AirGround, ChannelSpec, Interference, RelayOverride, Scenario, Source,
-};
 use uav_relay_sim::simulator::chain;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
@@ -93,7 +91,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
             x_m: link.x_i,
             y_m: link.y_i,
         }]),
-        noise: uav_relay_sim::scenario::Noise::default(),
+        noise: uav_relay_scenario::Noise::default(),
         relays: BTreeMap::new(),
     }
 }

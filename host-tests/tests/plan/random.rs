@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
 use uav_relay_oracle::reference::joint::{self, Corridor, Effort, Place};
 use uav_relay_oracle::reference::{Link, Station};
-use uav_relay_sim::scenario::{
+use uav_relay_scenario::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
 };
 use uav_relay_tools::plan::{Ask, NoPlan, Number, Plan, plan};
@@ -95,7 +95,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
             ..ChannelSpec::default()
         },
         interference,
-        noise: uav_relay_sim::scenario::Noise::default(),
+        noise: uav_relay_scenario::Noise::default(),
         relays,
     }
 }

@@ -1,7 +1,7 @@
 //! Chains of emulated drones with a wire to each neighbour, held against the simulated chain.
 
 use uav_relay::Method;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;

@@ -7,7 +7,7 @@ use mavlink::dialects::common::MavLandedState;
 use uav_relay::Placement;
 use uav_relay::flight::autopilot::Kind;
 use uav_relay::flight::axis::Axis;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_tools::provision::block::Flight;
 

@@ -4,9 +4,7 @@
 use std::time::Instant;
 
 use uav_relay::{Adjust, Method};
-use uav_relay_sim::scenario::{
-    BetaPoint, Field, Interference, Noise, RelayOverride, Scenario, Source,
-};
+use uav_relay_scenario::{BetaPoint, Field, Interference, Noise, RelayOverride, Scenario, Source};
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_tools::provision::block::Flight;
 

@@ -10,7 +10,7 @@ use host_tests::firmware::ram::Ram;
 use host_tests::firmware::uploads::{SECTORS, WORDS, kept};
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Ground, Key, Progress, Side, Upload, Wiring};
-use uav_relay_sim::scenario::{Interference, Scenario, Source};
+use uav_relay_scenario::{Interference, Scenario, Source};
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::Secret;

@@ -4,7 +4,7 @@ mod keys;
 mod meaning;
 mod mistakes;
 
-use uav_relay_sim::scenario::{Problem, Scenario, ScenarioError};
+use uav_relay_scenario::{Problem, Scenario, ScenarioError};
 
 /// Smallest files that parse: one with an interferer, one with a field.
 const GEOMETRY: &str = "[geometry]\ndistance_m = 1000\naltitude_m = 20\n";

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use uav_relay_sim::scenario::{
+use uav_relay_scenario::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, Noise, RelayOverride, Source,
 };
 

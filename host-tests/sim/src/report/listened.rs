@@ -7,12 +7,12 @@ use uav_relay::sensing::belief::Belief;
 use uav_relay::{Interference, Interferer, Mission, MissionConfig};
 
 use super::hops::db;
-use crate::command::narrow;
-use crate::scene::Scene;
 use crate::simulator::chain::run;
 use crate::simulator::outcome::Outcome;
 use crate::simulator::setup::Setup;
 use crate::simulator::sky::Sky;
+use uav_relay_scenario::number::narrow;
+use uav_relay_scenario::scene::Scene;
 
 /// An interferer that is believed to be there.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]

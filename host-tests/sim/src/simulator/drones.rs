@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::{Duration, Instant, Placement};
 
-use crate::command::narrow;
+use uav_relay_scenario::number::narrow;
 
 /// A place in the air: x, y and altitude, m.
 pub type Point = [f64; 3];

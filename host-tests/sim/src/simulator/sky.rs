@@ -6,7 +6,7 @@ use rand_distr::{Distribution as _, Gamma, StandardNormal};
 use uav_relay::sensing::belief::Told;
 use uav_relay::{Duration, Instant, Placement, Sample};
 
-use crate::scene::{Place, Scene};
+use uav_relay_scenario::scene::{Place, Scene};
 
 /// What is heard, and when.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,8 +12,8 @@ mod least_baud;
 mod messages;
 
 use uav_relay::{Instant, Mission};
-use uav_relay_sim::mission;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::mission;
 
 /// The paper's chain of so many relays, which may stand 0.1 m apart.
 fn close(relays: u16) -> Mission {

@@ -20,8 +20,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use uav_relay::{Instant, Mission};
-use uav_relay_sim::mission;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::mission;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::medium::Access;
 use uav_relay_sim::simulator::outcome::Outcome;

@@ -6,8 +6,8 @@ use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Auth, Event, Ground, Identity, Instant, Key, Mission, Port, Relay, Settings, Wiring,
 };
-use uav_relay_sim::mission::mission as of_scenario;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::mission::mission as of_scenario;
 
 /// How long a frame takes.
 const STEP_MS: u64 = 10;

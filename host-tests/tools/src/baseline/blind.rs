@@ -8,7 +8,7 @@
 //! No relay can stand nearer to the ground than straight above it. Where the hops are longer than the distance even then,
 //! many chains are equally good, and the one is taken that shortens every hop in the same proportion.
 
-use uav_relay_sim::scene::{Relay, Scene};
+use uav_relay_scenario::scene::{Relay, Scene};
 
 /// Halvings of the common signal: enough for any f64 bracket to close.
 const HALVINGS: u32 = 200;

@@ -1,6 +1,6 @@
 //! Relays at equal distances; a single one in the middle.
 
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::scene::Scene;
 
 /// The places of the relays, m from Tx: k D / (N + 1). Work: one division a relay.
 pub fn places(scene: &Scene) -> Vec<f64> {

@@ -6,7 +6,7 @@
 //! | [`blind`] | where every hop would have the best signal if there were no interference |
 //! | [`equal`] | at equal distances |
 //!
-//! All of them are scored by [`Scene`](uav_relay_sim::scene::Scene), in f64: the SIR of the worst hop at those places.
+//! All of them are scored by [`Scene`](uav_relay_scenario::scene::Scene), in f64: the SIR of the worst hop at those places.
 
 pub mod blind;
 pub mod equal;

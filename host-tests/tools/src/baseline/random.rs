@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::scene::Scene;
 
 /// Draws that the paper takes.
 pub const DRAWS: u32 = 1000;

@@ -6,8 +6,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::{Parser, ValueEnum};
 use uav_relay::{Adjust, ChannelLoad, Local, Measure, Settings};
+use uav_relay_scenario::{Interference, Scenario};
 use uav_relay_sim::command::{self, Failure, MOST_BAUD};
-use uav_relay_sim::scenario::{Interference, Scenario};
 use uav_relay_sim::simulator::medium::access::OVERHEAD;
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::{ADDRESS, LEN, Secret};

@@ -9,7 +9,7 @@ use super::chart::{Axis, Chart, Line, Look, Panel};
 use super::paper;
 use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 
 /// Power of the relay, W.
 pub const RELAY_W: f64 = 0.5;

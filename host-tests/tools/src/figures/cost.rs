@@ -9,7 +9,7 @@ use super::flight::{Flown, fly};
 use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
 use super::{convergence, paper};
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 
 /// The chains that are flown.
 pub const RELAYS: [u16; 10] = [1, 2, 3, 5, 8, 14, 24, 40, 65, 100];

@@ -8,7 +8,7 @@ use super::chart::{Axis, Chart, Line, Look};
 use super::paper;
 use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 
 /// The most that is asked for, linear SIR: every whole number from 1 to this.
 pub const MOST_TARGET: u16 = 40;

@@ -9,7 +9,7 @@ use super::trouble::Trouble;
 use super::{paper, walk};
 use crate::baseline::random::{DRAWS, mean};
 use crate::baseline::{blind, equal};
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::scene::Scene;
 
 /// The chains that are drawn: every N from 1 to this.
 pub const MOST_RELAYS: u16 = 100;

@@ -8,7 +8,7 @@ use super::chart::{Axis, Chart, Line, Look};
 use super::paper;
 use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 
 /// Power of Tx, W, and place of the interferer, m, of each line.
 pub const CHOICES: [(f64, (f64, f64)); 4] = [

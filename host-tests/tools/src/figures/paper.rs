@@ -3,8 +3,8 @@
 use uav_relay::Mission;
 
 use super::trouble::Trouble;
-use uav_relay_sim::mission;
-use uav_relay_sim::scenario::{Interference, Scenario, Source};
+use uav_relay_scenario::mission;
+use uav_relay_scenario::{Interference, Scenario, Source};
 
 /// Relative tolerance on the target of a chain without messages: ten times what an f32 can tell.
 pub(super) const FINE: f64 = 1e-6;

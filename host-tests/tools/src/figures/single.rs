@@ -7,9 +7,9 @@ use uav_relay::planning::single::given_altitude;
 use super::trouble::Trouble;
 use crate::baseline::random::mean;
 use crate::baseline::{blind, equal};
-use uav_relay_sim::mission;
-use uav_relay_sim::scenario::{Interference, Scenario, Source};
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::mission;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::{Interference, Scenario, Source};
 
 /// The realisations that are drawn: powers of Tx and of the relay, W.
 pub const REALISATIONS: [(f64, f64); 2] = [(100.0, 0.5), (80.0, 2.0)];

@@ -9,7 +9,7 @@ use super::chart::{Axis, Chart, Line, Look, Panel};
 use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
 use super::{convergence, paper, walk};
-use uav_relay_sim::scenario::{BetaPoint, Field, Interference, Scenario};
+use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario};
 
 /// The chains that are drawn.
 pub const RELAYS: [u16; 5] = [10, 20, 30, 40, 50];

@@ -6,7 +6,7 @@ use uav_relay::SetupError;
 use uav_relay::optimiser::search::Infeasible;
 
 use super::draw::NotDrawn;
-use uav_relay_sim::mission::Refusal;
+use uav_relay_scenario::mission::Refusal;
 
 /// Why a figure could not be made: its numbers are fixed, so all but `File` would be a bug.
 #[derive(Debug)]

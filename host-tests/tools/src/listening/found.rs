@@ -68,7 +68,7 @@ pub fn shadowed(wild: &Wild) -> Result<Setup, Trouble> {
 /// [`Trouble`].
 pub fn hypothetical(wild: &Wild) -> Result<Setup, Trouble> {
     let mut setup = unknown(wild)?;
-    (setup.mission, _) = uav_relay_sim::mission::mission(&wild.scenario, wild.relays, 1e-4)?;
+    (setup.mission, _) = uav_relay_scenario::mission::mission(&wild.scenario, wild.relays, 1e-4)?;
     setup.settings.listen = None;
     Ok(setup)
 }

@@ -3,9 +3,9 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::{Duration, Instant, Interference, Listen, Mission, MissionConfig, Placement};
-use uav_relay_sim::mission::mission;
-use uav_relay_sim::scenario::{Interference as Known, Scenario, Source};
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::mission::mission;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::{Interference as Known, Scenario, Source};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::drones::FlightSpec;
 use uav_relay_sim::simulator::setup::Setup;

@@ -1,7 +1,7 @@
 //! The common altitude at which the best chain is best.
 
 use super::optimum::{Chain, at_altitude, best_at_altitude};
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::scene::Scene;
 
 /// Altitudes of the scan that are spread evenly, and as many that are spread by equal factors.
 const SCANNED: u32 = 24;

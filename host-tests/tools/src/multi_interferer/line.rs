@@ -2,8 +2,8 @@
 
 use super::crossing::{Crossing, crossings};
 use super::spans::Span;
-use uav_relay_sim::hypothetical::mesh::{Centre, graded};
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::hypothetical::mesh::{Centre, graded};
+use uav_relay_scenario::scene::Scene;
 
 /// Width of the cells over the distance to the nearest source.
 const STEP: f64 = 0.02;

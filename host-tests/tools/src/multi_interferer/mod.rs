@@ -1,7 +1,7 @@
 //! Several interferers at once: the true sum of what they do, the one hypothetical interferer that comes closest to it, and
 //! chains that are placed against the true sum.
 //!
-//! The relays know one interferer. Several are replaced by one for them ([`hypothetical`](uav_relay_sim::hypothetical)), which is an approximation; how
+//! The relays know one interferer. Several are replaced by one for them ([`hypothetical`](uav_relay_scenario::hypothetical)), which is an approximation; how
 //! much SIR it costs is known only by comparing with the best chain against the true sum: [`optimum`] for relays that hold
 //! one altitude (exact), [`best_common_altitude`] where that altitude may be chosen, [`polish`] for relays that differ, and for
 //! places to the side.

@@ -3,7 +3,7 @@
 use super::line::Line;
 use super::spans::Span;
 use super::stages::Stages;
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::scene::Scene;
 
 /// Relative width at which the bracket of a target is narrow enough.
 const TOLERANCE: f64 = 1e-13;

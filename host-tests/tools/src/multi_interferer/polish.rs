@@ -5,8 +5,8 @@
 //! improves a chain that was placed by an approximation, and cannot leave the side of an interferer that the chain is on.
 
 use super::altitude::golden;
-use uav_relay_sim::scene::Corridor;
-use uav_relay_sim::scene::{Place, Relay, Scene, Sender};
+use uav_relay_scenario::scene::Corridor;
+use uav_relay_scenario::scene::{Place, Relay, Scene, Sender};
 
 /// Rounds after which it ends.
 const ROUNDS: u32 = 200;

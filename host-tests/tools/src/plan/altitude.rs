@@ -14,7 +14,7 @@ use uav_relay::{Mission, Placement};
 use super::briefed::Briefed;
 use super::found::{NoPlan, Plan};
 use super::source;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 
 /// A solver for any chain.
 type Chain = Solver<{ MAX_RELAYS as usize }, { MAX_RELAYS as usize / 10 }>;

@@ -1,9 +1,9 @@
 //! A mission as its relays are briefed for it.
 
 use uav_relay::{Mission, Placement, Profile};
-use uav_relay_sim::mission;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::mission;
 use uav_relay_sim::report::hop_sirs;
-use uav_relay_sim::scenario::Scenario;
 
 use super::found::{NoPlan, Plan};
 

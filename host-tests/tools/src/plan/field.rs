@@ -9,7 +9,7 @@ use super::ask::{Ask, Number};
 use super::briefed::{Briefed, is_free};
 use super::found::{NoPlan, Plan};
 use super::source::{fewest, nothing, placed, solved};
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 
 pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     let scenario = if ask.free_altitude {

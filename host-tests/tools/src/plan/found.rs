@@ -1,8 +1,8 @@
 //! What planning comes to.
 
 use uav_relay::{Mission, Placement, Profile};
-use uav_relay_sim::hypothetical::Hypothetical;
-use uav_relay_sim::mission::Refusal;
+use uav_relay_scenario::hypothetical::Hypothetical;
+use uav_relay_scenario::mission::Refusal;
 
 /// Which of the paper's theorems, or what stands in for one, placed the only relay, and by which of its cases.
 #[derive(Clone, PartialEq, Eq, Debug)]

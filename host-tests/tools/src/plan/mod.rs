@@ -19,7 +19,7 @@ pub mod report;
 mod several;
 mod source;
 
-use uav_relay_sim::scenario::{Interference, Scenario};
+use uav_relay_scenario::{Interference, Scenario};
 
 pub use altitude::solved;
 pub use ask::{Ask, Number};

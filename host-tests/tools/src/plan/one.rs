@@ -1,6 +1,6 @@
 //! Plans against one interferer: which rule places the relays.
 
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 
 use super::ask::{Ask, Number};
 use super::found::{NoPlan, Plan};

@@ -10,11 +10,11 @@ use super::briefed::{Briefed, MOST_RELAYS};
 use super::found::{Fitted, NoPlan, Plan};
 use super::{altitude, one, source};
 use crate::multi_interferer::{best_common_altitude, optimum, polish};
-use uav_relay_sim::command::narrow;
-use uav_relay_sim::hypothetical::Hypothetical;
-use uav_relay_sim::mission::{self, Refusal};
-use uav_relay_sim::scenario::{Interference, Scenario, Source};
-use uav_relay_sim::scene::{Place, Scene};
+use uav_relay_scenario::hypothetical::Hypothetical;
+use uav_relay_scenario::mission::{self, Refusal};
+use uav_relay_scenario::number::narrow;
+use uav_relay_scenario::scene::{Place, Scene};
+use uav_relay_scenario::{Interference, Scenario, Source};
 
 /// By how much the places for the hypothetical interferer may fall short, relative, and still be kept.
 const LOSS: f64 = 0.01;

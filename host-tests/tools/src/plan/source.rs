@@ -8,8 +8,8 @@ use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 use super::ask::Ask;
 use super::briefed::{Briefed, MOST_RELAYS, is_free};
 use super::found::{NoPlan, Plan, Theorem};
-use uav_relay_sim::command::narrow;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::number::narrow;
 
 /// The fewest relays at the altitudes they hold, by eq. (Opt).
 pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {

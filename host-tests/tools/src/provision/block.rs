@@ -9,8 +9,8 @@ use super::config::{
     read, secret, write,
 };
 use super::course::{CourseError, course};
-use uav_relay_sim::mission::{self, Refusal};
-use uav_relay_sim::scenario::{AirGround, ChannelSpec, Scenario};
+use uav_relay_scenario::mission::{self, Refusal};
+use uav_relay_scenario::{AirGround, ChannelSpec, Scenario};
 
 /// Why there is no block.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -1,7 +1,7 @@
 //! What stands in a block: the table of `config/mod.rs`, byte by byte, and what a drone reads of it.
 
 use uav_relay::{Adjust, Local, Measure, Method};
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{ConfigError, LEN, MAX_POINTS};
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use uav_relay::{Adjust, Measure, Method};
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::Block;
 

@@ -1,7 +1,7 @@
 //! What a block says of listening, and where `cargo provision` has it from.
 
 use uav_relay::{Duration, Interference, Listen};
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{ConfigError, LEN};
 
@@ -85,7 +85,7 @@ fn the_ranges_are_those_of_a_relay() {
 #[test]
 fn a_field_has_nothing_to_find() {
     let mut scenario = super::in_a_field(3);
-    scenario.listen = Some(uav_relay_sim::scenario::ListenSpec::default());
+    scenario.listen = Some(uav_relay_scenario::ListenSpec::default());
     let flight = Flight::new(&scenario, 5, 1e-4, 7).unwrap();
     assert_eq!(
         flight.block(3),

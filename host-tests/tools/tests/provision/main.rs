@@ -18,7 +18,7 @@ mod sites;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use uav_relay_sim::scenario::{BetaPoint, Field, Interference, Scenario};
+use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario};
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::{Block, Config, ConfigError, EMPTY, LEN, read};
 

@@ -6,7 +6,7 @@ use uav_relay::channel::ChannelError;
 use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
 use uav_relay::{Adjust, Instant, Local, Measure, Method, Relay, Settings};
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::{Config, ConfigError, LEN};
 use uav_relay_tools::provision::course::course;

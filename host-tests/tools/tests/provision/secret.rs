@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Block, ConfigError, Secret, secret};
 use uav_relay_tools::provision::key;

@@ -2,7 +2,7 @@
 
 use uav_relay::Geodetic;
 use uav_relay::flight::axis::AxisError;
-use uav_relay_sim::scenario::Scenario;
+use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Block, ConfigError, Sites, autopilot_key};
 use uav_relay_tools::provision::course::{CourseError, course};

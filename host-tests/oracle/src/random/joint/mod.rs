@@ -43,7 +43,7 @@ use super::log_uniform;
 use crate::mission::as_relays_know_it;
 use crate::reference::joint::{Corridor, Hold};
 use crate::reference::{Link, Station};
-use uav_relay_sim::command::narrow;
+use uav_relay_scenario::number::narrow;
 
 /// A link and the corridor of its relays, which stand at its lowest altitude in the link.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,9 +2,10 @@
 
 use clap::Args;
 use uav_relay::{Instant, Interference, Interferer, Listen, Mission, MissionConfig};
-use uav_relay_sim::command::{Failure, narrow, number};
-use uav_relay_sim::scenario::Scenario;
-use uav_relay_sim::scene::Scene;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::number::narrow;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_sim::command::{Failure, number};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::simulator::sky::Sky;
 

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
-use uav_relay_sim::command::{narrow, number};
+use uav_relay_scenario::number::narrow;
+use uav_relay_sim::command::number;
 
 use crate::hostile::Hostile;
 use crate::listening::Listening;

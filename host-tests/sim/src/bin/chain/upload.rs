@@ -6,7 +6,8 @@ use uav_relay::{
     Band, Geodetic, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Side,
     Sites, Upload,
 };
-use uav_relay_sim::command::{Failure, narrow, number};
+use uav_relay_scenario::number::narrow;
+use uav_relay_sim::command::{Failure, number};
 use uav_relay_sim::simulator::setup::UploadSpec;
 
 use crate::times::instant;

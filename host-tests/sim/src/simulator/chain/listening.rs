@@ -53,11 +53,12 @@ impl Chain {
                 now,
                 Sample::Heard {
                     at,
-                    power_w: crate::command::narrow(power_w),
+                    power_w: uav_relay_scenario::number::narrow(power_w),
                 },
             );
             if member.node == self.setup.mission.relays() {
-                let power_w = crate::command::narrow(sky.receiver_w(&scene, &mut self.rng));
+                let power_w =
+                    uav_relay_scenario::number::narrow(sky.receiver_w(&scene, &mut self.rng));
                 member
                     .relay
                     .handle_sample(now, Sample::Receiver { power_w });

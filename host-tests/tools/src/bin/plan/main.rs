@@ -5,8 +5,8 @@ mod options;
 use std::process::ExitCode;
 
 use clap::Parser as _;
+use uav_relay_scenario::Scenario;
 use uav_relay_sim::command::{self, Failure};
-use uav_relay_sim::scenario::Scenario;
 use uav_relay_sim::svg::{self, Picture, room};
 use uav_relay_tools::plan::report::PlanReport;
 use uav_relay_tools::plan::{self, Ask, NoPlan, Plan};

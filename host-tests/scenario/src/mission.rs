@@ -7,10 +7,10 @@ use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
 use uav_relay::{Band, Channel, Field, FieldPoint, Interferer, Mission, MissionConfig, Profile};
 
-use crate::command::narrow;
 use crate::hypothetical::{self, Hypothetical};
-use crate::scenario::{self, Interference, Scenario, Source};
+use crate::number::narrow;
 use crate::scene::Scene;
+use crate::{Interference, Scenario, Source};
 
 /// Why a scenario is no mission.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -161,8 +161,8 @@ pub fn told_of_an_even_field(mission: &Mission) -> Mission {
 }
 
 /// The shapes of the distribution of I / `i_max_w` at `x_m`: alpha interpolated, and beta so that Upsilon is.
-pub fn shapes(spec: &scenario::Field, x_m: f64) -> (f64, f64) {
-    let of = |point: &scenario::BetaPoint| {
+pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
+    let of = |point: &crate::BetaPoint| {
         let upsilon = (point.alpha + point.beta - 1.0) / (point.alpha - 1.0);
         (point.alpha, upsilon)
     };
@@ -184,7 +184,7 @@ pub fn shapes(spec: &scenario::Field, x_m: f64) -> (f64, f64) {
 }
 
 /// Upsilon at the points of `spec`. A field lives as long as the program: a relay's is part of its image.
-fn field(spec: &scenario::Field) -> Result<Field, FieldError> {
+fn field(spec: &crate::Field) -> Result<Field, FieldError> {
     let points: Option<Vec<FieldPoint>> = spec
         .beta
         .iter()
@@ -198,9 +198,9 @@ fn field(spec: &scenario::Field) -> Result<Field, FieldError> {
 fn channel(scenario: &Scenario) -> Result<Channel, ChannelError> {
     let spec = &scenario.channel;
     let air_ground = match spec.air_ground {
-        scenario::AirGround::Los => AirGround::Los,
-        scenario::AirGround::Nlos => AirGround::Nlos,
-        scenario::AirGround::Weight(weight) => AirGround::Weighted(weight),
+        crate::AirGround::Los => AirGround::Los,
+        crate::AirGround::Nlos => AirGround::Nlos,
+        crate::AirGround::Weight(weight) => AirGround::Weighted(weight),
     };
     Channel::from_db(
         spec.carrier_hz,

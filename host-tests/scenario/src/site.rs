@@ -4,10 +4,10 @@ use serde::Deserialize;
 use uav_relay::Geodetic;
 use uav_relay::flight::axis::{Axis, AxisError};
 
-use super::check::mistake;
-use super::error::{Problem, ScenarioError};
-use super::keys::number;
-use super::spec::Line;
+use crate::check::mistake;
+use crate::error::{Problem, ScenarioError};
+use crate::keys::number;
+use crate::spec::Line;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

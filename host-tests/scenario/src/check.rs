@@ -3,9 +3,9 @@
 use serde_path_to_error::Segment;
 use toml::{Table, Value};
 
-use super::error::{Problem, ScenarioError, cut, quote};
-use super::keys::Rule::{LinkOrNumber, Number, Whole};
-use super::keys::{FILE, Keys, Rule, names};
+use crate::error::{Problem, ScenarioError, cut, quote};
+use crate::keys::Rule::{LinkOrNumber, Number, Whole};
+use crate::keys::{FILE, Keys, Rule, names};
 
 /// A mistake in the value of a key.
 pub(super) fn mistake(

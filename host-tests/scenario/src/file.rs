@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::Table;
 
-use super::check::{mistake, wrong_type};
-use super::error::{Problem, ScenarioError};
-use super::keys::number;
-use super::site::{self, RawSites};
-use super::spec::{
+use crate::check::{mistake, wrong_type};
+use crate::error::{Problem, ScenarioError};
+use crate::keys::number;
+use crate::site::{self, RawSites};
+use crate::spec::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, ListenSpec, Noise, RelayOverride,
     Scenario, Source,
 };
@@ -131,7 +131,7 @@ struct RawBeta {
     beta: f64,
 }
 
-/// The typed form of a table that [`super::check::table`] has passed.
+/// The typed form of a table that [`crate::check::table`] has passed.
 pub(super) fn from_table(file: &str, table: &Table) -> Result<RawFile, ScenarioError> {
     serde_path_to_error::deserialize(table.clone())
         .map_err(|error| wrong_type(file, table, error.path()))

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use toml::Table;
 
-use super::error::{Problem, ScenarioError, cut};
+use crate::error::{Problem, ScenarioError, cut};
 
 /// Longest file read, in bytes: 1000 relays and as many interferers fit many times over, and a name such as
 /// `/dev/zero` still ends.

@@ -12,7 +12,7 @@ pub mod mesh;
 mod raster;
 mod simplex;
 
-use crate::scenario::Source;
+use crate::Source;
 use crate::scene::{Place, Scene};
 use mesh::{Centre, graded};
 pub use raster::{Raster, Weighed};

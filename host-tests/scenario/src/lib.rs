@@ -1,5 +1,12 @@
 //! The scenario file of the host tools: what is agreed about the flight before any relay takes off.
 //!
+//! | module | one idea |
+//! | --- | --- |
+//! | [`Scenario`] | a scenario file, read and checked |
+//! | [`mission`] | from a scenario to the mission that relays fly |
+//! | [`scene`], [`hypothetical`] | several interferers whose powers add up, and the one that stands for them |
+//! | [`number`] | from the f64 of files to the f32 of relays |
+//!
 //! A file is read in three passes, each with one job: `check` compares its shape, its keys and every range with
 //! the table in `keys`; serde checks the types; `file` checks what only several keys together can break.
 //! Whatever is wrong comes back as a [`ScenarioError`], one line that names the file, the key, the value and
@@ -8,8 +15,12 @@
 mod check;
 mod error;
 mod file;
+pub mod hypothetical;
 mod keys;
+pub mod mission;
+pub mod number;
 mod read;
+pub mod scene;
 mod site;
 mod spec;
 

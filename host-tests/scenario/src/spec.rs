@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Duration, Geodetic, Listen};
 
-use crate::command::narrow;
+use crate::number::narrow;
 
 /// Everything a host tool has to know about a flight, in SI units, with x along the line from Tx (x = 0) to Rx and y to the
 /// right of it as seen from above.

@@ -3,7 +3,7 @@
 use uav_relay::channel::AirGround;
 use uav_relay::{Channel, Placement};
 
-use crate::scenario::{self, Interference, Scenario, Source};
+use crate::{Interference, Scenario, Source};
 
 /// One relay of a [`Scene`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,9 +101,9 @@ impl Scene {
         };
         let spec = &scenario.channel;
         let air_ground = match spec.air_ground {
-            scenario::AirGround::Los => AirGround::Los,
-            scenario::AirGround::Nlos => AirGround::Nlos,
-            scenario::AirGround::Weight(weight) => AirGround::Weighted(weight),
+            crate::AirGround::Los => AirGround::Los,
+            crate::AirGround::Nlos => AirGround::Nlos,
+            crate::AirGround::Weight(weight) => AirGround::Weighted(weight),
         };
         let channel = Channel::from_db(
             spec.carrier_hz,
