@@ -167,14 +167,20 @@ impl Peer {
         if frame != sealed(KEY, unsigned, *link, stamp) || !is_new {
             return false;
         }
-        if let Some(at) = last {
-            self.senders.remove(at);
-        } else if self.senders.len() == SENDERS
-            && let Some((at, _)) = (0..).zip(&self.senders).min_by_key(|(_, (_, last))| *last)
-        {
-            self.senders.remove(at);
+        // Of several whose last stamp is the same the one that was met first goes: where it stood the new one stands.
+        let oldest = || {
+            let places = (0..).zip(&self.senders);
+            let oldest = places.min_by_key(|(_, (_, last))| *last);
+            oldest.filter(|_| self.senders.len() == SENDERS)
+        };
+        match last.or_else(|| oldest().map(|(at, _)| at)) {
+            Some(at) => {
+                if let Some(place) = self.senders.get_mut(at) {
+                    *place = (sender, stamp);
+                }
+            }
+            None => self.senders.push((sender, stamp)),
         }
-        self.senders.push((sender, stamp));
         self.time = self.time.max(stamp);
         true
     }
