@@ -31,7 +31,12 @@ pub enum Sample {
         /// That power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// The same at the ground receiver, handed to relay N.
+    /// The same at the ground transmitter, handed to relay 1, or to any of the first four.
+    Transmitter {
+        /// That power, W: 1e-30 to 1e6.
+        power_w: f32,
+    },
+    /// The same at the ground receiver, handed to relay N, or to any of the last four: in a view the last relay's counts.
     Receiver {
         /// That power, W: 1e-30 to 1e6.
         power_w: f32,

@@ -10,7 +10,7 @@
 //! | too few places, or no source | a source | it is kept |
 
 use super::fit::{Fit, FoundSource, Unfit, misfit};
-use super::receiver::Receiver;
+use super::level::{Level, Levels};
 use super::sums::Sums;
 use super::terms::{coefficients, terms, unit_w};
 use super::track::Track;
@@ -136,19 +136,19 @@ pub(crate) struct Review {
     pub(crate) unfit: Option<Unfit>,
 }
 
-/// Reviews `told`, of which `mission` is made, by `sums` along the chain and what the receiver hears, W or 0. `before` is what was
+/// Reviews `told`, of which `mission` is made, by `sums` along the chain and what its ends hear. `before` is what was
 /// known when it was taken up.
 pub(crate) fn review(
     mission: &Mission,
     belief: &Belief,
     sums: &Sums,
-    receiver: Receiver,
+    levels: &Levels,
     listen: &Listen,
     before: Knowledge,
     now: Instant,
 ) -> Review {
     let known = mission.known_source();
-    let (fit, found) = match fitted(mission, sums, receiver, listen) {
+    let (fit, found) = match fitted(mission, sums, levels, listen) {
         Ok(found) => found,
         Err(unfit) => return at_a_loss(mission, belief, sums, listen, before, unfit),
     };
@@ -160,7 +160,13 @@ pub(crate) fn review(
         .then(|| followed(mission, &fit, &found, &mut track, [heard, now], listen))
         .flatten();
     let (source, moves) = (ahead.unwrap_or(found.source), ahead.is_some());
-    let receiver_w = at_receiver(mission, &fit, &source, receiver, listen.relative_error);
+    let receiver_w = at_receiver(
+        mission,
+        &fit,
+        &source,
+        levels.receiver,
+        listen.relative_error,
+    );
     let information = fit.information();
     let before = Knowledge { track, ..before };
     let keep = |unfit| Review {
@@ -217,11 +223,18 @@ pub(crate) fn review(
 fn fitted(
     mission: &Mission,
     sums: &Sums,
-    receiver: Receiver,
+    levels: &Levels,
     listen: &Listen,
 ) -> Result<(Fit, FoundSource), Unfit> {
-    let fit = Fit::of(sums, listen.relative_error)?;
-    let fit = with_receiver(mission, fit, sums, receiver, listen.relative_error);
+    let mut fit = Fit::of(sums, listen.relative_error)?;
+    let mut sums = *sums;
+    let ends = [
+        (0.0, levels.transmitter),
+        (mission.config().distance_m, levels.receiver),
+    ];
+    for (x_m, level) in ends {
+        fit = with_end(mission, fit, &mut sums, x_m, level, listen.relative_error);
+    }
     let side_m = mission.known_source().map_or(1.0, |source| source.y_m);
     Ok((fit, fit.source(mission, side_m)?))
 }
@@ -249,38 +262,35 @@ fn followed(
     None
 }
 
-/// The fit that counts the receiver as one place more, as far as what it hears is in line with the others: then the path loss over the ground
-/// is what the mission says.
+/// The fit that counts the end at `x_m` as one place more, as far as what it hears is in line with the others: then the path loss over the
+/// ground is what the mission says.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "v of a power that is a float"
 )]
-fn with_receiver(
+fn with_end(
     mission: &Mission,
     fit: Fit,
-    sums: &Sums,
-    receiver: Receiver,
+    sums: &mut Sums,
+    x_m: f32,
+    level: Level,
     relative_error: f32,
 ) -> Fit {
-    if !(receiver.power_w > 0.0 && receiver.count > 0.0) {
+    if !level.is_heard() {
         return fit;
     }
     let config = mission.config();
-    let there = terms(
-        config.distance_m,
-        Placement::on_line(config.distance_m, 0.0),
-    );
+    let there = terms(config.distance_m, Placement::on_line(x_m, 0.0));
     let ground = config.channel.eta() / config.channel.mu_nlos();
-    let v = f64::from(unit_w(mission)) * ground / f64::from(receiver.power_w);
+    let v = f64::from(unit_w(mission)) * ground / f64::from(level.power_w);
     let expected = fit.value(&there);
     let off = v / expected - 1.0;
     let chance = 25.0 * (fit.variance() + fit.relative_variance(&there));
     if !(expected > 0.0 && off * off < chance) {
         return fit;
     }
-    let mut sums = *sums;
-    sums.add(&there, v as f32, expected as f32, 1.0, receiver.count);
-    Fit::of(&sums, relative_error).unwrap_or(fit)
+    sums.add(&there, v as f32, expected as f32, 1.0, level.count);
+    Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
 /// What the receiver hears, W: what it says, and, as far as that is in line with it, what the source makes of it over the ground. Both count
@@ -293,10 +303,10 @@ fn at_receiver(
     mission: &Mission,
     fit: &Fit,
     source: &Interferer,
-    receiver: Receiver,
+    receiver: Level,
     relative_error: f32,
 ) -> f32 {
-    if !(receiver.power_w > 0.0 && receiver.count > 0.0) {
+    if !receiver.is_heard() {
         return 0.0;
     }
     let heard = f64::from(receiver.power_w);

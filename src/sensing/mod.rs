@@ -16,7 +16,7 @@
 //! | `terms` | the four terms of a place, and the coefficients of a source |
 //! | [`sums`] | what a pass adds up along the chain |
 //! | `listener` | what one relay has heard, place by place, and how it fades |
-//! | [`receiver`] | what the receiver on the ground hears |
+//! | [`level`] | what the transmitter and the receiver hear, on the ground |
 //! | `average` | a mean that fades |
 //! | `factor` | a 4 x 4 system, solved |
 //! | [`fit`] | the source that the sums speak of, how sure that is, and when none does |
@@ -34,9 +34,9 @@ pub mod belief;
 pub(crate) mod doubt;
 mod factor;
 pub mod fit;
+pub mod level;
 pub(crate) mod listener;
 mod nearest;
-pub mod receiver;
 pub mod sums;
 pub(crate) mod terms;
 pub(crate) mod track;

@@ -295,6 +295,7 @@ fn look_at(message: &Message) {
             let same = Mission::try_new(*upload.config()).is_ok();
             assert!(same && upload.version() > 0, "{upload:?}");
         }
+        Message::Level { power_w, .. } => assert!((1e-30..=1e6).contains(power_w)),
         Message::Busy { .. } | Message::Heartbeat { .. } | Message::Pulsed(_) => {}
     }
 }

@@ -143,8 +143,13 @@ impl Scene {
 
     /// Interference power that Rx receives, watts; infinite with an interferer at Rx.
     pub fn interference_rx_w(&self) -> f64 {
+        self.interference_on_ground_w(self.distance_m)
+    }
+
+    /// The same on the line between Tx and Rx, on the ground, at `x_m`.
+    pub fn interference_on_ground_w(&self, x_m: f64) -> f64 {
         let each = self.sources.iter().map(|source| {
-            let dx = self.distance_m - source.x_m;
+            let dx = x_m - source.x_m;
             received_w(source.power_w, self.mu_nlos, dx, source.y_m, 0.0)
         });
         each.sum()

@@ -2,6 +2,7 @@
 //!
 //! `COUNT=1000` flies as many scenes a row, `SEED` begins elsewhere.
 
+mod ends;
 mod following;
 mod found;
 mod steady;

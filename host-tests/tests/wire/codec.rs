@@ -80,6 +80,11 @@ pub(crate) enum Said {
     },
     Sense(Heard),
     Sensed(Heard),
+    /// How strong the interference is where the sender stands, on the ground.
+    Level {
+        mission: u16,
+        power_w: f32,
+    },
 }
 
 /// How far a relay keeps off.
@@ -188,6 +193,12 @@ impl Said {
             }
             Self::Sense(heard) => heard.body(17),
             Self::Sensed(heard) => heard.body(18),
+            Self::Level { mission, power_w } => {
+                let mut out = vec![19];
+                words(&mut out, &[*mission]);
+                reals(&mut out, &[*power_w]);
+                out
+            }
         }
     }
 
@@ -240,6 +251,7 @@ impl Said {
             }),
             Self::Sense(ref heard) => heard.message(17),
             Self::Sensed(ref heard) => heard.message(18),
+            Self::Level { mission, power_w } => Message::Level { mission, power_w },
         }
     }
 
@@ -309,6 +321,10 @@ impl Said {
             },
             17 => Self::Sense(Heard::read(rest)?),
             18 => Self::Sensed(Heard::read(rest)?),
+            19 => Self::Level {
+                mission: rest.word()?,
+                power_w: rest.real()?,
+            },
             _ => return None,
         })
     }
@@ -333,6 +349,7 @@ impl Said {
             Self::Fence(fenced) => fenced.in_range(),
             Self::Offer(offer) => offer.in_range(),
             Self::Sense(heard) | Self::Sensed(heard) => heard.in_range(),
+            Self::Level { power_w, .. } => (1e-30..=1e6).contains(power_w),
         }
     }
 }

@@ -69,14 +69,21 @@ fn what_tx_and_rx_may_not_say_is_misaddressed() {
         let mut after = relay.clone();
         peer.clone().says(&mut after, NOW, &one);
         let expected = match one {
-            Said::Hello(_) | Said::Offer(_) => "received",
+            Said::Hello(_) | Said::Offer(_) | Said::Level { .. } => "received",
             _ => "misaddressed",
         };
         assert_eq!(counted(after.stats()), [expected], "{one:?}");
+        // It does not listen.
+        let refused = u32::from(matches!(one, Said::Level { .. }));
+        assert_eq!(after.stats().samples_refused, refused, "{one:?}");
     }
     for one in [
         Said::Offer(upload(1, base ^ 1)),
         hello(base ^ 1, 0, (1, 1), ASKS),
+        Said::Level {
+            mission: base ^ 1,
+            power_w: 1e-9,
+        },
     ] {
         let mut after = relay.clone();
         peer.clone().says(&mut after, NOW, &one);

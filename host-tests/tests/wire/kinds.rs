@@ -207,6 +207,10 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         },
         Said::Sense(heard(number, mission)),
         Said::Sensed(heard(number, mission)),
+        Said::Level {
+            mission,
+            power_w: 1e-9,
+        },
     ]
 }
 

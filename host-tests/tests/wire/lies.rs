@@ -48,7 +48,9 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         } => (*number, *mission) = (as_number, as_mission),
         Said::Busy { number } => *number = as_number,
         // The number of a fence is that of a talk, never 0.
-        Said::Heartbeat { mission, .. } | Said::Fence(Fenced { mission, .. }) => {
+        Said::Heartbeat { mission, .. }
+        | Said::Fence(Fenced { mission, .. })
+        | Said::Level { mission, .. } => {
             *mission = as_mission;
         }
         Said::Hello(hello) => (hello.newest, hello.mission) = (view(as_number), as_mission),

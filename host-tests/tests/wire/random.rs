@@ -144,12 +144,12 @@ fn the_draws_reach_messages_and_both_refusals() {
     use proptest::test_runner::TestRunner;
 
     /// The first tag without a message, for it and all after it.
-    const NONE: usize = 19;
+    const NONE: usize = 20;
 
     let mut runner = TestRunner::new(config(1));
     // Of each tag: messages, wrongly encoded, out of range. Every busy, every heartbeat and all that comes back of a pulse is in range, and of
     // pulses all but those of no time.
-    let mut seen = [[0; 3]; 20];
+    let mut seen = [[0; 3]; 21];
     for _ in 0..16_000 {
         let body = bodies().new_tree(&mut runner).unwrap().current();
         let tag = body.first().map_or(NONE, |&tag| usize::from(tag).min(NONE));

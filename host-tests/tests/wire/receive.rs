@@ -135,6 +135,8 @@ fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port
     match Said::read(&checked[10..]) {
         Err(_) => "malformed",
         Ok(Said::Hello(_)) => "received",
+        // Tx and Rx say that.
+        Ok(Said::Level { .. }) => "misaddressed",
         Ok(_) if neighbours.contains(&Some(sender)) => "received",
         Ok(_) => "misaddressed",
     }

@@ -456,6 +456,8 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         3 => sweeps(0),
         3 => verdicts,
         1 => any::<u16>().prop_map(|number| Said::Busy { number }),
+        1 => (any::<u16>(), prop_oneof![Just(1e-30), 1e-12..1e-3_f32, Just(1e6)])
+            .prop_map(|(mission, power_w)| Said::Level { mission, power_w }),
         1 => (any::<u16>(), questions(), questions())
             .prop_map(|(mission, ask, answer)| Said::Heartbeat { mission, ask, answer }),
         2 => measured(sweeps(0)),
@@ -506,6 +508,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
                 10..=12 => &[5, 7],
                 14 => &NUMBERS,
                 17 | 18 => &[8, 12, 16, 20, 24, 28, 80, 84, 88, 92, 96, 100],
+                19 => &[3],
                 _ => &[1],
             };
             let at = starts[at.index(starts.len())];
@@ -547,7 +550,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         pad(&mut body, tag, more);
         body
     });
-    let tagged = (0..=18_u8, vec(any::<u8>(), 0..=120)).prop_map(|(tag, mut body)| {
+    let tagged = (0..=19_u8, vec(any::<u8>(), 0..=120)).prop_map(|(tag, mut body)| {
         body.insert(0, tag);
         body
     });

@@ -28,6 +28,11 @@ impl Node {
         if self.ground_side(from).is_some() {
             return self.on_ground(now, side, from, message);
         }
+        #[cfg(feature = "upload")]
+        if let Message::Level { .. } = message {
+            // The ground alone says that.
+            return false;
+        }
         let taken = self.layers.neighbours.at(side).node() == from;
         let distance = from.abs_diff(self.member.node);
         let neighbour = self.layers.neighbours.at_mut(side);

@@ -1,8 +1,9 @@
-//! Newer missions, in flight: what is offered, to whom, and what the ground is told.
+//! Newer missions, in flight: what is offered, to whom, and what the ground is told; and what the ground measures.
 
 use super::state::Node;
 use crate::event::Event;
 use crate::node::mission_update::{Offered, takes_uploads};
+use crate::node::sample::Sample;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
@@ -21,7 +22,9 @@ impl Node {
     ) -> bool {
         let base = self.member.digest;
         match message {
-            Message::Offer { .. } | Message::Hello(_) if message.mission() != Some(base) => {
+            Message::Offer { .. } | Message::Hello(_) | Message::Level { .. }
+                if message.mission() != Some(base) =>
+            {
                 self.refuse_mission(side, from);
             }
             Message::Offer { upload, answer } => {
@@ -31,6 +34,13 @@ impl Node {
                 self.layers.neighbours.at_mut(side).ground = true;
             }
             Message::Hello(hello) => self.layers.neighbours.at_mut(side).ground |= hello.ask,
+            Message::Level { power_w, .. } => self.handle_sample(
+                now,
+                match side {
+                    Side::Upstream => Sample::Transmitter { power_w: *power_w },
+                    Side::Downstream => Sample::Receiver { power_w: *power_w },
+                },
+            ),
             _ => return false,
         }
         true

@@ -6,8 +6,8 @@ use crate::place::Placement;
 use crate::sensing::average::{Average, left};
 use crate::sensing::belief::{Belief, Knowledge, Told};
 use crate::sensing::fit::{Unfit, expected_at};
+use crate::sensing::level::Level;
 use crate::sensing::listener::Listener;
-use crate::sensing::receiver::Receiver;
 use crate::sensing::sums::Sums;
 use crate::sensing::terms::unit_w;
 use crate::settings::Listen;
@@ -26,7 +26,8 @@ pub(crate) struct Sensing([Ear; SENSING as usize]);
 pub(super) struct Ear {
     pub(super) listener: Listener,
     pub(super) told: Told,
-    /// What the receiver hears, as far as it has told this relay.
+    /// What the transmitter and the receiver hear, as far as they have told this relay.
+    pub(super) transmitter: Average,
     pub(super) receiver: Average,
     /// Whether this relay hears something else than all the others.
     pub(super) off: bool,
@@ -59,6 +60,7 @@ impl Sensing {
         let ear = Ear {
             listener: Listener::new(half_life, now),
             told: AS_LOADED,
+            transmitter: Average::NONE,
             receiver: Average::NONE,
             off: false,
             named: 0,
@@ -95,6 +97,9 @@ impl Sensing {
         if let Some(ear) = self.ear_mut() {
             ear.told.belief = Belief::Mission;
             ear.told.number = ear.told.number.wrapping_add(1);
+            // The ends may stand elsewhere.
+            ear.transmitter = Average::NONE;
+            ear.receiver = Average::NONE;
             ear.known = Knowledge::NOTHING;
             ear.wait = 1;
         }
@@ -141,13 +146,12 @@ impl Sensing {
 }
 
 impl Ear {
-    pub(super) fn heard_at_receiver(&self, now: Instant) -> Receiver {
-        let Average {
-            mean, weight, last, ..
-        } = self.receiver;
-        Receiver {
-            power_w: mean,
-            count: weight * left(now.since(last), self.listener.half_life()),
+    /// What an end hears of which this is the average.
+    pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
+        let age = now.since(average.last);
+        Level {
+            power_w: average.mean,
+            count: average.weight * left(age, self.listener.half_life()),
         }
     }
 
@@ -159,6 +163,7 @@ impl Ear {
             let heard_w = power_w - noise_w;
             (1e-30..=1e6).contains(&heard_w).then_some(heard_w)
         };
+        let half_life = self.listener.half_life();
         match sample {
             Sample::Heard { at, power_w } if is_near(at) => {
                 let Some(heard_w) = heard(power_w) else {
@@ -171,12 +176,11 @@ impl Ear {
                     .take(now, distance_m, at, heard_w / unit, expected);
                 true
             }
+            Sample::Transmitter { power_w } => {
+                take_level(&mut self.transmitter, now, half_life, heard(power_w))
+            }
             Sample::Receiver { power_w } => {
-                let heard = heard(power_w);
-                if let Some(heard_w) = heard {
-                    self.receiver.take(now, self.listener.half_life(), heard_w);
-                }
-                heard.is_some()
+                take_level(&mut self.receiver, now, half_life, heard(power_w))
             }
             _ => false,
         }
@@ -202,6 +206,19 @@ pub(super) struct Findings {
     pub(super) unfit: Option<Unfit>,
     /// Who hears something else than all the others, as of the last pass.
     pub(super) off: u16,
+}
+
+/// Takes what an end hears, if that is anything above the noise; whether it is.
+fn take_level(
+    average: &mut Average,
+    now: Instant,
+    half_life: Duration,
+    heard_w: Option<f32>,
+) -> bool {
+    if let Some(heard_w) = heard_w {
+        average.take(now, half_life, heard_w);
+    }
+    heard_w.is_some()
 }
 
 /// Whether a drone may be there.

@@ -17,7 +17,7 @@ use crate::node::context::Context;
 use crate::sensing::belief::{Told, review};
 use crate::sensing::doubt::is_off;
 use crate::sensing::fit::expected_at;
-use crate::sensing::receiver::Receiver;
+use crate::sensing::level::{Level, Levels};
 use crate::sensing::sums::Sums;
 use crate::wire::message::Heard;
 
@@ -70,7 +70,7 @@ impl Computation {
             mission: context.digest(),
             told: self.sensing.told(),
             sums: Sums::NONE,
-            receiver: Receiver::default(),
+            receiver: Level::default(),
             off: 0,
         };
         self.sense(context, hearing, holds)
@@ -114,7 +114,7 @@ impl Computation {
         let mut hearing = hearing;
         hearing.sums.merge(&own);
         if context.is_last() {
-            hearing.receiver = ear.heard_at_receiver(context.now);
+            hearing.receiver = ear.level(&ear.receiver, context.now);
         }
         self.pass = PassKind::Sense(Sense {
             hearing,
@@ -180,11 +180,15 @@ impl Computation {
         let (Some(listen), Some(ear)) = (context.settings().listen, self.sensing.ear_mut()) else {
             return false;
         };
+        let levels = Levels {
+            transmitter: ear.level(&ear.transmitter, context.now),
+            receiver: hearing.receiver,
+        };
         let review = review(
             context.mission(),
             &ear.told.belief,
             &hearing.sums,
-            hearing.receiver,
+            &levels,
             &listen,
             ear.known,
             context.now,

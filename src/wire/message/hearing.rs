@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::parts::{MessageError, PassId, Word, read, write};
 use crate::mission::Interferer;
 use crate::sensing::belief::{Belief, Spread, Told};
-use crate::sensing::receiver::{Receiver, is_power};
+use crate::sensing::level::{Level, is_power};
 use crate::sensing::sums::{SUMS, Sums};
 use crate::wire::node_number::MAX_NODE;
 
@@ -24,7 +24,7 @@ pub struct Heard {
     /// What is heard.
     pub sums: Sums,
     /// What the receiver hears.
-    pub receiver: Receiver,
+    pub receiver: Level,
     /// Back: the node number of a relay that hears something else than all the others, whose share has been left out; 0 for none.
     pub off: u16,
 }
@@ -125,7 +125,7 @@ impl Heard {
         };
         let told = told.checked().ok_or(MessageError::Value)?;
         let off = off.number();
-        let receiver = Receiver { power_w, count };
+        let receiver = Level { power_w, count };
         if !(sums.is_sound() && receiver.is_sound() && off <= MAX_NODE) {
             return Err(MessageError::Value);
         }

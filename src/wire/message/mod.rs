@@ -8,6 +8,8 @@ mod fence;
 mod hearing;
 mod hello;
 #[cfg(feature = "upload")]
+mod level;
+#[cfg(feature = "upload")]
 mod offer;
 mod parts;
 mod pulse;
@@ -115,6 +117,14 @@ pub enum Message {
         /// The number of the receiver's hello that it answers, 0 for none.
         answer: u16,
     },
+    /// From the ground: how strong the interference is at that end of the chain.
+    #[cfg(feature = "upload")]
+    Level {
+        /// Digest of the mission that the relays were loaded with.
+        mission: u16,
+        /// Mean received power, W: 1e-30 to 1e6, with the noise of the end's receiver.
+        power_w: f32,
+    },
 }
 
 impl Message {
@@ -136,6 +146,8 @@ impl Message {
             Self::Decision(count) => Some(count.mission_id.digest),
             #[cfg(feature = "upload")]
             Self::Offer { upload, .. } => Some(upload.base()),
+            #[cfg(feature = "upload")]
+            Self::Level { mission, .. } => Some(*mission),
         }
     }
 
@@ -183,6 +195,8 @@ impl Message {
             // What it was built without it never says.
             Self::Gather(_) | Self::Gathered(_) if !cfg!(feature = "altitude") => None,
             Self::Sense(_) | Self::Sensed(_) if !cfg!(feature = "sensing") => None,
+            #[cfg(feature = "upload")]
+            Self::Level { .. } if !cfg!(feature = "sensing") => None,
             Self::Token(_) | Self::Moved(_) if !cfg!(feature = "adjust") => None,
             Self::Fence { .. } if !cfg!(feature = "guard") => None,
             Self::Sweep(sweep) => sweep.encode(buffer),
@@ -210,6 +224,8 @@ impl Message {
             Self::Fence { mission, fence } => fence::encode(*mission, fence, buffer),
             #[cfg(feature = "upload")]
             Self::Offer { upload, answer } => offer::encode(upload, *answer, buffer),
+            #[cfg(feature = "upload")]
+            Self::Level { mission, power_w } => level::encode(*mission, *power_w, buffer),
         }
     }
 
@@ -227,6 +243,8 @@ impl Message {
                 Err(MessageError::Value)
             }
             tag::SENSE | tag::SENSED if !cfg!(feature = "sensing") => Err(MessageError::Value),
+            #[cfg(feature = "upload")]
+            tag::LEVEL if !cfg!(feature = "sensing") => Err(MessageError::Value),
             tag::TOKEN | tag::MOVED if !cfg!(feature = "adjust") => Err(MessageError::Value),
             tag::FENCE if !cfg!(feature = "guard") => Err(MessageError::Value),
             tag @ (tag::SWEEP | tag::MEASURED | tag::ASIDE) => {
@@ -263,6 +281,11 @@ impl Message {
             tag::OFFER => {
                 let (upload, answer) = offer::decode(body)?;
                 Ok(Self::Offer { upload, answer })
+            }
+            #[cfg(feature = "upload")]
+            tag::LEVEL => {
+                let (mission, power_w) = level::decode(body)?;
+                Ok(Self::Level { mission, power_w })
             }
             _ => Err(MessageError::Encoding),
         }

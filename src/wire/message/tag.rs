@@ -20,3 +20,5 @@ pub(super) const PULSE: u8 = 15;
 pub(super) const PULSED: u8 = 16;
 pub(super) const SENSE: u8 = 17;
 pub(super) const SENSED: u8 = 18;
+#[cfg(feature = "upload")]
+pub(super) const LEVEL: u8 = 19;

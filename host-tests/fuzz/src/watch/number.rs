@@ -19,6 +19,7 @@ pub(super) const fn number_of(message: &Message) -> Option<u16> {
         | Message::Proposal(_)
         | Message::Decision(_)
         | Message::Fence { .. }
-        | Message::Offer { .. } => return None,
+        | Message::Offer { .. }
+        | Message::Level { .. } => return None,
     })
 }

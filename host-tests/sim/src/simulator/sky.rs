@@ -27,6 +27,9 @@ pub struct Sky {
     pub handed: Vec<(u16, Sample)>,
     /// Relays whose receiver says something else: index from 1, by how many dB too much, and since when.
     pub broken: Vec<(u16, f64, Instant)>,
+    /// Whether the transmitter and the receiver measure, too: with keys they say it on the air, without them the receiver has a wire to the
+    /// last relay.
+    pub ends: bool,
     /// The run goes on until then.
     pub until: Instant,
     /// Seed of the shadows.
@@ -48,6 +51,7 @@ impl Sky {
             once: false,
             handed: Vec::new(),
             broken: Vec::new(),
+            ends: true,
             until: Instant::from_millis(600_000),
             seed: 1,
         }
@@ -79,12 +83,21 @@ impl Sky {
             .iter()
             .find(|(which, _, since)| *which == index && now >= *since);
         let off_db = broken.map_or(0.0, |(_, db, _)| *db) + self.shadow_db * self.shadow(at.into());
-        scene.interference_w(at) * decibel(off_db) * self.mean(rng)
+        (scene.interference_w(at) * decibel(off_db) + scene.noise_w) * self.mean(rng)
     }
 
     /// What the receiver measures, W.
     pub(super) fn receiver_w(&self, scene: &Scene, rng: &mut ChaCha8Rng) -> f64 {
-        scene.interference_rx_w() * self.mean(rng)
+        self.on_ground_w(scene, scene.distance_m, rng)
+    }
+
+    /// What the transmitter measures, W.
+    pub(super) fn transmitter_w(&self, scene: &Scene, rng: &mut ChaCha8Rng) -> f64 {
+        self.on_ground_w(scene, 0.0, rng)
+    }
+
+    fn on_ground_w(&self, scene: &Scene, x_m: f64, rng: &mut ChaCha8Rng) -> f64 {
+        (scene.interference_on_ground_w(x_m) + scene.noise_w) * self.mean(rng)
     }
 
     /// The mean of so many exponential samples with a mean of 1.

@@ -2,9 +2,12 @@
 
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Port, Side, Wiring};
+use uav_relay_scenario::number::narrow;
+use uav_relay_scenario::scene::Scene;
 
 use super::super::outcome::{Moment, Turning};
 use super::super::queue::Happening;
+use super::super::sky::Sky;
 use super::air::Receiver;
 use super::state::Chain;
 
@@ -47,6 +50,20 @@ impl Chain {
             station.ground.handle_timeout(now);
         }
         self.drain_station(at);
+    }
+
+    /// Every station that has something to measure says what.
+    pub(super) fn measure_at_ends(&mut self, sky: &Sky, scene: &Scene) {
+        for at in 0..self.stations.len() {
+            if let Some(station) = self.stations.get_mut(at) {
+                let power_w = match station.end {
+                    Side::Upstream => sky.transmitter_w(scene, &mut self.rng),
+                    Side::Downstream => sky.receiver_w(scene, &mut self.rng),
+                };
+                station.ground.measured(narrow(power_w));
+            }
+            self.drain_station(at);
+        }
     }
 
     fn drain_station(&mut self, at: usize) {

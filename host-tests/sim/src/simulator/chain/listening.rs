@@ -56,13 +56,16 @@ impl Chain {
                     power_w: uav_relay_scenario::number::narrow(power_w),
                 },
             );
-            if member.node == self.setup.mission.relays() {
+            if sky.ends && !self.setup.auth && member.node == self.setup.mission.relays() {
                 let power_w =
                     uav_relay_scenario::number::narrow(sky.receiver_w(&scene, &mut self.rng));
                 member
                     .relay
                     .handle_sample(now, Sample::Receiver { power_w });
             }
+        }
+        if sky.ends && sky.handed.is_empty() {
+            self.measure_at_ends(&sky, &scene);
         }
         self.stand(places);
         if now < sky.until {

@@ -26,13 +26,15 @@ impl Station {
     }
 }
 
-/// One station for every end that something is uploaded from.
+/// One station for every end that something is uploaded from, and for both where the relays listen: what it measures it says on the air.
 pub(super) fn stations(setup: &Setup) -> Vec<Station> {
     let Some(proof) = setup.proof(1) else {
         return Vec::new();
     };
     let uploads = setup.uploads.iter().map(|spec| spec.end);
-    let mut ends: Vec<Side> = uploads.collect();
+    let measures = setup.sky.as_ref().filter(|sky| sky.handed.is_empty());
+    let both = measures.map(|_| [Side::Upstream, Side::Downstream]);
+    let mut ends: Vec<Side> = uploads.chain(both.into_iter().flatten()).collect();
     ends.sort();
     ends.dedup();
     ends.into_iter()

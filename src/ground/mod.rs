@@ -1,4 +1,5 @@
-//! The ground's end of an upload: hands a new mission to the nearest relay that answers, until it is flown.
+//! The transmitter or the receiver as a node: hands a new mission to the nearest relay that answers, until it is flown, and tells the relays
+//! near by how strong the interference is where it stands.
 //!
 //! | progress | what comes of the relay asked | what follows |
 //! | --- | --- | --- |
@@ -7,9 +8,14 @@
 //! | `Flown` | it flies it: so does every relay of its view, or it takes part in nothing until it does | done |
 //! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
 
+mod progress;
+
+pub use progress::Progress;
+
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::relay::signed::{greeting, say};
+use crate::sensing::level::is_level;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
@@ -28,35 +34,10 @@ const PATIENCE: Duration = Duration::from_millis(1_000);
 /// So many questions without an answer are put to one relay before the next one is asked.
 const QUESTIONS: u8 = 3;
 
-/// How far an upload has come.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Progress {
-    /// There is nothing to upload.
-    #[default]
-    Idle,
-    /// No relay is known to hold it.
-    Offering,
-    /// A relay holds it: the others are being asked.
-    Held {
-        /// Node number of the relay.
-        by: u16,
-    },
-    /// The chain flies it.
-    Flown {
-        /// Node number of the relay that says so.
-        by: u16,
-        /// The latest view of the chain that it has heard of.
-        view: ViewId,
-    },
-    /// The chain has a newer mission.
-    Outdated {
-        /// Its version.
-        version: u16,
-    },
-}
+/// So many levels are said until the relays are greeted anew: one that was switched on since can read them again from then on.
+const LEVELS_A_GREETING: u8 = 16;
 
-/// The transmitter or the receiver, where it uploads missions; sans-IO, as [`Relay`](crate::Relay) is.
+/// The transmitter or the receiver, where it uploads missions or measures the interference; sans-IO, as [`Relay`](crate::Relay) is.
 ///
 /// After every input call [`poll_transmit`](Self::poll_transmit) until it gives `None`, then wait for a byte or for
 /// [`poll_timeout`](Self::poll_timeout). It takes in anything, and what is not for it has no effect.
@@ -121,6 +102,10 @@ pub struct Ground {
     answer: Option<u16>,
     due: bool,
     again: Option<Instant>,
+    /// The interference here, W, as last measured, and the distances of the relays that are to be told: bit d - 1 for d.
+    level_w: f32,
+    untold: u8,
+    levels: u8,
     deframer: Deframer,
     session: Session,
     counter: u32,
@@ -154,6 +139,9 @@ impl Ground {
             answer: None,
             due: false,
             again: None,
+            level_w: 0.0,
+            untold: 0,
+            levels: 0,
             deframer: Deframer::new(),
             session: Session::new(auth),
             counter: 0,
@@ -177,6 +165,28 @@ impl Ground {
         self.due = true;
         self.again = Some(now + PATIENCE);
         Ok(())
+    }
+
+    /// Tells the relays near by how strong the interference is here: mean received power, W, over enough time that its relative error is
+    /// that of [`Listen`](crate::Listen), the noise of the receiver in it and the chain's own signals not. On a link to one neighbour that
+    /// is one frame of 23 bytes and a tag, on a shared channel one to each of the four nearest; a relay that is not there, or was switched
+    /// on since, is sent a handshake instead. Nobody answers, and what is lost the next measurement makes up for: to measure once in
+    /// [`Listen::every`](crate::Listen::every) is enough.
+    ///
+    /// Whether it was taken: not if it is outside 1e-30 to 1e6 W.
+    pub fn measured(&mut self, power_w: f32) -> bool {
+        if !is_level(power_w) {
+            return false;
+        }
+        self.level_w = power_w;
+        self.untold = (1..=self.within).fold(0, |all, distance| all | bit(distance));
+        self.levels = (self.levels + 1) % LEVELS_A_GREETING;
+        if self.levels == 0 {
+            for distance in 1..=self.within {
+                self.session.greet(self.at(distance));
+            }
+        }
+        true
     }
 
     /// How far the upload has come.
@@ -219,7 +229,12 @@ impl Ground {
                         }
                         _ => self.refused = self.refused.saturating_add(1),
                     },
-                    Checked::Handshake { first } => self.due |= first && self.is_under_way(),
+                    Checked::Handshake { first } => {
+                        self.due |= first && self.is_under_way();
+                        if first && self.level_w > 0.0 {
+                            self.untold |= bit(distance);
+                        }
+                    }
                     Checked::Unproven => {}
                     _ => self.refused = self.refused.saturating_add(1),
                 }
@@ -288,9 +303,14 @@ impl Ground {
 
     /// The relay that is asked.
     fn to(&self) -> u16 {
+        self.at(self.distance)
+    }
+
+    /// The relay that far away.
+    fn at(&self, distance: u16) -> u16 {
         match self.end {
-            Side::Upstream => self.distance,
-            Side::Downstream => self.node.saturating_sub(self.distance),
+            Side::Upstream => distance,
+            Side::Downstream => self.node.saturating_sub(distance),
         }
     }
 
@@ -320,7 +340,7 @@ impl Ground {
             return Some(len);
         }
         if !core::mem::take(&mut self.due) {
-            return None;
+            return self.next_level(header, frame);
         }
         let upload = self.upload?;
         let to = self.to();
@@ -347,5 +367,25 @@ impl Ground {
             })
         };
         say(&mut self.session, to, &message, header, frame)
+    }
+
+    /// Tells the next relay of the level; a handshake goes to one that could not read it.
+    fn next_level(&mut self, header: &mut Header, frame: &mut FrameBuf) -> Option<usize> {
+        let distance = (1..=self.within).find(|distance| self.untold & bit(*distance) != 0)?;
+        self.untold &= !bit(distance);
+        let message = Message::Level {
+            mission: self.base,
+            power_w: self.level_w,
+        };
+        let to = self.at(distance);
+        say(&mut self.session, to, &message, header, frame)
+    }
+}
+
+/// The bit of a relay that far away, 1 to 8.
+const fn bit(distance: u16) -> u8 {
+    match 1_u8.checked_shl(distance.saturating_sub(1) as u32) {
+        Some(bit) => bit,
+        None => 0,
     }
 }

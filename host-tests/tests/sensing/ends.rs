@@ -1,0 +1,95 @@
+//! What the transmitter and the receiver measure, told on the air: `Ground::measured`.
+
+use rayon::prelude::*;
+use uav_relay::sensing::belief::Belief;
+use uav_relay::{Instant, Interference, Wiring};
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::outcome::Outcome;
+use uav_relay_sim::simulator::setup::Setup;
+
+use uav_relay_tools::listening::found::quantile;
+use uav_relay_tools::listening::wild::Wild;
+
+use crate::count;
+
+const RELAYS: u16 = 5;
+
+/// How much more the way over the ground takes than the mission says: the receiver stands behind a hill.
+const HILL: f64 = 8.0;
+
+/// Runs as `change` says, in which both ends have a key and a radio: by how much is off what the first relay believes of the receiver, and
+/// the share of the optimum. `None` of the former where it believes nothing of it.
+fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
+    let one = |seed| {
+        let wild = Wild::new(seed, RELAYS, 1);
+        let mut setup = wild.setup(Interference::Unknown).unwrap();
+        setup.settings.wiring = Wiring::Shared;
+        setup.auth = true;
+        setup.sky.as_mut().unwrap().scene.mu_nlos *= HILL;
+        change(&mut setup);
+        let truth = setup.sky.as_ref().unwrap().scene.clone();
+        let outcome = run(setup).unwrap();
+        let off = heard_at_rx(&outcome).map(|heard| heard / truth.interference_rx_w() - 1.0);
+        let stand = outcome.stands.last().unwrap();
+        let flown = stand.goals.as_ref().map_or(0.0, |goals| {
+            let mut scene = truth.clone();
+            scene.relays.truncate(goals.len());
+            scene.chain_sir(goals)
+        });
+        (off, flown)
+    };
+    (0..count(20)).into_par_iter().map(one).collect()
+}
+
+/// What the first relay believes that the receiver hears, W.
+fn heard_at_rx(outcome: &Outcome) -> Option<f64> {
+    match outcome.relays.first()?.believed.belief {
+        Belief::Source { receiver_w, .. } if receiver_w > 0.0 => Some(f64::from(receiver_w)),
+        _ => None,
+    }
+}
+
+#[test]
+fn what_the_receiver_says_on_the_air_is_believed_by_all() {
+    type Change = fn(&mut Setup);
+    let last_lost: Change = |setup| setup.kills = vec![(RELAYS, Instant::from_millis(7_000))];
+    let last_anew: Change = |setup| {
+        setup.kills = vec![(RELAYS, Instant::from_millis(6_000))];
+        setup.boots = vec![(RELAYS, Instant::from_millis(7_000))];
+    };
+    for (what, change) in [
+        ("as it should be", (|_| {}) as Change),
+        ("on a bad day", |setup| setup.faults = Faults::BAD_DAY),
+        ("the last relay lost", last_lost),
+        ("the last relay switched on again", last_anew),
+    ] {
+        let runs = flown(change);
+        let said = runs.iter().filter(|(off, _)| off.is_some()).count();
+        let mut off: Vec<f64> = runs.iter().filter_map(|run| Some(run.0?.abs())).collect();
+        let [median, most] = [0.5, 1.0].map(|part| quantile(&mut off, part));
+        println!(
+            "{what}: of {} runs {said} know it, off by {median:.4} in the median, {most:.4} at most",
+            runs.len()
+        );
+        assert_eq!(said, runs.len(), "{what}");
+        assert!(most < 0.1, "{what}");
+    }
+}
+
+/// Where nobody tells what the receiver hears, the last hop goes by what the mission says of the way over the ground, which the hill makes
+/// wrong.
+#[test]
+fn it_is_worth_something() {
+    let told = flown(|_| {});
+    let untold = flown(|setup| setup.sky.as_mut().unwrap().ends = false);
+    assert!(untold.iter().all(|(off, _)| off.is_none()));
+    let mut gains: Vec<f64> = told
+        .iter()
+        .zip(&untold)
+        .map(|(told, untold)| told.1 / untold.1)
+        .collect();
+    let [least, median] = [0.0, 0.5].map(|part| quantile(&mut gains, part));
+    println!("SIR with what the ends say over that without: median {median:.3}, least {least:.3}");
+    assert!(median > 3.0 && least > 2.0);
+}
