@@ -3,6 +3,7 @@
 //! Bodies are written from the byte tables, not by the crate: what the crate would never write must come too.
 
 mod header;
+mod hearing;
 mod offer;
 mod parts;
 
@@ -14,10 +15,10 @@ use parts::Body;
 pub use header::{Header, sealed};
 pub use parts::Known;
 
-/// A body of any of the seventeen kinds, or of none.
+/// A body of any of the twenty kinds, or of none.
 pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
     let tag = match input.below(16) {
-        15 => 15 + input.below(3),
+        15 => 15 + input.below(6),
         tag => tag,
     };
     let mut body = Body {
@@ -46,6 +47,8 @@ pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
         14 => body.offer(),
         15 => body.pulse(),
         16 => body.pulsed(),
+        17 | 18 => body.hearing(),
+        19 => body.level(),
         _ => body.bytes = body.input.piece().to_vec(),
     }
     body.bytes

@@ -4,7 +4,7 @@ mod addresses;
 
 use uav_relay::wire::digest::{MissionId, digest};
 use uav_relay::wire::frame::MAX_DECODED;
-use uav_relay::{Duration, Instant, Mission, Placement, Port, Sample, Side, Stats, Upload, Wiring};
+use uav_relay::{Duration, Instant, Mission, Port, Sample, Side, Stats, Upload, Wiring};
 
 use super::cobs::stuffed;
 use super::counted::intact;
@@ -206,14 +206,25 @@ impl Bench {
 
     fn sample(&mut self, input: &mut Input<'_>) {
         let count = input.byte();
-        let sample = if input.flag() {
-            Sample::Interference {
-                power_w: input.mostly(|input| input.scaled(1e-30, 1e6)),
-            }
-        } else {
-            Sample::FirstHop {
+        let kind = input.byte();
+        let power_w = |input: &mut Input<'_>| input.mostly(|input| input.scaled(1e-30, 1e6));
+        let sample = match kind % 8 {
+            1 | 3 => Sample::Interference {
+                power_w: power_w(input),
+            },
+            5 => Sample::Heard {
+                at: setting::place(input, self.mission.config()),
+                power_w: power_w(input),
+            },
+            6 => Sample::Transmitter {
+                power_w: power_w(input),
+            },
+            7 => Sample::Receiver {
+                power_w: power_w(input),
+            },
+            _ => Sample::FirstHop {
                 sir: input.mostly(|input| input.scaled(1e-9, 1e9)),
-            }
+            },
         };
         self.watched.sample(self.now, sample, count);
     }
@@ -231,12 +242,7 @@ impl Bench {
         }
         let ago = Duration::from_millis(u64::from(how % 16) * 20);
         let at = self.now.as_micros().saturating_sub(ago.as_micros());
-        let config = self.mission.config();
-        let place = Placement {
-            x_m: input.mostly(|input| input.even(0.0, config.distance_m)),
-            y_m: setting::aside(input, config.lateral),
-            altitude_m: input.mostly(|input| input.scaled(0.1, 1e5)),
-        };
+        let place = setting::place(input, self.mission.config());
         let at = Instant::from_micros(at);
         self.watched.position(self.now, at, place);
     }

@@ -4,8 +4,8 @@ use uav_relay::channel::AirGround;
 use uav_relay::guard::config::GuardConfig;
 use uav_relay::wire::auth::{Auth, Key};
 use uav_relay::{
-    Adjust, Band, Channel, Duration, Field, FieldPoint, Interference, Interferer, Local, Measure,
-    Method, Mission, MissionConfig, Profile, Schedule, Settings, Wiring,
+    Adjust, Band, Channel, Duration, Field, FieldPoint, Interference, Interferer, Listen, Local,
+    Measure, Method, Mission, MissionConfig, Placement, Profile, Schedule, Settings, Wiring,
 };
 
 use super::input::Input;
@@ -15,6 +15,13 @@ const EVEN: Field = Field::new(&[at(0.0, 1e8)]);
 const UNEVEN: Field = Field::new(&[at(0.0, 4.2e5), at(600.0, 3.75e5), at(1000.0, 4.4e5)]);
 const STEEP: Field = Field::new(&[at(100.0, 1e7), at(300.0, 1e10), at(310.0, 1e6)]);
 const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
+
+/// Where there is room to the side.
+const BESIDE: Interference = Interference::Source(Interferer {
+    power_w: 80.0,
+    x_m: 500.0,
+    y_m: 150.0,
+});
 
 /// The key of every network here.
 pub const KEY: [u8; 32] = *b"known to whoever reads this line";
@@ -28,11 +35,24 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
 /// Half of the missions are the paper's with little changed: a few bytes get a relay far there. The other half draws every
 /// number from the whole of its range.
 pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
-    let kind = input.below(14);
+    let drawn = input.byte();
+    let (kind, variant) = (drawn % 14, drawn / 14 % 8);
     let relays = u16::from(input.below(most.max(1))) + 1;
     let config = match kind {
         6..=12 => wild(input, kind, relays)?,
         _ => tame(kind, relays)?,
+    };
+    let config = match (variant, config.interference) {
+        // Nobody knows of one.
+        (6, Interference::Source(_)) => MissionConfig {
+            interference: Interference::Unknown,
+            ..config
+        },
+        (7, _) => MissionConfig {
+            noise_w: input.scaled(1e-30, 1.0),
+            ..config
+        },
+        _ => config,
     };
     Mission::try_new(config).ok()
 }
@@ -95,11 +115,7 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
                 least_m: -280.0,
                 most_m: 280.0,
             },
-            interference: Interference::Source(Interferer {
-                power_w: 80.0,
-                x_m: 500.0,
-                y_m: 150.0,
-            }),
+            interference: BESIDE,
             ..paper
         },
     })
@@ -147,6 +163,15 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
         noise_w: 0.0,
         tolerance: input.scaled(1e-6, 0.1),
     })
+}
+
+/// Where a drone is: mostly on the link, at any altitude, in the room beside it.
+pub fn place(input: &mut Input<'_>, config: &MissionConfig) -> Placement {
+    Placement {
+        x_m: input.mostly(|input| input.even(0.0, config.distance_m)),
+        y_m: aside(input, config.lateral),
+        altitude_m: input.mostly(|input| input.scaled(0.1, 1e5)),
+    }
 }
 
 /// How far from the line a drone is, m: in the room beside it or out of it, where there is some.
@@ -221,6 +246,14 @@ pub fn of_chain(input: &mut Input<'_>, mission: &Mission) -> Settings {
         2 if mission.interferer().is_some() => Method::Adjust(adjust(input)),
         _ => Method::Align,
     };
+    let unknown = mission.config().interference == Interference::Unknown;
+    let listen = (unknown || how % 4 == 3 && mission.field().is_none()).then(|| {
+        if (how / 4).is_multiple_of(2) {
+            Listen::default()
+        } else {
+            Listen::following(mission.relays())
+        }
+    });
     let schedule = if how / 4 % 8 == 1 {
         Schedule::FixedStep {
             step: f64::from(input.scaled(1e-6, 1e6)),
@@ -236,6 +269,7 @@ pub fn of_chain(input: &mut Input<'_>, mission: &Mission) -> Settings {
         method,
         schedule,
         auth,
+        listen,
         predict: how / 32 % 2 != 1,
         wiring: if how / 64 % 2 == 1 {
             Wiring::Shared
