@@ -6,7 +6,7 @@
 //!
 //! The chain is as good as its worst hop: `SIR_S` = min over hops (paper, section "Position planning for multiple UAVs").
 //! All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
-//! `host-tests/tests/placement.rs`.
+//! `host-tests/tests/placement/main.rs`.
 
 mod turn;
 

@@ -48,6 +48,16 @@ pub enum Sample {
     },
 }
 
+impl Sample {
+    /// Whether it is for a relay that listens.
+    pub(crate) const fn is_heard(self) -> bool {
+        matches!(
+            self,
+            Self::Heard { .. } | Self::Transmitter { .. } | Self::Receiver { .. }
+        )
+    }
+}
+
 /// What a relay has measured.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meter {

@@ -35,7 +35,7 @@
 //!
 //! With noise of their own receivers hear less, and the reach has no such form: `noise` searches for it from this one on.
 //!
-//! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement.rs` asserts it against a bisection of the
+//! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` asserts it against a bisection of the
 //! SIR itself in f64.
 
 mod noise;

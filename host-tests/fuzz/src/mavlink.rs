@@ -1,6 +1,7 @@
 //! Any bytes as what comes from an autopilot, and any orders to the link to it.
 
 mod link;
+mod payload;
 mod peer;
 mod reference;
 mod wire;

@@ -2,6 +2,7 @@
 //!
 //! `COUNT` and `SEED` in the environment take other schedules; a failure names the seed of its one.
 
+mod agenda;
 mod drone;
 mod known;
 mod medium;

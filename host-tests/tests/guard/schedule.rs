@@ -26,6 +26,7 @@ use uav_relay::{Duration, Side};
 
 use uav_relay_sim::simulator::drones::Point;
 
+use crate::agenda::*;
 use crate::drone::{Board, length, place, way};
 use crate::medium::Faults;
 use crate::world::{World, beside};
@@ -48,32 +49,6 @@ pub(crate) struct Report {
     pub(crate) share_of_time: f64,
     pub(crate) messages: f64,
 }
-
-/// What happens to drone `.0`.
-#[derive(Clone, Copy, Debug)]
-enum What {
-    Hear(usize, Point),
-    Off(usize),
-    On(usize),
-    Mute(usize),
-    Unmute(usize),
-    Vanish(usize),
-    /// It links to the last one, around the third.
-    Around(usize, Side, usize, Option<usize>),
-    Back(usize, Side, usize),
-    Forget(usize, Side),
-    Speed(usize, f64),
-    /// Its pilot takes it, its guard hears of that, the pilot moves it aside, and gives it back.
-    Take(usize),
-    Hears(usize),
-    Aside(usize, (usize, bool, f64)),
-    Along(usize, f64),
-    Give(usize),
-}
-
-const ROUGH_S: f64 = 200.0;
-const SLOWEST: f64 = 2.0;
-const FASTEST: f64 = 40.0;
 
 pub(crate) fn fly(seed: u64) -> Report {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x00C0_FFEE);
@@ -149,76 +124,6 @@ fn line(
     (confines, starts)
 }
 
-/// Places in order, the separation apart.
-fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize) -> Vec<Point> {
-    let distance = f64::from(confines.fence.most_x_m);
-    let step = f64::from(confines.separation_m) + 5e-7 * distance;
-    let slack = distance - step * (relays - 1) as f64;
-    let (from, to) = match rng.random_range(0..4) {
-        0 => (0.0, 0.05),
-        1 => (0.95, 1.0),
-        2 => (0.4, 0.5),
-        _ => (0.0, 1.0),
-    };
-    let mut spare: Vec<f64> = (0..relays)
-        .map(|_| slack * rng.random_range(from..=to))
-        .collect();
-    spare.sort_by(f64::total_cmp);
-    (0..relays)
-        .map(|k| {
-            let x = spare[k] + step * k as f64;
-            let (y, h): (f32, f32) = (
-                rng.random_range(-80.0..=40.0),
-                rng.random_range(20.0..=120.0),
-            );
-            [x as f32, y, h].map(f64::from)
-        })
-        .collect()
-}
-
-/// The same with half of the neighbours closer along x, and the separation apart in space: relays that are not neighbours stay that far
-/// apart along x. Where `wild`, they do not: some take turns at two places across the line.
-fn closer(
-    rng: &mut ChaCha8Rng,
-    confines: &GuardConfig,
-    mut at: Vec<Point>,
-    wild: bool,
-) -> Vec<Point> {
-    let rounding = 5e-7 * f64::from(confines.fence.most_x_m);
-    let apart = 1.0001 * f64::from(confines.separation_m) + rounding;
-    let fence = confines.fence;
-    let inside = |y: f64, h: f64| {
-        (f64::from(fence.least_y_m)..=f64::from(fence.most_y_m)).contains(&y)
-            && (f64::from(fence.least_altitude_m)..=f64::from(fence.most_altitude_m)).contains(&h)
-    };
-    let mut before = apart;
-    for k in 1..at.len() {
-        let [x, y, h] = at[k - 1];
-        let most = (at[k][0] - x).min(apart);
-        let least = if wild { 0.0 } else { (apart - before).max(0.0) };
-        before = at[k][0] - x;
-        if rng.random_bool(0.5) || least >= most {
-            continue;
-        }
-        let step = if rng.random_bool(0.3) {
-            least
-        } else {
-            rng.random_range(least..=most)
-        };
-        let aside = (apart * apart - step * step).max(0.0).sqrt();
-        let turn = rng.random_range(0.0..=std::f64::consts::TAU);
-        let (y, h) = (y + aside * turn.sin(), h + aside * turn.cos());
-        if wild && k > 1 && rng.random_bool(0.5) {
-            at[k] = [x + step, at[k - 2][1], at[k - 2][2]].map(|part| f64::from(part as f32));
-            before = step;
-        } else if inside(y, h) {
-            at[k] = [x + step, y, h].map(|part| f64::from(part as f32));
-            before = step;
-        }
-    }
-    at
-}
-
 /// Everything that may happen does.
 fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     world.faults = Faults {
@@ -261,142 +166,6 @@ fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     }
     for (_, what) in plan {
         happen(world, what, report);
-    }
-}
-
-fn agreements(rng: &mut ChaCha8Rng, world: &World) -> Vec<(f64, What)> {
-    let mut plan = Vec::new();
-    for _ in 0..rng.random_range(0..=6) {
-        let at_s = rng.random_range(0.0..ROUGH_S - 60.0);
-        let mut confines = world.confines;
-        if rng.random_bool(0.2) {
-            confines.separation_m *= rng.random_range(0.0..=1.0);
-        }
-        let mut agreed = places(rng, &confines, world.drones.len());
-        if rng.random_bool(0.5) {
-            let wild = rng.random_bool(0.3);
-            agreed = closer(rng, &world.confines, agreed, wild);
-        }
-        for (k, at) in agreed.into_iter().enumerate() {
-            if rng.random_bool(0.8) {
-                plan.push((
-                    at_s + 60.0 * rng.random_range(0.0..=1.0_f64).powi(3),
-                    What::Hear(k, at),
-                ));
-            }
-        }
-    }
-    plan
-}
-
-fn speeds(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
-    let mut plan = Vec::new();
-    for k in 0..relays {
-        let mut at_s = 0.0;
-        while at_s < ROUGH_S {
-            let speed = if rng.random_bool(0.25) {
-                0.0
-            } else {
-                FASTEST.powf(rng.random_range(0.0..=1.0))
-            };
-            plan.push((at_s, What::Speed(k, speed)));
-            at_s += rng.random_range(1.0..=40.0);
-        }
-    }
-    plan
-}
-
-/// Relays that are rebooted, fall silent, or go: of three in a row only one in the second and third ways.
-fn troubles(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
-    let mut plan = Vec::new();
-    let mut left_out = 0;
-    for k in 0..relays {
-        let at_s = rng.random_range(5.0..ROUGH_S - 90.0);
-        match rng.random_range(0..10) {
-            0..=3 => {
-                plan.push((at_s, What::Off(k)));
-                plan.push((at_s + rng.random_range(0.0..=15.0), What::On(k)));
-            }
-            kind @ 4..=6 if relays > 2 && left_out < k => {
-                left_out = k + 2;
-                around(rng, &mut plan, (k, relays), at_s, kind == 6);
-            }
-            _ => {}
-        }
-    }
-    plan
-}
-
-/// Pilots who take their drones. Not beside one that is gone: an operator says that nobody is there any more.
-fn pilots(rng: &mut ChaCha8Rng, relays: usize, troubles: &[(f64, What)]) -> Vec<(f64, What)> {
-    let mut plan = Vec::new();
-    if rng.random_bool(0.5) {
-        return plan;
-    }
-    for k in 0..relays {
-        let beside_gone = troubles
-            .iter()
-            .any(|(_, what)| matches!(what, What::Vanish(gone) if gone.abs_diff(k) <= 1));
-        if beside_gone || rng.random_bool(0.7) {
-            continue;
-        }
-        let mut at_s = rng.random_range(1.0..ROUGH_S - 20.0);
-        for _ in 0..rng.random_range(1..=2) {
-            plan.push((at_s, What::Take(k)));
-            let told_s = at_s + rng.random_range(0.0..=1.5);
-            plan.push((told_s, What::Hears(k)));
-            if rng.random_bool(0.5) {
-                let most_m = rng.random_range(1.0..=30.0);
-                let way = (rng.random_range(1..=2), rng.random(), most_m);
-                plan.push((told_s, What::Aside(k, way)));
-            }
-            let is_alone = troubles.iter().all(|(_, what)| {
-                !matches!(what, What::Mute(other) | What::Vanish(other) if other.abs_diff(k) <= 3)
-            });
-            if is_alone && rng.random_bool(0.5) {
-                let later_s = told_s + rng.random_range(0.5..=15.0);
-                plan.push((later_s, What::Along(k, rng.random_range(0.0..=1.0))));
-            }
-            if rng.random_bool(0.2) {
-                break;
-            }
-            let back_s = at_s + rng.random_range(5.0..=60.0);
-            plan.push((back_s, What::Give(k)));
-            at_s = back_s + 20.0 * rng.random_range(0.01..=1.0_f64).powi(2);
-        }
-    }
-    plan
-}
-
-/// Relay `k` falls silent, its neighbours link to each other, and it is back some time later; or it is gone.
-fn around(
-    rng: &mut ChaCha8Rng,
-    plan: &mut Vec<(f64, What)>,
-    (k, relays): (usize, usize),
-    at_s: f64,
-    gone: bool,
-) {
-    let [before, after] = beside(k, relays);
-    plan.push((at_s, if gone { What::Vanish(k) } else { What::Mute(k) }));
-    let back_s = at_s + rng.random_range(10.0..=60.0);
-    for (who, side, other) in [
-        (before, Side::Downstream, after),
-        (after, Side::Upstream, before),
-    ] {
-        let Some(who) = who else { continue };
-        plan.push((
-            at_s + rng.random_range(0.0..=10.0),
-            What::Around(who, side, k, other),
-        ));
-        let then_s = back_s + rng.random_range(0.0..=10.0);
-        plan.push(if gone {
-            (then_s, What::Forget(who, side))
-        } else {
-            (then_s, What::Back(who, side, k))
-        });
-    }
-    if !gone {
-        plan.push((back_s, What::Unmute(k)));
     }
 }
 

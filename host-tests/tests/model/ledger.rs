@@ -11,19 +11,12 @@ use uav_relay_oracle::reference::joint::Place;
 use super::Checked;
 use super::scenario::Scenario;
 use super::seal::{Taken, refused, taken};
+use super::signs::{LONGEST, QUESTIONS, Signs};
 use super::wires::{Ended, Flying, message};
 
 /// The most frames that one drain may give: a pass or what came of one, "busy", what came of a proposal, a pulse and what came of it,
 /// and to each side a heartbeat and a hello.
 pub(crate) const MOST_FRAMES: u32 = 9;
-
-/// Questions that a neighbour leaves open at least until it is missed, and how many of them may still be answered.
-const QUESTIONS: usize = 16;
-const OPEN: u32 = 4;
-
-/// How many times as many questions as were open before an answer, and how many times `dead_after`, are enough in any case.
-const MARGIN: usize = 3;
-const LONGEST: u32 = 8;
 
 /// One relay, by what it has said since it was switched on.
 #[derive(Debug)]
@@ -53,91 +46,6 @@ pub(crate) struct Ledger {
     pub(crate) record: Option<ViewRecord>,
     /// The frames that it has taken.
     taken: Taken,
-}
-
-/// What is known of a neighbour's being there.
-#[derive(Debug)]
-struct Signs {
-    /// Its number, and when it was asked, of every question.
-    asked: Vec<(u16, Instant)>,
-    /// When it was there for certain, and when it may have been.
-    surely: Instant,
-    perhaps: Instant,
-    /// When something came that may have been a sign of it.
-    last: Instant,
-    /// Questions since a certain sign, since one that may have been, and the most since a certain one.
-    open: usize,
-    perhaps_open: usize,
-    most_open: usize,
-    /// Whether the relay has said that it is lost.
-    missed: bool,
-}
-
-impl Signs {
-    const fn new(now: Instant) -> Self {
-        Self {
-            asked: Vec::new(),
-            surely: now,
-            perhaps: now,
-            last: now,
-            open: 0,
-            perhaps_open: 0,
-            most_open: QUESTIONS,
-            missed: false,
-        }
-    }
-
-    fn ask(&mut self, message: &Message, now: Instant) {
-        if let Message::Heartbeat { ask, .. } = message {
-            self.asked.push((*ask, now));
-            self.open += 1;
-            self.perhaps_open += 1;
-            self.most_open = self.most_open.max(self.open);
-        }
-    }
-
-    /// An answer is a sign of when its question was asked; what comes back of a pulse or a pass, of when that was handed on; and the next
-    /// one, of when what came back of the last was.
-    fn heard(&mut self, message: &Message, tick: Duration, now: Instant) {
-        match message {
-            Message::Heartbeat { answer, .. } => {
-                let known = self.asked.iter().rev().find(|(number, _)| number == answer);
-                let Some((_, asked)) = known else {
-                    return;
-                };
-                self.last = now;
-                self.perhaps_open = 0;
-                self.perhaps = self.perhaps.max(*asked);
-                // So few questions can have followed it that it is open yet.
-                if now.since(*asked) < tick.times(OPEN) {
-                    self.surely = self.surely.max(*asked);
-                    self.open = 0;
-                }
-            }
-            Message::Hello(_)
-            | Message::Busy { .. }
-            | Message::Fence { .. }
-            | Message::Proposal(_)
-            | Message::Decision(_)
-            | Message::Offer { .. } => {}
-            // A pulse, a pass, or what came of one.
-            _ => {
-                (self.last, self.perhaps) = (now, now);
-                self.perhaps_open = 0;
-            }
-        }
-    }
-
-    /// Whether it was to be missed when it was asked last, as nothing had come for `most`: that often it had been asked before, or that
-    /// long it may be silent at most.
-    fn is_to_be_missed(&self, most: Duration, longest: Duration) -> bool {
-        let Some((_, asked)) = self.asked.last() else {
-            return false;
-        };
-        let silent = asked.since(self.perhaps);
-        let enough = self.perhaps_open > MARGIN * self.most_open;
-        silent >= most && (enough || silent >= longest)
-    }
 }
 
 /// How long after one question the next one is asked, at the soonest: as often as all of a chain can do on one channel, sixteen times within

@@ -32,6 +32,7 @@ mod passes;
 mod recovery;
 mod scenario;
 mod seal;
+mod signs;
 mod tally;
 mod wires;
 

@@ -7,6 +7,7 @@ mod brute;
 mod known;
 mod lemmas;
 mod optima;
+mod roomy;
 mod scene;
 
 /// How far below the best SIR a place may be, relative.

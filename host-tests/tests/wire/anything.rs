@@ -13,11 +13,11 @@ use uav_relay::{
 
 use super::codec::{Judged, Proposed, Said, SizedView};
 use super::config;
-use super::forming::mark;
 use super::kinds::{FIRST, WEAK, framed, mission, one_of_each, placed, source};
 use super::lies::renamed;
 use super::receive::{FIELD, drain, relay_of};
 use super::strategies::messages;
+use super::votes::mark;
 
 /// A field as strong and as weak as one may be.
 const WILD: Field = Field::new(&[

@@ -4,7 +4,7 @@ use uav_relay::wire::frame::{self, FrameError, Header};
 use uav_relay::wire::message::{MAX_BODY, Message, MessageError};
 
 use super::codec::{Said, Swept, plain};
-use super::strategies::pad;
+use super::stream_strategies::pad;
 
 pub(crate) const HEADER: Header = Header {
     network: 7,

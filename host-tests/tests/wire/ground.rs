@@ -4,11 +4,11 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Event, Port, Relay, Wiring};
 
 use super::codec::Said;
-use super::forming::{ASKS, FLIES, FORMS, FRESH, READY, between, events, long};
 use super::kinds::{FIRST, one_of_each};
 use super::receive::{counted, relay};
 use super::signed::{Peer, said, with_key};
 use super::uploads::{NOW, held, hello, mission_id, upload};
+use super::votes::{ASKS, FLIES, FORMS, FRESH, READY, between, events, long};
 
 /// What Tx is told by relay 1, or Rx by relay 8.
 fn told(relay: &mut Relay, ground: u16) -> Vec<Said> {

@@ -11,10 +11,10 @@ use uav_relay::{
 use super::codec::{
     Fenced, Greeting, Handed, Heard, Judged, Said, Seats, Shifted, Swept, plain, wire,
 };
-use super::forming::{granted, id, proposed};
 use super::offer::{Offer, offer};
 use super::receive::{drain, relay_of};
 use super::stream::unstuffed;
+use super::votes::{granted, id, proposed};
 
 /// A field of next to no interference.
 pub(crate) const WEAK: Field = Field::new(&[FieldPoint {

@@ -6,12 +6,17 @@
 use proptest::test_runner::{Config, RngSeed};
 use uav_relay_oracle::random::seed;
 
+mod adopted;
 mod anything;
 mod bodies;
+mod bounds;
+mod calls;
 mod codec;
 mod damage;
 mod document;
+mod extremes;
 mod forming;
+mod gathered;
 mod gathering;
 mod golden;
 mod ground;
@@ -30,8 +35,11 @@ mod signed;
 mod sited;
 mod strategies;
 mod stream;
+mod stream_strategies;
 mod uploads;
+mod view_strategies;
 mod views;
+mod votes;
 
 /// `cases` cases from the seed in `SEED`; a failure prints its shrunk input and leaves no file behind.
 fn config(cases: u32) -> Config {

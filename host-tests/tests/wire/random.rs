@@ -10,7 +10,9 @@ use super::codec::{self, Said, plain, sealed, wire};
 use super::config;
 use super::golden::only_frame;
 use super::offered::offers;
-use super::strategies::{asides, bodies, headers, heard, measured, messages, sweeps};
+use super::strategies::{asides, headers, measured, messages, sweeps};
+use super::stream_strategies::bodies;
+use super::view_strategies::heard;
 
 /// Bodies are compared rather than messages: bytes tell -0 from 0.
 fn body_of(message: &Message) -> Vec<u8> {

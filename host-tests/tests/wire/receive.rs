@@ -18,8 +18,8 @@ use uav_relay::{
 
 use super::codec::{Said, sealed};
 use super::config;
-use super::strategies::pieces;
 use super::stream::{chunks, unstuffed};
+use super::stream_strategies::pieces;
 
 /// A field in which a chain of eight can be placed.
 pub(crate) const FIELD: Field = Field::new(&[

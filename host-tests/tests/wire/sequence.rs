@@ -5,11 +5,11 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Instant, Interference, Port, Wiring};
 
 use super::codec::{Handed, Judged, Said, Shifted, Swept};
-use super::forming::{ASKS, FRESH, a_hello, hearing, long};
 use super::kinds::{
     FIRST, SECOND, WEAK, framed, mission, one_of_each, placed, relay_4, sent, settle, source,
 };
 use super::receive::{FIELD, counted, drain, relay_of};
+use super::votes::{ASKS, FRESH, a_hello, hearing, long};
 
 #[test]
 fn a_message_from_the_wrong_side_for_the_heading_is_misdirected_and_nothing_else() {

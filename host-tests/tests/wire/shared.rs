@@ -4,9 +4,9 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Instant, Port, Relay, Wiring};
 
 use super::codec::Said;
-use super::forming::{ASKS, FORMS, FRESH, a_hello, between, hearing, id, long, soon};
 use super::kinds::{FIRST, one_of_each, sent};
 use super::receive::{counted, relay};
+use super::votes::{ASKS, FORMS, FRESH, a_hello, between, hearing, id, long, soon};
 
 /// On a channel that all hear, hellos come from up to four nodes away; anything else from a node that is no neighbour is
 /// counted as misaddressed and answered by a hello, which says who the neighbours are.

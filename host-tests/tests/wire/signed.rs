@@ -10,8 +10,8 @@ use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Duration, Identity, Instant, Mission, Port, Relay, Settings, Wiring};
 
 use super::codec::{Greeting, Said, header, sealed, wire};
-use super::forming::{ASKS, unnumbered};
 use super::stream::unstuffed;
+use super::votes::{ASKS, unnumbered};
 use uav_relay::wire::frame::Header;
 
 const KEY: [u8; 32] = *b"whoever reads this is not secret";

@@ -10,11 +10,12 @@ use uav_relay::{
     Sites, Upload, Wiring,
 };
 
+use super::adopted::adopts;
 use super::codec::{Fenced, Said};
-use super::forming::events;
 use super::offer::Offer;
 use super::signed::{Peer, said, set};
-use super::uploads::{NOW, adopts, held, hello, mission_id, relay_4, upload};
+use super::uploads::{NOW, held, hello, mission_id, relay_4, upload};
+use super::votes::events;
 
 /// Sites a kilometre apart, to the millimetre.
 pub(crate) const A_KILOMETRE: [i32; 6] = [

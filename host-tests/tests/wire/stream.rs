@@ -11,7 +11,8 @@ use super::codec::wire;
 use super::config;
 use super::golden::vectors;
 use super::receive::relay;
-use super::strategies::{headers, pieces};
+use super::strategies::headers;
+use super::stream_strategies::pieces;
 
 type Outcome = Result<Vec<u8>, DeframeError>;
 

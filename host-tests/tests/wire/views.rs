@@ -4,11 +4,11 @@ use uav_relay::wire::digest::digest;
 use uav_relay::{Event, Instant, Port, Relay, Wiring};
 
 use super::codec::{Proposed, Said, SizedView};
-use super::forming::{
-    ASKS, FORMS, FRESH, a_hello, events, granted, hearing, id, long, mark, proposed, soon,
-};
 use super::kinds::{FIRST, framed, one_of_each, sent};
 use super::receive::{counted, relay};
+use super::votes::{
+    ASKS, FORMS, FRESH, a_hello, events, granted, hearing, id, long, mark, proposed, soon,
+};
 
 /// Relay `own` of 8 with its part in `view`, which relay `own` - 1 has handed it as one of eight; it has nothing to say.
 fn in_view(own: u16, view: u32) -> (Relay, u16) {

@@ -247,8 +247,7 @@ impl Round {
 
     /// One measurement, by a relay that measures; whether it was of use.
     pub(crate) fn handle_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
-        if let Sample::Heard { .. } | Sample::Transmitter { .. } | Sample::Receiver { .. } = sample
-        {
+        if sample.is_heard() {
             return SENSING
                 && member.settings.listen.is_some()
                 && self.computation.sensing.take(now, member, sample);

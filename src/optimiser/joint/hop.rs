@@ -17,7 +17,7 @@
 //! R_z = F_z / a,    R_zz' = (F_zz' + F_1z R_z' + R_z F_1z' + F_11 R_z R_z') / a
 //! ```
 //!
-//! and by ln gamma R = -c |p' - p|^2 / 2a. `host-tests/tests/joint_method.rs` holds the chains that come of
+//! and by ln gamma R = -c |p' - p|^2 / 2a. `host-tests/tests/joint_method/main.rs` holds the chains that come of
 //! these against an independent optimiser.
 
 use super::axis::Triple;

@@ -8,6 +8,7 @@ use uav_relay::flight::axis::Axis;
 use uav_relay::pointing::Bearing;
 use uav_relay::{Duration, Instant, Placement};
 
+use super::payload::{float, long, sized};
 use super::peer::Peer;
 use super::wire::{
     ACK, EXTENDED_STATE, GLOBAL_POSITION, HEARTBEAT, POSITION_TARGET, SENT, SET_POSITION, VALUE,
@@ -367,24 +368,6 @@ impl Link {
         let datum = TX[2] + (self.rx[2] - TX[2]) * along / length;
         assert!((amsl - datum).abs() <= AROUND_M, "{amsl} m high");
     }
-}
-
-fn sized(mut payload: Vec<u8>, length: usize) -> Vec<u8> {
-    payload.resize(length, 0);
-    payload
-}
-
-fn four(payload: &[u8], at: usize) -> [u8; 4] {
-    let bytes = payload.get(at..).and_then(<[u8]>::first_chunk);
-    bytes.copied().unwrap_or_default()
-}
-
-fn long(payload: &[u8], at: usize) -> i32 {
-    i32::from_le_bytes(four(payload, at))
-}
-
-fn float(payload: &[u8], at: usize) -> f32 {
-    f32::from_le_bytes(four(payload, at))
 }
 
 /// A place near the line.

@@ -7,6 +7,8 @@
     missing_docs
 )]
 
+mod kept;
+
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -300,122 +302,4 @@ fn the_sides_that_were_chosen_are_judged() {
         text.contains("| 8 | far | does not count: relay 3 is at y = -280.5 m |"),
         "{text}"
     );
-}
-
-/// The table of RESULTS.md is what the command makes of the run that is kept beside the rivals.
-#[test]
-fn the_results_have_the_run_that_is_kept() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let readme = std::fs::read_to_string(root.join("../RESULTS.md")).unwrap();
-    let folder = TempDir::new().unwrap();
-    let copy = folder.path().join("RESULTS.md");
-    // Nothing of the table is left in the copy.
-    let begin = readme.find("<!-- cargo compare").unwrap();
-    let begin = begin + readme[begin..].find('\n').unwrap() + 1;
-    let end = readme.find("<!-- end of that -->").unwrap();
-    std::fs::write(&copy, readme[..begin].to_owned() + &readme[end..]).unwrap();
-    let kept = root.join("rivals/measured.json");
-    let arguments = [
-        "--from",
-        kept.to_str().unwrap(),
-        "--into",
-        copy.to_str().unwrap(),
-    ];
-    let output = compare(&arguments);
-    assert!(output.status.success(), "{output:?}");
-    assert_eq!(std::fs::read_to_string(&copy).unwrap(), readme);
-
-    std::fs::write(&copy, "no table").unwrap();
-    let line = refusal(&compare(&arguments), 2);
-    assert!(
-        line.contains("--into") && line.contains("no lines"),
-        "{line}"
-    );
-}
-
-/// Eight and fifty relays that choose their altitudes: in the kept run SLSQP, from the start that suits it best, takes at least twenty
-/// times as long to the same SIR. With room to the side this crate has more than twice as many starts to try.
-#[test]
-fn the_kept_run_is_twenty_times_as_fast_as_one_good_start() {
-    let kept = include_str!("../rivals/measured.json");
-    let kept: Value = serde_json::from_str(kept).unwrap();
-    for solved in kept["problems"].as_array().unwrap() {
-        let (choice, relays) = (&solved["problem"]["choice"], &solved["problem"]["relays"]);
-        let runs = solved["runs"].as_array().unwrap();
-        let found = |run: &Value| run["answer"]["found"].clone();
-        let one = runs
-            .iter()
-            .find(|run| run["solver"] == "SciPy SLSQP, its best start alone");
-        let (own, one) = (found(&runs[0]), found(one.unwrap()));
-        let own_s = own["time_s"].as_f64().unwrap();
-        let ratio = |time: &Value| time.as_f64().map(|time_s| time_s / own_s);
-        let (level, all) = (ratio(&one["level"]["after_s"]), ratio(&one["time_s"]));
-        println!("{choice} of {relays}: {level:?} to the same, {all:?} in all");
-        if choice == "altitudes" && (relays == 8 || relays == 50) {
-            assert!(level >= Some(20.0) && all >= Some(20.0));
-        }
-    }
-}
-
-#[test]
-fn json_is_given_back_as_it_was() {
-    let (sir, chain) = (2.25, [[350.5, 0.0, 20.0], [400.25, 0.5, 20.0]]);
-    let own = run("own", 1e-5, sir, &chain);
-    let mut rival = run("rival", 1.5, sir, &chain);
-    rival["answer"]["found"]["good"] = json!({ "after_s": 0.5, "chain": chain });
-    rival["answer"]["found"]["evaluations"] = json!(7);
-    let lost = json!({ "solver": "lost", "answer": { "error": "why" } });
-    let results = results("places", 2, &[own, rival, lost]);
-    let output = rescored(&results, &["--json"]);
-    assert_eq!(
-        serde_json::from_slice::<Value>(&output.stdout).unwrap(),
-        results
-    );
-}
-
-/// Runs the command with nothing on PATH but what `folder` has, its virtual environment to be in there too.
-fn with_path(folder: &Path) -> Output {
-    let venv = folder.join("venv");
-    Command::new(env!("CARGO_BIN_EXE_compare"))
-        .env("PATH", folder)
-        .args(["--limit", "1", "--venv", venv.to_str().unwrap()])
-        .output()
-        .unwrap()
-}
-
-#[test]
-fn without_python_it_says_so() {
-    let folder = TempDir::new().unwrap();
-    let line = refusal(&with_path(folder.path()), 2);
-    assert!(line.starts_with("python3 is not on PATH: "), "{line}");
-}
-
-/// Programs that do nothing stand in for Python: one that fails, one that succeeds.
-#[cfg(target_os = "linux")]
-#[test]
-fn without_venv_pip_or_packages_it_says_so() {
-    use std::os::unix::fs::symlink;
-
-    let folder = TempDir::new().unwrap();
-    let python3 = folder.path().join("python3");
-    symlink("/bin/false", &python3).unwrap();
-    let line = refusal(&with_path(folder.path()), 2);
-    assert!(line.contains("are venv and pip there?"), "{line}");
-
-    std::fs::remove_file(&python3).unwrap();
-    symlink("/bin/true", &python3).unwrap();
-    let bin = folder.path().join("venv/bin");
-    std::fs::create_dir_all(&bin).unwrap();
-    symlink("/bin/false", bin.join("python")).unwrap();
-    let line = refusal(&with_path(folder.path()), 2);
-    assert!(
-        line.contains("pip cannot install nlopt==") && line.contains("is there a network"),
-        "{line}"
-    );
-
-    // An environment that is finished but does not answer.
-    std::fs::remove_file(bin.join("python")).unwrap();
-    symlink("/bin/true", bin.join("python")).unwrap();
-    let line = refusal(&with_path(folder.path()), 1);
-    assert!(line.contains("Python gives no answer"), "{line}");
 }

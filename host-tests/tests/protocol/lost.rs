@@ -1,0 +1,161 @@
+//! A neighbour that is lost and comes back, and settings that are refused.
+
+use host_tests::fixtures::mission;
+use uav_relay::wire::digest::digest;
+use uav_relay::wire::message::Message;
+use uav_relay::{Duration, Event, Identity, Instant, Port, Relay, Settings, Side};
+
+use super::*;
+
+#[test]
+fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
+    let beat = |ask, answer| {
+        let mission = digest(&mission(2));
+        let beat = Message::Heartbeat {
+            mission,
+            ask,
+            answer,
+        };
+        encode(1, 2, &beat)
+    };
+    // A relay that has had a pass has nothing to call for.
+    let mut tail = relay(mission(2), 2);
+    let (start, sweep) = first_sweep(&mut relay(mission(2), 1));
+    tail.handle_bytes(start, Port::Upstream, &sweep);
+    drain(&mut tail, start);
+    events(&mut tail);
+    // When each question was asked.
+    let mut asked = Vec::new();
+    let mut now = start;
+    let mut seen = Vec::new();
+    while now.since(start) < Duration::from_millis(60_000) {
+        now = tail.poll_timeout().unwrap();
+        tail.handle_timeout(now);
+        let sent = drain(&mut tail, now);
+        for (_, message, _) in &sent {
+            let Message::Heartbeat { ask, answer: 0, .. } = message else {
+                panic!("{message:?}");
+            };
+            asked.push(now);
+            assert_eq!(usize::from(*ask), asked.len());
+        }
+        seen.extend(
+            events(&mut tail)
+                .into_iter()
+                .map(|event| (now.since(Instant::ZERO).as_micros() / 1_000, event)),
+        );
+    }
+    let [
+        (
+            lost_ms,
+            Event::NeighbourLost {
+                side: Side::Upstream,
+                node: 1,
+            },
+        ),
+    ] = seen[..]
+    else {
+        panic!("{seen:?}");
+    };
+    // Not before `dead_after`, and no later than it is asked next: questions are 10 s / 64 apart, and up to an eighth more.
+    assert!(
+        (15_000..=15_000 + 157 * 9 / 8).contains(&lost_ms),
+        "{lost_ms}"
+    );
+    let count = asked.len();
+    // Up to 64 in the ten seconds until it is lost, and one in five seconds from then on.
+    assert!((60..=75).contains(&count), "{count} heartbeats in a minute");
+    // Only an answer is a sign of life, and only one to one of the last four questions.
+    let last = u16::try_from(count).unwrap();
+    for (ask, answer) in [(9, 0), (0, last - 4), (0, 1), (0, last + 1), (0, u16::MAX)] {
+        tail.handle_bytes(now, Port::Upstream, &beat(ask, answer));
+        assert_eq!(events(&mut tail), [], "{ask} {answer}");
+        drain(&mut tail, now);
+    }
+    // It counts from when the question was asked.
+    for before in 0..4_u16 {
+        let mut after = tail.clone();
+        let late = now + Duration::from_millis(100);
+        after.handle_bytes(late, Port::Upstream, &beat(0, last - before));
+        assert_eq!(
+            events(&mut after),
+            [Event::NeighbourBack {
+                side: Side::Upstream,
+                node: 1
+            }],
+            "{before}"
+        );
+        let heard = asked[count - 1 - usize::from(before)];
+        let mut lost = late;
+        while events(&mut after)
+            != [Event::NeighbourLost {
+                side: Side::Upstream,
+                node: 1,
+            }]
+        {
+            lost = after.poll_timeout().unwrap();
+            after.handle_timeout(lost);
+            drain(&mut after, lost);
+        }
+        // It is asked again then; `dead_after` and sixteen questions later, or three times as many as it had left open, it is lost.
+        let due = heard + Duration::from_millis(15_000);
+        let longest = heard + Duration::from_millis(8 * 15_000);
+        let latest = longest + Duration::from_millis(157 * 9 / 8);
+        assert!(
+            due <= lost && lost <= latest,
+            "{before}: {:?}",
+            (heard, lost)
+        );
+    }
+}
+
+#[test]
+fn what_a_relay_is_set_to_is_checked() {
+    use uav_relay::SetupError;
+    use uav_relay::{Profile, Schedule};
+    let with = |index, change: fn(&mut Settings)| {
+        let mut settings = Settings::default();
+        change(&mut settings);
+        Relay::new(
+            mission(3),
+            Identity { network: 1, index },
+            settings,
+            1,
+            Instant::ZERO,
+        )
+        .map(|_| ())
+    };
+    assert_eq!(with(1, |_| ()), Ok(()));
+    assert_eq!(with(0, |_| ()), Err(SetupError::Index));
+    assert_eq!(with(4, |_| ()), Err(SetupError::Index));
+    let profile = |altitude_m, power_w| {
+        Some(Profile {
+            altitude_m,
+            power_w,
+        })
+    };
+    assert_eq!(
+        with(1, |s| s.profile = Some(Profile {
+            altitude_m: f32::NAN,
+            power_w: 1.0
+        })),
+        Err(SetupError::Profile)
+    );
+    assert!(profile(1.0, 1.0).unwrap().is_valid());
+    assert_eq!(
+        with(1, |s| s.schedule = Schedule::FixedStep { step: 0.0 }),
+        Err(SetupError::Step)
+    );
+    assert_eq!(
+        with(1, |s| s.schedule = Schedule::FixedStep { step: f64::NAN }),
+        Err(SetupError::Step)
+    );
+    assert_eq!(
+        with(1, |s| s.hop_time = Duration::from_micros(0)),
+        Err(SetupError::HopTime)
+    );
+    assert_eq!(
+        with(1, |s| s.dead_after = s.probe_after),
+        Err(SetupError::Silence)
+    );
+}
