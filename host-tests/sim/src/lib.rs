@@ -13,7 +13,6 @@
 //! | [`command`] | what the commands have in common |
 
 pub mod beta;
-pub mod command;
 pub mod hypothetical;
 pub mod mission;
 pub mod report;
@@ -21,3 +20,5 @@ pub mod scenario;
 pub mod scene;
 pub mod simulator;
 pub mod svg;
+
+pub use uav_relay_command as command;

@@ -9,6 +9,7 @@
 )]
 
 mod air;
+mod capture;
 mod hostile;
 mod listen;
 mod upload;

@@ -1,6 +1,7 @@
 //! `cargo chain`: simulated relays, each running the on-board code, find their places over simulated serial links.
 
 mod air;
+mod capture;
 mod flight;
 mod hostile;
 mod listening;
@@ -26,6 +27,7 @@ use uav_relay_sim::simulator::outcome::{Outcome, RelayEnd};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::svg::{self, Others, Picture, room};
 
+use capture::AirCapture;
 use options::{Method, Options};
 
 fn main() -> ExitCode {
@@ -77,7 +79,14 @@ fn run(options: &Options) -> Result<(), Failure> {
     options
         .listening
         .prepare(&mut setup, &scenario, options.uavs)?;
-    let outcome = fly(options, &scenario, setup.clone())?;
+    let mut capture = match &options.capture {
+        Some(file) => Some(AirCapture::begin(file, &setup)?),
+        None => None,
+    };
+    setup.record = capture.is_some();
+    let outcome = fly(options, &scenario, setup.clone(), capture.as_mut())?;
+    capture.map_or(Ok(()), AirCapture::finish)?;
+    setup.record = false;
     let listened = ListenedReport::of(&setup, &outcome);
     // What is reported is held against what is there, whatever the relays were told.
     setup.mission = options.listening.moved(told, outcome.ended);
@@ -88,7 +97,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     report.listened = listened;
     if setup.attack.take().is_some() {
         let auth = setup.auth;
-        let attack = AttackReport::new(auth, &outcome, &fly(options, &scenario, setup)?);
+        let attack = AttackReport::new(auth, &outcome, &fly(options, &scenario, setup, None)?);
         report.error = report.error.or_else(|| attack.harm());
         report.attack = Some(attack);
     }
@@ -179,13 +188,18 @@ fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Se
 }
 
 /// Runs the chain to its end; in a closed loop as often as that measures.
-fn fly(options: &Options, scenario: &Scenario, mut setup: Setup) -> Result<Outcome, Failure> {
+fn fly(
+    options: &Options,
+    scenario: &Scenario,
+    mut setup: Setup,
+    mut capture: Option<&mut AirCapture>,
+) -> Result<Outcome, Failure> {
     let start = |setup| Chain::new(setup).map_err(|error| Failure::input(error.to_string()));
     let (Interference::Field(field), Some(rounds)) = (&scenario.interference, options.closed_loop)
     else {
         let mut chain = start(setup)?;
-        watch(&mut chain);
-        return Ok(chain.finish());
+        watch(&mut chain, &mut capture)?;
+        return end(chain, capture);
     };
     let i_max_w = narrow(field.i_max_w);
     setup.mission = mission::told_of_an_even_field(&setup.mission);
@@ -194,14 +208,22 @@ fn fly(options: &Options, scenario: &Scenario, mut setup: Setup) -> Result<Outco
         samples: SAMPLES,
     });
     let mut chain = start(setup)?;
-    watch(&mut chain);
+    watch(&mut chain, &mut capture)?;
     for _ in 0..rounds {
         chain.measure(SAMPLES, |place, rng| {
             let (alpha, beta) = mission::shapes(field, f64::from(place.x_m));
             beta_w(rng, alpha, beta, i_max_w)
         });
         chain.restart();
-        watch(&mut chain);
+        watch(&mut chain, &mut capture)?;
+    }
+    end(chain, capture)
+}
+
+/// What came of it, once the capture has the last frame.
+fn end(mut chain: Chain, capture: Option<&mut AirCapture>) -> Result<Outcome, Failure> {
+    if let Some(capture) = capture {
+        capture.follow(&mut chain, true)?;
     }
     Ok(chain.finish())
 }
@@ -210,10 +232,13 @@ fn fly(options: &Options, scenario: &Scenario, mut setup: Setup) -> Result<Outco
 const SAMPLES: u32 = 10_000;
 
 /// Runs the chain, with a progress line on a terminal once it takes longer than a second.
-fn watch(chain: &mut Chain) {
+fn watch(chain: &mut Chain, capture: &mut Option<&mut AirCapture>) -> Result<(), Failure> {
     let started = Instant::now();
     let mut line: Option<ProgressBar> = None;
     while !chain.step(20_000) {
+        if let Some(capture) = capture {
+            capture.follow(chain, false)?;
+        }
         if line.is_none()
             && started.elapsed() > Duration::from_secs(1)
             && std::io::stderr().is_terminal()
@@ -236,6 +261,7 @@ fn watch(chain: &mut Chain) {
     if let Some(bar) = line {
         bar.finish_and_clear();
     }
+    Ok(())
 }
 
 /// The chain at its places in the mission that it flies.

@@ -65,6 +65,9 @@ pub(crate) struct Options {
     /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
+    /// Write every frame that is put on the air to a pcapng capture, with virtual times, for `cargo decode` and Wireshark
+    #[arg(long, value_name = "FILE")]
+    pub(crate) capture: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) listening: Listening,
     #[command(flatten)]
