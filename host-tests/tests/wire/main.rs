@@ -10,6 +10,7 @@ mod anything;
 mod bodies;
 mod codec;
 mod damage;
+mod decoded;
 mod document;
 mod forming;
 mod gathering;

@@ -1,7 +1,7 @@
 //! Frames from a pcapng capture.
 
 use std::borrow::Cow;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::time::Duration;
 
 use pcap_file::PcapError;
@@ -27,7 +27,7 @@ pub(super) fn read<E>(
     input: impl Read,
     mut take: impl FnMut(Item<'_>) -> Result<(), E>,
 ) -> Result<(), Trouble<E>> {
-    let mut reader = PcapNgReader::new(input).map_err(|error| trouble(&error))?;
+    let mut reader = PcapNgReader::new(input).map_err(trouble)?;
     let comment = reader
         .section()
         .options
@@ -41,7 +41,7 @@ pub(super) fn read<E>(
     }
     let mut interfaces: Vec<Interface> = Vec::new();
     while let Some(block) = reader.next_block() {
-        match block.map_err(|error| trouble(&error))? {
+        match block.map_err(trouble)? {
             Block::SectionHeader(_) => interfaces.clear(),
             Block::InterfaceDescription(block) => interfaces.push(interface(&block)),
             Block::EnhancedPacket(packet) => {
@@ -58,9 +58,14 @@ pub(super) fn read<E>(
     Ok(())
 }
 
-fn trouble<E>(error: &PcapError) -> Trouble<E> {
+fn trouble<E>(error: PcapError) -> Trouble<E> {
     match error {
-        PcapError::IncompleteBuffer => Trouble::Capture("it ends inside a block".to_owned()),
+        PcapError::IoError(error) if error.kind() != ErrorKind::UnexpectedEof => {
+            Trouble::Read(error)
+        }
+        PcapError::IoError(_) | PcapError::IncompleteBuffer => {
+            Trouble::Capture("it ends inside a block".to_owned())
+        }
         error => Trouble::Capture(error.to_string()),
     }
 }

@@ -51,8 +51,18 @@ fn run(options: &Options) -> Result<(), Failure> {
         return Err(Failure::input(line.to_owned()));
     }
     agree(options, &method, &scenario)?;
-    let (mission, profiles) = match mission::mission(&scenario, options.uavs, options.tolerance) {
+    let tolerance = options.tolerance.unwrap_or(1e-4);
+    let (mission, profiles) = match mission::mission(&scenario, options.uavs, tolerance) {
         Ok(briefed) => briefed,
+        // Who has given no scenario has none of its keys before them.
+        Err(Refusal::NoRoom) if options.scenario.is_none() => {
+            let fits = |uavs: &u16| mission::mission(&scenario, *uavs, tolerance).is_ok();
+            let most = (1..options.uavs).rev().find(fits).unwrap_or(1);
+            return Err(Failure::input(format!(
+                "--uavs {}: must be within 1 to {most} without a --scenario: relays keep {} m apart on {} m",
+                options.uavs, scenario.min_separation_m, scenario.distance_m
+            )));
+        }
         Err(refusal @ Refusal::NoRoom) => {
             let report =
                 ChainReport::refused(&method, options.uavs, options.seed, &refusal.to_string());
@@ -110,10 +120,8 @@ fn run(options: &Options) -> Result<(), Failure> {
 
 /// Whether the options go together, and with the scenario.
 fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Failure> {
-    if options.closed_loop.is_some() && !options.method.is_for_fields() {
-        let line = format!("--closed-loop: there is nothing to measure with --method {method}");
-        return Err(Failure::input(line));
-    }
+    options.agree(method)?;
+    options.listening.agree()?;
     options
         .hostile
         .agree(options.uavs, options.closed_loop.is_some())?;
@@ -134,13 +142,15 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         return Err(Failure::input(line));
     }
     if let Some(one) = mission::hypothetical(scenario) {
-        eprintln!(
+        command::complain(&format!(
             "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m stands for all, and SIRs are against it; `cargo plan` has what \
              its places are worth against all",
             one.power_w, one.x_m, one.y_m
-        );
+        ));
         if uploads {
-            eprintln!("note: an upload changes that one, and what it leaves out stays as it is");
+            command::complain(
+                "note: an upload changes that one, and what it leaves out stays as it is",
+            );
         }
     }
     for index in scenario
@@ -148,10 +158,10 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         .keys()
         .filter(|index| **index > options.uavs)
     {
-        eprintln!(
+        command::complain(&format!(
             "note: [[relay]] index {index} is left out of a chain of {}",
             options.uavs
-        );
+        ));
     }
     Ok(())
 }
@@ -161,15 +171,15 @@ fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Se
     let mut setup = Setup::new(mission);
     setup.settings.schedule = match options.method {
         Method::AlignStep | Method::StochasticStep => Schedule::FixedStep {
-            step: options.epsilon,
+            step: options.epsilon.unwrap_or(0.1),
         },
         _ => Schedule::Bracketed,
     };
     setup.settings.method = match options.method {
         Method::Joint => uav_relay::Method::Joint,
         Method::Adjust => uav_relay::Method::Adjust(uav_relay::Adjust {
-            rounds: options.rounds,
-            explore_m: options.explore_m,
+            rounds: options.rounds.unwrap_or(500),
+            explore_m: options.explore_m.unwrap_or(10.0),
             local: options.grid.unwrap_or_default(),
         }),
         _ => uav_relay::Method::Align,
