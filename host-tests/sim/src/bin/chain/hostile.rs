@@ -177,19 +177,25 @@ impl Hostile {
         let Some(end) = self.air.soaked() else {
             return Ok(());
         };
-        let named =
-            |option: &'static str| move |one: &One| (format!("{option} {}", one.index), one.at);
+        let named = |option: &'static str| {
+            move |one: &One| {
+                let text = format!("{option} {}@{}", one.index, seconds(one.at));
+                (text, one.at)
+            }
+        };
         let parts = self.partition.iter();
         let mut all = (self.kill.iter().map(named("--kill")))
             .chain(self.boot.iter().map(named("--boot")))
-            .chain(parts.map(|part| (format!("--partition {}", part.after), part.from)))
+            .chain(parts.map(|part| {
+                let text = format!("--partition {}@{}", part.after, seconds(part.from));
+                (text, part.from)
+            }))
             .chain(self.uploads.begins())
             .chain(self.air.begins())
             .chain(self.flight.begins());
         match all.find(|(_, at)| *at >= end) {
-            Some((option, at)) => Err(Failure::input(format!(
-                "{option}: would be ignored: it begins after {} s, and --soak {} ends before",
-                seconds(at),
+            Some((option, _)) => Err(Failure::input(format!(
+                "{option}: would be ignored: the run ends before, see --soak {}",
                 seconds(end)
             ))),
             None => Ok(()),

@@ -58,10 +58,15 @@ fn run(options: &Options) -> Result<(), Failure> {
         Err(Refusal::NoRoom) if options.scenario.is_none() => {
             let fits = |uavs: &u16| mission::mission(&scenario, *uavs, tolerance).is_ok();
             let most = (1..options.uavs).rev().find(fits).unwrap_or(1);
-            return Err(Failure::input(format!(
+            let line = format!(
                 "--uavs {}: must be within 1 to {most} without a --scenario: relays keep {} m apart on {} m",
                 options.uavs, scenario.min_separation_m, scenario.distance_m
-            )));
+            );
+            if options.json {
+                let report = ChainReport::refused(&method, options.uavs, options.seed, &line);
+                command::print(&command::json(&report)?);
+            }
+            return Err(Failure::input(line));
         }
         Err(refusal @ Refusal::NoRoom) => {
             let report =

@@ -106,12 +106,7 @@ impl Options {
                 said("--explore", self.explore_m.filter(|_| !is_adjust)),
                 rounds,
             ),
-            (
-                self.grid
-                    .filter(|_| !is_adjust)
-                    .map(|_| "--grid".to_owned()),
-                rounds,
-            ),
+            (self.grid.filter(|_| !is_adjust).map(grid_said), rounds),
             (
                 said("--tolerance", self.tolerance.filter(|_| is_step)),
                 bracket,
@@ -132,6 +127,13 @@ impl Options {
             return Err(Failure::input(line));
         }
         Ok(())
+    }
+}
+
+fn grid_said(grid: uav_relay::Local) -> String {
+    match grid {
+        uav_relay::Local::Grid { columns, rows } => format!("--grid {columns}x{rows}"),
+        uav_relay::Local::Fine => "--grid".to_owned(),
     }
 }
 
