@@ -23,9 +23,6 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 
-// For the target nothing is left of it.
-#![cfg(not(target_os = "none"))]
-
 mod cut;
 mod write;
 

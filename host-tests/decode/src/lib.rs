@@ -2,16 +2,13 @@
 //!
 //! | module | one idea |
 //! | --- | --- |
-//! | [`format`] | the tables of `FORMAT.md`, read |
+//! | [`mod@format`] | the tables of `FORMAT.md`, read |
 //! | [`value`], [`walk`] | what a field says; a body field by field |
 //! | [`frame`], [`refusal`] | a frame, taken apart; why one is no message |
 //! | [`members`] | whether tags are right |
 //! | [`source`] | frames from a capture or a stream of bytes |
 //! | [`shown`] | a frame as text and as JSON |
 //! | [`dissector`] | the same tables for Wireshark |
-
-// For the target nothing is left of it.
-#![cfg(not(target_os = "none"))]
 
 pub mod dissector;
 pub mod format;

@@ -3,6 +3,8 @@
 mod json;
 mod text;
 
+use std::fmt::Write as _;
+
 use crate::frame::Frame;
 use crate::members::TagCheck;
 use crate::source::Packet;
@@ -25,5 +27,8 @@ pub struct Shown<'a> {
 
 /// Bytes in hexadecimal.
 fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        _ = write!(text, "{byte:02x}");
+        text
+    })
 }

@@ -1,6 +1,5 @@
 //! Frames from a pcapng capture.
 
-use std::borrow::Cow;
 use std::io::{ErrorKind, Read};
 use std::time::Duration;
 
@@ -94,11 +93,11 @@ fn pieces<E>(
     interface: &Interface,
     take: &mut impl FnMut(Item<'_>) -> Result<(), E>,
 ) -> Result<(), Trouble<E>> {
-    let mut comment = Cow::Borrowed("");
+    let mut comment = "";
     let mut direction = Direction::Unknown;
     for option in &packet.options {
         match option {
-            EnhancedPacketOption::Comment(said) => comment = said.clone(),
+            EnhancedPacketOption::Comment(said) => comment = said,
             EnhancedPacketOption::Flags(bits) => {
                 direction = match bits & 3 {
                     1 => Direction::In,
@@ -119,7 +118,7 @@ fn pieces<E>(
             at: Some(at),
             interface: &interface.name,
             direction,
-            comment: &comment,
+            comment,
             wire: piece.bytes,
             len: piece.len + missing,
         }))

@@ -111,7 +111,7 @@ fn tags_are_checked_with_the_key_once_the_handshake_was_seen() {
     let [handshake, answer, heartbeat] = [0, 1, 2].map(|at: usize| worked[at].clone());
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("key");
-    let key: String = (0..32).map(|byte| format!("{byte:02x}")).collect();
+    let key = (0..32).fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
     std::fs::write(&file, format!("{key}\n")).unwrap();
     let checks = |arguments: &[&str], frames: &[&[u8]]| -> Vec<String> {
         let all = [&["--json"], arguments].concat();

@@ -120,7 +120,9 @@ fn one<'f>(name: &str, value: &Value<'f>, all: &mut Vec<Wanted<'f>>) {
 }
 
 fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    bytes
+        .iter()
+        .fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
 }
 
 impl Wanted<'_> {

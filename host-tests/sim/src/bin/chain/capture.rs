@@ -1,6 +1,7 @@
 //! The file that `--capture` asks for: what is put on the air.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
@@ -25,8 +26,10 @@ impl AirCapture {
     pub(crate) fn begin(file: &Path, setup: &Setup) -> Result<Self, Failure> {
         // The key is of this run alone, and drawn from its seed: it is no secret.
         let key = setup.secret().map_or_else(String::new, |key| {
-            let digits = key.iter().map(|byte| format!("{byte:02x}"));
-            format!(", key {}", digits.collect::<String>())
+            key.iter().fold(", key ".to_owned(), |mut text, byte| {
+                _ = write!(text, "{byte:02x}");
+                text
+            })
         });
         let relays = setup.mission.relays();
         let comment = format!("{relays} simulated relays, seed {}{key}", setup.seed);

@@ -1,5 +1,7 @@
 //! What is kept of the frames on the air, where that is asked for.
 
+use std::fmt::Write as _;
+
 use uav_relay::{Instant, Port, Side};
 
 use super::super::faults::Arrival;
@@ -65,7 +67,7 @@ impl Chain {
         if !note.is_empty() {
             note.push_str("; ");
         }
-        *note += &format!("at {whom}: {}", fates.join(", "));
+        _ = write!(note, "at {whom}: {}", fates.join(", "));
     }
 }
 
