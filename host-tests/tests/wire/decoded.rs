@@ -8,8 +8,9 @@ use serde_json::{Value, json};
 use uav_relay::wire::frame::{self, MAX_FRAME};
 use uav_relay_decode::format::Format;
 
-use super::codec::{Call, Heard, Said, Seats, Swept};
+use super::codec::{Call, Fenced, Greeting, Heard, Said, Seats, Swept};
 use super::config;
+use super::offer::Offer;
 use super::strategies::{headers, messages};
 
 /// Frames of each tag.
@@ -67,6 +68,35 @@ fn call(call: &Call, more: Value) -> Value {
     value
 }
 
+fn offer(said: &Offer) -> Value {
+    json!({
+        "version": said.version, "base": digest(said.base), "relays": said.relays, "distance_m": said.distance_m,
+        "min_separation_m": said.min_separation_m, "tx_power_w": said.tx_power_w, "altitude_m": said.altitude_m,
+        "power_w": said.power_w, "interferer_power_w": said.interferer_w, "interferer_x_m": said.x_m,
+        "interferer_y_m": said.y_m, "tolerance": said.tolerance, "mu_los": said.mu_los, "mu_nlos": said.mu_nlos,
+        "eta": said.eta, "altitude_min_m": said.least_m, "altitude_max_m": said.most_m, "lateral_min_m": said.left_m,
+        "lateral_max_m": said.right_m, "noise_w": said.noise_w, "tx_lat_e7": said.sites[0], "tx_lon_e7": said.sites[1],
+        "tx_amsl_mm": said.sites[2], "rx_lat_e7": said.sites[3], "rx_lon_e7": said.sites[4],
+        "rx_amsl_mm": said.sites[5], "answers": said.answer,
+    })
+}
+
+fn fence(said: &Fenced) -> Value {
+    json!({
+        "association": said.number, "line": digest(said.mission), "echo": said.echo, "fence": said.fence,
+        "x_m": said.places[0], "target_m": said.places[1], "y_m": said.places[2], "altitude_m": said.places[3],
+        "apart_m": said.places[4], "flags": flags(said.flags, ["arrived", "agrees", "needs", "needed", "left"]),
+    })
+}
+
+fn hello(said: &Greeting) -> Value {
+    json!({
+        "mission": digest(said.mission), "neighbour": said.neighbour, "behind": said.behind, "newest_view": said.newest,
+        "holds": digest(said.holds.0), "holds_version": said.holds.1, "offer_number": said.nonce, "hears": said.hears,
+        "flags": flags(said.flags, ["ask", "form", "fresh", "ready", "flies"]),
+    })
+}
+
 /// The name of a message, and what its fields say, by what was said and not by its bytes.
 fn wanted(said: &Said) -> (&'static str, Value) {
     match said {
@@ -112,14 +142,7 @@ fn wanted(said: &Said) -> (&'static str, Value) {
                 "moved": said.any, "worst_sir": said.worst,
             }),
         ),
-        Said::Hello(said) => (
-            "Hello",
-            json!({
-                "mission": digest(said.mission), "neighbour": said.neighbour, "behind": said.behind, "newest_view": said.newest,
-                "holds": digest(said.holds.0), "holds_version": said.holds.1, "offer_number": said.nonce, "hears": said.hears,
-                "flags": flags(said.flags, ["ask", "form", "fresh", "ready", "flies"]),
-            }),
-        ),
+        Said::Hello(said) => ("Hello", hello(said)),
         Said::Proposal(said) => (
             "Proposal",
             call(
@@ -143,27 +166,8 @@ fn wanted(said: &Said) -> (&'static str, Value) {
                 }),
             ),
         ),
-        Said::Fence(said) => (
-            "Fence",
-            json!({
-                "association": said.number, "line": digest(said.mission), "echo": said.echo, "fence": said.fence,
-                "x_m": said.places[0], "target_m": said.places[1], "y_m": said.places[2], "altitude_m": said.places[3],
-                "apart_m": said.places[4], "flags": flags(said.flags, ["arrived", "agrees", "needs", "needed", "left"]),
-            }),
-        ),
-        Said::Offer(said) => (
-            "Offer",
-            json!({
-                "version": said.version, "base": digest(said.base), "relays": said.relays, "distance_m": said.distance_m,
-                "min_separation_m": said.min_separation_m, "tx_power_w": said.tx_power_w, "altitude_m": said.altitude_m,
-                "power_w": said.power_w, "interferer_power_w": said.interferer_w, "interferer_x_m": said.x_m,
-                "interferer_y_m": said.y_m, "tolerance": said.tolerance, "mu_los": said.mu_los, "mu_nlos": said.mu_nlos,
-                "eta": said.eta, "altitude_min_m": said.least_m, "altitude_max_m": said.most_m, "lateral_min_m": said.left_m,
-                "lateral_max_m": said.right_m, "noise_w": said.noise_w, "tx_lat_e7": said.sites[0], "tx_lon_e7": said.sites[1],
-                "tx_amsl_mm": said.sites[2], "rx_lat_e7": said.sites[3], "rx_lon_e7": said.sites[4],
-                "rx_amsl_mm": said.sites[5], "answers": said.answer,
-            }),
-        ),
+        Said::Fence(said) => ("Fence", fence(said)),
+        Said::Offer(said) => ("Offer", offer(said)),
         Said::Pulse {
             number,
             mission,
