@@ -115,6 +115,28 @@ fn random_frames_of_every_kind_say_what_cargo_decode_says() {
     println!("{} frames, {fields} fields", frames.len());
 }
 
+/// The frames of the rejection table of FORMAT.md.
+fn rejected() -> Vec<Vec<u8>> {
+    let document = include_str!("../../../../src/wire/FORMAT.md");
+    let (_, section) = document.split_once("\n## Rejected").unwrap();
+    let rows = section.lines().filter_map(|line| line.strip_prefix("| `"));
+    let mut all = Vec::new();
+    for row in rows {
+        let mut stream = Vec::new();
+        for word in row.split('`').next().unwrap().split(' ') {
+            let (byte, times) = word.split_once('*').unwrap_or((word, "1"));
+            let byte = u8::from_str_radix(byte, 16).unwrap();
+            stream.extend(vec![byte; times.parse().unwrap()]);
+        }
+        let pieces = stream
+            .split(|byte| *byte == 0)
+            .filter(|piece| !piece.is_empty());
+        all.extend(pieces.map(|piece| [piece, &[0]].concat()));
+    }
+    assert!(all.len() > 150, "{}", all.len());
+    all
+}
+
 #[test]
 fn hurt_frames_are_refused_for_the_same_reason() {
     let format = Format::load().unwrap();
@@ -133,6 +155,7 @@ fn hurt_frames_are_refused_for_the_same_reason() {
     }));
     // Too few bytes for header and CRC.
     frames.extend((1..14).map(|len| [&[len + 1][..], &vec![7; len.into()], &[0]].concat()));
+    frames.extend(rejected());
     let packets = dissected(&frames);
     let mut reasons: BTreeMap<&str, usize> = BTreeMap::new();
     for (bytes, packet) in frames.iter().zip(&packets) {
