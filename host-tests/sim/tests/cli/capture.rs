@@ -147,3 +147,56 @@ fn a_capture_that_cannot_be_written_is_refused_before_the_run() {
         );
     }
 }
+
+/// The capture in Wireshark, with the dissector of the repository. Without `tshark` this fails and says what to type.
+#[test]
+fn tshark_names_every_frame_of_a_capture() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("air.pcapng");
+    let dissector = super::example("wireshark/uav_relay.lua");
+    for (arguments, names) in [
+        (
+            &["--method", "joint", "--auth"][..],
+            &["Handshake", "Sweep", "Verdict"][..],
+        ),
+        (
+            &["--kill", "3@20", "--upload", "30:uav_w=2"],
+            &["Hello", "Proposal", "Decision", "Offer", "Pulse", "Pulsed"],
+        ),
+        (
+            &["--method", "adjust", "--rounds", "2"],
+            &["Token", "Moved"],
+        ),
+    ] {
+        let report = json(&[arguments, &["--capture", file.to_str().unwrap()]].concat());
+        let output = std::process::Command::new("tshark")
+            .args(["-X", &format!("lua_script:{dissector}"), "-r"])
+            .arg(&file)
+            .args([
+                "-T",
+                "fields",
+                "-e",
+                "uav_relay.message",
+                "-e",
+                "uav_relay.refused",
+            ])
+            .output()
+            .unwrap_or_else(|error| {
+                panic!("tshark: {error}; type: sudo apt-get install --yes tshark")
+            });
+        assert!(output.status.success());
+        let shown = String::from_utf8(output.stdout).unwrap();
+        let shown: Vec<&str> = shown.lines().map(str::trim).collect();
+        assert!(shown.len() > 10 && shown.len() as u64 <= report["messages"].as_u64().unwrap());
+        for line in &shown {
+            // A name, and nothing of a refusal after it.
+            assert!(
+                line.chars().all(char::is_alphabetic) && !line.is_empty(),
+                "{line}"
+            );
+        }
+        for name in names {
+            assert!(shown.contains(name), "{name} of {arguments:?}");
+        }
+    }
+}
