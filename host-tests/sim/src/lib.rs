@@ -10,7 +10,8 @@
 //! | [`command`] | what the commands have in common |
 
 pub mod beta;
-pub mod command;
 pub mod report;
 pub mod simulator;
 pub mod svg;
+
+pub use uav_relay_command as command;

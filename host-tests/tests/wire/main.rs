@@ -13,6 +13,7 @@ mod bounds;
 mod calls;
 mod codec;
 mod damage;
+mod decoded;
 mod document;
 mod extremes;
 mod forming;

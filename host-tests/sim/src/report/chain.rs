@@ -257,6 +257,12 @@ impl ChainReport {
         }
         match self.version {
             None => {}
+            Some(0) if self.timeline.iter().any(|moment| moment.what == "adopted") => {
+                _ = writeln!(
+                    text,
+                    "no relay is left in a chain that flies what was uploaded and adopted"
+                );
+            }
             Some(0) => {
                 _ = writeln!(
                     text,

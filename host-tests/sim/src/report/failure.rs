@@ -2,18 +2,27 @@
 
 use super::flown::version;
 use super::timeline::seconds;
-use crate::simulator::outcome::{Ending, Outcome};
+use crate::simulator::outcome::{Ending, Outcome, Turning};
 
 /// Why a run by `method` has not ended well, and what else it lacks.
 pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     let error = ended(method, outcome)?;
-    let missing = outcome
-        .offered()
-        .filter(|newest| *newest > version(outcome));
+    // One that was adopted and is flown by nobody who is left was adopted all the same.
+    let known = version(outcome).max(adopted(outcome));
+    let missing = outcome.offered().filter(|newest| *newest > known);
     Some(match missing {
         Some(version) => format!("{error}; mission {version} was not adopted"),
         None => error,
     })
+}
+
+/// The newest mission that any relay has ever flown, 0 for the one that all took off with.
+fn adopted(outcome: &Outcome) -> u16 {
+    let versions = outcome.moments.iter().map(|moment| match moment.what {
+        Turning::Adopted(version) => version,
+        _ => 0,
+    });
+    versions.max().unwrap_or(0)
 }
 
 /// Why a run has not ended well.

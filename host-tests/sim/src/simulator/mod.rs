@@ -8,6 +8,7 @@
 //! | [`deaf`] | a relay that does not hear another one |
 //! | [`attack`], [`forge`] | what an attacker does, and the frames it makes up |
 //! | [`queue`] | what happens when, in order |
+//! | [`record`] | the frames that were put on the air, for a capture |
 //! | [`setup`], [`outcome`] | what a chain is run with, and what came of it |
 //! | [`sky`] | interferers that nobody told the relays of |
 //! | [`drones`] | drones that fly to where they are told, and know where they are only nearly |
@@ -36,6 +37,7 @@ pub mod optima;
 pub mod optimum;
 pub mod outcome;
 pub mod queue;
+pub mod record;
 pub mod setup;
 pub mod sky;
 pub mod watch;

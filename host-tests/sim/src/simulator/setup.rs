@@ -107,6 +107,8 @@ pub struct Setup {
     pub soak: Option<Instant>,
     /// After this time frames get through, if there is one.
     pub faults_end: Option<Instant>,
+    /// Whether the frames on the air are kept for [`Chain::frames`](super::chain::Chain::frames).
+    pub record: bool,
     /// Seed of every random draw.
     pub seed: u64,
     /// The run ends at this time at the latest.
@@ -142,6 +144,7 @@ impl Setup {
             sky: None,
             soak: None,
             faults_end: None,
+            record: false,
             seed: 1,
             deadline: Instant::from_millis(1_000 * 3_600 * 24 * 30),
         }
@@ -209,12 +212,17 @@ impl Setup {
 
     /// How a relay that is switched on for the `start`th time, from 1, proves who it is.
     pub fn proof(&self, start: u32) -> Option<Auth> {
+        self.secret().map(|secret| Auth {
+            key: Key::new(secret),
+            epoch: start,
+        })
+    }
+
+    /// The bytes of the key, where frames carry tags.
+    pub fn secret(&self) -> Option<[u8; 32]> {
         // Not the generator of the run: a chain with tags draws what one without them does.
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(KEYS);
-        self.auth.then(|| Auth {
-            key: Key::new(rng.random()),
-            epoch: start,
-        })
+        self.auth.then(|| rng.random())
     }
 }

@@ -126,7 +126,7 @@ fn wrong_options_of_the_air_are_named_with_what_is_allowed() {
     let cases: [(&[&str], &[&str]); 12] = [
         (&["--air", "csma", "--wires"], &["--air", "--wires"]),
         (&["--air", "tdma"], &["--air", "tdma"]),
-        (&["--baud", "299"], &["--baud", "299", "300..=10000000"]),
+        (&["--baud", "299"], &["--baud", "299", "300 to 10000000"]),
         (&["--burst", "0.5"], &["--burst", "0.5", "1.0 to 1000000.0"]),
         (
             &["--burst", "2", "--loss", "0.7"],

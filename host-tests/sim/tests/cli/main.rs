@@ -9,9 +9,11 @@
 )]
 
 mod air;
+mod capture;
 mod hostile;
 mod listen;
 mod upload;
+mod words;
 
 use std::process::{Command, Output};
 
@@ -147,8 +149,8 @@ fn the_fixed_step_reports_the_papers_sweeps() {
 #[test]
 fn wrong_options_are_named_with_their_value_and_range() {
     for (arguments, parts) in [
-        (&["--uavs", "0"][..], &["--uavs", "'0'", "1..=1000"][..]),
-        (&["--uavs", "1001"], &["--uavs", "'1001'", "1..=1000"]),
+        (&["--uavs", "0"][..], &["--uavs", "'0'", "1 to 1000"][..]),
+        (&["--uavs", "1001"], &["--uavs", "'1001'", "1 to 1000"]),
         (&["--uavs", "many"], &["--uavs", "many"]),
         (&["--loss", "0.95"], &["--loss", "0.95", "0.0 to 0.9"]),
         (&["--corrupt", "NaN"], &["--corrupt", "NaN", "0.0 to 0.9"]),
@@ -184,8 +186,8 @@ fn wrong_options_are_named_with_their_value_and_range() {
             &["--partition", "3@1", "--wires"],
             &["--partition", "--wires"],
         ),
-        (&["--forge", "0"], &["--forge", "'0'", "1..=100000"]),
-        (&["--replay", "100001"], &["--replay", "1..=100000"]),
+        (&["--forge", "0"], &["--forge", "'0'", "1 to 100000"]),
+        (&["--replay", "100001"], &["--replay", "1 to 100000"]),
         (&["--auth", "--no-auth"], &["--auth", "--no-auth"]),
         (&["--shared", "--wires"], &["--shared", "--wires"]),
         (&["--seed", "-3"], &["-3"]),
@@ -379,14 +381,13 @@ fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
     );
     assert_eq!(report["best_sir"].as_f64(), Some(0.0));
 
+    // Without a scenario the option is what is wrong, and the JSON says so all the same.
     let output = chain(&["--json", "--uavs", "1000"]);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(2));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let error = report["error"].as_str().unwrap();
     assert!(
-        report["error"]
-            .as_str()
-            .unwrap()
-            .contains("min_separation_m"),
+        error.starts_with("--uavs 1000: must be within 1 to 250 "),
         "{report}"
     );
 }

@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use uav_relay::{Instant, Wiring};
-use uav_relay_sim::command::{Failure, carries, number};
+use uav_relay_sim::command::{Failure, carries, number, whole};
 use uav_relay_sim::simulator::bursts::Bursts;
 use uav_relay_sim::simulator::deaf::Deaf;
 use uav_relay_sim::simulator::medium::Access;
@@ -18,7 +18,7 @@ pub(crate) struct Air {
     #[arg(long = "air", value_name = "A", value_enum, conflicts_with = "wires")]
     sharing: Option<Sharing>,
     /// Bits per second of every link, or of the channel, 300 to 10000000; a byte takes ten
-    #[arg(long, value_name = "B", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..=10_000_000))]
+    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = |text: &str| whole::<u32>(text, 300, 10_000_000))]
     baud: u32,
     /// Losses come in runs of L frames on average, 1 to 1e6, each direction of a link by itself (Gilbert-Elliott), with --loss P as
     /// the mean share; 1 is for independent losses, anything else at least 1 / (1 - P)
@@ -54,6 +54,17 @@ impl Air {
         !self.deaf.is_empty() || self.soak.is_some()
     }
 
+    /// When the run ends, if that is known.
+    pub(crate) const fn soaked(&self) -> Option<Instant> {
+        self.soak
+    }
+
+    /// When what begins.
+    pub(crate) fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
+        let name = |deaf: &Deaf| (format!("--deaf {}:{}", deaf.by, deaf.of), deaf.from);
+        self.deaf.iter().map(name)
+    }
+
     /// When something happens.
     pub(crate) fn times(&self) -> impl Iterator<Item = Instant> {
         self.deaf
@@ -76,6 +87,10 @@ impl Air {
 
     /// Puts all of it into a run that loses `loss` of the frames, once it is known how the relays talk.
     pub(crate) fn prepare(&self, setup: &mut Setup, loss: f64) -> Result<(), Failure> {
+        if self.burst > 1.0 && loss <= 0.0 {
+            let line = format!("--burst {}: would be ignored without --loss", self.burst);
+            return Err(Failure::input(line));
+        }
         let least = Bursts::shortest(loss);
         if self.burst > 1.0 && self.burst < least {
             let line = format!(

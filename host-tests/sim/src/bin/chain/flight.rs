@@ -27,13 +27,19 @@ pub(crate) struct Flight {
     #[arg(long)]
     fly: bool,
     /// The pilot of drone I has the sticks from S seconds on, until E or for good. Repeatable
-    #[arg(long, value_name = "I@S[-E]", value_parser = takeover, requires = "fly")]
+    #[arg(long, value_name = "I@S[-E]", value_parser = takeover)]
     takeover: Vec<Takeover>,
 }
 
 impl Flight {
     pub(crate) const fn is_chosen(&self) -> bool {
         self.fly
+    }
+
+    /// When what begins.
+    pub(crate) fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
+        let name = |it: &Takeover| (format!("--takeover {}", it.relay), it.from);
+        self.takeover.iter().map(name)
     }
 
     /// When something happens.
@@ -45,6 +51,10 @@ impl Flight {
 
     /// Whether this goes together with a chain of `uavs`.
     pub(crate) fn agree(&self, uavs: u16) -> Result<(), Failure> {
+        if let (false, Some(Takeover { relay, .. })) = (self.fly, self.takeover.first()) {
+            let line = format!("--takeover {relay}@..: would be ignored without --fly");
+            return Err(Failure::input(line));
+        }
         let wrong = |takeover: &&Takeover| !(1..=uavs).contains(&takeover.relay);
         match self.takeover.iter().find(wrong) {
             Some(takeover) => Err(Failure::input(format!(

@@ -2,13 +2,13 @@
 
 use clap::Args;
 use uav_relay::{Instant, Sites, Wiring};
-use uav_relay_sim::command::Failure;
+use uav_relay_sim::command::{Failure, whole};
 use uav_relay_sim::simulator::attack::Attack;
 use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 use crate::air::Air;
 use crate::flight::Flight;
-use crate::times::{instant, span};
+use crate::times::{instant, seconds, span};
 use crate::upload::Uploads;
 
 /// The options for that.
@@ -30,10 +30,10 @@ pub(crate) struct Hostile {
     #[arg(long, value_name = "K@S[-T]", value_parser = partition, conflicts_with = "wires")]
     partition: Vec<Partition>,
     /// An attacker sends N forged frames, 1 to 100000: with guessed tags, altered, without a tag, with another key
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |text: &str| whole::<u32>(text, 1, 100_000))]
     forge: Option<u32>,
     /// An attacker sends N of the frames that it has heard again, 1 to 100000
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |text: &str| whole::<u32>(text, 1, 100_000))]
     replay: Option<u32>,
     #[command(flatten)]
     pub(crate) uploads: Uploads,
@@ -106,6 +106,8 @@ impl Hostile {
                 return Err(Failure::input(line));
             }
         }
+        self.in_order()?;
+        self.uploads.agree(!self.boot.is_empty())?;
         if let Some(part) = self
             .partition
             .iter()
@@ -123,6 +125,7 @@ impl Hostile {
         }
         self.air.agree(uavs)?;
         self.flight.agree(uavs)?;
+        self.in_time()?;
         if self.is_eventful() && is_loop {
             let line = "--closed-loop goes with none of --kill, --boot, --partition, --deaf, --soak, --fly, --forge, --replay and --upload";
             return Err(Failure::input(line));
@@ -132,6 +135,71 @@ impl Hostile {
             return Err(Failure::input(line));
         }
         Ok(())
+    }
+
+    /// Whether relays that go silent are on before, and those that are switched on again have gone silent if they ever do.
+    fn in_order(&self) -> Result<(), Failure> {
+        let kills = self.kill.iter().map(|one| (one, true));
+        let mut all: Vec<(&One, bool)> = kills
+            .chain(self.boot.iter().map(|one| (one, false)))
+            .collect();
+        // Of one time, too, it goes silent first.
+        all.sort_by_key(|(one, _)| (one.index, one.at));
+        for (place, (one, is_kill)) in all.iter().enumerate() {
+            let of_it = |(other, _): &&(&One, bool)| other.index == one.index;
+            let (before, after) = all.split_at(place);
+            let last = before.iter().rev().find(of_it);
+            let first = after
+                .iter()
+                .skip(1)
+                .filter(of_it)
+                .find(|(_, is_kill)| *is_kill);
+            let One { index, at } = one;
+            let at = seconds(*at);
+            if *is_kill && let Some((other, true)) = last {
+                let line = format!(
+                    "--kill {index}@{at}: would be ignored: the relay has been silent since --kill {index}@{}",
+                    seconds(other.at)
+                );
+                return Err(Failure::input(line));
+            }
+            if let (false, None, Some((other, _))) = (is_kill, last, first) {
+                let kill = seconds(other.at);
+                let line = format!("--boot {index}@{at}: must be after --kill {index}@{kill}");
+                return Err(Failure::input(line));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether all of it begins before the run ends.
+    fn in_time(&self) -> Result<(), Failure> {
+        let Some(end) = self.air.soaked() else {
+            return Ok(());
+        };
+        let named = |option: &'static str| {
+            move |one: &One| {
+                let text = format!("{option} {}@{}", one.index, seconds(one.at));
+                (text, one.at)
+            }
+        };
+        let parts = self.partition.iter();
+        let mut all = (self.kill.iter().map(named("--kill")))
+            .chain(self.boot.iter().map(named("--boot")))
+            .chain(parts.map(|part| {
+                let text = format!("--partition {}@{}", part.after, seconds(part.from));
+                (text, part.from)
+            }))
+            .chain(self.uploads.begins())
+            .chain(self.air.begins())
+            .chain(self.flight.begins());
+        match all.find(|(_, at)| *at >= end) {
+            Some((option, _)) => Err(Failure::input(format!(
+                "{option}: would be ignored: the run ends before, see --soak {}",
+                seconds(end)
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// Puts all of it into a run.

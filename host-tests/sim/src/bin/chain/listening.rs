@@ -5,9 +5,11 @@ use uav_relay::{Instant, Interference, Interferer, Listen, Mission, MissionConfi
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
-use uav_relay_sim::command::{Failure, number};
+use uav_relay_sim::command::{Failure, number, whole};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::simulator::sky::Sky;
+
+use crate::options::said;
 
 /// The options for that.
 #[derive(Args, Debug)]
@@ -17,21 +19,40 @@ pub(crate) struct Listening {
     /// find one that accounts for it. How they listen is what the scenario says of it, if it does
     #[arg(long)]
     listen: bool,
-    /// Independent samples of the interference in one measurement, 1 to 1000000
-    #[arg(long, value_name = "K", default_value_t = 1_000, requires = "listen", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    samples: u32,
-    /// Standard deviation of a place's own error, dB, 0 to 20
-    #[arg(long, value_name = "DB", default_value_t = 0.0, requires = "listen", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 20.0))]
-    shadow: f64,
+    /// Independent samples of the interference in one measurement, 1 to 1000000; 1000 unless said otherwise
+    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = |text: &str| whole::<u32>(text, 1, 1_000_000))]
+    samples: Option<u32>,
+    /// Standard deviation of a place's own error, dB, 0 to 20; 0 unless said otherwise
+    #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 20.0))]
+    shadow: Option<f64>,
     /// All interferers move from the start on, m/s along the line and to its right, each -100 to 100
-    #[arg(long, value_name = "VX,VY", requires = "listen", allow_hyphen_values = true, value_parser = velocity)]
+    #[arg(long, value_name = "VX,VY", allow_hyphen_values = true, value_parser = velocity)]
     move_interferer: Option<[f64; 2]>,
-    /// For how many virtual seconds they listen, 10 to 1e5
-    #[arg(long, value_name = "S", default_value_t = 120.0, requires = "listen", value_parser = |text: &str| number(text, 10.0, 1e5))]
-    listen_for: f64,
+    /// For how many virtual seconds they listen, 10 to 1e5; 120 unless said otherwise
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = |text: &str| number(text, 10.0, 1e5))]
+    listen_for: Option<f64>,
 }
 
 impl Listening {
+    /// Refuses what says how they listen where they do not.
+    pub(crate) fn agree(&self) -> Result<(), Failure> {
+        let velocity = self
+            .move_interferer
+            .map(|[along, aside]| format!("{along},{aside}"));
+        let told = [
+            said("--samples", self.samples),
+            said("--shadow", self.shadow),
+            said("--move-interferer", velocity),
+            said("--listen-for", self.listen_for),
+        ];
+        match told.into_iter().flatten().next() {
+            Some(option) if !self.listen => Err(Failure::input(format!(
+                "{option}: would be ignored without --listen"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
     /// Has the relays of `setup` find the interferers of `scenario`.
     pub(crate) fn prepare(
         &self,
@@ -60,16 +81,17 @@ impl Listening {
             (None, Some(_)) => Listen::following(uavs),
             (None, None) => Listen::default(),
         };
+        let samples = self.samples.unwrap_or(1_000);
         #[expect(clippy::cast_possible_truncation, reason = "of 1e-3 to 1")]
-        let error = (1.0 / f64::from(self.samples).sqrt()).max(1e-3) as f32;
+        let error = (1.0 / f64::from(samples).sqrt()).max(1e-3) as f32;
         let said = scenario.listen.and_then(|spec| spec.relative_error);
         if said.is_none() {
             listen.relative_error = error;
         }
         setup.settings.listen = Some(listen);
         let mut sky = Sky::of(scene);
-        sky.samples = self.samples;
-        sky.shadow_db = self.shadow;
+        sky.samples = samples;
+        sky.shadow_db = self.shadow.unwrap_or_default();
         sky.velocity_mps = self.move_interferer.unwrap_or_default();
         sky.seed = setup.seed;
         #[expect(
@@ -77,7 +99,7 @@ impl Listening {
             clippy::cast_sign_loss,
             reason = "10 to 1e5"
         )]
-        let until = (self.listen_for * 1e3) as u64;
+        let until = (self.listen_for.unwrap_or(120.0) * 1e3) as u64;
         sky.until = Instant::from_millis(until);
         setup.sky = Some(sky);
         Ok(())

@@ -1,6 +1,7 @@
 //! `cargo chain`: simulated relays, each running the on-board code, find their places over simulated serial links.
 
 mod air;
+mod capture;
 mod flight;
 mod hostile;
 mod listening;
@@ -27,6 +28,7 @@ use uav_relay_sim::simulator::outcome::{Outcome, RelayEnd};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::svg::{self, Others, Picture, room};
 
+use capture::AirCapture;
 use options::{Method, Options};
 
 fn main() -> ExitCode {
@@ -50,8 +52,23 @@ fn run(options: &Options) -> Result<(), Failure> {
         return Err(Failure::input(line.to_owned()));
     }
     agree(options, &method, &scenario)?;
-    let (mission, profiles) = match mission::mission(&scenario, options.uavs, options.tolerance) {
+    let tolerance = options.tolerance.unwrap_or(1e-4);
+    let (mission, profiles) = match mission::mission(&scenario, options.uavs, tolerance) {
         Ok(briefed) => briefed,
+        // Who has given no scenario has none of its keys before them.
+        Err(Refusal::NoRoom) if options.scenario.is_none() => {
+            let fits = |uavs: &u16| mission::mission(&scenario, *uavs, tolerance).is_ok();
+            let most = (1..options.uavs).rev().find(fits).unwrap_or(1);
+            let line = format!(
+                "--uavs {}: must be within 1 to {most} without a --scenario: relays keep {} m apart on {} m",
+                options.uavs, scenario.min_separation_m, scenario.distance_m
+            );
+            if options.json {
+                let report = ChainReport::refused(&method, options.uavs, options.seed, &line);
+                command::print(&command::json(&report)?);
+            }
+            return Err(Failure::input(line));
+        }
         Err(refusal @ Refusal::NoRoom) => {
             let report =
                 ChainReport::refused(&method, options.uavs, options.seed, &refusal.to_string());
@@ -78,7 +95,14 @@ fn run(options: &Options) -> Result<(), Failure> {
     options
         .listening
         .prepare(&mut setup, &scenario, options.uavs)?;
-    let outcome = fly(options, &scenario, setup.clone())?;
+    let mut capture = match &options.capture {
+        Some(file) => Some(AirCapture::begin(file, &setup)?),
+        None => None,
+    };
+    setup.record = capture.is_some();
+    let outcome = fly(options, &scenario, setup.clone(), capture.as_mut())?;
+    capture.map_or(Ok(()), AirCapture::finish)?;
+    setup.record = false;
     let listened = ListenedReport::of(&setup, &outcome);
     // What is reported is held against what is there, whatever the relays were told.
     setup.mission = options.listening.moved(told, outcome.ended);
@@ -89,7 +113,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     report.listened = listened;
     if setup.attack.take().is_some() {
         let auth = setup.auth;
-        let attack = AttackReport::new(auth, &outcome, &fly(options, &scenario, setup)?);
+        let attack = AttackReport::new(auth, &outcome, &fly(options, &scenario, setup, None)?);
         report.error = report.error.or_else(|| attack.harm());
         report.attack = Some(attack);
     }
@@ -102,10 +126,8 @@ fn run(options: &Options) -> Result<(), Failure> {
 
 /// Whether the options go together, and with the scenario.
 fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Failure> {
-    if options.closed_loop.is_some() && !options.method.is_for_fields() {
-        let line = format!("--closed-loop: there is nothing to measure with --method {method}");
-        return Err(Failure::input(line));
-    }
+    options.agree(method)?;
+    options.listening.agree()?;
     options
         .hostile
         .agree(options.uavs, options.closed_loop.is_some())?;
@@ -126,13 +148,15 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         return Err(Failure::input(line));
     }
     if let Some(one) = mission::hypothetical(scenario) {
-        eprintln!(
+        command::complain(&format!(
             "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m stands for all, and SIRs are against it; `cargo plan` has what \
              its places are worth against all",
             one.power_w, one.x_m, one.y_m
-        );
+        ));
         if uploads {
-            eprintln!("note: an upload changes that one, and what it leaves out stays as it is");
+            command::complain(
+                "note: an upload changes that one, and what it leaves out stays as it is",
+            );
         }
     }
     for index in scenario
@@ -140,10 +164,10 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         .keys()
         .filter(|index| **index > options.uavs)
     {
-        eprintln!(
+        command::complain(&format!(
             "note: [[relay]] index {index} is left out of a chain of {}",
             options.uavs
-        );
+        ));
     }
     Ok(())
 }
@@ -153,15 +177,15 @@ fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Se
     let mut setup = Setup::new(mission);
     setup.settings.schedule = match options.method {
         Method::AlignStep | Method::StochasticStep => Schedule::FixedStep {
-            step: options.epsilon,
+            step: options.epsilon.unwrap_or(0.1),
         },
         _ => Schedule::Bracketed,
     };
     setup.settings.method = match options.method {
         Method::Joint => uav_relay::Method::Joint,
         Method::Adjust => uav_relay::Method::Adjust(uav_relay::Adjust {
-            rounds: options.rounds,
-            explore_m: options.explore_m,
+            rounds: options.rounds.unwrap_or(500),
+            explore_m: options.explore_m.unwrap_or(10.0),
             local: options.grid.unwrap_or_default(),
         }),
         _ => uav_relay::Method::Align,
@@ -180,13 +204,18 @@ fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Se
 }
 
 /// Runs the chain to its end; in a closed loop as often as that measures.
-fn fly(options: &Options, scenario: &Scenario, mut setup: Setup) -> Result<Outcome, Failure> {
+fn fly(
+    options: &Options,
+    scenario: &Scenario,
+    mut setup: Setup,
+    mut capture: Option<&mut AirCapture>,
+) -> Result<Outcome, Failure> {
     let start = |setup| Chain::new(setup).map_err(|error| Failure::input(error.to_string()));
     let (Interference::Field(field), Some(rounds)) = (&scenario.interference, options.closed_loop)
     else {
         let mut chain = start(setup)?;
-        watch(&mut chain);
-        return Ok(chain.finish());
+        watch(&mut chain, &mut capture)?;
+        return end(chain, capture);
     };
     let i_max_w = narrow(field.i_max_w);
     setup.mission = mission::told_of_an_even_field(&setup.mission);
@@ -195,14 +224,22 @@ fn fly(options: &Options, scenario: &Scenario, mut setup: Setup) -> Result<Outco
         samples: SAMPLES,
     });
     let mut chain = start(setup)?;
-    watch(&mut chain);
+    watch(&mut chain, &mut capture)?;
     for _ in 0..rounds {
         chain.measure(SAMPLES, |place, rng| {
             let (alpha, beta) = mission::shapes(field, f64::from(place.x_m));
             beta_w(rng, alpha, beta, i_max_w)
         });
         chain.restart();
-        watch(&mut chain);
+        watch(&mut chain, &mut capture)?;
+    }
+    end(chain, capture)
+}
+
+/// What came of it, once the capture has the last frame.
+fn end(mut chain: Chain, capture: Option<&mut AirCapture>) -> Result<Outcome, Failure> {
+    if let Some(capture) = capture {
+        capture.follow(&mut chain, true)?;
     }
     Ok(chain.finish())
 }
@@ -211,10 +248,13 @@ fn fly(options: &Options, scenario: &Scenario, mut setup: Setup) -> Result<Outco
 const SAMPLES: u32 = 10_000;
 
 /// Runs the chain, with a progress line on a terminal once it takes longer than a second.
-fn watch(chain: &mut Chain) {
+fn watch(chain: &mut Chain, capture: &mut Option<&mut AirCapture>) -> Result<(), Failure> {
     let started = Instant::now();
     let mut line: Option<ProgressBar> = None;
     while !chain.step(20_000) {
+        if let Some(capture) = capture {
+            capture.follow(chain, false)?;
+        }
         if line.is_none()
             && started.elapsed() > Duration::from_secs(1)
             && std::io::stderr().is_terminal()
@@ -237,6 +277,7 @@ fn watch(chain: &mut Chain) {
     if let Some(bar) = line {
         bar.finish_and_clear();
     }
+    Ok(())
 }
 
 /// The chain at its places in the mission that it flies.

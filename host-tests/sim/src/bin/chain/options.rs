@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
 use uav_relay_scenario::number::narrow;
-use uav_relay_sim::command::number;
+use uav_relay_sim::command::{Failure, file, number, whole};
 
 use crate::hostile::Hostile;
 use crate::listening::Listening;
@@ -18,54 +18,57 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FILE")]
     pub(crate) scenario: Option<PathBuf>,
     /// Number of relays, 1 to 1000
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 8, allow_negative_numbers = true, value_parser = |text: &str| whole::<u16>(text, 1, 1000))]
     pub(crate) uavs: u16,
     /// How the places are found
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     pub(crate) method: Method,
-    /// The fixed step of the -step methods, linear SIR, 1e-6 to 1e6
-    #[arg(long, value_name = "E", default_value_t = 0.1, value_parser = |text: &str| number(text, 1e-6, 1e6))]
-    pub(crate) epsilon: f64,
-    /// Rounds of `adjust` at most, 1 to 65535
-    #[arg(long, value_name = "K", default_value_t = 500, value_parser = clap::value_parser!(u16).range(1..))]
-    pub(crate) rounds: u16,
-    /// How far a relay may go up or down in one round of `adjust`, metres, 0 to 1e5
-    #[arg(long = "explore", value_name = "M", default_value_t = 10.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 1e5).map(narrow))]
-    pub(crate) explore_m: f32,
+    /// The fixed step of the -step methods, linear SIR, 1e-6 to 1e6; 0.1 unless said otherwise
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 1e6))]
+    pub(crate) epsilon: Option<f64>,
+    /// Rounds of `adjust` at most, 1 to 65535; 500 unless said otherwise
+    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = |text: &str| whole::<u16>(text, 1, 65_535))]
+    pub(crate) rounds: Option<u16>,
+    /// How far a relay may go up or down in one round of `adjust`, metres, 0 to 1e5; 10 unless said otherwise
+    #[arg(long = "explore", value_name = "M", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 1e5).map(narrow))]
+    pub(crate) explore_m: Option<f32>,
     /// Have `adjust` search a grid of columns by rows, 2 to 255 each, instead of from coarse to fine
     #[arg(long, value_name = "CxR", value_parser = grid)]
     pub(crate) grid: Option<uav_relay::Local>,
     /// The relays of a stochastic chain are told that Upsilon is everywhere what it is at Rx, fly, measure the true field where
     /// they stand, and agree again, R times, 1 to 100
-    #[arg(long, value_name = "R", value_parser = clap::value_parser!(u8).range(1..=100))]
+    #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = |text: &str| whole::<u8>(text, 1, 100))]
     pub(crate) closed_loop: Option<u8>,
-    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
-    #[arg(long, value_name = "T", default_value_t = 1e-4, value_parser = |text: &str| number(text, 1e-6, 0.1))]
-    pub(crate) tolerance: f64,
+    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1; 1e-4 unless said otherwise. The -step methods have their step instead
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 0.1))]
+    pub(crate) tolerance: Option<f64>,
     /// Probability that a frame never arrives, 0 to 0.9
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
     pub(crate) loss: f64,
     /// Probability that bytes of a frame arrive changed, 0 to 0.9
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
     pub(crate) corrupt: f64,
     /// Probability that a frame arrives twice, 0 to 0.9
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
     pub(crate) duplicate: f64,
     /// Probability that a frame is overtaken by others, 0 to 0.9
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
     pub(crate) reorder: f64,
     /// The leader does not solve the chain beforehand; it brackets from scratch
     #[arg(long)]
     pub(crate) no_predict: bool,
     /// Seed of every random draw; the same seed gives the same run, byte for byte
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1, allow_negative_numbers = true, value_parser = |text: &str| whole::<u64>(text, 0, u64::MAX))]
     pub(crate) seed: u64,
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,
     /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = file)]
     pub(crate) svg: Option<PathBuf>,
+    /// Write every frame that is put on the air to a pcapng capture, with virtual times, for `cargo decode` and Wireshark
+    #[arg(long, value_name = "FILE", value_parser = file)]
+    pub(crate) capture: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) listening: Listening,
     #[command(flatten)]
@@ -87,6 +90,57 @@ pub(crate) enum Method {
     Stochastic,
     /// Algorithm 4 with the fixed step
     StochasticStep,
+}
+
+impl Options {
+    /// Refuses an option that the method would ignore.
+    pub(crate) fn agree(&self, method: &str) -> Result<(), Failure> {
+        let is_step = matches!(self.method, Method::AlignStep | Method::StochasticStep);
+        let is_adjust = self.method == Method::Adjust;
+        let step = "has no fixed step; align-step and stochastic-step have";
+        let rounds = "has no rounds; adjust has";
+        let bracket = "has a fixed step, see --epsilon; the other methods bracket";
+        let ignored: [(Option<String>, &str); 6] = [
+            (said("--epsilon", self.epsilon.filter(|_| !is_step)), step),
+            (said("--rounds", self.rounds.filter(|_| !is_adjust)), rounds),
+            (
+                said("--explore", self.explore_m.filter(|_| !is_adjust)),
+                rounds,
+            ),
+            (self.grid.filter(|_| !is_adjust).map(grid_said), rounds),
+            (
+                said("--tolerance", self.tolerance.filter(|_| is_step)),
+                bracket,
+            ),
+            (
+                (is_step && self.no_predict).then(|| "--no-predict".to_owned()),
+                bracket,
+            ),
+        ];
+        for (option, why) in ignored {
+            if let Some(option) = option {
+                let line = format!("{option}: would be ignored: --method {method} {why}");
+                return Err(Failure::input(line));
+            }
+        }
+        if self.closed_loop.is_some() && !self.method.is_for_fields() {
+            let line = format!("--closed-loop: there is nothing to measure with --method {method}");
+            return Err(Failure::input(line));
+        }
+        Ok(())
+    }
+}
+
+fn grid_said(grid: uav_relay::Local) -> String {
+    match grid {
+        uav_relay::Local::Grid { columns, rows } => format!("--grid {columns}x{rows}"),
+        uav_relay::Local::Fine => "--grid".to_owned(),
+    }
+}
+
+/// An option with its value, where it was given.
+pub(crate) fn said(option: &str, value: Option<impl std::fmt::Display>) -> Option<String> {
+    value.map(|value| format!("{option} {value}"))
 }
 
 impl Method {

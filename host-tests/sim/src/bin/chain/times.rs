@@ -27,3 +27,8 @@ pub(crate) fn span(text: &str) -> Option<(Instant, Option<Instant>)> {
     });
     cuts.next()
 }
+
+/// The same, back.
+pub(crate) fn seconds(at: Instant) -> f64 {
+    at.as_micros() as f64 / 1e6
+}

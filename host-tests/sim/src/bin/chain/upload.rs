@@ -21,17 +21,11 @@ pub(crate) struct Uploads {
     /// scenario has a site, tx_lat_deg, tx_lon_deg, tx_amsl_m and those of rx move an end; the distance then follows. Repeatable: versions count from 1
     #[arg(long, value_name = "S[:KEY=VALUE,..]", value_parser = planned)]
     upload: Vec<Planned>,
-    /// Which end of the link uploads
-    #[arg(
-        long,
-        value_name = "END",
-        value_enum,
-        default_value_t = End::Tx,
-        requires = "upload"
-    )]
-    upload_from: End,
+    /// Which end of the link uploads; tx unless said otherwise
+    #[arg(long, value_name = "END", value_enum)]
+    upload_from: Option<End>,
     /// Relays do not store what was uploaded: one that is switched on again begins with the mission of the scenario
-    #[arg(long, requires = "upload")]
+    #[arg(long)]
     no_store: bool,
 }
 
@@ -112,6 +106,31 @@ impl Uploads {
         !self.no_store
     }
 
+    /// Refuses what says how they are done where there are none, and where no relay `boots` that could have stored any.
+    pub(crate) fn agree(&self, boots: bool) -> Result<(), Failure> {
+        let given = match (self.upload_from, self.no_store) {
+            (Some(End::Tx), _) => "--upload-from tx",
+            (Some(End::Rx), _) => "--upload-from rx",
+            (None, true) => "--no-store",
+            (None, false) => return Ok(()),
+        };
+        if !self.are_planned() {
+            let line = format!("{given}: would be ignored without --upload");
+            return Err(Failure::input(line));
+        }
+        if self.no_store && !boots {
+            let line = "--no-store: would be ignored: no relay is switched on again, see --boot";
+            return Err(Failure::input(line));
+        }
+        Ok(())
+    }
+
+    /// When what begins.
+    pub(crate) fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
+        let name = |one: &Planned| (format!("--upload {}", one.text), one.at);
+        self.upload.iter().map(name)
+    }
+
     /// When each of them begins.
     pub(crate) fn times(&self) -> impl Iterator<Item = Instant> {
         self.upload.iter().map(|one| one.at)
@@ -124,8 +143,8 @@ impl Uploads {
         sites: Option<Sites>,
     ) -> Result<Vec<UploadSpec>, Failure> {
         let end = match self.upload_from {
-            End::Tx => Side::Upstream,
-            End::Rx => Side::Downstream,
+            None | Some(End::Tx) => Side::Upstream,
+            Some(End::Rx) => Side::Downstream,
         };
         let mut planned: Vec<&Planned> = self.upload.iter().collect();
         planned.sort_by_key(|one| one.at);

@@ -5,6 +5,7 @@ use uav_relay::{Instant, Port};
 use super::super::attack::Recorded;
 use super::super::faults::Faults;
 use super::super::queue::Happening;
+use super::recorded::link;
 use super::state::Chain;
 
 /// Who hears a frame, counted from 0.
@@ -47,7 +48,8 @@ impl Chain {
         let relays = relays.into_iter().map(Receiver::Relay);
         let receivers: Vec<Receiver> = relays.chain(grounds).collect();
         self.overhear(frame, into, arrives);
-        self.send(index, frame, into, arrives, receivers);
+        let note = self.send(index, frame, into, arrives, receivers);
+        self.keep_frame(self.sent_at(arrives), link(index, port), frame, note);
     }
 
     /// An attacker hears a frame that arrives at all whom it is for.
@@ -61,7 +63,7 @@ impl Chain {
         }
     }
 
-    /// Puts `frame` of node `from` into the queues of all that hear it, each with what happens to it on its way.
+    /// Puts `frame` of node `from` into the queues of all that hear it, each with what happens to it on its way; what that was, in words.
     pub(super) fn send(
         &mut self,
         from: usize,
@@ -69,7 +71,8 @@ impl Chain {
         into: Port,
         arrives: Instant,
         receivers: impl IntoIterator<Item = Receiver>,
-    ) {
+    ) -> String {
+        let mut note = String::new();
         let late_by = self.setup.link.hop_time();
         let mut faults = match self.setup.faults_end {
             Some(end) if self.now >= end => Faults::default(),
@@ -82,9 +85,11 @@ impl Chain {
         for receiver in receivers {
             if in_runs && self.loses(from, receiver) {
                 self.outcome.injected.lost += 1;
+                self.remark(&mut note, receiver, frame, &[]);
                 continue;
             }
             let arrivals = faults.inject(frame, &mut self.rng, &mut self.outcome.injected);
+            self.remark(&mut note, receiver, frame, &arrivals);
             for arrival in arrivals {
                 let late = late_by.times(u32::try_from(arrival.late).unwrap_or(u32::MAX));
                 let bytes = arrival.bytes;
@@ -95,6 +100,7 @@ impl Chain {
                 self.queue.put(arrives + late, at, happening);
             }
         }
+        note
     }
 
     /// Whether a frame falls into a run of losses.

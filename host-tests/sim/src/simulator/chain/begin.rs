@@ -14,6 +14,7 @@ use super::super::medium::{Access, AirCounts, Medium};
 use super::super::optima::Run;
 use super::super::outcome::{Ending, Outcome};
 use super::super::queue::{Happening, Queue};
+use super::super::record::Record;
 use super::super::setup::Setup;
 use super::fleet::LANDS_AFTER;
 use super::judge::Touched;
@@ -58,6 +59,7 @@ impl Chain {
                 ahead += 1;
             }
         }
+        let record = setup.record.then(Record::default);
         let mut chain = Self {
             stations,
             setup,
@@ -98,6 +100,7 @@ impl Chain {
             agreements: 0,
             listened: false,
             watch: None,
+            record,
         };
         if shared || chain.setup.soak.is_some() {
             chain.begin_watch(run);

@@ -4,6 +4,7 @@ use uav_relay::Port;
 
 use super::super::medium::{Agenda, AirEvent, Sent};
 use super::super::queue::Happening;
+use super::super::record::Link;
 use super::air::Receiver;
 use super::state::Chain;
 
@@ -70,6 +71,15 @@ impl Chain {
             node.checked_sub(relays)
                 .map_or(Receiver::Relay(*node), Receiver::Ground)
         });
-        self.send(sent.from, &sent.frame, Port::Shared, arrives, receivers);
+        let mut note = self.send(sent.from, &sent.frame, Port::Shared, arrives, receivers);
+        if sent.missed > 0 {
+            let missed = format!("{} in range did not hear it", sent.missed);
+            note = if note.is_empty() {
+                missed
+            } else {
+                format!("{missed}; {note}")
+            };
+        }
+        self.keep_frame(self.now, Link::Shared, &sent.frame, note);
     }
 }

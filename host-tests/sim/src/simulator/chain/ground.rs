@@ -7,6 +7,7 @@ use uav_relay_scenario::scene::Scene;
 
 use super::super::outcome::{Moment, Turning};
 use super::super::queue::Happening;
+use super::super::record::Link;
 use super::super::sky::Sky;
 use super::air::Receiver;
 use super::state::Chain;
@@ -95,7 +96,13 @@ impl Chain {
             };
             let from = relays + at;
             self.overhear(bytes, into, arrives);
-            self.send(from, bytes, into, arrives, receivers.map(Receiver::Relay));
+            let link = match (into, end) {
+                (Port::Shared, _) => Link::Shared,
+                (_, Side::Upstream) => Link::After(0),
+                (_, Side::Downstream) => Link::After(self.setup.mission.relays()),
+            };
+            let note = self.send(from, bytes, into, arrives, receivers.map(Receiver::Relay));
+            self.keep_frame(self.sent_at(arrives), link, bytes, note);
         }
         if let Some(station) = self.stations.get_mut(at)
             && let Some(again) = station.ground.poll_timeout()

@@ -12,6 +12,7 @@ use super::super::link::Line;
 use super::super::medium::Medium;
 use super::super::outcome::Outcome;
 use super::super::queue::Queue;
+use super::super::record::Record;
 use super::super::setup::Setup;
 use super::super::watch::Watch;
 use super::station::Station;
@@ -70,4 +71,6 @@ pub struct Chain {
     pub(super) listened: bool,
     /// Where its whole time counts.
     pub(super) watch: Option<Watch>,
+    /// Where somebody wants to see what is on the air.
+    pub(super) record: Option<Record>,
 }

@@ -6,6 +6,7 @@ use uav_relay::{Duration, Port, Wiring};
 use super::super::attack::{Attacker, Strike, fate};
 use super::super::forge::{Way, destination, forge};
 use super::super::queue::Happening;
+use super::recorded::link;
 use super::state::{Chain, Member};
 
 /// How long an attacker that has heard nothing yet waits.
@@ -111,6 +112,11 @@ impl Chain {
         member.relay.handle_bytes(self.now, port, bytes);
         let name = fate(&before, member.relay.stats());
         *self.outcome.struck.counted.entry((kind, name)).or_default() += 1;
+        let note = match kind {
+            Strike::Forge => "the attacker's own",
+            Strike::Replay => "the attacker's, sent again",
+        };
+        self.keep_frame(self.now, link(index, port), bytes, note.to_owned());
         self.drain(index);
     }
 }

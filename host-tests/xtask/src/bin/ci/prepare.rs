@@ -6,12 +6,9 @@ use uav_relay_xtask::toolchain::{llvm_tool, succeeds};
 
 use super::steps::{CARGO_FUZZ, NIGHTLY, OLDEST, TARGET};
 
-/// The emulator that runs the firmware.
-const QEMU: &str = "qemu-system-arm";
-
-/// What to type where it is missing.
-const MISSING: &str =
-    "qemu-system-arm is missing; type: sudo apt-get install --yes qemu-system-arm";
+/// Programs of Debian's packages of the same name: the emulator that runs the firmware, and Wireshark without windows, which reads
+/// captures.
+const OF_DEBIAN: [&str; 2] = ["qemu-system-arm", "tshark"];
 
 /// What it is called, a command that tells whether it is there, and what rustup adds it by.
 type Needed = (
@@ -83,7 +80,7 @@ pub(crate) fn prepare(quick: bool) -> Result<(), String> {
     }
     add(&FOR_THE_REST)?;
     prepare_fuzzer()?;
-    prepare_emulator()
+    OF_DEBIAN.into_iter().try_for_each(prepare_program)
 }
 
 /// cargo-fuzz is built into the target folder: what it is for is this project alone.
@@ -137,13 +134,13 @@ fn add(needed: &[Needed]) -> Result<(), String> {
     Ok(())
 }
 
-/// The emulator that runs the firmware is Debian's. Only root can add it, so for anybody else this says what to type.
-fn prepare_emulator() -> Result<(), String> {
-    if succeeds(QEMU, &["--version"]) {
+/// Only root can add a package of Debian, so for anybody else this says what to type.
+fn prepare_program(program: &str) -> Result<(), String> {
+    if succeeds(program, &["--version"]) {
         return Ok(());
     }
-    let install = ["install", "--yes", "--no-install-recommends", QEMU];
-    println!("ci: adding {QEMU}: apt-get {}", install.join(" "));
+    let install = ["install", "--yes", "--no-install-recommends", program];
+    println!("ci: adding {program}: apt-get {}", install.join(" "));
     let apt_get = |arguments: &[&str]| {
         Command::new("apt-get")
             .args(arguments)
@@ -155,7 +152,9 @@ fn prepare_emulator() -> Result<(), String> {
     if apt_get(&install) || (apt_get(&["update"]) && apt_get(&install)) {
         Ok(())
     } else {
-        Err(MISSING.into())
+        Err(format!(
+            "{program} is missing; type: sudo apt-get install --yes {program}"
+        ))
     }
 }
 

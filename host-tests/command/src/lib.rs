@@ -1,8 +1,10 @@
 //! What the commands have in common: how they refuse, and numbers from the command line.
 
 use std::io::Write as _;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use uav_relay::{ChannelLoad, Duration};
 
 /// The fastest link there is, bit/s.
@@ -40,18 +42,24 @@ pub fn ended(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("{}", failure.line);
+            complain(&failure.line);
             ExitCode::from(failure.status)
         }
     }
 }
 
-/// Help as it is; of an error only the line that says what is wrong.
+/// Help as it is; of an error one line that says what is wrong, and what is allowed.
 pub fn usage(error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
-        print!("{error}");
+        print(&error.to_string());
         return ExitCode::SUCCESS;
     }
+    complain(&wrong(error));
+    ExitCode::from(2)
+}
+
+/// What is wrong with the options, in one line.
+fn wrong(error: &clap::Error) -> String {
     let text = error.to_string();
     let mut lines = text.lines().filter(|line| !line.trim().is_empty());
     let mut wrong = lines.next().unwrap_or("wrong options").to_owned();
@@ -62,8 +70,28 @@ pub fn usage(error: &clap::Error) -> ExitCode {
             wrong.push_str(missing.trim());
         }
     }
-    eprintln!("{}", wrong.trim_start_matches("error: "));
-    ExitCode::from(2)
+    // So are the values that there are, and what may have been meant.
+    let told = |kind| match error.get(kind) {
+        Some(ContextValue::String(one)) => one.clone(),
+        Some(ContextValue::Strings(all)) => all.join(", "),
+        _ => String::new(),
+    };
+    let allowed = told(ContextKind::ValidValue);
+    if !allowed.is_empty() {
+        wrong = format!("{wrong}: must be one of {allowed}");
+    }
+    let meant = [ContextKind::SuggestedArg, ContextKind::SuggestedValue].map(told);
+    if let Some(meant) = meant.iter().find(|meant| !meant.is_empty()) {
+        wrong = format!("{wrong}; did you mean {meant}?");
+    } else if error.kind() == ErrorKind::UnknownArgument {
+        wrong.push_str("; --help lists what there is");
+    }
+    wrong.trim_start_matches("error: ").to_owned()
+}
+
+/// Says `line` on standard error. Where nobody reads that, the exit status has to do.
+pub fn complain(line: &str) {
+    _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// Prints `text`. A reader that has had enough, such as `head`, is no fault of the command.
@@ -120,5 +148,32 @@ pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(range())
+    }
+}
+
+/// A whole number of the command line, within `least` to `most`.
+///
+/// # Errors
+/// The range, where it is not one of them.
+pub fn whole<T: TryFrom<u64>>(text: &str, least: u64, most: u64) -> Result<T, String> {
+    let value = text.parse().ok();
+    value
+        .filter(|value| (least..=most).contains(value))
+        .and_then(|value| T::try_from(value).ok())
+        .ok_or_else(|| format!("must be a whole number within {least} to {most}"))
+}
+
+/// A file of the command line that is written to. Standard output, which `-` stands for elsewhere, has the report.
+///
+/// # Errors
+/// What to say instead of `-`, and that it must not be empty.
+pub fn file(text: &str) -> Result<PathBuf, String> {
+    match text {
+        "" => Err("must be the name of a file".to_owned()),
+        "-" => Err(
+            "must be the name of a file: standard output has the report; a file of this name is ./-"
+                .to_owned(),
+        ),
+        name => Ok(name.into()),
     }
 }

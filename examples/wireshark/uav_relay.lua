@@ -1,0 +1,577 @@
+-- Frames of uav-relay in Wireshark. Written by `cargo decode --dissector` from the tables of FORMAT.md: do not edit it.
+--
+-- wireshark -X lua_script:examples/wireshark/uav_relay.lua FILE
+-- or copy it to the folder that Help > About Wireshark > Folders calls `Personal Lua Plugins`.
+
+local messages = {
+    [0x00] = { name = "Sweep", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the sweep, wrapping" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "anchor", kind = "f32", unit = "linear SIR", text = "anchor of the ladder; with the sign reversed on a plain pass" },
+        { name = "gap", kind = "u8", unit = "", text = "gap code of the ladder" },
+        { name = "growth", kind = "u8", unit = "", text = "growth code of the ladder" },
+        { name = "altitude_m", kind = "f32", unit = "m", text = "altitude the sender holds" },
+        { name = "power_w", kind = "f32", unit = "W", text = "its transmit power" },
+        { name = "reach_m", kind = "list", most = 16, of = { kind = "f32" }, unit = "m from Tx", text = "reach for target 0, 1, ...: the sender's place" },
+    } },
+    [0x01] = { name = "Verdict", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the sweep" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "own", kind = "bool", unit = "", text = "own: whether the sender, or a relay after it, brings along another power than the mission says of all relays, or keeps to an altitude where they choose theirs" },
+        { name = "commit", kind = "option", of = { kind = "u8" }, unit = "", text = "commit: the target, by its place in the ladder, that every relay now takes its place for" },
+        { name = "slack_m", kind = "list", most = 16, of = { kind = "f32" }, unit = "m", text = "slack of target 0, 1, ...: by how much the chain overshoots Rx, in a field Tx" },
+        { name = "stand_m", kind = "option", of = { kind = "f32" }, unit = "m from Tx", text = "stand: where the receiver is to stand if a target is committed; none: at its own reach for that" },
+    } },
+    [0x02] = { name = "Busy", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the pass; of a proposal the mark of its view, see Views" },
+    } },
+    [0x03] = { name = "Heartbeat", fields = {
+        { name = "mission", kind = "digest", unit = "", text = "digest of the mission that the sender was loaded with" },
+        { name = "asks", kind = "u16", unit = "", text = "number of the sender's question; 0 for none" },
+        { name = "answers", kind = "u16", unit = "", text = "number of the question that it answers; 0 for none" },
+    } },
+    [0x04] = { name = "Measured", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the sweep, wrapping" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "anchor", kind = "f32", unit = "linear SIR", text = "anchor of the ladder; with the sign reversed on a plain pass" },
+        { name = "gap", kind = "u8", unit = "", text = "gap code of the ladder" },
+        { name = "growth", kind = "u8", unit = "", text = "growth code of the ladder" },
+        { name = "altitude_m", kind = "f32", unit = "m", text = "altitude the sender holds" },
+        { name = "power_w", kind = "f32", unit = "W", text = "its transmit power" },
+        { name = "upsilon_per_w", kind = "f32", unit = "1/W", text = "Upsilon = E[1/I] as the sender measures it" },
+        { name = "reach_m", kind = "list", most = 16, of = { kind = "f32" }, unit = "m from Tx", text = "reach for target 0, 1, ..." },
+    } },
+    [0x05] = { name = "Aside", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the sweep, wrapping" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "anchor", kind = "f32", unit = "linear SIR", text = "anchor of the ladder; with the sign reversed on a plain pass" },
+        { name = "gap", kind = "u8", unit = "", text = "gap code of the ladder" },
+        { name = "growth", kind = "u8", unit = "", text = "growth code of the ladder" },
+        { name = "altitude_m", kind = "f32", unit = "m", text = "altitude the sender holds" },
+        { name = "power_w", kind = "f32", unit = "W", text = "its transmit power" },
+        { name = "y_m", kind = "f32", unit = "m", text = "y of the place chosen" },
+        { name = "reach_m", kind = "list", most = 16, of = { kind = "f32" }, unit = "m from Tx", text = "reach for target 0, 1, ..." },
+    } },
+    [0x06] = { name = "Gather", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "after", kind = "u16", unit = "", text = "after: the last relay that the passes before have asked; 0 in the first one" },
+        { name = "seats", kind = "list", most = 8, of = { kind = "group", fields = {
+            { name = "relay", kind = "u16", unit = "", text = "the relay's place in the view, 1 next to Tx" },
+            { name = "altitude_m", kind = "f32", unit = "m", text = "the altitude that it keeps to; 0 if it chooses" },
+            { name = "power_w", kind = "f32", unit = "W", text = "its transmit power" },
+        } }, unit = "", text = "the seats, by rising place in the view, each as follows" },
+    } },
+    [0x07] = { name = "Gathered", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "after", kind = "u16", unit = "", text = "after: the last relay that the passes before have asked; 0 in the first one" },
+        { name = "seats", kind = "list", most = 8, of = { kind = "group", fields = {
+            { name = "relay", kind = "u16", unit = "", text = "the relay's place in the view, 1 next to Tx" },
+            { name = "altitude_m", kind = "f32", unit = "m", text = "the altitude that it keeps to; 0 if it chooses" },
+            { name = "power_w", kind = "f32", unit = "W", text = "its transmit power" },
+        } }, unit = "", text = "the seats, by rising place in the view, each as follows" },
+    } },
+    [0x08] = { name = "Token", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "x_m", kind = "f32", unit = "m from Tx", text = "where the sender stands now: x" },
+        { name = "altitude_m", kind = "f32", unit = "m", text = "and its altitude" },
+        { name = "power_w", kind = "f32", unit = "W", text = "its transmit power" },
+        { name = "turn", kind = "words", words = { [0] = "look", [1] = "stop", [2] = "move" }, unit = "", text = "turn: 0 look, 1 stop, 2 move" },
+        { name = "explore_m", kind = "f32", unit = "m", text = "how far up or down a relay may move" },
+        { name = "columns", kind = "u8", unit = "", text = "columns of the grid to search; 0: from coarse to fine" },
+        { name = "rows", kind = "u8", unit = "", text = "rows of the grid" },
+        { name = "sir", kind = "f32", unit = "linear SIR", text = "SIR of the chain before this pass, 0 before it is known" },
+    } },
+    [0x09] = { name = "Moved", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the pass" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "x_m", kind = "f32", unit = "m from Tx", text = "where the sender stands now: x" },
+        { name = "altitude_m", kind = "f32", unit = "m", text = "and its altitude" },
+        { name = "moved", kind = "bool", unit = "", text = "whether it or any relay after it has moved" },
+        { name = "worst_sir", kind = "f32", unit = "linear SIR", text = "SIR of the worst hop after the sender" },
+    } },
+    [0x0a] = { name = "Hello", fields = {
+        { name = "mission", kind = "digest", unit = "", text = "digest of the mission that the sender was loaded with" },
+        { name = "neighbour", kind = "u16", unit = "", text = "the node that it takes for its neighbour on this side; 0 for none" },
+        { name = "behind", kind = "u16", unit = "", text = "how many relays hang together from it on toward its other side, itself included; 1 while it is fresh" },
+        { name = "newest_view", kind = "view", unit = "", text = "the latest view that the sender has heard of" },
+        { name = "holds", kind = "digest", unit = "", text = "digest of the newest mission that it holds" },
+        { name = "holds_version", kind = "u16", unit = "", text = "version of that" },
+        { name = "offer_number", kind = "u16", unit = "", text = "number for the offer that answers it; 0 at a node that takes none" },
+        { name = "hears", kind = "u8", unit = "", text = "the nodes on this side that it hears, bit 0 for the nearest, bit 3 for the fourth" },
+        { name = "flags", kind = "flags", words = { "ask", "form", "fresh", "ready", "flies" }, unit = "", text = "flags" },
+    } },
+    [0x0b] = { name = "Proposal", fields = {
+        { name = "mission", kind = "digest", unit = "", text = "digest of the mission that the view is to fly" },
+        { name = "version", kind = "u16", unit = "", text = "version of that" },
+        { name = "proposed_view", kind = "view", unit = "", text = "the view that is proposed" },
+        { name = "place", kind = "u16", unit = "", text = "the sender's place, from 1 at the relay that has proposed" },
+        { name = "agreed_view", kind = "view", unit = "", text = "the newest view that a relay up to the sender knows to be agreed on" },
+        { name = "agreed_relays", kind = "u16", unit = "", text = "its relays" },
+        { name = "votes", kind = "u16", unit = "", text = "how many of them are the sender or before it" },
+        { name = "lease_left_ds", kind = "u16", unit = "0.1 s", text = "how long those of them that are elsewhere may hold it yet", per = 10, base = "s" },
+        { name = "rest_ds", kind = "u16", unit = "0.1 s", text = "how long its places are still not to be taken, for the sake of members of earlier views", per = 10, base = "s" },
+        { name = "proposer", kind = "bool", unit = "", text = "whether the node that proposed it is one of those that are here" },
+        { name = "successor", kind = "option", of = { kind = "group", fields = {
+            { name = "proposal", kind = "view", unit = "", text = "the proposal by which it was decided on" },
+            { name = "view", kind = "view", unit = "", text = "the view that was decided on" },
+            { name = "relays", kind = "u16", unit = "", text = "its relays" },
+        } }, unit = "", text = "the latest successor of it that one of them has accepted:" },
+    } },
+    [0x0c] = { name = "Decision", fields = {
+        { name = "mission", kind = "digest", unit = "", text = "digest of the mission that was proposed" },
+        { name = "version", kind = "u16", unit = "", text = "version of that" },
+        { name = "proposed_view", kind = "view", unit = "", text = "the view that was proposed" },
+        { name = "place", kind = "u16", unit = "", text = "the sender's place, as in a Proposal" },
+        { name = "base_view", kind = "view", unit = "", text = "base: the view that is followed, the newest that a relay on the way knew to be agreed on" },
+        { name = "base_relays", kind = "u16", unit = "", text = "its relays" },
+        { name = "accepted", kind = "option", of = { kind = "group", fields = {
+            { name = "view", kind = "view", unit = "", text = "that view: the one proposed, or one that was decided on before" },
+            { name = "relays", kind = "u16", unit = "", text = "its relays" },
+        } }, unit = "", text = "the view to be accepted; none if too few are there:" },
+        { name = "there", kind = "u16", unit = "", text = "how many relays the proposal has come through" },
+        { name = "rest_ds", kind = "u16", unit = "0.1 s", text = "how long its places are not to be taken", per = 10, base = "s" },
+    } },
+    [0x0d] = { name = "Fence", fields = {
+        { name = "association", kind = "u16", unit = "", text = "number of the sender's association with the receiver" },
+        { name = "line", kind = "digest", unit = "", text = "digest of the line that the sender flies along, see Views" },
+        { name = "echo", kind = "u16", unit = "", text = "number of the receiver's association, as the sender has heard it; 0 for none" },
+        { name = "fence", kind = "u16", unit = "", text = "number of the fence; toward Tx, of the newest one that the sender has heard of" },
+        { name = "x_m", kind = "f32", unit = "m", text = "where the fence is; toward Tx, the low end of where the sender may be" },
+        { name = "target_m", kind = "f32", unit = "m", text = "where the sender is to be in the end" },
+        { name = "y_m", kind = "f32", unit = "m", text = "where the sender flies to across the line, y" },
+        { name = "altitude_m", kind = "f32", unit = "m", text = "and its altitude" },
+        { name = "apart_m", kind = "f32", unit = "m", text = "toward Rx, how far before the fence the sender stays along x; toward Tx 0" },
+        { name = "flags", kind = "flags", words = { "arrived", "agrees", "needs", "needed", "left" }, unit = "", text = "flags" },
+    } },
+    [0x0e] = { name = "Offer", fields = {
+        { name = "version", kind = "u16", unit = "", text = "version of the mission" },
+        { name = "base", kind = "digest", unit = "", text = "digest of its base, the mission that the relays were loaded with" },
+        { name = "relays", kind = "u16", unit = "", text = "N, number of relays" },
+        { name = "distance_m", kind = "f32", unit = "m", text = "D" },
+        { name = "min_separation_m", kind = "f32", unit = "m", text = "S, least separation" },
+        { name = "tx_power_w", kind = "f32", unit = "W", text = "power of Tx" },
+        { name = "altitude_m", kind = "f32", unit = "m", text = "common altitude" },
+        { name = "power_w", kind = "f32", unit = "W", text = "common power" },
+        { name = "interferer_power_w", kind = "f32", unit = "W", text = "power of the interferer; 0 where nobody knows it, with an X and a Y of 0" },
+        { name = "interferer_x_m", kind = "f32", unit = "m from Tx", text = "its X" },
+        { name = "interferer_y_m", kind = "f32", unit = "m to the right", text = "its Y" },
+        { name = "tolerance", kind = "f32", unit = "", text = "tolerance" },
+        { name = "mu_los", kind = "f64", unit = "", text = "mu_LoS" },
+        { name = "mu_nlos", kind = "f64", unit = "", text = "mu_NLoS" },
+        { name = "eta", kind = "f64", unit = "", text = "eta" },
+        { name = "altitude_min_m", kind = "f32", unit = "m", text = "lowest altitude of the band" },
+        { name = "altitude_max_m", kind = "f32", unit = "m", text = "highest altitude" },
+        { name = "lateral_min_m", kind = "f32", unit = "m", text = "room to the side: the least y" },
+        { name = "lateral_max_m", kind = "f32", unit = "m", text = "the most y" },
+        { name = "noise_w", kind = "f32", unit = "W", text = "noise power at every receiver; 0 for none" },
+        { name = "tx_lat_e7", kind = "i32", unit = "1e-7 degrees", text = "latitude of Tx, north above 0", per = 10000000, base = "degrees" },
+        { name = "tx_lon_e7", kind = "i32", unit = "1e-7 degrees", text = "longitude of Tx, east above 0", per = 10000000, base = "degrees" },
+        { name = "tx_amsl_mm", kind = "i32", unit = "mm", text = "height of the ground at Tx above the mean sea level" },
+        { name = "rx_lat_e7", kind = "i32", unit = "1e-7 degrees", text = "latitude of Rx, north above 0", per = 10000000, base = "degrees" },
+        { name = "rx_lon_e7", kind = "i32", unit = "1e-7 degrees", text = "longitude of Rx, east above 0", per = 10000000, base = "degrees" },
+        { name = "rx_amsl_mm", kind = "i32", unit = "mm", text = "height of the ground at Rx above the mean sea level" },
+        { name = "answers", kind = "u16", unit = "", text = "number of the hello of the receiver that it answers; 0 for none" },
+    } },
+    [0x0f] = { name = "Pulse", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the pulse, wrapping" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "lease_ds", kind = "u16", unit = "0.1 s", text = "the lease: how long a relay may hold the view after it has taken part", per = 10, base = "s" },
+    } },
+    [0x10] = { name = "Pulsed", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the pulse" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "back", kind = "bool", unit = "", text = "whether it has come to the last relay, and back from there" },
+    } },
+    [0x11] = { name = "Sense", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "belief_number", kind = "u16", unit = "", text = "number of what is believed, which the leader counts up, wrapping" },
+        { name = "belief", kind = "words", words = { [0] = "what the mission says", [1] = "nothing, the relays spread evenly", [2] = "nothing, the first hop half as long as the others", [3] = "nothing, the last hop half as long", [4] = "one source" }, unit = "", text = "what is believed: 0 what the mission says; 1 nothing, the relays spread evenly; 2 nothing, the first hop half as long as the others; 3 nothing, the last hop half as long; 4 one source" },
+        { name = "source_power_w", kind = "f32", unit = "W", text = "power of the source" },
+        { name = "source_x_m", kind = "f32", unit = "m from Tx", text = "its X" },
+        { name = "source_y_m", kind = "f32", unit = "m to the right", text = "its Y" },
+        { name = "source_at_rx_w", kind = "f32", unit = "W", text = "what Rx hears of it; 0 where Rx has not said" },
+        { name = "sum_ab", kind = "array", size = 10, of = { kind = "f32" }, unit = "", text = "sums of w a b for every two of the four terms: of the first with the first to the fourth, the second with the second to the fourth, the third with the third and the fourth, the fourth with itself" },
+        { name = "sum_av", kind = "array", size = 4, of = { kind = "f32" }, unit = "", text = "sums of w a v for the first term to the fourth" },
+        { name = "sum_vv", kind = "f32", unit = "", text = "sum of w v^2" },
+        { name = "places", kind = "f32", unit = "", text = "places: the sum of how much each counts" },
+        { name = "measurements", kind = "f32", unit = "", text = "their measurements, each place as it counts" },
+        { name = "age_s", kind = "f32", unit = "s", text = "their age, each place as it counts" },
+        { name = "rx_power_w", kind = "f32", unit = "W", text = "mean interference at Rx; 0 where Rx has not said" },
+        { name = "rx_measurements", kind = "f32", unit = "", text = "of how many measurements, as far as they have not faded" },
+        { name = "left_out", kind = "u16", unit = "", text = "node number of a relay whose share has been left out; 0 for none" },
+    } },
+    [0x12] = { name = "Sensed", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
+        { name = "view", kind = "digest", unit = "", text = "digest of the sender's view, see Views" },
+        { name = "belief_number", kind = "u16", unit = "", text = "number of what is believed, which the leader counts up, wrapping" },
+        { name = "belief", kind = "words", words = { [0] = "what the mission says", [1] = "nothing, the relays spread evenly", [2] = "nothing, the first hop half as long as the others", [3] = "nothing, the last hop half as long", [4] = "one source" }, unit = "", text = "what is believed: 0 what the mission says; 1 nothing, the relays spread evenly; 2 nothing, the first hop half as long as the others; 3 nothing, the last hop half as long; 4 one source" },
+        { name = "source_power_w", kind = "f32", unit = "W", text = "power of the source" },
+        { name = "source_x_m", kind = "f32", unit = "m from Tx", text = "its X" },
+        { name = "source_y_m", kind = "f32", unit = "m to the right", text = "its Y" },
+        { name = "source_at_rx_w", kind = "f32", unit = "W", text = "what Rx hears of it; 0 where Rx has not said" },
+        { name = "sum_ab", kind = "array", size = 10, of = { kind = "f32" }, unit = "", text = "sums of w a b for every two of the four terms: of the first with the first to the fourth, the second with the second to the fourth, the third with the third and the fourth, the fourth with itself" },
+        { name = "sum_av", kind = "array", size = 4, of = { kind = "f32" }, unit = "", text = "sums of w a v for the first term to the fourth" },
+        { name = "sum_vv", kind = "f32", unit = "", text = "sum of w v^2" },
+        { name = "places", kind = "f32", unit = "", text = "places: the sum of how much each counts" },
+        { name = "measurements", kind = "f32", unit = "", text = "their measurements, each place as it counts" },
+        { name = "age_s", kind = "f32", unit = "s", text = "their age, each place as it counts" },
+        { name = "rx_power_w", kind = "f32", unit = "W", text = "mean interference at Rx; 0 where Rx has not said" },
+        { name = "rx_measurements", kind = "f32", unit = "", text = "of how many measurements, as far as they have not faded" },
+        { name = "left_out", kind = "u16", unit = "", text = "node number of a relay whose share has been left out; 0 for none" },
+    } },
+    [0x13] = { name = "Level", fields = {
+        { name = "mission", kind = "digest", unit = "", text = "digest of the mission that the relays were loaded with" },
+        { name = "power_w", kind = "f32", unit = "W", text = "mean received power, with the noise of its receiver" },
+    } },
+}
+
+local handshake = { name = "Handshake", fields = {
+    { name = "sender_nonce", kind = "u64", unit = "", text = "nonce of the sender toward the receiver" },
+    { name = "receiver_nonce", kind = "u64", unit = "", text = "nonce of the receiver toward the sender, as the sender knows it" },
+    { name = "asks", kind = "u8", unit = "", text = "1 if the sender still lacks proof that the receiver is there now, else 0" },
+} }
+
+-- What stands above is data; from here on it is read.
+
+local MOST = 135 -- bytes of a frame without COBS
+local HEADER, TAG, CHECK = 10, 8, 4
+
+local proto = Proto("uav_relay", "UAV relay")
+local all = {}
+
+local function keep(made)
+    all[#all + 1] = made
+    return made
+end
+
+local head = {
+    version = keep(ProtoField.uint8("uav_relay.version", "version")),
+    sender = keep(ProtoField.uint16("uav_relay.sender", "sender")),
+    flags = keep(ProtoField.uint8("uav_relay.flags", "flags", base.HEX)),
+    destination = keep(ProtoField.uint16("uav_relay.destination", "destination")),
+    network = keep(ProtoField.uint16("uav_relay.network", "network")),
+    counter = keep(ProtoField.uint32("uav_relay.counter", "counter")),
+    tag = keep(ProtoField.bytes("uav_relay.tag", "tag")),
+    crc = keep(ProtoField.uint32("uav_relay.crc", "CRC", base.HEX)),
+    message = keep(ProtoField.string("uav_relay.message", "message")),
+    refused = keep(ProtoField.string("uav_relay.refused", "refused")),
+}
+local wrong = ProtoExpert.new("uav_relay.wrong", "The frame is refused", expert.group.MALFORMED, expert.severity.ERROR)
+proto.experts = { wrong }
+
+-- Bytes and constructor of each type of a fixed size.
+local plain = {
+    u8 = { 1, ProtoField.uint8 },
+    u16 = { 2, ProtoField.uint16 },
+    u64 = { 8, ProtoField.uint64 },
+    i32 = { 4, ProtoField.int32 },
+    f32 = { 4, ProtoField.float },
+    f64 = { 8, ProtoField.double },
+    bool = { 1, ProtoField.uint8 },
+    digest = { 2, ProtoField.uint16, base.HEX },
+    view = { 4, ProtoField.uint32 },
+    flags = { 1, ProtoField.uint8, base.HEX },
+    words = { 1, ProtoField.uint8 },
+}
+local yes = { [0] = "no", [1] = "yes" }
+
+-- Makes what Wireshark needs of a field, and of those within it.
+local function declare(abbreviation, field)
+    local kind = field.kind
+    if kind == "group" then
+        for _, inner in ipairs(field.fields) do
+            declare(abbreviation .. "." .. inner.name, inner)
+        end
+        return
+    end
+    if kind == "option" or kind == "array" or kind == "list" then
+        if kind == "list" then
+            field.count = keep(ProtoField.uint8(abbreviation .. "_count", field.name .. "_count"))
+        end
+        field.of.name, field.of.text, field.of.unit = field.name, field.text, field.unit
+        declare(abbreviation, field.of)
+        return
+    end
+    local make, display = plain[kind][2], plain[kind][3]
+    if kind == "f32" or kind == "f64" then
+        field.made = keep(make(abbreviation, field.name, field.text))
+    elseif kind == "words" or kind == "bool" then
+        field.made = keep(make(abbreviation, field.name, base.DEC, kind == "bool" and yes or field.words, nil, field.text))
+    else
+        field.made = keep(make(abbreviation, field.name, display or base.DEC, nil, nil, field.text))
+    end
+    if kind == "flags" then
+        field.bits = {}
+        for bit, name in ipairs(field.words) do
+            local mask = 2 ^ (bit - 1)
+            field.bits[bit] = keep(ProtoField.bool(abbreviation .. "." .. name, name, 8, nil, mask))
+        end
+    end
+end
+
+local function declare_message(message)
+    for _, field in ipairs(message.fields) do
+        declare("uav_relay." .. message.name:lower() .. "." .. field.name, field)
+    end
+end
+for _, message in pairs(messages) do
+    declare_message(message)
+end
+declare_message(handshake)
+proto.fields = all
+
+-- A body under way: what is refused ends it by an error whose text is the reason.
+local function refuse(why)
+    error({ why = why }, 0)
+end
+
+local function bytes(body, count)
+    if body.at + count > body.ends then
+        refuse("malformed")
+    end
+    local range = body.tvb(body.at, count)
+    body.at = body.at + count
+    return range
+end
+
+-- A postcard varint in its one form, and where it stands.
+local function varint(body)
+    local from, number, factor = body.at, 0, 1
+    while true do
+        local byte = bytes(body, 1):uint()
+        if byte == 0 and factor > 1 or factor > 2 ^ 28 then
+            refuse("malformed")
+        end
+        number = number + byte % 128 * factor
+        if byte < 128 then
+            return number, body.tvb(from, body.at - from)
+        end
+        factor = factor * 128
+    end
+end
+
+local function flag(body)
+    local range = bytes(body, 1)
+    if range:uint() > 1 then
+        refuse("malformed")
+    end
+    return range:uint() == 1, range
+end
+
+local read
+
+local function several(tree, field, body, count)
+    for number = 1, count do
+        if field.of.kind == "group" then
+            local from = body.at
+            local branch = tree:add(body.tvb(from, 0), field.name .. " " .. number)
+            read(branch, field.of, body)
+            branch:set_len(body.at - from)
+        else
+            read(tree, field.of, body)
+        end
+    end
+end
+
+function read(tree, field, body)
+    local kind = field.kind
+    if kind == "group" then
+        for _, inner in ipairs(field.fields) do
+            read(tree, inner, body)
+        end
+    elseif kind == "array" then
+        several(tree, field, body, field.size)
+    elseif kind == "list" then
+        local count, range = varint(body)
+        tree:add(field.count, range, count)
+        if count > field.most then
+            refuse("malformed")
+        end
+        several(tree, field, body, count)
+    elseif kind == "option" then
+        local some, range = flag(body)
+        if not some then
+            tree:add(range, field.name .. ": none")
+        elseif field.of.kind == "group" then
+            local branch = tree:add(range, field.name)
+            read(branch, field.of, body)
+        else
+            read(tree, field.of, body)
+        end
+    else
+        local range
+        if kind == "bool" then
+            range = select(2, flag(body))
+        else
+            range = bytes(body, plain[kind][1])
+        end
+        local item = tree:add_le(field.made, range)
+        if field.unit ~= "" then
+            item:append_text(field.per and string.format(" x %s", field.unit) or " " .. field.unit)
+        end
+        if field.per then
+            local number = kind == "i32" and range:le_int() or range:le_uint()
+            item:append_text(string.format(" = %.10g %s", number / field.per, field.base))
+        elseif kind == "view" and range:le_uint() > 0 then
+            local view = range:le_uint()
+            item:append_text(string.format(" (%d by node %d)", math.floor(view / 1024), view % 1024))
+        elseif kind == "flags" then
+            for _, bit in ipairs(field.bits) do
+                item:add(bit, range)
+            end
+        end
+    end
+end
+
+-- CRC-32C, reflected. Whichever Lua it is has one of these.
+local library = bit32 or bit
+local xor = library and library.bxor or load("return function(a, b) return a ~ b end")()
+local steps = {}
+for byte = 0, 255 do
+    local crc = byte
+    for _ = 1, 8 do
+        local low = crc % 2
+        crc = math.floor(crc / 2)
+        if low == 1 then
+            crc = xor(crc, 0x82f63b78) % 2 ^ 32
+        end
+    end
+    steps[byte] = crc
+end
+
+local function crc32c(tvb, count)
+    local crc = 0xffffffff
+    for at = 0, count - 1 do
+        local byte = xor(crc % 256, tvb(at, 1):uint()) % 256
+        crc = xor(math.floor(crc / 256), steps[byte]) % 2 ^ 32
+    end
+    return xor(crc, 0xffffffff) % 2 ^ 32
+end
+
+-- What stands before the delimiter without COBS, as a tvb, or why there is nothing.
+local function unstuffed(tvb, from, ends, is_ended)
+    if not is_ended then
+        return nil, "unended"
+    end
+    local plain_bytes = {}
+    local at = from
+    while at < ends do
+        local run = tvb(at, 1):uint()
+        local left = math.min(run - 1, ends - at - 1)
+        for more = 1, left do
+            plain_bytes[#plain_bytes + 1] = tvb(at + more, 1):uint()
+        end
+        if #plain_bytes > MOST then
+            return nil, "oversized"
+        elseif left < run - 1 then
+            return nil, "truncated"
+        end
+        at = at + run
+        if at < ends and run < 255 then
+            plain_bytes[#plain_bytes + 1] = 0
+        end
+    end
+    if #plain_bytes > MOST then
+        return nil, "oversized"
+    elseif #plain_bytes < HEADER + CHECK then
+        return nil, "short"
+    end
+    local array = ByteArray.new()
+    array:set_size(#plain_bytes)
+    for number, byte in ipairs(plain_bytes) do
+        array:set_index(number - 1, byte)
+    end
+    return array:tvb("Frame without COBS")
+end
+
+local function header(tvb, tree, pinfo)
+    local first, second = tvb(0, 2):le_uint(), tvb(2, 2):le_uint()
+    local sender, destination = first % 4096, second % 4096
+    local version, flags = math.floor(first / 4096), math.floor(second / 4096)
+    if version ~= 1 or flags ~= 0 and flags ~= 1 and flags ~= 3 then
+        refuse("version")
+    end
+    if flags > 0 and tvb:len() < HEADER + TAG + CHECK then
+        refuse("short")
+    end
+    tree:add(head.version, tvb(1, 1), version)
+    tree:add(head.sender, tvb(0, 2), sender)
+    tree:add(head.flags, tvb(3, 1), flags)
+    tree:add(head.destination, tvb(2, 2), destination)
+    tree:add_le(head.network, tvb(4, 2))
+    tree:add_le(head.counter, tvb(6, 4))
+    pinfo.cols.src = tostring(sender)
+    pinfo.cols.dst = tostring(destination)
+    return flags
+end
+
+local function open(tvb, tree, pinfo)
+    local ends = tvb:len() - CHECK
+    local crc = tree:add_le(head.crc, tvb(ends, CHECK))
+    local is = crc32c(tvb, ends)
+    if tvb(ends, CHECK):le_uint() ~= is then
+        crc:append_text(string.format(", its bytes have 0x%08x", is))
+        refuse("crc")
+    end
+    local flags = header(tvb, tree, pinfo)
+    if flags > 0 then
+        ends = ends - TAG
+        tree:add(head.tag, tvb(ends, TAG))
+    end
+    local body = { tvb = tvb, at = HEADER, ends = ends }
+    local message = handshake
+    if flags < 2 then
+        local tag = bytes(body, 1):uint()
+        message = messages[tag] or refuse("unknown_tag")
+    end
+    tree:add(head.message, tvb(HEADER, flags < 2 and 1 or 0), message.name)
+    pinfo.cols.info:append(message.name .. " ")
+    local branch = tree:add(tvb(HEADER, ends - HEADER), message.name)
+    for _, field in ipairs(message.fields) do
+        read(branch, field, body)
+    end
+    if body.at < body.ends then
+        refuse("malformed")
+    end
+end
+
+-- The frame in a piece of a packet.
+local function frame(tvb, from, ends, is_ended, tree, pinfo)
+    local range = tvb(from, ends - from + (is_ended and 1 or 0))
+    local branch = tree:add(proto, range)
+    local without, why = unstuffed(tvb, from, ends, is_ended)
+    if without then
+        local opened, failure = pcall(open, without, branch, pinfo)
+        if not opened then
+            why = type(failure) == "table" and failure.why or error(failure, 0)
+        end
+    end
+    if why then
+        branch:add(head.refused, range, why)
+        branch:add_proto_expert_info(wrong, "The frame is refused: " .. why)
+        pinfo.cols.info:append("[refused: " .. why .. "] ")
+    end
+end
+
+function proto.dissector(tvb, pinfo, tree)
+    pinfo.cols.protocol = "UAV relay"
+    pinfo.cols.info = ""
+    local from = 0
+    for at = 0, tvb:len() - 1 do
+        if tvb(at, 1):uint() == 0 then
+            if at > from then
+                frame(tvb, from, at, true, tree, pinfo)
+            end
+            from = at + 1
+        end
+    end
+    if from < tvb:len() then
+        frame(tvb, from, tvb:len(), false, tree, pinfo)
+    end
+end
+
+DissectorTable.get("wtap_encap"):add(wtap.USER0, proto)

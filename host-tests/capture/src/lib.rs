@@ -1,0 +1,30 @@
+//! What goes over the air as a pcapng capture, for Wireshark and `cargo decode`.
+//!
+//! A packet is one frame as it is on the wire, COBS and delimiter included, under LINKTYPE_USER0 (147). A [`Capture`] writes frames;
+//! [`Cut`] makes frames of a stream of bytes, for whoever reads a port.
+//!
+//! ```
+//! use std::time::Duration;
+//! use uav_relay_capture::{Capture, Cut, Direction, Frame};
+//!
+//! let mut capture = Capture::new(Vec::new(), "an example", "")?;
+//! let port = capture.interface("/dev/ttyUSB0", "toward Tx")?;
+//! let mut cut = Cut::default();
+//! cut.push(&[2, 7, 0, 3], |piece| {
+//!     capture.frame(port, &Frame {
+//!         at: Duration::from_millis(1_250),
+//!         bytes: piece.bytes,
+//!         len: piece.len,
+//!         direction: Direction::In,
+//!         comment: "",
+//!     })
+//! })?;
+//! assert!(capture.finish()?.len() > 100);
+//! # Ok::<(), std::io::Error>(())
+//! ```
+
+mod cut;
+mod write;
+
+pub use cut::{Cut, MOST, Piece};
+pub use write::{Capture, Direction, Frame, Interface, LINK_TYPE};

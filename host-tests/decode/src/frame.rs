@@ -1,0 +1,125 @@
+//! A frame, taken apart.
+
+use uav_relay::wire::auth::TAG;
+use uav_relay::wire::crc::CRC_32C;
+use uav_relay::wire::deframe::{DeframeError, Deframer};
+use uav_relay::wire::frame::{self, FrameError, HEADER, Header};
+use uav_relay::wire::message::{Message, MessageError};
+
+use crate::format::{Format, Layout};
+use crate::refusal::Refusal;
+use crate::value::Fields;
+use crate::walk::walk;
+
+/// A frame, taken apart as far as it goes.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Frame<'f> {
+    /// How many bytes it has on the wire.
+    pub len: usize,
+    /// Who sends it to whom; `None` unless version and CRC are right.
+    pub header: Option<Header>,
+    /// What it is called: the message, or `Handshake`.
+    pub name: Option<&'f str>,
+    /// Whether it is a handshake.
+    pub handshake: bool,
+    /// What it says, as far as it can be read.
+    pub fields: Fields<'f>,
+    /// Header and body, if a tag follows, and the tag.
+    pub tag: Option<(Vec<u8>, [u8; TAG])>,
+    /// Why it is refused, if it is.
+    pub refusal: Option<Refusal>,
+}
+
+/// Takes a frame apart: `wire` is it as it is on the wire, its delimiter last, or the first bytes of one of `len`.
+///
+/// Whether it is refused the library itself says; the tables tell what it says, and why.
+pub fn read<'f>(format: &'f Format, wire: &[u8], len: usize) -> Frame<'f> {
+    let mut frame = Frame {
+        len,
+        header: None,
+        name: None,
+        handshake: false,
+        fields: Fields::default(),
+        tag: None,
+        refusal: None,
+    };
+    match unstuffed(wire, len) {
+        Ok(plain) => open(format, &plain, &mut frame),
+        Err(refusal) => frame.refusal = Some(refusal),
+    }
+    frame
+}
+
+/// The frame without COBS.
+fn unstuffed(wire: &[u8], len: usize) -> Result<Vec<u8>, Refusal> {
+    if wire.len() < len {
+        return Err(Refusal::Oversized(len));
+    }
+    let mut deframer = Deframer::new();
+    for &byte in wire {
+        match deframer.push(byte) {
+            Some(Ok(plain)) => return Ok(plain.to_vec()),
+            Some(Err(DeframeError::Oversized)) => return Err(Refusal::Oversized(len)),
+            Some(Err(_)) => return Err(Refusal::Truncated),
+            None => {}
+        }
+    }
+    Err(Refusal::Unended)
+}
+
+fn open<'f>(format: &'f Format, plain: &[u8], frame: &mut Frame<'f>) {
+    let opened = match frame::open(plain) {
+        Ok(opened) => opened,
+        Err(error) => {
+            frame.refusal = Some(broken(error, plain));
+            return;
+        }
+    };
+    frame.header = Some(opened.header);
+    frame.handshake = opened.handshake;
+    frame.tag = opened.tag.map(|tag| (opened.signed.to_vec(), tag));
+    if opened.handshake {
+        let layout = &format.handshake;
+        frame.name = Some(&layout.name);
+        let (fields, error) = walk(&layout.fields, opened.body);
+        frame.fields = fields;
+        frame.refusal = error.map(Refusal::Malformed).or_else(|| {
+            let whole = opened.body.split_first_chunk::<8>();
+            let unsaid = whole.is_none_or(|(nonce, _)| *nonce == [0; 8]);
+            let asks = opened.body.last().copied().unwrap_or_default();
+            (unsaid || asks > 1).then_some(Refusal::Range)
+        });
+        return;
+    }
+    let Some((&tag, body)) = opened.body.split_first() else {
+        frame.refusal = Some(Refusal::Malformed("there is no body".to_owned()));
+        return;
+    };
+    let Some(Layout { name, fields }) = format.message(tag) else {
+        frame.refusal = Some(Refusal::UnknownTag(tag));
+        return;
+    };
+    frame.name = Some(name);
+    let (read, error) = walk(fields, body);
+    frame.fields = read;
+    frame.refusal = match (Message::decode(opened.body), error) {
+        (Ok(_), None) => None,
+        (Err(MessageError::Value), None) => Some(Refusal::Range),
+        (_, Some(error)) => Some(Refusal::Malformed(error)),
+        (Err(_), None) => Some(Refusal::Malformed("not its one encoding".to_owned())),
+    };
+}
+
+/// Why the library does not open it.
+fn broken(error: FrameError, plain: &[u8]) -> Refusal {
+    match (error, plain.split_last_chunk::<4>()) {
+        (FrameError::Crc, Some((checked, check))) => {
+            Refusal::Crc(u32::from_le_bytes(*check), CRC_32C.checksum(checked))
+        }
+        (FrameError::Version, Some((&[_, version, _, flags, ..], _))) => {
+            Refusal::Version(version >> 4, flags >> 4)
+        }
+        (FrameError::Version, _) => Refusal::Short(plain.len().min(HEADER)),
+        _ => Refusal::Short(plain.len()),
+    }
+}
