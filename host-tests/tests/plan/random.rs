@@ -77,6 +77,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
     Scenario {
         line: None,
         listen: None,
+        plan: None,
         distance_m: d,
         altitude_m,
         altitude_min_m: round((altitude_m * rng.random_range(0.5..1.0)).max(0.2)).min(altitude_m),

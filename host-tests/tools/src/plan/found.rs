@@ -59,7 +59,7 @@ pub enum NoPlan {
 impl From<Refusal> for NoPlan {
     fn from(refusal: Refusal) -> Self {
         match refusal {
-            Refusal::NoRoom => Self::Unmet(refusal.to_string(), None),
+            Refusal::NoRoom { .. } => Self::Unmet(refusal.to_string(), None),
             other => Self::Wrong(other.to_string()),
         }
     }

@@ -52,7 +52,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     agree(options, &method, &scenario)?;
     let (mission, profiles) = match mission::mission(&scenario, options.uavs, options.tolerance) {
         Ok(briefed) => briefed,
-        Err(refusal @ Refusal::NoRoom) => {
+        Err(refusal @ Refusal::NoRoom { .. }) => {
             let report =
                 ChainReport::refused(&method, options.uavs, options.seed, &refusal.to_string());
             return show(options, &report);
