@@ -165,6 +165,7 @@ const LISTEN: Keys = &[
 const SITES: Keys = &[
     required("tx", Rule::Table(SITE)),
     required("rx", Rule::Table(SITE)),
+    optional("geoid_m", Number(range(-120.0, 100.0, "m"))),
 ];
 
 const SITE: Keys = &[

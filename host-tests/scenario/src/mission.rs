@@ -148,6 +148,14 @@ pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     }
 }
 
+/// What is wrong with a scenario that describes a relay that a chain of `uavs` does not have, in one line; `None` where it does not.
+pub fn left_out(scenario: &Scenario, uavs: u16) -> Option<String> {
+    let (index, _) = scenario.relays.last_key_value()?;
+    (*index > uavs).then(|| {
+        format!("[[relay]] index = {index}: there is no such relay in a chain of {uavs}; allowed: 1 to {uavs}")
+    })
+}
+
 /// The relays that hold an altitude of their own, by index from 1.
 pub fn held(scenario: &Scenario, uavs: u16) -> Vec<u16> {
     scenario

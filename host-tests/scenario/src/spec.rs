@@ -55,6 +55,8 @@ pub struct Line {
     pub axis: Axis,
     /// The transmitter's site and the receiver's.
     pub sites: [Geodetic; 2],
+    /// How high the mean sea level there is above the ellipsoid of WGS84, in metres, -120 to 100, where that is said.
+    pub geoid_m: Option<f64>,
 }
 
 /// The radio channel: its carrier and the excess losses over free space.

@@ -40,7 +40,7 @@ pub fn ended(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("{}", failure.line);
+            say(&failure.line);
             ExitCode::from(failure.status)
         }
     }
@@ -49,7 +49,7 @@ pub fn ended(result: Result<(), Failure>) -> ExitCode {
 /// Help as it is; of an error only the line that says what is wrong.
 pub fn usage(error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
-        print!("{error}");
+        print(&error.to_string());
         return ExitCode::SUCCESS;
     }
     let text = error.to_string();
@@ -62,13 +62,25 @@ pub fn usage(error: &clap::Error) -> ExitCode {
             wrong.push_str(missing.trim());
         }
     }
-    eprintln!("{}", wrong.trim_start_matches("error: "));
+    // What would have been right, and what may have been meant, are below too.
+    for hint in text.lines().map(str::trim) {
+        if hint.starts_with("[possible values:") || hint.starts_with("tip: a similar") {
+            wrong.push(' ');
+            wrong.push_str(hint);
+        }
+    }
+    say(wrong.trim_start_matches("error: "));
     ExitCode::from(2)
 }
 
 /// Prints `text`. A reader that has had enough, such as `head`, is no fault of the command.
 pub fn print(text: &str) {
     _ = std::io::stdout().write_all(text.as_bytes());
+}
+
+/// Says `line` on standard error. Nobody there to hear it is no fault of the command either.
+pub fn say(line: &str) {
+    _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// A report as one JSON object.
@@ -120,5 +132,19 @@ pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(range())
+    }
+}
+
+/// What reads a whole number of the command line, within `least` to `most`.
+pub fn whole<T>(least: T, most: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
+where
+    T: std::str::FromStr + std::fmt::Display + PartialOrd + Copy + Send + Sync,
+{
+    move |text| {
+        let value = text
+            .parse()
+            .ok()
+            .filter(|value| (least..=most).contains(value));
+        value.ok_or_else(|| format!("must be a whole number within {least} to {most}"))
     }
 }

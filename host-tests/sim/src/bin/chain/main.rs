@@ -50,6 +50,9 @@ fn run(options: &Options) -> Result<(), Failure> {
         return Err(Failure::input(line.to_owned()));
     }
     agree(options, &method, &scenario)?;
+    if let Some(line) = mission::left_out(&scenario, options.uavs) {
+        return Err(Failure::input(format!("{}: {line}", file(options))));
+    }
     let (mission, profiles) = match mission::mission(&scenario, options.uavs, options.tolerance) {
         Ok(briefed) => briefed,
         Err(refusal @ Refusal::NoRoom { .. }) => {
@@ -58,11 +61,7 @@ fn run(options: &Options) -> Result<(), Failure> {
             return show(options, &report);
         }
         Err(refusal) => {
-            let file = options
-                .scenario
-                .as_ref()
-                .map_or("default scenario".into(), |file| file.to_string_lossy());
-            return Err(Failure::input(format!("{file}: {refusal}")));
+            return Err(Failure::input(format!("{}: {refusal}", file(options))));
         }
     };
     let sites = scenario.line.map(|line| Sites {
@@ -100,6 +99,15 @@ fn run(options: &Options) -> Result<(), Failure> {
     show(options, &report)
 }
 
+/// The scenario, as a message names it.
+fn file(options: &Options) -> String {
+    let file = options.scenario.as_ref();
+    file.map_or_else(
+        || "default scenario".to_owned(),
+        |file| file.display().to_string(),
+    )
+}
+
 /// Whether the options go together, and with the scenario.
 fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Failure> {
     if options.closed_loop.is_some() && !options.method.is_for_fields() {
@@ -134,16 +142,6 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         if uploads {
             eprintln!("note: an upload changes that one, and what it leaves out stays as it is");
         }
-    }
-    for index in scenario
-        .relays
-        .keys()
-        .filter(|index| **index > options.uavs)
-    {
-        eprintln!(
-            "note: [[relay]] index {index} is left out of a chain of {}",
-            options.uavs
-        );
     }
     Ok(())
 }
