@@ -312,6 +312,25 @@ impl fmt::Display for Rule {
     }
 }
 
+/// Every key of a file, as `table.key`; those of a list of tables as those of a table.
+pub fn all() -> Vec<String> {
+    let mut names = Vec::new();
+    collect("", FILE, &mut names);
+    names
+}
+
+fn collect(table: &str, keys: Keys, names: &mut Vec<String>) {
+    for key in keys {
+        let name = format!("{table}{}", key.name);
+        match key.rule {
+            Rule::Table(inner) | Rule::Tables(inner, _) => {
+                collect(&format!("{name}."), inner, names)
+            }
+            _ => names.push(name),
+        }
+    }
+}
+
 /// The names of some keys, for a message.
 pub(super) fn names(keys: Keys) -> String {
     keys.iter()

@@ -30,6 +30,7 @@ mod spec;
 use std::path::Path;
 
 pub use error::{Problem, ScenarioError};
+pub use keys::all as keys;
 pub use plan::{Planned, PlannedMethod, PlannedPlace};
 pub use spec::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, ListenSpec, Noise, RelayOverride,

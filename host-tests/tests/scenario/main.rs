@@ -1,6 +1,7 @@
 //! Scenario files: what a good one means, and that every mistake in one is told in one line that helps.
 
 mod earth;
+mod example;
 mod keys;
 mod meaning;
 mod mistakes;

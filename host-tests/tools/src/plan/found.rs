@@ -79,7 +79,7 @@ impl Why {
                 most,
                 relays,
             } => {
-                let (target, most) = (unit.asked(*target), unit.say(*most, 6));
+                let (target, most) = (unit.asked(*target), unit.say(*most));
                 match relays {
                     Some(relays) => format!(
                         "no number of relays, up to {MAX_RELAYS}, gives every hop an SIR of {target}: the most is {most}, with {relays}"

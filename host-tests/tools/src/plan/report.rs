@@ -211,7 +211,7 @@ impl PlanReport {
         }
         if let (Some(target), Some(most)) = (self.target_sir, self.most_sir) {
             let target = unit.asked(target);
-            let most = unit.say(most, 6);
+            let most = unit.say(most);
             _ = writeln!(
                 text,
                 "target: SIR {target}; so many relays can have up to {most} (--uavs {uavs})"

@@ -11,11 +11,11 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// An SIR (linear) in this unit, with `digits` behind the point.
-    pub fn say(self, sir: f64, digits: usize) -> String {
+    /// An SIR (linear) in this unit, with the digits of a result.
+    pub fn say(self, sir: f64) -> String {
         match self {
-            Self::Linear => format!("{sir:.digits$}"),
-            Self::Decibels => format!("{:.digits$} dB", 10.0 * sir.log10()),
+            Self::Linear => format!("{sir:.6}"),
+            Self::Decibels => format!("{:.3} dB", 10.0 * sir.log10()),
         }
     }
 

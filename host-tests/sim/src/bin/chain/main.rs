@@ -20,7 +20,9 @@ use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::{Interference, Scenario};
 use uav_relay_sim::beta::beta_w;
 use uav_relay_sim::command::{self, Failure};
-use uav_relay_sim::report::{self, AirReport, AttackReport, ChainReport, ListenedReport, timeline};
+use uav_relay_sim::report::{
+    self, AgainstAll, AirReport, AttackReport, ChainReport, ListenedReport, timeline,
+};
 use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::{Outcome, RelayEnd};
@@ -86,6 +88,10 @@ fn run(options: &Options) -> Result<(), Failure> {
     report.channel = (setup.settings.wiring == Wiring::Shared).then_some("shared");
     report.air = AirReport::of(&setup, &outcome);
     report.listened = listened;
+    if let (None, false, Some(sir)) = (&listened, options.hostile.uploads.are_planned(), report.sir)
+    {
+        report.against_all = AgainstAll::of(&scenario, &report.relays, sir);
+    }
     if setup.attack.take().is_some() {
         let auth = setup.auth;
         let attack = AttackReport::new(auth, &outcome, &fly(options, &scenario, setup)?);

@@ -21,7 +21,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "A", value_enum, default_value_t = Altitude::Given)]
     pub(crate) altitude: Altitude,
     /// Where the only relay has to stand, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, conflicts_with = "altitude", value_parser = along)]
     pub(crate) x_m: Option<f64>,
     /// Bandwidth of a hop, hertz, 1 to 1e12: SIRs are also told as data rates, log2(1 + SIR) bits a second and hertz
     #[arg(long, value_name = "B", value_parser = |text: &str| number(text, 1.0, 1e12))]
@@ -65,6 +65,12 @@ struct Wanted {
     /// The fewest relays that carry this data rate, bit/s, above 0 to 1e15; needs --bandwidth-hz
     #[arg(long, value_name = "R", requires = "bandwidth_hz", value_parser = |text: &str| number(text, 1e-9, 1e15))]
     target_rate_bps: Option<f64>,
+}
+
+/// A place along the line: how far it may be is the scenario's to say.
+fn along(text: &str) -> Result<f64, String> {
+    text.parse()
+        .map_err(|_| "must be a number, metres from Tx".to_owned())
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]

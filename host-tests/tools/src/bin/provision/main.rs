@@ -201,6 +201,10 @@ impl<'a> Asked<'a> {
     /// Where the relays settle by themselves, where that is known before and needed; refuses a stand-in that loses too much.
     fn flown(&self) -> Result<Option<Flown>, String> {
         let is_plain = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() == 1);
+        let is_several = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() > 1);
+        if self.options.stand_in && !is_several {
+            return Err("--stand-in: is for a scenario with several [[interferer]]".to_owned());
+        }
         if !self.scenario.knows_interference() || is_plain && !self.options.all {
             return Ok(None);
         }
