@@ -16,6 +16,9 @@ import geojson
 from fastkml import kml
 from geographiclib.geodesic import Geodesic
 
+# It would round what it reads to 11 cm.
+geojson.geometry.DEFAULT_PRECISION = 9
+
 given = json.load(sys.stdin)
 EARTH = Geodesic.WGS84
 
