@@ -201,7 +201,7 @@ fn rates_are_those_of_the_sir() {
 fn wrong_input_is_named_in_one_line_with_status_2() {
     for (arguments, named) in [
         (&[][..], "--uavs <N>|--target-sir <X>"),
-        (&["--uavs", "0"], "0 is not in 1..=1000"),
+        (&["--uavs", "0"], "must be a whole number within 1 to 1000"),
         (
             &["--uavs", "1001"],
             "must be a whole number within 1 to 1000",

@@ -1,15 +1,13 @@
 //! A plan that a scenario file carries on, to what is written into drones.
 
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value};
-use uav_relay::Placement;
-use uav_relay_scenario::{Planned, PlannedMethod, PlannedPlace, Scenario};
+use uav_relay_scenario::{Planned, PlannedMethod, PlannedPlace};
 
-use super::flown::{Flown, judged};
-use super::found::NoPlan;
-use super::unit::Unit;
+use super::flown::Flown;
 
-/// How far the SIR of a plan's places may be from what the plan says, dB: its digits.
-const SAME_DB: f64 = 1e-3;
+/// How far what is flown may be from what was planned, m and dB: what another machine's last digits come to.
+const SAME_M: f64 = 0.1;
+const SAME_DB: f64 = 0.01;
 
 /// What a scenario is told of relays that fly `flown`.
 pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned {
@@ -77,32 +75,31 @@ fn value(of: impl Into<Value>) -> Item {
     Item::Value(of.into())
 }
 
-/// Whether the plan that a scenario carries is one of that scenario.
+/// Whether the plan that a scenario carries is what relays in that scenario fly: `flown`, of as many relays by its method.
 ///
 /// # Errors
-/// In one line, what its places give now.
-pub fn is_current(scenario: &Scenario, planned: &Planned) -> Result<(), String> {
-    #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]
-    let places: Vec<Placement> = planned
-        .places
-        .iter()
-        .map(|place| Placement {
-            x_m: place.x_m as f32,
-            y_m: place.y_m as f32,
-            altitude_m: place.altitude_m as f32,
+/// In one line, how far apart the two are.
+pub fn is_current(planned: &Planned, flown: &Flown) -> Result<(), String> {
+    let places = planned.places.iter().zip(&flown.plan.places);
+    let off_m = places
+        .map(|(then, (now, _))| {
+            let now = [now.x_m, now.y_m, now.altitude_m].map(f64::from);
+            let then = [then.x_m, then.y_m, then.altitude_m];
+            let apart = |axis: usize| {
+                now.get(axis)
+                    .zip(then.get(axis))
+                    .map_or(0.0, |(a, b)| a - b)
+            };
+            libm::hypot(libm::hypot(apart(0), apart(1)), apart(2))
         })
-        .collect();
-    let sir = judged(scenario, &places, planned.tolerance).map_err(|wrong| match wrong {
-        NoPlan::Wrong(why) => why,
-        NoPlan::Unmet(why, _) => why.say(Unit::Decibels),
-    })?;
-    let sir_db = 10.0 * sir.log10();
-    if (sir_db - planned.sir_db).abs() <= SAME_DB {
+        .fold(0.0, f64::max);
+    let sir_db = 10.0 * flown.plan.sir().log10();
+    if off_m <= SAME_M && (sir_db - planned.sir_db).abs() <= SAME_DB {
         return Ok(());
     }
     Err(format!(
-        "plan.sir_db = {:.3} is of another scenario: in this one its places give {sir_db:.3} dB; allowed: [plan] as `cargo plan --out` \
-         writes it for what is above it",
+        "[plan] is of another scenario: relays in this one settle up to {off_m:.1} m from plan.places, at {sir_db:.3} dB in place of \
+         plan.sir_db = {:.3}; allowed: [plan] as `cargo plan --out` writes it for what is above it",
         planned.sir_db
     ))
 }

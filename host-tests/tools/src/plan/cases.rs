@@ -23,8 +23,8 @@ pub(super) fn along_x(case: given_altitude::PlaceCase) -> &'static str {
             "the drone goes right above Rx: its first hop is the better one even there, and only the second needs help"
         }
         PlaceCase::BeforeValley => {
-            "both hops are equally good at a place before the interference is worst: the drone goes there, or past it all to right \
-             above Rx, whichever is better"
+            "the drone goes to where both hops are equally good, before the interference is worst, or past it all to right above Rx, \
+             whichever is better"
         }
         PlaceCase::OverValley => {
             "the drone goes right above Rx: its first hop is the better one even where the interference is worst"

@@ -113,21 +113,3 @@ fn alone(
         ..plan
     })
 }
-
-/// SIR (linear) of the worst hop of relays at `places`, one for each, against all that is there in `scenario`.
-///
-/// # Errors
-/// [`NoPlan`] where the scenario is no mission.
-pub fn judged(
-    scenario: &Scenario,
-    places: &[uav_relay::Placement],
-    tolerance: f64,
-) -> Result<f64, NoPlan> {
-    let relays = u16::try_from(places.len()).unwrap_or(u16::MAX);
-    if mission::hypothetical(scenario).is_some() {
-        let scene = Scene::new(scenario, relays).ok_or_else(source::nothing)?;
-        return Ok(scene.chain_sir(places));
-    }
-    let briefed = super::briefed::Briefed::new(scenario, relays, tolerance)?;
-    Ok(briefed.plan(places, "", false).sir())
-}

@@ -252,7 +252,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
         ),
         (
             &["--scenario", &old],
-            "plan.sir_db = 2.423 is of another scenario: in this one its places give ",
+            "[plan] is of another scenario: relays in this one settle up to ",
         ),
         (
             &[],

@@ -148,9 +148,6 @@ impl<'a> Asked<'a> {
                 return Err(format!("{option}: is for --method adjust"));
             }
         }
-        if let Some(plan) = plan {
-            is_current(&scenario, plan).map_err(|why| format!("{name}: {why}"))?;
-        }
         Ok(Self {
             options,
             scenario,
@@ -205,7 +202,9 @@ impl<'a> Asked<'a> {
         if self.options.stand_in && !is_several {
             return Err("--stand-in: is for a scenario with several [[interferer]]".to_owned());
         }
-        if !self.scenario.knows_interference() || is_plain && !self.options.all {
+        if !self.scenario.knows_interference()
+            || is_plain && !self.options.all && self.scenario.plan.is_none()
+        {
             return Ok(None);
         }
         let method = match self.method {
@@ -215,8 +214,17 @@ impl<'a> Asked<'a> {
         };
         // Relays that settle on nothing say so by themselves.
         let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
-            return Ok(None);
+            return match self.scenario.plan {
+                Some(_) => Err(format!(
+                    "{}: [plan] is of another scenario: relays in this one settle on nothing",
+                    self.name
+                )),
+                None => Ok(None),
+            };
         };
+        if let Some(plan) = &self.scenario.plan {
+            is_current(plan, &flown).map_err(|why| format!("{}: {why}", self.name))?;
+        }
         if flown.is_poor() {
             let line = format!("{}: {}", self.name, flown.describe());
             if flown.stand_in && !self.options.stand_in {
