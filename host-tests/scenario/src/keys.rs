@@ -324,7 +324,7 @@ fn collect(table: &str, keys: Keys, names: &mut Vec<String>) {
         let name = format!("{table}{}", key.name);
         match key.rule {
             Rule::Table(inner) | Rule::Tables(inner, _) => {
-                collect(&format!("{name}."), inner, names)
+                collect(&format!("{name}."), inner, names);
             }
             _ => names.push(name),
         }

@@ -6,6 +6,7 @@ use std::process::{Command, Output};
 
 use uav_relay::Method;
 use uav_relay_scenario::Scenario;
+use uav_relay_scenario::number::narrow;
 use uav_relay_tools::provision::config::{Block, secret};
 
 use super::{example, provision, reads, refusal};
@@ -33,6 +34,54 @@ fn names(dir: &Path) -> BTreeSet<String> {
     entries
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect()
+}
+
+/// The block of that relay in `dir` is the plan's, and the summary has it.
+fn is_provisioned(scenario: &Scenario, dir: &Path, index: u16, summary: &str) {
+    let plan = scenario.plan.as_ref().unwrap();
+    let block: Block = std::fs::read(dir.join(format!("relay{index}.bin")))
+        .unwrap()
+        .try_into()
+        .unwrap();
+    let config = reads(&block).unwrap();
+    assert_eq!((config.identity.network, config.identity.index), (9, index));
+    assert_eq!(config.mission.relays(), plan.uavs);
+    assert_eq!(config.method, Method::Align);
+    assert!(config.sites.is_some());
+    assert_eq!(secret(&block).unwrap().map(|secret| secret.epoch), Some(77));
+    // The table has its place, on the line and on earth; a line to type has its file.
+    let place = plan.places[usize::from(index) - 1];
+    let row = summary
+        .lines()
+        .find(|line| line.trim_start().starts_with(&format!("relay{index}.bin ")))
+        .unwrap();
+    let numbers: Vec<f64> = row
+        .split_whitespace()
+        .skip(1)
+        .map(|word| word.parse().unwrap())
+        .collect();
+    assert!(
+        (numbers[0] - place.x_m).abs() < 1e-3 && (numbers[2] - place.altitude_m).abs() < 1e-2,
+        "{row}"
+    );
+    let at = scenario.line.unwrap().axis.point(uav_relay::Placement {
+        x_m: narrow(place.x_m),
+        y_m: narrow(place.y_m),
+        altitude_m: narrow(place.altitude_m),
+    });
+    let at = at.unwrap();
+    assert!(
+        (numbers[3] * 1e7 - f64::from(at.lat_e7)).abs() < 1.5,
+        "{row}"
+    );
+    assert!(
+        (numbers[4] * 1e7 - f64::from(at.lon_e7)).abs() < 1.5,
+        "{row}"
+    );
+    assert!(
+        summary.contains(&format!("--base-address 0x080E0000 relay{index}.bin\n")),
+        "{summary}"
+    );
 }
 
 #[test]
@@ -87,49 +136,7 @@ fn a_plan_goes_to_every_drone() {
     assert_eq!(names(&dir), expected);
     let summary = std::fs::read_to_string(dir.join("summary.txt")).unwrap();
     for index in 1..=plan.uavs {
-        let block: Block = std::fs::read(dir.join(format!("relay{index}.bin")))
-            .unwrap()
-            .try_into()
-            .unwrap();
-        let config = reads(&block).unwrap();
-        assert_eq!((config.identity.network, config.identity.index), (9, index));
-        assert_eq!(config.mission.relays(), plan.uavs);
-        assert_eq!(config.method, Method::Align);
-        assert!(config.sites.is_some());
-        assert_eq!(secret(&block).unwrap().map(|secret| secret.epoch), Some(77));
-        // The table has its place, on the line and on earth; a line to type has its file.
-        let place = plan.places[usize::from(index) - 1];
-        let row = summary
-            .lines()
-            .find(|line| line.trim_start().starts_with(&format!("relay{index}.bin ")))
-            .unwrap();
-        let numbers: Vec<f64> = row
-            .split_whitespace()
-            .skip(1)
-            .map(|word| word.parse().unwrap())
-            .collect();
-        assert!(
-            (numbers[0] - place.x_m).abs() < 1e-3 && (numbers[2] - place.altitude_m).abs() < 1e-2,
-            "{row}"
-        );
-        let at = scenario.line.unwrap().axis.point(uav_relay::Placement {
-            x_m: place.x_m as f32,
-            y_m: place.y_m as f32,
-            altitude_m: place.altitude_m as f32,
-        });
-        let at = at.unwrap();
-        assert!(
-            (numbers[3] * 1e7 - f64::from(at.lat_e7)).abs() < 1.5,
-            "{row}"
-        );
-        assert!(
-            (numbers[4] * 1e7 - f64::from(at.lon_e7)).abs() < 1.5,
-            "{row}"
-        );
-        assert!(
-            summary.contains(&format!("--base-address 0x080E0000 relay{index}.bin\n")),
-            "{summary}"
-        );
+        is_provisioned(&scenario, &dir, index, &summary);
     }
     assert!(!summary.contains("0123456789abcdef"));
 
@@ -194,12 +201,14 @@ fn all_or_none_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("blocks");
     // A block that no drone takes: a field with more points than it has room for.
-    let mut field = "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[field]\ni_max_w = 1e-9\nbeta = [\n".to_owned();
-    for x in 0..17 {
-        field += &format!("{{ x_m = {x}, alpha = 3, beta = 2 }},\n");
-    }
+    let points = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
+        .map(|x| format!("{{ x_m = {x}, alpha = 3, beta = 2 }}"))
+        .join(", ");
+    let field = format!(
+        "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[field]\ni_max_w = 1e-9\nbeta = [{points}]\n"
+    );
     let file = folder.path().join("field.toml");
-    std::fs::write(&file, field + "]\n").unwrap();
+    std::fs::write(&file, field).unwrap();
     let wide = [
         "--scenario",
         file.to_str().unwrap(),

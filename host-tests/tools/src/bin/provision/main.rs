@@ -60,7 +60,7 @@ fn run(options: &Options) -> Result<String, String> {
     let secret = secret(options)?;
     let flight = asked.flight(secret)?;
     let flown = asked.flown()?;
-    let said = match (&options.out, options.index, &options.out_dir) {
+    let said = match (&options.out, options.index, &options.folder.out_dir) {
         (Some(file), Some(index), _) => {
             let block = flight
                 .block(index)
@@ -203,7 +203,7 @@ impl<'a> Asked<'a> {
             return Err("--stand-in: is for a scenario with several [[interferer]]".to_owned());
         }
         if !self.scenario.knows_interference()
-            || is_plain && !self.options.all && self.scenario.plan.is_none()
+            || is_plain && !self.options.folder.all && self.scenario.plan.is_none()
         {
             return Ok(None);
         }
@@ -257,7 +257,7 @@ impl<'a> Asked<'a> {
         }
         let text = summary(&heading, places, self.scenario.line.as_ref());
         files.push(("summary.txt".to_owned(), text.clone().into_bytes()));
-        folder::write(dir, &files, self.options.force)?;
+        folder::write(dir, &files, self.options.folder.force)?;
         Ok(format!(
             "{}: {} blocks of {LEN} bytes, and summary.txt:\n{text}",
             dir.display(),

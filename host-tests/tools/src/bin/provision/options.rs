@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Parser, ValueEnum};
+use clap::{Args, Parser, ValueEnum};
 use uav_relay_sim::command::{MOST_BAUD, number, whole};
 
 /// Writes the configuration block of one relay, or of all: which one it is, and the mission it flies.
@@ -22,9 +22,6 @@ pub(crate) struct Options {
     /// Which of them this drone is, 1 (next to the transmitter) to N
     #[arg(long, value_name = "I", required_unless_present = "all", value_parser = whole::<u16>(1, 1000))]
     pub(crate) index: Option<u16>,
-    /// The blocks of all relays, relay1.bin and so on, and summary.txt: all of them, or none
-    #[arg(long, conflicts_with_all = ["index", "out"], requires = "out_dir")]
-    pub(crate) all: bool,
     /// Number of the network, 0 to 65535; frames of any other are ignored
     #[arg(long, value_name = "W", default_value_t = 1, value_parser = whole(0, u16::MAX))]
     pub(crate) network: u16,
@@ -72,6 +69,16 @@ pub(crate) struct Options {
     /// File to write the block to
     #[arg(long, value_name = "FILE", required_unless_present = "all")]
     pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) folder: FolderOptions,
+}
+
+/// The blocks of all relays.
+#[derive(Args, Debug)]
+pub(crate) struct FolderOptions {
+    /// The blocks of all relays, relay1.bin and so on, and summary.txt: all of them, or none
+    #[arg(long, conflicts_with_all = ["index", "out"], requires = "out_dir")]
+    pub(crate) all: bool,
     /// Folder to write the blocks of all relays to; made if it is not there
     #[arg(long, value_name = "DIR", requires = "all")]
     pub(crate) out_dir: Option<PathBuf>,
