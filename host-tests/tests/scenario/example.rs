@@ -15,7 +15,7 @@ fn shown(text: &str) -> BTreeSet<String> {
             .strip_prefix('[')
             .and_then(|rest| rest.split(']').next())
         {
-            table = name.trim_start_matches('[').to_owned();
+            name.trim_start_matches('[').clone_into(&mut table);
             continue;
         }
         if let Some(entry) = line.strip_prefix('{') {

@@ -35,7 +35,7 @@ pub(crate) struct Options {
     /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
-    /// Write sites, relays, hops and interferers on earth, for a map (GeoJSON); needs a scenario with [site]
+    /// Write sites, relays, hops and interferers on earth, for a map (GeoJSON); needs a scenario with a site
     #[arg(long, value_name = "FILE")]
     pub(crate) geojson: Option<PathBuf>,
     /// The same for a globe (KML), with altitudes above the sea

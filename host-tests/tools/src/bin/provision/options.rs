@@ -16,7 +16,7 @@ pub(crate) struct Options {
     /// Scenario file (TOML); without it the paper's multi-hop scenario
     #[arg(long, value_name = "FILE")]
     pub(crate) scenario: Option<PathBuf>,
-    /// Number of relays, 1 to 1000; without it that of the scenario's [plan]
+    /// Number of relays, 1 to 1000; without it that of the scenario's plan
     #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1000))]
     pub(crate) uavs: Option<u16>,
     /// Which of them this drone is, 1 (next to the transmitter) to N
@@ -25,10 +25,10 @@ pub(crate) struct Options {
     /// Number of the network, 0 to 65535; frames of any other are ignored
     #[arg(long, value_name = "W", default_value_t = 1, value_parser = whole(0, u16::MAX))]
     pub(crate) network: u16,
-    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1; without it that of the scenario's [plan], or 1e-4
+    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1; without it that of the scenario's plan, or 1e-4
     #[arg(long, value_name = "T", value_parser = |text: &str| number(text, 1e-6, 0.1))]
     pub(crate) tolerance: Option<f64>,
-    /// How the places are found; in a field, only by `align`. Without it that of the scenario's [plan], or `align`
+    /// How the places are found; in a field, only by `align`. Without it that of the scenario's plan, or `align`
     #[arg(long, value_name = "M", value_enum)]
     pub(crate) method: Option<Method>,
     /// Rounds of `adjust` at most, 1 to 65535; 500 without it
