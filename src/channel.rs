@@ -101,7 +101,8 @@ impl Channel {
         })
     }
 
-    /// As [`Channel::new`], with the excess losses in dB (0 to 200), the way data sheets and the paper state them.
+    /// As [`Channel::new`], with the excess losses in dB (0 to 200), the way data sheets and the paper state them. Not for a constant: a
+    /// power of ten is worked out.
     ///
     /// # Errors
     /// [`ChannelError`] names the parameter that is outside its range.

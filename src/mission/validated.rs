@@ -127,6 +127,60 @@ impl Mission {
 
     /// As [`Mission::try_new`], for a mission that is a constant of the firmware.
     ///
+    /// [`Channel::from_db`](crate::Channel::from_db) is no function of a constant; [`Channel::new`](crate::Channel::new), which takes the losses
+    /// as factors, 10^(dB / 10), is:
+    ///
+    /// ```
+    /// use uav_relay::channel::AirGround;
+    /// use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+    ///
+    /// // 0.1 dB and 21 dB.
+    /// const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_541, AirGround::Los) {
+    ///     Ok(channel) => channel,
+    ///     Err(_) => panic!("the channel is out of range"),
+    /// };
+    /// const MISSION: Mission = Mission::new(MissionConfig {
+    ///     relays: 5,
+    ///     distance_m: 1_000.0,
+    ///     min_separation_m: 4.0,
+    ///     tx_power_w: 80.0,
+    ///     common: Profile { altitude_m: 20.0, power_w: 1.0 },
+    ///     band: Band::at(20.0),
+    ///     lateral: Band::NONE,
+    ///     channel: CHANNEL,
+    ///     interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
+    ///     noise_w: 0.0,
+    ///     tolerance: 1e-4,
+    /// });
+    /// assert_eq!(MISSION.relays(), 5);
+    /// ```
+    ///
+    /// A number out of range is a failed build:
+    ///
+    /// ```compile_fail,E0080
+    /// # use uav_relay::channel::AirGround;
+    /// # use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+    /// # const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_541, AirGround::Los) {
+    /// #     Ok(channel) => channel,
+    /// #     Err(_) => panic!("the channel is out of range"),
+    /// # };
+    /// const MISSION: Mission = Mission::new(MissionConfig {
+    ///     relays: 0,
+    ///     // and the rest as above
+    /// #   distance_m: 1_000.0,
+    /// #   min_separation_m: 4.0,
+    /// #   tx_power_w: 80.0,
+    /// #   common: Profile { altitude_m: 20.0, power_w: 1.0 },
+    /// #   band: Band::at(20.0),
+    /// #   lateral: Band::NONE,
+    /// #   channel: CHANNEL,
+    /// #   interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
+    /// #   noise_w: 0.0,
+    /// #   tolerance: 1e-4,
+    /// });
+    /// # assert_eq!(MISSION.relays(), 0);
+    /// ```
+    ///
     /// # Panics
     /// On a parameter outside its range: in a `const` that is a failed build, which is what this is for. For numbers that
     /// are only known at run time use [`Mission::try_new`].

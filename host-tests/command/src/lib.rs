@@ -99,6 +99,11 @@ pub fn print(text: &str) {
     _ = std::io::stdout().write_all(text.as_bytes());
 }
 
+/// Says `line` on standard error. Nobody there to hear it is no fault of the command either.
+pub fn say(line: &str) {
+    _ = writeln!(std::io::stderr(), "{line}");
+}
+
 /// A report as one JSON object.
 ///
 /// # Errors
@@ -151,16 +156,18 @@ pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
     }
 }
 
-/// A whole number of the command line, within `least` to `most`.
-///
-/// # Errors
-/// The range, where it is not one of them.
-pub fn whole<T: TryFrom<u64>>(text: &str, least: u64, most: u64) -> Result<T, String> {
-    let value = text.parse().ok();
-    value
-        .filter(|value| (least..=most).contains(value))
-        .and_then(|value| T::try_from(value).ok())
-        .ok_or_else(|| format!("must be a whole number within {least} to {most}"))
+/// What reads a whole number of the command line, within `least` to `most`.
+pub fn whole<T>(least: T, most: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
+where
+    T: std::str::FromStr + std::fmt::Display + PartialOrd + Copy + Send + Sync,
+{
+    move |text| {
+        let value = text
+            .parse()
+            .ok()
+            .filter(|value| (least..=most).contains(value));
+        value.ok_or_else(|| format!("must be a whole number within {least} to {most}"))
+    }
 }
 
 /// A file of the command line that is written to. Standard output, which `-` stands for elsewhere, has the report.

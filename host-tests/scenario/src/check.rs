@@ -5,7 +5,7 @@ use toml::{Table, Value};
 
 use crate::error::{Problem, ScenarioError, cut, quote};
 use crate::keys::Rule::{LinkOrNumber, Number, Whole};
-use crate::keys::{FILE, Keys, Rule, names};
+use crate::keys::{FILE, Key, Keys, Rule, names};
 
 /// A mistake in the value of a key.
 pub(super) fn mistake(
@@ -39,7 +39,7 @@ impl Check<'_> {
             .iter()
             .find(|(name, _)| keys.iter().all(|key| key.name != *name))
         {
-            let allowed = format!("the keys {}", names(keys));
+            let allowed = format!("the keys {}{}", names(keys), nearest(name, keys));
             // The name is the file's own, and a quoted key may be as long as the file.
             let path = join(path, &cut(name));
             return Err(mistake(
@@ -53,8 +53,11 @@ impl Check<'_> {
         for key in keys {
             let path = join(path, key.name);
             match table.get(key.name) {
-                Some(value) => self.value(&path, value, &key.rule)?,
-                None if !key.required => {}
+                Some(value) => {
+                    self.alone(&path, value, table, key)?;
+                    self.value(&path, value, &key.rule)?;
+                }
+                None if !key.is_missed(table) => {}
                 // An absent table is as good as an empty one: its first required key is what is missing.
                 None => match key.rule {
                     Rule::Table(inner) => self.table(&path, &Table::new(), inner)?,
@@ -64,7 +67,9 @@ impl Check<'_> {
                             &path,
                             None,
                             Problem::Missing,
-                            rule.to_string(),
+                            key.instead(keys).fold(rule.to_string(), |said, other| {
+                                format!("{said}, or {} instead, {}", other.name, other.rule)
+                            }),
                         ));
                     }
                 },
@@ -73,14 +78,42 @@ impl Check<'_> {
         Ok(())
     }
 
+    /// Refuses a key beside one that says the same.
+    fn alone(
+        &self,
+        path: &str,
+        value: &Value,
+        table: &Table,
+        key: &Key,
+    ) -> Result<(), ScenarioError> {
+        let mut beside = key.without.iter();
+        let Some((other, twice)) = beside.find_map(|name| table.get_key_value(*name)) else {
+            return Ok(());
+        };
+        let allowed = format!("{} or {other}, not both", key.name);
+        let both = format!("{} beside {other} = {}", quote(value), quote(twice));
+        Err(mistake(
+            self.file,
+            path,
+            Some(both),
+            Problem::SaidTwice,
+            allowed,
+        ))
+    }
+
     fn value(&self, path: &str, value: &Value, rule: &Rule) -> Result<(), ScenarioError> {
         let fail = |problem| {
+            let allowed = match problem {
+                Problem::NoList => format!("[[{path}]] in place of [{path}], {rule}"),
+                Problem::NoTable => format!("[{path}] in place of [[{path}]], {rule}"),
+                _ => rule.to_string(),
+            };
             Err(mistake(
                 self.file,
                 path,
                 Some(quote(value)),
                 problem,
-                rule.to_string(),
+                allowed,
             ))
         };
         match (rule, value) {
@@ -91,7 +124,10 @@ impl Check<'_> {
             (Whole(range), Value::Integer(whole)) if !range.holds(*whole as f64) => {
                 fail(Problem::OutOfRange)
             }
-            (Whole(_) | Rule::Flag, _) => Ok(()),
+            (Rule::Choice(texts), Value::String(text)) if !texts.contains(&text.as_str()) => {
+                fail(Problem::UnknownChoice)
+            }
+            (Whole(_) | Rule::Flag | Rule::Choice(_), _) => Ok(()),
             (Rule::Table(keys), Value::Table(table)) => self.table(path, table, keys),
             (Rule::Tables(_, least), Value::Array(list)) if list.len() < *least => {
                 fail(Problem::EmptyList)
@@ -102,10 +138,28 @@ impl Check<'_> {
                 }
                 Ok(())
             }
+            (Rule::Tables(..), Value::Table(_)) => fail(Problem::NoList),
+            (Rule::Table(_), Value::Array(list)) if list.iter().any(Value::is_table) => {
+                fail(Problem::NoTable)
+            }
             // serde would take a list for a table, field by field; nobody who writes one means that.
             (Rule::Table(_) | Rule::Tables(..), _) => fail(Problem::WrongType),
         }
     }
+}
+
+/// How alike two names are at least, by Jaro and Winkler from 0 to 1, where one may be meant by the other.
+const ALIKE: f64 = 0.8;
+
+/// The known key that is most like an unknown one, where one is.
+fn nearest(name: &str, keys: Keys) -> String {
+    let alike = keys
+        .iter()
+        .map(|key| (strsim::jaro_winkler(name, key.name), key.name));
+    alike
+        .filter(|(alike, _)| *alike >= ALIKE)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or_else(String::new, |(_, key)| format!("; did you mean {key}?"))
 }
 
 /// The key a path leads to, in the file's own words.

@@ -44,6 +44,18 @@ pub enum Problem {
     UnknownKey,
     /// A key that has no default is absent.
     Missing,
+    /// Two keys say the same.
+    SaidTwice,
+    /// A place on earth is no place on a line that is not.
+    NoSite,
+    /// The text is none of those that are known.
+    UnknownChoice,
+    /// There are more or fewer entries than another key says.
+    OtherNumber,
+    /// A table stands where a list of tables does.
+    NoList,
+    /// A list of tables stands where a table does.
+    NoTable,
     /// The value is of another type.
     WrongType,
     /// The value is outside its range, NaN or infinite.
@@ -76,6 +88,12 @@ impl fmt::Display for Problem {
             Self::Syntax => "is not valid TOML",
             Self::UnknownKey => "is not a known key",
             Self::Missing => "is missing",
+            Self::SaidTwice => "says the same twice",
+            Self::NoSite => "needs [site]",
+            Self::UnknownChoice => "is not known",
+            Self::OtherNumber => "contradicts plan.uavs",
+            Self::NoList => "is one table, and may be several",
+            Self::NoTable => "is a list, and there is only one",
             Self::WrongType => "has the wrong type",
             Self::OutOfRange => "is out of range",
             Self::EmptyList => "has no entry",

@@ -7,11 +7,14 @@ use toml::Table;
 
 use crate::check::{mistake, wrong_type};
 use crate::error::{Problem, ScenarioError};
+use crate::interferer::{RawSource, Room, sources};
 use crate::keys::number;
+use crate::plan::{Planned, PlannedMethod, PlannedPlace};
+use crate::power::{Powers, RawPower, Said, powers};
 use crate::site::{self, RawSites};
 use crate::spec::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, ListenSpec, Noise, RelayOverride,
-    Scenario, Source,
+    Scenario,
 };
 
 /// `deny_unknown_fields` guards the table of keys: a key listed there and forgotten here fails at once.
@@ -30,6 +33,7 @@ pub(super) struct RawFile {
     field: Option<RawField>,
     site: Option<RawSites>,
     listen: Option<RawListen>,
+    plan: Option<RawPlan>,
 }
 
 #[derive(Deserialize)]
@@ -63,13 +67,6 @@ struct RawGeometry {
     min_separation_m: f64,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawPower {
-    tx_w: f64,
-    uav_w: f64,
-}
-
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields)]
 struct RawChannel {
@@ -84,6 +81,7 @@ struct RawChannel {
 struct RawNoise {
     bandwidth_hz: Option<f64>,
     figure_db: Option<f64>,
+    power_dbm: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -102,18 +100,11 @@ enum RawLink {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawSource {
-    power_w: f64,
-    x_m: f64,
-    y_m: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
 struct RawRelay {
     index: u16,
     altitude_m: Option<f64>,
     power_w: Option<f64>,
+    power_dbm: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -129,6 +120,16 @@ struct RawBeta {
     x_m: f64,
     alpha: f64,
     beta: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPlan {
+    uavs: u16,
+    method: PlannedMethod,
+    tolerance: f64,
+    sir_db: f64,
+    places: Vec<PlannedPlace>,
 }
 
 /// The typed form of a table that [`crate::check::table`] has passed.
@@ -160,6 +161,20 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
         return band("geometry.altitude_max_m", altitude_max_m, "least");
     }
     let (line, distance_m) = site::line(file, raw.site, geometry.distance_m)?;
+    let powers = powers(file, &raw.power)?;
+    let room = Room {
+        line: line.as_ref(),
+        distance_m,
+        altitudes_m: [altitude_min_m, altitude_max_m],
+        lateral_m: [geometry.lateral_min_m, geometry.lateral_max_m],
+    };
+    let interference = interference(
+        file,
+        raw.interferer.as_deref(),
+        raw.field,
+        raw.listen.is_some(),
+        &room,
+    )?;
     Ok(Scenario {
         line,
         distance_m,
@@ -169,26 +184,29 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
         lateral_min_m: geometry.lateral_min_m,
         lateral_max_m: geometry.lateral_max_m,
         min_separation_m: geometry.min_separation_m,
-        tx_w: raw.power.tx_w,
-        uav_w: raw.power.uav_w,
+        tx_w: powers.tx_w,
+        uav_w: powers.uav_w,
         channel: channel(file, &raw.channel)?,
-        interference: interference(file, raw.interferer, raw.field, raw.listen.is_some())?,
+        interference,
         listen: raw.listen.map(|raw| ListenSpec {
             following: raw.following,
             every_s: raw.every_s,
             half_life_s: raw.half_life_s,
             relative_error: raw.relative_error,
         }),
-        noise: noise(&raw.noise),
-        relays: relays(file, raw.relay)?,
+        noise: noise(&raw.noise, &powers),
+        relays: relays(file, raw.relay, powers.uav_gain_dbi)?,
+        plan: raw.plan.map(|plan| planned(file, plan)).transpose()?,
     })
 }
 
-fn noise(raw: &RawNoise) -> Noise {
+fn noise(raw: &RawNoise, powers: &Powers) -> Noise {
     let default = Noise::default();
     Noise {
         bandwidth_hz: raw.bandwidth_hz.unwrap_or(default.bandwidth_hz),
         figure_db: raw.figure_db.unwrap_or(default.figure_db),
+        power_dbm: raw.power_dbm,
+        gains_dbi: [powers.uav_gain_dbi, powers.rx_gain_dbi],
     }
 }
 
@@ -235,12 +253,13 @@ fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {
 
 fn interference(
     file: &str,
-    sources: Option<Vec<RawSource>>,
+    raw: Option<&[RawSource]>,
     field: Option<RawField>,
     listens: bool,
+    room: &Room,
 ) -> Result<Interference, ScenarioError> {
     let one = || "either one [field] or one or more [[interferer]]".to_owned();
-    match (sources, field) {
+    match (raw, field) {
         (None, None) if listens => Ok(Interference::Sources(Vec::new())),
         (None, Some(_)) if listens => Err(mistake(
             file,
@@ -256,8 +275,8 @@ fn interference(
             Problem::NoInterference,
             one(),
         )),
-        (Some(sources), Some(_)) => {
-            let both = format!("[field] beside {} [[interferer]]", sources.len());
+        (Some(raw), Some(_)) => {
+            let both = format!("[field] beside {} [[interferer]]", raw.len());
             Err(mistake(
                 file,
                 "field",
@@ -266,14 +285,7 @@ fn interference(
                 one(),
             ))
         }
-        (Some(sources), None) => {
-            let sources = sources.into_iter().map(|raw| Source {
-                power_w: raw.power_w,
-                x_m: raw.x_m,
-                y_m: raw.y_m,
-            });
-            Ok(Interference::Sources(sources.collect()))
-        }
+        (Some(raw), None) => Ok(Interference::Sources(sources(file, raw, room)?)),
         (None, Some(raw)) => {
             let points = raw.beta.into_iter();
             let beta: Vec<_> = points
@@ -307,7 +319,11 @@ fn interference(
     }
 }
 
-fn relays(file: &str, raw: Vec<RawRelay>) -> Result<BTreeMap<u16, RelayOverride>, ScenarioError> {
+fn relays(
+    file: &str,
+    raw: Vec<RawRelay>,
+    gain_dbi: f64,
+) -> Result<BTreeMap<u16, RelayOverride>, ScenarioError> {
     let mut relays = BTreeMap::new();
     for (place, raw) in raw.into_iter().enumerate() {
         let key = format!("relay[{place}].index");
@@ -320,15 +336,24 @@ fn relays(file: &str, raw: Vec<RawRelay>) -> Result<BTreeMap<u16, RelayOverride>
                 allowed,
             ))
         };
-        if raw.altitude_m.is_none() && raw.power_w.is_none() {
+        let table = format!("relay[{place}].");
+        let said = Said {
+            table: &table,
+            in_w: ("power_w", raw.power_w),
+            in_dbm: ("power_dbm", raw.power_dbm),
+            eirp: ("", None),
+            gain: ("power.uav_gain_dbi", Some(gain_dbi)),
+        };
+        let power_w = said.of_ours(file)?;
+        if raw.altitude_m.is_none() && power_w.is_none() {
             return fail(
                 Problem::NothingDiffers,
-                "altitude_m, power_w or both beside index".to_owned(),
+                "altitude_m, power_w (or power_dbm) or both beside index".to_owned(),
             );
         }
         let relay = RelayOverride {
             altitude_m: raw.altitude_m,
-            power_w: raw.power_w,
+            power_w,
         };
         if relays.insert(raw.index, relay).is_some() {
             let allowed = "1 to 1000, each in one [[relay]] only".to_owned();
@@ -336,4 +361,24 @@ fn relays(file: &str, raw: Vec<RawRelay>) -> Result<BTreeMap<u16, RelayOverride>
         }
     }
     Ok(relays)
+}
+
+/// The plan of a file whose keys have been checked: it has a place for every relay.
+fn planned(file: &str, raw: RawPlan) -> Result<Planned, ScenarioError> {
+    if raw.places.len() != usize::from(raw.uavs) {
+        return Err(mistake(
+            file,
+            "plan.places",
+            Some(format!("{} places", raw.places.len())),
+            Problem::OtherNumber,
+            format!("{} places, one for each of plan.uavs", raw.uavs),
+        ));
+    }
+    Ok(Planned {
+        uavs: raw.uavs,
+        method: raw.method,
+        tolerance: raw.tolerance,
+        sir_db: raw.sir_db,
+        places: raw.places,
+    })
 }

@@ -3,6 +3,10 @@
 
 use core::fmt;
 
+use toml::Table;
+
+use crate::plan::PlannedMethod;
+
 /// A range of numbers; both ends belong to it, except a low end that is `open`.
 pub(super) struct Range {
     low: f64,
@@ -19,15 +23,27 @@ pub(super) enum Rule {
     LinkOrNumber(Range),
     /// true or false.
     Flag,
+    /// One of these texts.
+    Choice(&'static [&'static str]),
     Table(Keys),
     /// An array of tables with at least so many entries.
     Tables(Keys, usize),
 }
 
+/// Whether a table must have a key.
+pub(super) enum Need {
+    Always,
+    Never,
+    /// Unless it has one of these.
+    Unless(&'static [&'static str]),
+}
+
 /// One key of a table.
 pub(super) struct Key {
     pub(super) name: &'static str,
-    pub(super) required: bool,
+    pub(super) need: Need,
+    /// Keys that say the same, or something of it: a table has no two of them.
+    pub(super) without: &'static [&'static str],
     pub(super) rule: Rule,
 }
 
@@ -55,7 +71,8 @@ const fn above(low: f64, high: f64) -> Range {
 const fn required(name: &'static str, rule: Rule) -> Key {
     Key {
         name,
-        required: true,
+        need: Need::Always,
+        without: &[],
         rule,
     }
 }
@@ -63,7 +80,26 @@ const fn required(name: &'static str, rule: Rule) -> Key {
 const fn optional(name: &'static str, rule: Rule) -> Key {
     Key {
         name,
-        required: false,
+        need: Need::Never,
+        without: &[],
+        rule,
+    }
+}
+
+/// Required unless the table has one of `others`, beside which it cannot stand.
+const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
+    Key {
+        need: Need::Unless(others),
+        ..without(others, name, rule)
+    }
+}
+
+/// Optional, and not beside `others`.
+const fn without(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
+    Key {
+        name,
+        need: Need::Never,
+        without: others,
         rule,
     }
 }
@@ -72,6 +108,12 @@ use Rule::{LinkOrNumber, Number, Whole};
 
 const ALTITUDE: Range = range(0.1, 1e5, "m");
 const POWER: Range = range(1e-6, 1e6, "W");
+const POWER_DBM: Range = range(-30.0, 90.0, "dBm");
+const SOURCE_DBM: Range = range(-30.0, 120.0, "dBm");
+const GAIN: Range = range(-30.0, 60.0, "dBi");
+const LATITUDE: Range = range(-90.0, 90.0, "degrees");
+const LONGITUDE: Range = range(-180.0, 180.0, "degrees");
+const AMSL: Range = range(-1e3, 1e4, "m");
 const PLACE: Range = range(-1e7, 1e7, "m");
 const LOSS: Range = range(0.0, 200.0, "dB");
 
@@ -86,6 +128,7 @@ pub(super) const FILE: Keys = &[
     optional("noise", Rule::Table(NOISE)),
     optional("site", Rule::Table(SITES)),
     optional("listen", Rule::Table(LISTEN)),
+    optional("plan", Rule::Table(PLAN)),
 ];
 
 const GEOMETRY: Keys = &[
@@ -98,6 +141,20 @@ const GEOMETRY: Keys = &[
     optional("min_separation_m", Number(range(0.0, 1e5, "m"))),
 ];
 
+const PLAN: Keys = &[
+    required("uavs", Whole(range(1.0, 1000.0, ""))),
+    required("method", Rule::Choice(PlannedMethod::NAMES)),
+    required("tolerance", Number(range(1e-6, 0.1, ""))),
+    required("sir_db", Number(range(-400.0, 400.0, "dB"))),
+    required("places", Rule::Tables(PLANNED_PLACE, 1)),
+];
+
+const PLANNED_PLACE: Keys = &[
+    required("x_m", Number(PLACE)),
+    required("y_m", Number(PLACE)),
+    required("altitude_m", Number(ALTITUDE)),
+];
+
 const LISTEN: Keys = &[
     optional("following", Rule::Flag),
     optional("every_s", Number(range(0.01, 1e5, "s"))),
@@ -108,17 +165,24 @@ const LISTEN: Keys = &[
 const SITES: Keys = &[
     required("tx", Rule::Table(SITE)),
     required("rx", Rule::Table(SITE)),
+    optional("geoid_m", Number(range(-120.0, 100.0, "m"))),
 ];
 
 const SITE: Keys = &[
-    required("lat_deg", Number(range(-90.0, 90.0, "degrees"))),
-    required("lon_deg", Number(range(-180.0, 180.0, "degrees"))),
-    required("amsl_m", Number(range(-1e3, 1e4, "m"))),
+    required("lat_deg", Number(LATITUDE)),
+    required("lon_deg", Number(LONGITUDE)),
+    required("amsl_m", Number(AMSL)),
 ];
 
 const POWERS: Keys = &[
-    required("tx_w", Number(POWER)),
-    required("uav_w", Number(POWER)),
+    unless(&["tx_dbm", "tx_eirp_dbm"], "tx_w", Number(POWER)),
+    without(&["tx_eirp_dbm"], "tx_dbm", Number(POWER_DBM)),
+    without(&["tx_eirp_dbm"], "tx_gain_dbi", Number(GAIN)),
+    optional("tx_eirp_dbm", Number(POWER_DBM)),
+    unless(&["uav_dbm"], "uav_w", Number(POWER)),
+    optional("uav_dbm", Number(POWER_DBM)),
+    optional("uav_gain_dbi", Number(GAIN)),
+    optional("rx_gain_dbi", Number(GAIN)),
 ];
 
 const CHANNEL: Keys = &[
@@ -129,20 +193,36 @@ const CHANNEL: Keys = &[
 ];
 
 const NOISE: Keys = &[
-    optional("bandwidth_hz", Number(range(0.0, 1e12, "Hz"))),
-    optional("figure_db", Number(range(0.0, 60.0, "dB"))),
+    without(
+        &["power_dbm"],
+        "bandwidth_hz",
+        Number(range(0.0, 1e12, "Hz")),
+    ),
+    without(&["power_dbm"], "figure_db", Number(range(0.0, 60.0, "dB"))),
+    optional("power_dbm", Number(range(-200.0, 0.0, "dBm"))),
 ];
 
 const INTERFERER: Keys = &[
-    required("power_w", Number(range(1e-6, 1e9, "W"))),
-    required("x_m", Number(PLACE)),
-    required("y_m", Number(PLACE)),
+    unless(
+        &["power_dbm", "eirp_dbm"],
+        "power_w",
+        Number(range(1e-6, 1e9, "W")),
+    ),
+    without(&["eirp_dbm"], "power_dbm", Number(SOURCE_DBM)),
+    without(&["eirp_dbm"], "gain_dbi", Number(GAIN)),
+    optional("eirp_dbm", Number(SOURCE_DBM)),
+    unless(&["lat_deg"], "x_m", Number(PLACE)),
+    unless(&["lon_deg"], "y_m", Number(PLACE)),
+    without(&["y_m"], "lat_deg", Number(LATITUDE)),
+    without(&["x_m"], "lon_deg", Number(LONGITUDE)),
+    without(&["x_m", "y_m"], "amsl_m", Number(AMSL)),
 ];
 
 const RELAY: Keys = &[
     required("index", Whole(range(1.0, 1000.0, ""))),
     optional("altitude_m", Number(ALTITUDE)),
-    optional("power_w", Number(POWER)),
+    without(&["power_dbm"], "power_w", Number(POWER)),
+    optional("power_dbm", Number(POWER_DBM)),
 ];
 
 const FIELD: Keys = &[
@@ -155,6 +235,26 @@ const BETA: Keys = &[
     required("alpha", Number(above(1.0, 1e6))),
     required("beta", Number(above(0.0, 1e6))),
 ];
+
+impl Key {
+    /// Whether `table`, which does not have it, must.
+    pub(super) fn is_missed(&self, table: &Table) -> bool {
+        match self.need {
+            Need::Always => true,
+            Need::Never => false,
+            Need::Unless(others) => !others.iter().any(|name| table.contains_key(*name)),
+        }
+    }
+
+    /// The keys that would do in its place, of those of its table.
+    pub(super) fn instead(&self, keys: Keys) -> impl Iterator<Item = &'static Key> {
+        let names = match self.need {
+            Need::Unless(names) => names,
+            _ => &[],
+        };
+        keys.iter().filter(|key| names.contains(&key.name))
+    }
+}
 
 impl Range {
     /// Whether a number belongs to the range.
@@ -200,6 +300,7 @@ impl fmt::Display for Rule {
             Whole(range) => write!(f, "a whole number, {range}"),
             LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
             Rule::Flag => f.write_str("true or false"),
+            Rule::Choice(texts) => write!(f, "\"{}\"", texts.join("\" or \"")),
             Rule::Table(keys) => write!(f, "a table with the keys {}", names(keys)),
             Rule::Tables(keys, 0) => write!(f, "a list of tables with the keys {}", names(keys)),
             Rule::Tables(keys, least) => write!(
@@ -207,6 +308,25 @@ impl fmt::Display for Rule {
                 "a list of {least} or more tables with the keys {}",
                 names(keys)
             ),
+        }
+    }
+}
+
+/// Every key of a file, as `table.key`; those of a list of tables as those of a table.
+pub fn all() -> Vec<String> {
+    let mut names = Vec::new();
+    collect("", FILE, &mut names);
+    names
+}
+
+fn collect(table: &str, keys: Keys, names: &mut Vec<String>) {
+    for key in keys {
+        let name = format!("{table}{}", key.name);
+        match key.rule {
+            Rule::Table(inner) | Rule::Tables(inner, _) => {
+                collect(&format!("{name}."), inner, names);
+            }
+            _ => names.push(name),
         }
     }
 }

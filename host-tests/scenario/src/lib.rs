@@ -16,9 +16,12 @@ mod check;
 mod error;
 mod file;
 pub mod hypothetical;
+mod interferer;
 mod keys;
 pub mod mission;
 pub mod number;
+mod plan;
+mod power;
 mod read;
 pub mod scene;
 mod site;
@@ -27,10 +30,15 @@ mod spec;
 use std::path::Path;
 
 pub use error::{Problem, ScenarioError};
+pub use keys::all as keys;
+pub use plan::{Planned, PlannedMethod, PlannedPlace};
 pub use spec::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, ListenSpec, Noise, RelayOverride,
     Scenario, Source,
 };
+
+/// The default scenario, as a file.
+pub const DEFAULT: &str = include_str!("default.toml");
 
 impl Scenario {
     /// Reads a scenario file of at most 1 MiB.

@@ -13,13 +13,20 @@ use crate::scene::Scene;
 use crate::{Interference, Scenario, Source};
 
 /// Why a scenario is no mission.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Refusal {
     /// No single interferer stands for the scenario's.
     NoHypothetical,
     /// The relays cannot stand that far apart on that distance.
-    NoRoom,
+    NoRoom {
+        /// How many relays.
+        relays: u16,
+        /// How far apart they stay at least, m.
+        apart_m: f32,
+        /// How far it is from Tx to Rx, m.
+        distance_m: f32,
+    },
     /// The mission refuses a parameter.
     Mission(MissionError),
     /// The channel refuses a parameter.
@@ -31,8 +38,19 @@ pub enum Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoHypothetical => f.write_str("no single interferer stands for these [[interferer]]"),
-            Self::NoRoom => f.write_str("no placement: (relays - 1) x geometry.min_separation_m is above geometry.distance_m"),
+            Self::NoHypothetical => {
+                f.write_str("no single interferer stands for these [[interferer]]")
+            }
+            Self::NoRoom {
+                relays,
+                apart_m,
+                distance_m,
+            } => write!(
+                f,
+                "no placement: {relays} relays that stay {apart_m} m apart need {} m, and there are {distance_m} m from Tx to Rx: fewer \
+                 relays, or geometry.min_separation_m and geometry.distance_m of a --scenario FILE",
+                f32::from(relays.saturating_sub(1)) * apart_m
+            ),
             Self::Mission(error) => error.fmt(f),
             Self::Channel(error) => error.fmt(f),
             Self::Field(error) => write!(f, "field: {error}"),
@@ -92,7 +110,11 @@ pub fn mission(
         tolerance: narrow(tolerance),
     };
     let mission = Mission::try_new(config).map_err(|error| match error {
-        MissionError::TooManyForDistance => Refusal::NoRoom,
+        MissionError::TooManyForDistance => Refusal::NoRoom {
+            relays: uavs,
+            apart_m: config.min_separation_m,
+            distance_m: config.distance_m,
+        },
         other => Refusal::Mission(other),
     })?;
     let profiles = scenario
@@ -124,6 +146,14 @@ pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
         }
         _ => None,
     }
+}
+
+/// What is wrong with a scenario that describes a relay that a chain of `uavs` does not have, in one line; `None` where it does not.
+pub fn left_out(scenario: &Scenario, uavs: u16) -> Option<String> {
+    let (index, _) = scenario.relays.last_key_value()?;
+    (*index > uavs).then(|| {
+        format!("[[relay]] index = {index}: there is no such relay in a chain of {uavs}; allowed: 1 to {uavs}")
+    })
 }
 
 /// The relays that hold an altitude of their own, by index from 1.

@@ -14,6 +14,7 @@ use crate::spec::Line;
 pub(super) struct RawSites {
     tx: RawSite,
     rx: RawSite,
+    geoid_m: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -56,6 +57,7 @@ pub(super) fn line(
 }
 
 fn on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
+    let geoid_m = sites.geoid_m;
     let sites @ [tx, rx] = [&sites.tx, &sites.rx].map(|site| {
         // Their ranges have been checked.
         Geodetic::from_degrees(site.lat_deg, site.lon_deg, site.amsl_m).unwrap_or_default()
@@ -70,5 +72,9 @@ fn on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
         let allowed = "10 to 1e5 m".to_owned();
         mistake(file, "site", Some(value), Problem::OutOfRange, allowed)
     })?;
-    Ok(Line { axis, sites })
+    Ok(Line {
+        axis,
+        sites,
+        geoid_m,
+    })
 }

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Duration, Geodetic, Listen};
 
-use crate::number::narrow;
+use crate::number::{factor, narrow, watts};
+use crate::plan::Planned;
 
 /// Everything a host tool has to know about a flight, in SI units, with x along the line from Tx (x = 0) to Rx and y to the
 /// right of it as seen from above.
@@ -29,9 +30,9 @@ pub struct Scenario {
     pub lateral_max_m: f64,
     /// Smallest distance allowed between two relays, in metres, 0 (its default) to 1e5.
     pub min_separation_m: f64,
-    /// Transmit power of Tx, in watts, 1e-6 to 1e6.
+    /// EIRP of Tx (its power and its antenna's gain), in watts, 1e-6 to 1e6.
     pub tx_w: f64,
-    /// Transmit power of every relay that has none of its own, in watts, 1e-6 to 1e6.
+    /// EIRP of every relay that has no power of its own, in watts, 1e-6 to 1e6.
     pub uav_w: f64,
     /// How signals weaken with distance.
     pub channel: ChannelSpec,
@@ -43,6 +44,8 @@ pub struct Scenario {
     pub noise: Noise,
     /// What differs for single relays, by relay number (1 to 1000, 1 is next to Tx).
     pub relays: BTreeMap<u16, RelayOverride>,
+    /// What a planner found for it.
+    pub plan: Option<Planned>,
 }
 
 /// The line on earth, and what it was made from.
@@ -52,6 +55,8 @@ pub struct Line {
     pub axis: Axis,
     /// The transmitter's site and the receiver's.
     pub sites: [Geodetic; 2],
+    /// How high the mean sea level there is above the ellipsoid of WGS84, in metres, -120 to 100, where that is said.
+    pub geoid_m: Option<f64>,
 }
 
 /// The radio channel: its carrier and the excess losses over free space.
@@ -102,13 +107,17 @@ impl ListenSpec {
     }
 }
 
-/// The noise of every receiver, as its bandwidth and its noise figure make it.
+/// The noise of every receiver, as its bandwidth and its noise figure make it, or as it is given.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Noise {
     /// Noise bandwidth, in hertz, 0 (its default: no noise) to 1e12.
     pub bandwidth_hz: f64,
     /// Noise figure, in dB, 0 to 60; 6 by default.
     pub figure_db: f64,
+    /// The noise itself, in dBm, -200 to 0, in place of what these two make it.
+    pub power_dbm: Option<f64>,
+    /// Gains of the antennas of the relays and of Rx, in dBi, -30 to 60; 0 by default.
+    pub gains_dbi: [f64; 2],
 }
 
 /// Boltzmann's constant, J/K.
@@ -122,14 +131,32 @@ impl Default for Noise {
         Self {
             bandwidth_hz: 0.0,
             figure_db: 6.0,
+            power_dbm: None,
+            gains_dbi: [0.0; 2],
         }
     }
 }
 
 impl Noise {
-    /// Noise power at the input of a receiver, in watts: k T0 B F.
+    /// Noise power at the input of a receiver, in watts: k T0 B F, or what is given.
+    pub fn receiver_w(&self) -> f64 {
+        self.power_dbm.map_or_else(
+            || BOLTZMANN * STANDARD_K * self.bandwidth_hz * factor(self.figure_db),
+            watts,
+        )
+    }
+
+    /// The noise power that a mission has for all receivers, in watts: [`Self::receiver_w`] over the antenna gain, the lower one where that
+    /// of the relays and of Rx differ.
     pub fn power_w(&self) -> f64 {
-        BOLTZMANN * STANDARD_K * self.bandwidth_hz * 10_f64.powf(self.figure_db / 10.0)
+        let [relays, rx] = self.gains_dbi;
+        self.receiver_w() / factor(relays.min(rx))
+    }
+
+    /// Whether one noise for all receivers is too much for some: there is noise, and the gains differ.
+    pub fn is_uneven(&self) -> bool {
+        let [relays, rx] = self.gains_dbi;
+        self.receiver_w() > 0.0 && relays.total_cmp(&rx).is_ne()
     }
 }
 
@@ -156,7 +183,7 @@ pub enum Interference {
 /// One interfering transmitter, on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Source {
-    /// Transmit power, in watts, 1e-6 to 1e9.
+    /// EIRP, in watts, 1e-6 to 1e9.
     pub power_w: f64,
     /// Place along the line from Tx to Rx, in metres, -1e7 to 1e7 (0 is Tx; beyond Rx is allowed).
     pub x_m: f64,
@@ -189,7 +216,7 @@ pub struct BetaPoint {
 pub struct RelayOverride {
     /// Altitude it holds, in metres, 0.1 to 1e5; the altitude band, which is for the joint methods, does not bind it.
     pub altitude_m: Option<f64>,
-    /// Its own transmit power, in watts, 1e-6 to 1e6.
+    /// Its own EIRP, in watts, 1e-6 to 1e6.
     pub power_w: Option<f64>,
 }
 
@@ -228,6 +255,7 @@ impl Default for Scenario {
             listen: None,
             noise: Noise::default(),
             relays: BTreeMap::new(),
+            plan: None,
         }
     }
 }

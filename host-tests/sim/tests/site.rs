@@ -17,7 +17,7 @@ const SITES: &str = "tx = { lat_deg = 47.40, lon_deg = 8.54, amsl_m = 420.0 }\n\
 #[test]
 fn the_distance_follows_from_the_sites() {
     let scenario = parse("", SITES).unwrap();
-    let Line { axis, sites } = scenario.line.unwrap();
+    let Line { axis, sites, .. } = scenario.line.unwrap();
     assert_eq!(scenario.distance_m.to_bits(), axis.distance_m().to_bits());
     // By GeographicLib.
     assert!(

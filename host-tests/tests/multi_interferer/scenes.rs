@@ -73,6 +73,7 @@ pub(crate) fn scenario(
     let scenario = Scenario {
         line: None,
         listen: None,
+        plan: None,
         distance_m: d,
         altitude_m,
         altitude_min_m: altitude_m,

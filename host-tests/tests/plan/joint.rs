@@ -71,6 +71,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     Scenario {
         line: None,
         listen: None,
+        plan: None,
         distance_m: link.distance_m,
         altitude_m: corridor.least_m,
         altitude_min_m: corridor.least_m,

@@ -10,7 +10,7 @@ use uav_relay_oracle::reference::{Link, Station};
 use uav_relay_scenario::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
 };
-use uav_relay_tools::plan::{Ask, NoPlan, Number, Plan, plan};
+use uav_relay_tools::plan::{Ask, NoPlan, Number, Plan, Unit, plan};
 
 fn round(value: f64) -> f64 {
     f64::from(value as f32)
@@ -77,6 +77,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
     Scenario {
         line: None,
         listen: None,
+        plan: None,
         distance_m: d,
         altitude_m,
         altitude_min_m: round((altitude_m * rng.random_range(0.5..1.0)).max(0.2)).min(altitude_m),
@@ -157,6 +158,7 @@ fn plans_keep_every_limit_and_what_is_proven_is() {
         let plan = match plan(&scenario, &ask) {
             Ok(plan) => plan,
             Err(NoPlan::Unmet(why, best)) => {
+                let why = why.say(Unit::Decibels);
                 assert!(!why.is_empty() && best.is_none_or(|best| best.is_finite() && best >= 0.0));
                 unmet += 1;
                 continue;

@@ -62,6 +62,7 @@ fn noisy(method: Method, most_m: f64) -> Flight {
         noise: Noise {
             bandwidth_hz: 20e6,
             figure_db: 60.0,
+            ..Noise::default()
         },
         ..Scenario::default()
     };

@@ -18,6 +18,9 @@ type Values = [&'static str; 4];
 
 const ALTITUDES: (Values, &str) = (["0.0999", "0.1", "1e5", "100000.1"], "0.1 to 1e5 m");
 const POWERS: (Values, &str) = (["0.9e-6", "1e-6", "1e6", "1000001"], "1e-6 to 1e6 W");
+const POWERS_DBM: (Values, &str) = (["-30.1", "-30", "90", "90.1"], "-30 to 90 dBm");
+const SOURCES_DBM: (Values, &str) = (["-30.1", "-30", "120", "120.1"], "-30 to 120 dBm");
+const GAINS: (Values, &str) = (["-30.1", "-30", "60", "60.1"], "-30 to 60 dBi");
 const PLACES: (Values, &str) = (["-10000001", "-1e7", "1e7", "1.01e7"], "-1e7 to 1e7 m");
 const LOSSES: (Values, &str) = (["-0.01", "0.0", "200.0", "200.1"], "0 to 200 dB");
 
@@ -36,7 +39,6 @@ fn row(key: &'static str, file: String, values: (Values, &'static str)) -> Row {
 
 fn geometry_and_power_rows() -> Vec<Row> {
     let geometry = |lines: &str| format!("[geometry]\n{lines}\n{POWER}{INTERFERER}");
-    let power = |lines: &str| format!("{GEOMETRY}{INTERFERER}[power]\n{lines}\n");
     let distances = (["0.99", "1", "1e6", "1000000.5"], "1 to 1e6 m");
     let separations = (["-1e-9", "0", "1e5", "100001"], "0 to 1e5 m");
     let low = "distance_m = 9\naltitude_m = 1e5\naltitude_min_m = @";
@@ -62,8 +64,25 @@ fn geometry_and_power_rows() -> Vec<Row> {
         row("geometry.lateral_min_m", geometry(left), lefts),
         row("geometry.lateral_max_m", geometry(right), rights),
         row("geometry.min_separation_m", geometry(apart), separations),
+    ]
+}
+
+fn power_rows() -> Vec<Row> {
+    let power = |lines: &str| format!("{GEOMETRY}{INTERFERER}[power]\n{lines}\n");
+    let both = |line: &str| power(&format!("tx_w = 1\nuav_w = 1\n{line} = @"));
+    vec![
         row("power.tx_w", power("tx_w = @\nuav_w = 1"), POWERS),
+        row("power.tx_dbm", power("tx_dbm = @\nuav_w = 1"), POWERS_DBM),
+        row("power.tx_gain_dbi", both("tx_gain_dbi"), GAINS),
+        row(
+            "power.tx_eirp_dbm",
+            power("tx_eirp_dbm = @\nuav_w = 1"),
+            POWERS_DBM,
+        ),
         row("power.uav_w", power("tx_w = 1\nuav_w = @"), POWERS),
+        row("power.uav_dbm", power("tx_w = 1\nuav_dbm = @"), POWERS_DBM),
+        row("power.uav_gain_dbi", both("uav_gain_dbi"), GAINS),
+        row("power.rx_gain_dbi", both("rx_gain_dbi"), GAINS),
     ]
 }
 
@@ -87,6 +106,21 @@ fn channel_and_interferer_rows() -> Vec<Row> {
             "interferer[1].power_w",
             source("power_w = @\nx_m = 0\ny_m = 0"),
             powers,
+        ),
+        row(
+            "interferer[1].power_dbm",
+            source("power_dbm = @\nx_m = 0\ny_m = 0"),
+            SOURCES_DBM,
+        ),
+        row(
+            "interferer[1].gain_dbi",
+            source("power_w = 1\ngain_dbi = @\nx_m = 0\ny_m = 0"),
+            GAINS,
+        ),
+        row(
+            "interferer[1].eirp_dbm",
+            source("eirp_dbm = @\nx_m = 0\ny_m = 0"),
+            SOURCES_DBM,
         ),
         row(
             "interferer[1].x_m",
@@ -119,6 +153,11 @@ fn relay_and_field_rows() -> Vec<Row> {
             ALTITUDES,
         ),
         row("relay[1].power_w", relay("index = 1\npower_w = @"), POWERS),
+        row(
+            "relay[1].power_dbm",
+            relay("index = 1\npower_dbm = @"),
+            POWERS_DBM,
+        ),
         row("field.i_max_w", field(bound), bounds),
         row(
             "field.beta[0].x_m",
@@ -140,6 +179,7 @@ fn relay_and_field_rows() -> Vec<Row> {
 
 fn rows() -> Vec<Row> {
     let mut rows = geometry_and_power_rows();
+    rows.extend(power_rows());
     rows.extend(channel_and_interferer_rows());
     rows.extend(relay_and_field_rows());
     rows
@@ -167,8 +207,11 @@ fn every_key_has_a_row() {
         let names = error.allowed.strip_prefix("the keys ").unwrap();
         keys.extend(names.split(", ").map(|name| format!("{table}{name}")));
     }
-    // Not a scalar.
-    keys.retain(|key| key != "field.beta");
+    // Not a scalar, and what needs a [site]: `earth`.
+    keys.retain(|key| {
+        let name = key.rsplit('.').next().unwrap();
+        !["beta", "lat_deg", "lon_deg", "amsl_m"].contains(&name) || key == "field.beta[0].beta"
+    });
     assert_eq!(keys, rows().iter().map(|row| row.key).collect::<Vec<_>>());
 }
 
@@ -239,6 +282,8 @@ fn every_required_key_is_missed() {
         "channel.",
         "relay[1].a",
         "relay[1].p",
+        "_dbm",
+        "_dbi",
     ];
     let mut missed = 0;
     for row in rows() {

@@ -1,8 +1,12 @@
 //! Scenario files: what a good one means, and that every mistake in one is told in one line that helps.
 
+mod earth;
+mod example;
 mod keys;
 mod meaning;
 mod mistakes;
+mod planned;
+mod power;
 
 use uav_relay_scenario::{Problem, Scenario, ScenarioError};
 

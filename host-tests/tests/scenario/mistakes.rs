@@ -26,7 +26,7 @@ fn every_table_refuses_unknown_keys_and_lists_its_own() {
         (
             small("").replacen("tx_w", "tx_mw = 5\ntx_w", 1),
             "power.tx_mw = 5",
-            "tx_w, uav_w",
+            "tx_w, tx_dbm, tx_gain_dbi, tx_eirp_dbm, uav_w, uav_dbm, uav_gain_dbi, rx_gain_dbi",
         ),
         (
             small("[channel]\neta = 'x'\n"),
@@ -36,7 +36,7 @@ fn every_table_refuses_unknown_keys_and_lists_its_own() {
         (
             small("z_m = 1\n"),
             "interferer[0].z_m = 1",
-            "power_w, x_m, y_m",
+            "power_w, power_dbm, gain_dbi, eirp_dbm, x_m, y_m, lat_deg, lon_deg, amsl_m",
         ),
         (
             small("[[relay]]\nindex = 1\nx = 2\n"),
@@ -64,6 +64,25 @@ fn every_table_refuses_unknown_keys_and_lists_its_own() {
 }
 
 #[test]
+fn a_key_that_is_nearly_right_is_named() {
+    let field = format!("{GEOMETRY}{POWER}{FIELD}");
+    for (text, meant) in [
+        (small("").replace("distance_m", "distnce_m"), "distance_m"),
+        (small("").replace("[geometry]", "[geometri]"), "geometry"),
+        (small("[[relays]]\nindex = 1\npower_w = 1\n"), "relay"),
+        (small("").replace("tx_w", "txw"), "tx_w"),
+        (field.replace("alpha", "alfa"), "alpha"),
+    ] {
+        let meant = format!("; did you mean {meant}?");
+        refused(&text, Problem::UnknownKey, &[&meant]);
+    }
+    let line = parse(&small("[wind]\nspeed = 3\n"))
+        .unwrap_err()
+        .to_string();
+    assert!(!line.contains("did you mean"), "{line}");
+}
+
+#[test]
 fn a_table_is_not_a_list_and_a_list_is_not_a_table() {
     let wrong = |text: &str, parts: &[&str]| refused(text, Problem::WrongType, parts);
     wrong(
@@ -74,21 +93,34 @@ fn a_table_is_not_a_list_and_a_list_is_not_a_table() {
         &format!("geometry = 3\n{POWER}{INTERFERER}"),
         &["geometry = 3", "a table"],
     );
-    wrong(
+    refused(
         &small("").replace("[[interferer]]", "[interferer]"),
-        &["interferer = {", "a list of 1 or more tables"],
+        Problem::NoList,
+        &[
+            "interferer = {",
+            "[[interferer]] in place of [interferer], a list of 1 or more tables",
+        ],
     );
-    wrong(
+    refused(
         &small("[relay]\nindex = 1\n"),
-        &["relay = {", "a list of tables", "index"],
+        Problem::NoList,
+        &[
+            "relay = {",
+            "[[relay]] in place of [relay], a list of tables",
+            "index",
+        ],
     );
     wrong(
         &format!("relay = [4]\n{}", small("")),
         &["relay[0] = 4", "a table with the keys index"],
     );
-    wrong(
+    refused(
         &format!("[[field]]\n{GEOMETRY}{POWER}"),
-        &["field = [{}]", "a table with the keys i_max_w, beta"],
+        Problem::NoTable,
+        &[
+            "field = [{}]",
+            "[field] in place of [[field]], a table with the keys i_max_w, beta",
+        ],
     );
     wrong(
         &format!("{GEOMETRY}{POWER}[field]\ni_max_w = 1\nbeta = 2\n"),
@@ -332,6 +364,13 @@ fn noise_out_of_range_is_refused_with_its_range() {
     refused(
         &small("[noise]\nfloor_dbm = -100\n"),
         Problem::UnknownKey,
-        &["noise.floor_dbm", "bandwidth_hz, figure_db"],
+        &["noise.floor_dbm", "bandwidth_hz, figure_db, power_dbm"],
     );
+    for value in ["-200.1", "0.1", "nan"] {
+        refused(
+            &small(&format!("[noise]\npower_dbm = {value}\n")),
+            Problem::OutOfRange,
+            &["noise.power_dbm = ", "-200 to 0 dBm"],
+        );
+    }
 }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use uav_relay::{Interference, Mission};
 
+use super::against::AgainstAll;
 use super::air::AirReport;
 use super::attack::AttackReport;
 use super::drones::{DroneReport, drones};
@@ -99,6 +100,9 @@ pub struct ChainReport {
     /// What relays that had to find the interferer by themselves believe, and what it is worth.
     #[serde(flatten)]
     pub listened: Option<ListenedReport>,
+    /// What the places are worth against several interferers, for which one stood.
+    #[serde(flatten)]
+    pub against_all: Option<AgainstAll>,
     /// How many relays are in the chain at the end, where that is not what it began with, or might not have been.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<u16>,
@@ -189,6 +193,7 @@ impl ChainReport {
             channel: None,
             air: None,
             listened: None,
+            against_all: None,
             watched: outcome.watched.map(WatchedReport::of).unwrap_or_default(),
             left: (!timeline.is_empty()).then_some(flown),
             lost: lost(outcome, &chain),
@@ -232,6 +237,7 @@ impl ChainReport {
             channel: None,
             air: None,
             listened: None,
+            against_all: None,
             watched: WatchedReport::default(),
             left: None,
             lost: Vec::new(),
@@ -321,6 +327,9 @@ impl ChainReport {
         }
         if let Some(listened) = &self.listened {
             text += &listened.text();
+        }
+        if let Some(against_all) = &self.against_all {
+            text += &against_all.text();
         }
         if let Some(air) = &self.air {
             text += &air.text(self.virtual_s);

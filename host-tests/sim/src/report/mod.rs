@@ -1,5 +1,6 @@
 //! What a run or a plan came to, as people and programs read it.
 
+pub mod against;
 pub mod air;
 pub mod attack;
 pub mod chain;
@@ -14,6 +15,7 @@ pub mod silences;
 pub mod timeline;
 pub mod watched;
 
+pub use against::AgainstAll;
 pub use air::AirReport;
 pub use attack::AttackReport;
 pub use chain::ChainReport;

@@ -18,6 +18,8 @@ mod words;
 use std::process::{Command, Output};
 
 use serde_json::Value;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::scene::Scene;
 
 fn chain(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_chain"))
@@ -462,4 +464,41 @@ fn several_interferers_are_flown_as_one_and_a_note_says_so() {
     );
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(report["sir"].as_f64().unwrap() > 0.1, "{report}");
+    // Held against both, it is another SIR: that of a scene with both.
+    let scenario = Scenario::load(std::path::Path::new(several)).unwrap();
+    let scene = Scene::new(&scenario, 3).unwrap();
+    let relays = report["relays"].as_array().unwrap();
+    let of = |relay: &Value, key: &str| relay[key].as_f64().unwrap();
+    let places: Vec<(f64, f64)> = relays
+        .iter()
+        .map(|relay| (of(relay, "x_m"), of(relay, "h_m")))
+        .collect();
+    let all = report["all_sir"].as_f64().unwrap();
+    assert!(
+        (all / scene.chain_sir(&places) - 1.0).abs() < 1e-9,
+        "{report}"
+    );
+    let lost = 1.0 - all / report["sir"].as_f64().unwrap();
+    assert!(
+        (report["all_loss"].as_f64().unwrap() - lost).abs() < 1e-9 && lost > 0.01,
+        "{report}"
+    );
+    let table = String::from_utf8(chain(&["--uavs", "3", "--scenario", several]).stdout).unwrap();
+    assert!(
+        table.contains("against all interferers: SIR ")
+            && table.contains("% below what the relays believe"),
+        "{table}"
+    );
+}
+
+#[test]
+fn a_relay_that_is_described_and_not_there_is_refused() {
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenario.toml");
+    let output = chain(&["--uavs", "4", "--scenario", example]);
+    assert_eq!(output.status.code(), Some(2));
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        line.ends_with("scenario.toml: [[relay]] index = 5: there is no such relay in a chain of 4; allowed: 1 to 4\n"),
+        "{line}"
+    );
 }

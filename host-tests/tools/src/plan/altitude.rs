@@ -12,7 +12,7 @@ use uav_relay::place::Station;
 use uav_relay::{Mission, Placement};
 
 use super::briefed::Briefed;
-use super::found::{NoPlan, Plan};
+use super::found::{NoPlan, Plan, Why};
 use super::source;
 use uav_relay_scenario::Scenario;
 
@@ -108,7 +108,7 @@ pub(super) fn fewest_of(
     free: impl Fn(u16) -> Result<Plan, NoPlan>,
 ) -> Result<Plan, NoPlan> {
     let mut found: Option<Plan> = None;
-    let mut most: Option<(String, Option<f64>)> = None;
+    let mut most: Option<(Why, Option<f64>)> = None;
     for step in 0..LEVELS {
         let share = f64::from(step) / f64::from(LEVELS - 1);
         let span = scenario.altitude_max_m - scenario.altitude_min_m;

@@ -12,18 +12,24 @@
 mod altitude;
 mod ask;
 mod briefed;
+pub mod carried;
+mod cases;
 mod field;
+pub mod flown;
 mod found;
+pub mod map;
 mod one;
 pub mod report;
 mod several;
 mod source;
+mod unit;
 
 use uav_relay_scenario::{Interference, Scenario};
 
 pub use altitude::solved;
 pub use ask::{Ask, Number};
-pub use found::{Fitted, NoPlan, Plan, Theorem};
+pub use found::{Fitted, LOSS, NoPlan, Plan, Theorem, Why};
+pub use unit::Unit;
 
 /// Plans `ask` in `scenario`.
 ///

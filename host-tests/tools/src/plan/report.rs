@@ -7,7 +7,8 @@ use serde::Serialize;
 use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
 
 use super::ask::Number;
-use super::found::Plan;
+use super::found::{Plan, Why};
+use super::unit::Unit;
 
 /// The one interferer that stands for several.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -27,6 +28,9 @@ pub struct HypotheticalReport {
     pub sir: Option<f64>,
     /// Whether these places are the plan's. If not, the plan's are the best that were found against all.
     pub kept: bool,
+    /// What these places lose to the plan's, as a part of its SIR: 0 for nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loss: Option<f64>,
     /// By how much the plan's SIR is above theirs, as a part of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
@@ -44,6 +48,9 @@ pub struct PlanReport {
     /// The most that was found, linear SIR, where what was asked for cannot be had.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
+    /// The same in dB, where it is above 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub best_sir_db: Option<f64>,
     /// SIR of the worst hop, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
@@ -56,9 +63,15 @@ pub struct PlanReport {
     /// The target, linear SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_sir: Option<f64>,
+    /// The same in dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_sir_db: Option<f64>,
     /// With a target: the most that so many relays can have, linear SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_sir: Option<f64>,
+    /// The same in dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub most_sir_db: Option<f64>,
     /// How the places were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub how: Option<&'static str>,
@@ -73,7 +86,7 @@ pub struct PlanReport {
     /// Rx, 4 to 6 on an edge of the corridor along x, along y or upward, 7 and 8 with the interferer at Tx or Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case: Option<u8>,
-    /// The case in words.
+    /// What the case means for the drone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case_words: Option<String>,
     /// The relays, from the transmitter on.
@@ -90,6 +103,9 @@ pub struct PlanReport {
     /// Whether there is room beside the line: the table then says where in it a relay is.
     #[serde(skip)]
     pub room: bool,
+    /// The unit that SIRs were asked for in.
+    #[serde(skip)]
+    pub unit: Unit,
 }
 
 /// The data rate at an SIR (linear) over a bandwidth, bit/s: Shannon's, with the interference as noise.
@@ -104,9 +120,13 @@ pub fn sir_for_rate(bandwidth_hz: f64, rate_bps: f64) -> f64 {
 
 impl PlanReport {
     /// The report of a plan for `number` relays, with rates over `bandwidth_hz` where one is given.
-    pub fn new(plan: &Plan, number: Number, bandwidth_hz: Option<f64>) -> Self {
+    pub fn new(plan: &Plan, number: Number, unit: Unit, bandwidth_hz: Option<f64>) -> Self {
         let sir = plan.sir();
         let rx_sir = plan.sirs.last().copied();
+        let target_sir = match number {
+            Number::Of(_) => None,
+            Number::Meeting(target) => Some(target),
+        };
         let hypothetical = plan.fitted.as_ref().map(|fitted| {
             let one = &fitted.hypothetical;
             HypotheticalReport {
@@ -117,6 +137,7 @@ impl PlanReport {
                 relative_error: one.relative_error,
                 sir: fitted.sir,
                 kept: fitted.kept,
+                loss: fitted.sir.map(|by_one| (1.0 - by_one / sir).max(0.0)),
                 gain: fitted
                     .sir
                     .filter(|by_one| *by_one > 0.0)
@@ -127,14 +148,14 @@ impl PlanReport {
             uavs: u16::try_from(plan.places.len()).ok(),
             error: None,
             best_sir: None,
+            best_sir_db: None,
             sir: Some(sir),
             sir_db: Some(db(sir)),
             rate_bps: bandwidth_hz.map(|bandwidth_hz| rate_bps(bandwidth_hz, sir)),
-            target_sir: match number {
-                Number::Of(_) => None,
-                Number::Meeting(target) => Some(target),
-            },
+            target_sir,
+            target_sir_db: target_sir.map(db),
             most_sir: plan.most,
+            most_sir_db: plan.most.map(db),
             how: Some(plan.how),
             proven: Some(plan.proven),
             theorem: plan.theorem.as_ref().map(|theorem| theorem.number),
@@ -145,20 +166,24 @@ impl PlanReport {
             rx_sir_db: rx_sir.map(db),
             hypothetical,
             room: !plan.mission.config().lateral.is_single(),
+            unit,
         }
     }
 
     /// The report of what could not be had: why, and the most that was found (linear SIR).
-    pub fn unmet(error: String, best_sir: Option<f64>, number: Number) -> Self {
+    pub fn unmet(why: &Why, best_sir: Option<f64>, number: Number, unit: Unit) -> Self {
         let (uavs, target_sir) = match number {
             Number::Of(relays) => (Some(relays), None),
             Number::Meeting(target) => (None, Some(target)),
         };
         Self {
             uavs,
-            error: Some(error),
+            error: Some(why.say(unit)),
             best_sir,
+            best_sir_db: best_sir.filter(|best| *best > 0.0).map(db),
             target_sir,
+            target_sir_db: target_sir.map(db),
+            unit,
             ..Self::default()
         }
     }
@@ -166,11 +191,12 @@ impl PlanReport {
     /// The report as a table to read.
     pub fn table(&self) -> String {
         let mut text = hops_table(&self.relays, &[], self.rx_sir, self.room);
-        let (Some(uavs), Some(sir), Some(sir_db)) = (self.uavs, self.sir, self.sir_db) else {
+        let (Some(uavs), Some(sir)) = (self.uavs, self.sir) else {
             return text;
         };
         let relays = if uavs == 1 { "relay" } else { "relays" };
-        _ = write!(text, "worst hop: SIR {sir:.6} ({sir_db:.3} dB)");
+        let unit = self.unit;
+        _ = write!(text, "worst hop: {}", unit.both(sir));
         if let Some(rate) = self.rate_bps {
             _ = write!(text, ", {rate:.6e} bit/s");
         }
@@ -180,17 +206,20 @@ impl PlanReport {
             self.how.unwrap_or("nothing")
         );
         if let (Some(case), Some(words)) = (self.case, &self.case_words) {
-            _ = writeln!(text, "case {case}: {words}");
+            let theorem = self.how.unwrap_or_default();
+            _ = writeln!(text, "{words} ({theorem}, case {case})");
         }
         if let (Some(target), Some(most)) = (self.target_sir, self.most_sir) {
+            let target = unit.asked(target);
+            let most = unit.say(most);
             _ = writeln!(
                 text,
-                "target: SIR {target:.6}; so many relays can have up to {most:.6} (--uavs {uavs})"
+                "target: SIR {target}; so many relays can have up to {most} (--uavs {uavs})"
             );
         }
         _ = writeln!(text, "{}", self.certainty());
         if let Some(one) = &self.hypothetical {
-            one.describe(&mut text);
+            one.describe(&mut text, unit);
         }
         text
     }
@@ -206,7 +235,7 @@ impl PlanReport {
 }
 
 impl HypotheticalReport {
-    fn describe(&self, text: &mut String) {
+    fn describe(&self, text: &mut String, unit: Unit) {
         _ = writeln!(
             text,
             "hypothetical interferer: {:.6} W at x = {:.3} m, y = {:.3} m; it is off by {:.3} % of the interference, {:.3e} W on average",
@@ -226,7 +255,9 @@ impl HypotheticalReport {
             ),
             (false, Some(sir)) => writeln!(
                 text,
-                "its places are not good enough: SIR {sir:.6} against all interferers; these are the best found against all{gain}"
+                "its places are not good enough: {} against all interferers; these are the best found against all{gain}. Relays by \
+                 themselves fly the first: `cargo provision` refuses them, and `cargo chain --listen` has relays find their own",
+                unit.both(sir)
             ),
             (false, None) => writeln!(
                 text,

@@ -7,7 +7,7 @@ use uav_relay::Placement;
 
 use super::ask::{Ask, Number};
 use super::briefed::{Briefed, MOST_RELAYS};
-use super::found::{Fitted, NoPlan, Plan};
+use super::found::{Fitted, LOSS, NoPlan, Plan, Why};
 use super::{altitude, one, source};
 use crate::multi_interferer::{best_common_altitude, optimum, polish};
 use uav_relay_scenario::hypothetical::Hypothetical;
@@ -15,9 +15,6 @@ use uav_relay_scenario::mission::{self, Refusal};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario, Source};
-
-/// By how much the places for the hypothetical interferer may fall short, relative, and still be kept.
-const LOSS: f64 = 0.01;
 
 /// How many of the starts are polished: the best against the true sum.
 const POLISHED: usize = 2;
@@ -56,6 +53,17 @@ pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     }
 }
 
+/// The scenario with the hypothetical interferer alone.
+pub(super) fn with_one(scenario: &Scenario, one: &Hypothetical) -> Scenario {
+    let mut source = one.source();
+    // No mission takes more; only interferers next to that limit have one that is stronger.
+    source.power_w = source.power_w.min(1e9);
+    Scenario {
+        interference: Interference::Sources(vec![source]),
+        ..scenario.clone()
+    }
+}
+
 struct Planner<'a> {
     scenario: &'a Scenario,
     ask: &'a Ask,
@@ -78,17 +86,6 @@ struct Best {
 }
 
 impl Planner<'_> {
-    /// The scenario with the hypothetical interferer alone.
-    fn with_one(&self) -> Scenario {
-        let mut source = self.hypothetical.source();
-        // No mission takes more; only interferers next to that limit have one that is stronger.
-        source.power_w = source.power_w.min(1e9);
-        Scenario {
-            interference: Interference::Sources(vec![source]),
-            ..self.scenario.clone()
-        }
-    }
-
     fn candidates(&self, relays: u16) -> Result<Candidates, NoPlan> {
         let scene = Scene::new(self.scenario, relays)
             .ok_or_else(|| NoPlan::Wrong("there is no interferer".to_owned()))?;
@@ -96,7 +93,7 @@ impl Planner<'_> {
             number: Number::Of(relays),
             ..*self.ask
         };
-        let by_one = match one::plan(&self.with_one(), &ask) {
+        let by_one = match one::plan(&with_one(self.scenario, &self.hypothetical), &ask) {
             Ok(plan) => {
                 let sir = scene.chain_sir(&plan.chain());
                 Some((plan, sir))
@@ -159,7 +156,7 @@ impl Planner<'_> {
     /// Scenarios with one interferer whose chains may go another way than the first: with the hypothetical interferer on the
     /// other side, with room to one side or to none, and with each of the first interferers alone.
     fn variants(&self) -> Vec<Scenario> {
-        let one = self.with_one();
+        let one = with_one(self.scenario, &self.hypothetical);
         let mut variants = Vec::new();
         if one.lateral_min_m < one.lateral_max_m {
             let (left, right) = (one.lateral_min_m, one.lateral_max_m);
@@ -209,10 +206,11 @@ impl Planner<'_> {
                 break found;
             }
             if enough >= MOST_RELAYS {
-                let why = format!(
-                    "no number of relays that was tried, up to {MOST_RELAYS}, gives every hop an SIR of {target}: \
-                     the most found is {most:.6}"
-                );
+                let why = Why::Short {
+                    target,
+                    most,
+                    relays: None,
+                };
                 return Err(NoPlan::Unmet(why, Some(most)));
             }
             (too_few, enough) = (enough, (enough * 2).min(MOST_RELAYS));
@@ -257,8 +255,11 @@ impl Candidates {
                 ..plan
             },
             (_, Some(best)) if best.sir > 0.0 => {
-                let briefed =
-                    Briefed::new(&planner.with_one(), self.relays, planner.ask.tolerance)?;
+                let briefed = Briefed::new(
+                    &with_one(planner.scenario, &planner.hypothetical),
+                    self.relays,
+                    planner.ask.tolerance,
+                )?;
                 briefed.plan(&best.places, "the true sum of the interferers", best.proven)
             }
             _ => return Err(source::nothing()),

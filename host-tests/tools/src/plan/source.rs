@@ -6,8 +6,9 @@ use uav_relay::planning::single::{Found, aside, free, given_altitude, given_x};
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 
 use super::ask::Ask;
-use super::briefed::{Briefed, MOST_RELAYS, is_free};
-use super::found::{NoPlan, Plan, Theorem};
+use super::briefed::{Briefed, is_free};
+use super::cases::{along_x, anywhere_above, sideways, upward};
+use super::found::{NoPlan, Plan, Theorem, Why};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
 
@@ -67,7 +68,7 @@ fn at_one_altitude(mission: &Mission, profile: Profile) -> Mission {
 
 pub(super) fn nothing() -> NoPlan {
     let why = "no placement gives every hop an SIR above 0";
-    NoPlan::Unmet(why.to_owned(), Some(0.0))
+    NoPlan::Unmet(Why::Plain(why.to_owned()), Some(0.0))
 }
 
 fn first(mission: &Mission, profile: Profile) -> Option<(Found, Theorem)> {
@@ -96,15 +97,7 @@ fn second(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Theorem)>
 
 fn third(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
     let (found, case) = free::best_place(mission, power_w)?;
-    let (number, words) = match case {
-        free::FreeCase::Lowest(case) => (1, format!("at the lowest altitude: {}", along_x(case))),
-        free::FreeCase::Highest(case) => (2, format!("at the highest altitude: {}", along_x(case))),
-        free::FreeCase::AboveRx(case) => (3, format!("right above Rx: {}", upward(case))),
-        free::FreeCase::Touching => (
-            4,
-            "between the altitudes, where the lines of equal SINR of both hops touch".to_owned(),
-        ),
-    };
+    let (number, words) = anywhere_above(case);
     Some((
         found,
         Theorem {
@@ -125,68 +118,6 @@ fn beside(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
             words: sideways(case).to_owned(),
         },
     ))
-}
-
-/// A case of one relay aside in words.
-fn sideways(case: aside::AsideCase) -> &'static str {
-    use aside::{AsideCase, EdgeCoordinate};
-    match case {
-        AsideCase::Touching => {
-            "where the circles of equal SIR of both hops touch, at the lowest altitude"
-        }
-        AsideCase::Hilltop => "the first hop is the worse one even at its best place",
-        AsideCase::AboveRx => "the first hop is the better one even above Rx",
-        AsideCase::Edge(EdgeCoordinate::Along) => "on an edge of the corridor along the line",
-        AsideCase::Edge(EdgeCoordinate::Across) => {
-            "on an edge of the corridor across the line, at Tx or Rx"
-        }
-        AsideCase::Edge(EdgeCoordinate::Upward) => {
-            "on an upright edge of the corridor, at Tx or Rx"
-        }
-        AsideCase::Level => "the interferer stands at Tx: the first hop is the same everywhere",
-        AsideCase::Inside => "within the corridor at the lowest altitude, by a search",
-        AsideCase::Wall => {
-            "on a wall of the corridor, where the lines of equal SINR of both hops touch"
-        }
-        AsideCase::Drowned => "the interferer stands at Rx: nothing is heard",
-    }
-}
-
-/// A case of Theorem 1 in words.
-fn along_x(case: given_altitude::PlaceCase) -> &'static str {
-    use given_altitude::PlaceCase;
-    match case {
-        PlaceCase::AboveTx => "the first hop is the worse one even above Tx",
-        PlaceCase::Crossing => "where both hops have the same SIR",
-        PlaceCase::AboveRx => "the first hop is the better one even above Rx",
-        PlaceCase::BeforeValley => {
-            "the hops cross before the worst place of the first: there, or above Rx"
-        }
-        PlaceCase::OverValley => "the first hop is the better one even at its worst place",
-        PlaceCase::Hilltop => "the first hop is the worse one even at its best place",
-        PlaceCase::BeyondHill => {
-            "beyond the best place of the first hop, where both have the same SIR"
-        }
-        PlaceCase::HillAboveRx => {
-            "the interferer is behind Tx, and the first hop the better one even above Rx"
-        }
-        PlaceCase::Level => "the interferer stands at Tx: the first hop is the same everywhere",
-        PlaceCase::SecondHill => {
-            "beyond the worst place of the first hop: at its best one there, or where both have the same SINR"
-        }
-        PlaceCase::Drowned => "the interferer stands at Rx: nothing is heard",
-    }
-}
-
-/// A case of Theorem 2 in words.
-fn upward(case: given_x::AltitudeCase) -> &'static str {
-    use given_x::AltitudeCase;
-    match case {
-        AltitudeCase::BothFall => "both hops fall with the altitude: the lowest",
-        AltitudeCase::Crossing => "the altitude at which both hops have the same SIR",
-        AltitudeCase::End => "the better end of the band",
-        AltitudeCase::Drowned => "the interferer stands at Rx: nothing is heard",
-    }
 }
 
 /// The best places of so many relays at the altitudes they hold: Algorithm 1 without its messages.
@@ -251,11 +182,13 @@ pub(super) fn enough(
         return Ok((briefed, found.proven));
     }
     let most = fleet::most(&own.mission, profile_of).ok_or_else(nothing)?;
-    let why = format!(
-        "no number of relays, up to {MOST_RELAYS}, gives every hop an SIR of {target}: the most is {:.6}, with {}",
-        most.target, most.relays
-    );
-    Err(NoPlan::Unmet(why, Some(f64::from(most.target))))
+    let best = f64::from(most.target);
+    let why = Why::Short {
+        target,
+        most: best,
+        relays: Some(most.relays),
+    };
+    Err(NoPlan::Unmet(why, Some(best)))
 }
 
 /// What any relay of the scenario would hold of its own, whatever their number.

@@ -91,7 +91,10 @@ fn what_cannot_be_done_is_said_in_one_line() {
     let plain = ["--uavs", "5", "--index", "1", "--out", out];
     for (arguments, words) in [
         (&["--method", "stochastic"][..], "'--method <M>'"),
-        (&["--rounds", "0"], "0 is not in 1..=65535"),
+        (
+            &["--rounds", "0"],
+            "must be a whole number within 1 to 65535",
+        ),
         (&["--explore=-1"], "must be a number within 0.0 to 100000.0"),
         (
             &["--explore", "NaN"],
@@ -101,7 +104,10 @@ fn what_cannot_be_done_is_said_in_one_line() {
             &["--explore", "100001"],
             "must be a number within 0.0 to 100000.0",
         ),
-        (&["--samples", "99"], "99 is not in 100..=1000000"),
+        (
+            &["--samples", "99"],
+            "must be a whole number within 100 to 1000000",
+        ),
         (
             &["--samples", "100"],
             "--samples 100: is for a scenario with a [field]",
@@ -161,7 +167,7 @@ fn what_is_wrong_is_said_in_one_line() {
                 "--out",
                 out,
             ],
-            "tolerance must be within",
+            "must be a number within 1e-6 to 0.1",
         ),
         (
             &["--uavs", "600", "--index", "1", "--out", out],

@@ -8,6 +8,7 @@
     missing_docs
 )]
 
+mod all;
 mod block;
 mod command;
 mod listen;

@@ -18,7 +18,7 @@ pub(crate) struct Air {
     #[arg(long = "air", value_name = "A", value_enum, conflicts_with = "wires")]
     sharing: Option<Sharing>,
     /// Bits per second of every link, or of the channel, 300 to 10000000; a byte takes ten
-    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = |text: &str| whole::<u32>(text, 300, 10_000_000))]
+    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = whole(300_u32, 10_000_000))]
     baud: u32,
     /// Losses come in runs of L frames on average, 1 to 1e6, each direction of a link by itself (Gilbert-Elliott), with --loss P as
     /// the mean share; 1 is for independent losses, anything else at least 1 / (1 - P)

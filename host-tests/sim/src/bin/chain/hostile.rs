@@ -30,10 +30,10 @@ pub(crate) struct Hostile {
     #[arg(long, value_name = "K@S[-T]", value_parser = partition, conflicts_with = "wires")]
     partition: Vec<Partition>,
     /// An attacker sends N forged frames, 1 to 100000: with guessed tags, altered, without a tag, with another key
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |text: &str| whole::<u32>(text, 1, 100_000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 100_000))]
     forge: Option<u32>,
     /// An attacker sends N of the frames that it has heard again, 1 to 100000
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |text: &str| whole::<u32>(text, 1, 100_000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 100_000))]
     replay: Option<u32>,
     #[command(flatten)]
     pub(crate) uploads: Uploads,

@@ -20,7 +20,7 @@ pub(crate) struct Listening {
     #[arg(long)]
     listen: bool,
     /// Independent samples of the interference in one measurement, 1 to 1000000; 1000 unless said otherwise
-    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = |text: &str| whole::<u32>(text, 1, 1_000_000))]
+    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = whole(1_u32, 1_000_000))]
     samples: Option<u32>,
     /// Standard deviation of a place's own error, dB, 0 to 20; 0 unless said otherwise
     #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 20.0))]

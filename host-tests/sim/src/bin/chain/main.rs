@@ -21,7 +21,9 @@ use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::{Interference, Scenario};
 use uav_relay_sim::beta::beta_w;
 use uav_relay_sim::command::{self, Failure};
-use uav_relay_sim::report::{self, AirReport, AttackReport, ChainReport, ListenedReport, timeline};
+use uav_relay_sim::report::{
+    self, AgainstAll, AirReport, AttackReport, ChainReport, ListenedReport, timeline,
+};
 use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::{Outcome, RelayEnd};
@@ -52,11 +54,14 @@ fn run(options: &Options) -> Result<(), Failure> {
         return Err(Failure::input(line.to_owned()));
     }
     agree(options, &method, &scenario)?;
+    if let Some(line) = mission::left_out(&scenario, options.uavs) {
+        return Err(Failure::input(format!("{}: {line}", file(options))));
+    }
     let tolerance = options.tolerance.unwrap_or(1e-4);
     let (mission, profiles) = match mission::mission(&scenario, options.uavs, tolerance) {
         Ok(briefed) => briefed,
         // Who has given no scenario has none of its keys before them.
-        Err(Refusal::NoRoom) if options.scenario.is_none() => {
+        Err(Refusal::NoRoom { .. }) if options.scenario.is_none() => {
             let fits = |uavs: &u16| mission::mission(&scenario, *uavs, tolerance).is_ok();
             let most = (1..options.uavs).rev().find(fits).unwrap_or(1);
             let line = format!(
@@ -69,17 +74,13 @@ fn run(options: &Options) -> Result<(), Failure> {
             }
             return Err(Failure::input(line));
         }
-        Err(refusal @ Refusal::NoRoom) => {
+        Err(refusal @ Refusal::NoRoom { .. }) => {
             let report =
                 ChainReport::refused(&method, options.uavs, options.seed, &refusal.to_string());
             return show(options, &report);
         }
         Err(refusal) => {
-            let file = options
-                .scenario
-                .as_ref()
-                .map_or("default scenario".into(), |file| file.to_string_lossy());
-            return Err(Failure::input(format!("{file}: {refusal}")));
+            return Err(Failure::input(format!("{}: {refusal}", file(options))));
         }
     };
     let sites = scenario.line.map(|line| Sites {
@@ -111,6 +112,10 @@ fn run(options: &Options) -> Result<(), Failure> {
     report.channel = (setup.settings.wiring == Wiring::Shared).then_some("shared");
     report.air = AirReport::of(&setup, &outcome);
     report.listened = listened;
+    if let (None, false, Some(sir)) = (&listened, options.hostile.uploads.are_planned(), report.sir)
+    {
+        report.against_all = AgainstAll::of(&scenario, &report.relays, sir);
+    }
     if setup.attack.take().is_some() {
         let auth = setup.auth;
         let attack = AttackReport::new(auth, &outcome, &fly(options, &scenario, setup, None)?);
@@ -122,6 +127,15 @@ fn run(options: &Options) -> Result<(), Failure> {
         command::write(file, &svg::draw(&picture))?;
     }
     show(options, &report)
+}
+
+/// The scenario, as a message names it.
+fn file(options: &Options) -> String {
+    let file = options.scenario.as_ref();
+    file.map_or_else(
+        || "default scenario".to_owned(),
+        |file| file.display().to_string(),
+    )
 }
 
 /// Whether the options go together, and with the scenario.
@@ -158,16 +172,6 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
                 "note: an upload changes that one, and what it leaves out stays as it is",
             );
         }
-    }
-    for index in scenario
-        .relays
-        .keys()
-        .filter(|index| **index > options.uavs)
-    {
-        command::complain(&format!(
-            "note: [[relay]] index {index} is left out of a chain of {}",
-            options.uavs
-        ));
     }
     Ok(())
 }

@@ -18,7 +18,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FILE")]
     pub(crate) scenario: Option<PathBuf>,
     /// Number of relays, 1 to 1000
-    #[arg(long, value_name = "N", default_value_t = 8, allow_negative_numbers = true, value_parser = |text: &str| whole::<u16>(text, 1, 1000))]
+    #[arg(long, value_name = "N", default_value_t = 8, allow_negative_numbers = true, value_parser = whole(1_u16, 1000))]
     pub(crate) uavs: u16,
     /// How the places are found
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
@@ -27,7 +27,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 1e6))]
     pub(crate) epsilon: Option<f64>,
     /// Rounds of `adjust` at most, 1 to 65535; 500 unless said otherwise
-    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = |text: &str| whole::<u16>(text, 1, 65_535))]
+    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = whole(1_u16, 65_535))]
     pub(crate) rounds: Option<u16>,
     /// How far a relay may go up or down in one round of `adjust`, metres, 0 to 1e5; 10 unless said otherwise
     #[arg(long = "explore", value_name = "M", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 1e5).map(narrow))]
@@ -37,7 +37,7 @@ pub(crate) struct Options {
     pub(crate) grid: Option<uav_relay::Local>,
     /// The relays of a stochastic chain are told that Upsilon is everywhere what it is at Rx, fly, measure the true field where
     /// they stand, and agree again, R times, 1 to 100
-    #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = |text: &str| whole::<u8>(text, 1, 100))]
+    #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = whole(1_u8, 100))]
     pub(crate) closed_loop: Option<u8>,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1; 1e-4 unless said otherwise. The -step methods have their step instead
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 0.1))]
@@ -58,7 +58,7 @@ pub(crate) struct Options {
     #[arg(long)]
     pub(crate) no_predict: bool,
     /// Seed of every random draw; the same seed gives the same run, byte for byte
-    #[arg(long, value_name = "S", default_value_t = 1, allow_negative_numbers = true, value_parser = |text: &str| whole::<u64>(text, 0, u64::MAX))]
+    #[arg(long, value_name = "S", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0, u64::MAX))]
     pub(crate) seed: u64,
     /// One JSON object on standard output and nothing else there
     #[arg(long)]

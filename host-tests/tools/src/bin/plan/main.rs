@@ -1,11 +1,13 @@
 //! `cargo plan`: how many relays, where, and what to expect of them, before anything flies.
 
+mod map;
 mod options;
+mod out;
 
 use std::process::ExitCode;
 
 use clap::Parser as _;
-use uav_relay_scenario::Scenario;
+use uav_relay_scenario::{Scenario, mission};
 use uav_relay_sim::command::{self, Failure};
 use uav_relay_sim::svg::{self, Picture, room};
 use uav_relay_tools::plan::report::PlanReport;
@@ -30,6 +32,8 @@ fn run(options: &Options) -> Result<(), Failure> {
         return Err(Failure::input(line.to_owned()));
     }
     let number = options.number()?;
+    out::check(options, &scenario)?;
+    map::check(options, &scenario)?;
     let ask = Ask {
         number,
         free_altitude: options.altitude == Altitude::Free,
@@ -38,19 +42,26 @@ fn run(options: &Options) -> Result<(), Failure> {
     };
     match plan::plan(&scenario, &ask) {
         Ok(plan) => {
+            let uavs = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+            if let Some(line) = mission::left_out(&scenario, uavs) {
+                return Err(Failure::input(format!("{}: {line}", options.file())));
+            }
             if let Some(file) = &options.svg {
                 command::write(file, &svg::draw(&picture(&plan, &scenario)))?;
             }
+            map::write(options, &scenario, &plan)?;
+            let next = out::write(options, &scenario, &plan, number)?;
             show(
                 options,
-                &PlanReport::new(&plan, number, options.bandwidth_hz),
-            )
+                &PlanReport::new(&plan, number, options.unit(), options.bandwidth_hz),
+            )?;
+            if !options.json {
+                command::print(&next);
+            }
+            Ok(())
         }
         Err(NoPlan::Wrong(line)) => {
-            let file = options
-                .scenario
-                .as_ref()
-                .map_or("default scenario".into(), |file| file.to_string_lossy());
+            let file = options.file();
             let about_an_option = line.starts_with("--");
             Err(Failure::input(if about_an_option {
                 line
@@ -58,9 +69,10 @@ fn run(options: &Options) -> Result<(), Failure> {
                 format!("{file}: {line}")
             }))
         }
-        Err(NoPlan::Unmet(error, best_sir)) => {
-            show(options, &PlanReport::unmet(error, best_sir, number))
-        }
+        Err(NoPlan::Unmet(why, best_sir)) => show(
+            options,
+            &PlanReport::unmet(&why, best_sir, number, options.unit()),
+        ),
     }
 }
 

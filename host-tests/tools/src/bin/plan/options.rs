@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, ValueEnum};
-use uav_relay_sim::command::{Failure, number};
-use uav_relay_tools::plan::Number;
+use uav_relay_sim::command::{Failure, number, whole};
 use uav_relay_tools::plan::report::sir_for_rate;
+use uav_relay_tools::plan::{Number, Unit};
 
 /// How many relays a target SIR needs, or the best places for a given number, worked out without any messages.
 #[derive(Parser, Debug)]
@@ -21,7 +21,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "A", value_enum, default_value_t = Altitude::Given)]
     pub(crate) altitude: Altitude,
     /// Where the only relay has to stand, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, conflicts_with = "altitude", value_parser = along)]
     pub(crate) x_m: Option<f64>,
     /// Bandwidth of a hop, hertz, 1 to 1e12: SIRs are also told as data rates, log2(1 + SIR) bits a second and hertz
     #[arg(long, value_name = "B", value_parser = |text: &str| number(text, 1.0, 1e12))]
@@ -35,6 +35,18 @@ pub(crate) struct Options {
     /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
+    /// Write sites, relays, hops and interferers on earth, for a map (GeoJSON); needs a scenario with a site
+    #[arg(long, value_name = "FILE")]
+    pub(crate) geojson: Option<PathBuf>,
+    /// The same for a globe (KML), with altitudes above the sea
+    #[arg(long, value_name = "FILE")]
+    pub(crate) kml: Option<PathBuf>,
+    /// Write the scenario with its plan, for cargo provision --scenario FILE --all
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Write over the file of --out
+    #[arg(long, requires = "out")]
+    pub(crate) force: bool,
 }
 
 /// What is wanted: exactly one of these.
@@ -42,7 +54,7 @@ pub(crate) struct Options {
 #[group(required = true, multiple = false)]
 struct Wanted {
     /// The best places for this number of relays, 1 to 1000
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1000))]
     uavs: Option<u16>,
     /// The fewest relays that give every hop this SIR, linear, 1e-9 to 1e9
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-9, 1e9))]
@@ -55,6 +67,12 @@ struct Wanted {
     target_rate_bps: Option<f64>,
 }
 
+/// A place along the line: how far it may be is the scenario's to say.
+fn along(text: &str) -> Result<f64, String> {
+    text.parse()
+        .map_err(|_| "must be a number, metres from Tx".to_owned())
+}
+
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum Altitude {
     /// As the scenario gives it
@@ -64,6 +82,22 @@ pub(crate) enum Altitude {
 }
 
 impl Options {
+    /// The scenario, as a message names it.
+    pub(crate) fn file(&self) -> String {
+        self.scenario.as_ref().map_or_else(
+            || "default scenario".into(),
+            |file| file.display().to_string(),
+        )
+    }
+
+    /// The unit that SIRs are asked for in.
+    pub(crate) const fn unit(&self) -> Unit {
+        match self.wanted.target_sir_db {
+            Some(_) => Unit::Decibels,
+            None => Unit::Linear,
+        }
+    }
+
     /// How many relays are asked for.
     pub(crate) fn number(&self) -> Result<Number, Failure> {
         let wanted = &self.wanted;

@@ -1,0 +1,61 @@
+//! What places that were found against one interferer are worth against all that it stands for.
+
+use serde::Serialize;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::mission;
+use uav_relay_scenario::scene::{Place, Scene};
+
+use super::hops::{RelayReport, db};
+
+/// The chain against all interferers, where one stood for several.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct AgainstAll {
+    /// SIR of the worst hop against all, linear.
+    pub all_sir: f64,
+    /// The same in dB.
+    pub all_sir_db: f64,
+    /// How much of the SIR that the relays believe in is not there, as a part of it; below 0 where there is more.
+    pub all_loss: f64,
+}
+
+impl AgainstAll {
+    /// Of `relays`, which believe in `sir`; `None` where one interferer or a field is all there is.
+    pub fn of(scenario: &Scenario, relays: &[RelayReport], sir: f64) -> Option<Self> {
+        mission::hypothetical(scenario)?;
+        let last = relays.last()?.index;
+        let mut scene = Scene::new(scenario, last)?;
+        // Those that are left, in their order.
+        let all = std::mem::take(&mut scene.relays);
+        let of = |relay: &RelayReport| all.get(usize::from(relay.index) - 1).copied();
+        scene.relays = relays.iter().filter_map(of).collect();
+        let places: Vec<Place> = relays
+            .iter()
+            .map(|relay| Place {
+                x: relay.x_m,
+                y: relay.y_m,
+                h: relay.h_m,
+            })
+            .collect();
+        let all_sir = scene.chain_sir(&places);
+        Some(Self {
+            all_sir,
+            all_sir_db: db(all_sir),
+            all_loss: 1.0 - all_sir / sir,
+        })
+    }
+
+    /// As a line to read.
+    pub fn text(&self) -> String {
+        let Self {
+            all_sir,
+            all_sir_db,
+            all_loss,
+        } = self;
+        let part = 100.0 * all_loss.abs();
+        let side = if *all_loss < 0.0 { "above" } else { "below" };
+        format!(
+            "against all interferers: SIR {all_sir:.6} ({all_sir_db:.3} dB), {part:.1} % {side} what the relays believe; the best places \
+             against all are those of `cargo plan`\n"
+        )
+    }
+}

@@ -1,0 +1,85 @@
+//! A plan that a scenario carries on.
+
+use uav_relay_scenario::{PlannedMethod, PlannedPlace};
+
+use super::*;
+
+const PLAN: &str = "[plan]\nuavs = 2\nmethod = \"joint\"\ntolerance = 1e-4\nsir_db = 3.5\n\
+                    places = [{ x_m = 1, y_m = -2, altitude_m = 30 }, { x_m = 4, y_m = 5, altitude_m = 6.5 }]\n";
+
+#[test]
+fn a_plan_is_read() {
+    let plan = parse(&small(PLAN)).unwrap().plan.unwrap();
+    assert_eq!((plan.uavs, plan.method), (2, PlannedMethod::Joint));
+    assert_eq!((plan.tolerance, plan.sir_db), (1e-4, 3.5));
+    let second = PlannedPlace {
+        x_m: 4.0,
+        y_m: 5.0,
+        altitude_m: 6.5,
+    };
+    assert_eq!(plan.places[1], second);
+    assert_eq!(parse(&small("")).unwrap().plan, None);
+}
+
+#[test]
+fn the_default_scenario_is_that_of_its_file() {
+    let file = parse(uav_relay_scenario::DEFAULT).unwrap();
+    assert_eq!(file, Scenario::default());
+}
+
+#[test]
+fn what_is_wrong_with_a_plan_is_named() {
+    let plan = |from: &str, to: &str| small(&PLAN.replace(from, to));
+    for (text, problem, parts) in [
+        (
+            plan("uavs = 2", "uavs = 3"),
+            Problem::OtherNumber,
+            ["plan.places = 2 places", "3 places"],
+        ),
+        (
+            plan("uavs = 2", "uavs = 0"),
+            Problem::OutOfRange,
+            ["plan.uavs = 0", "1 to 1000"],
+        ),
+        (
+            plan("joint", "jont"),
+            Problem::UnknownChoice,
+            [
+                "plan.method = \"jont\" is not known",
+                "\"align\" or \"joint\"",
+            ],
+        ),
+        (
+            plan("\"joint\"", "3"),
+            Problem::WrongType,
+            ["plan.method = 3", "\"align\" or \"joint\""],
+        ),
+        (
+            plan("1e-4", "0.2"),
+            Problem::OutOfRange,
+            ["plan.tolerance = 0.2", "1e-6 to 0.1"],
+        ),
+        (
+            plan("3.5", "401"),
+            Problem::OutOfRange,
+            ["plan.sir_db = 401", "-400 to 400 dB"],
+        ),
+        (
+            plan("altitude_m = 30", "altitude_m = 0"),
+            Problem::OutOfRange,
+            ["plan.places[0].altitude_m = 0", "0.1 to 1e5 m"],
+        ),
+        (
+            plan("x_m = 4", "x_m = 1e8"),
+            Problem::OutOfRange,
+            ["plan.places[1].x_m", "-1e7 to 1e7 m"],
+        ),
+        (
+            plan("sir_db = 3.5\n", ""),
+            Problem::Missing,
+            ["plan.sir_db is missing", "dB"],
+        ),
+    ] {
+        refused(&text, problem, &parts);
+    }
+}

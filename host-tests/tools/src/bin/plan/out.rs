@@ -1,0 +1,100 @@
+//! The scenario with its plan, as `--out` writes it for `cargo provision`.
+
+use std::path::Path;
+
+use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario};
+use uav_relay_sim::command::Failure;
+use uav_relay_tools::plan::carried::{planned, with_plan};
+use uav_relay_tools::plan::flown::flown;
+use uav_relay_tools::plan::{NoPlan, Number, Plan};
+
+use crate::options::{Altitude, Options};
+
+/// Whether what is asked for can be flown at all, before it is planned.
+pub(crate) fn check(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
+    let Some(file) = &options.out else {
+        return Ok(());
+    };
+    let refuse = |line: String| Err(Failure::input(line));
+    if let Some(x_m) = options.x_m {
+        return refuse(format!(
+            "--x-m {x_m:?} is not for --out: a relay chooses its place along the line by itself"
+        ));
+    }
+    let is_field = matches!(scenario.interference, Interference::Field(_));
+    if is_field && options.altitude == Altitude::Free {
+        return refuse(
+            "--altitude free is not for --out with a [field]: relays hold geometry.altitude_m there, and best at geometry.altitude_min_m"
+                .to_owned(),
+        );
+    }
+    if file.exists() && !options.force {
+        return refuse(format!(
+            "--out {}: is there already; --force writes over it",
+            file.display()
+        ));
+    }
+    Ok(())
+}
+
+/// Writes the scenario and what its relays will fly; says what is next.
+pub(crate) fn write(
+    options: &Options,
+    scenario: &Scenario,
+    plan: &Plan,
+    number: Number,
+) -> Result<String, Failure> {
+    let Some(file) = &options.out else {
+        return Ok(String::new());
+    };
+    let method = match options.altitude {
+        Altitude::Given => PlannedMethod::Align,
+        Altitude::Free => PlannedMethod::Joint,
+    };
+    let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+    let flown = flown(scenario, relays, method, options.tolerance).map_err(|none| match none {
+        NoPlan::Wrong(why) => Failure::input(why),
+        NoPlan::Unmet(why, _) => Failure::unmet(why.say(options.unit())),
+    })?;
+    let sir = db(flown.plan.sir());
+    if flown.is_poor() {
+        return Err(Failure::unmet(format!(
+            "--out {}: not written: {}",
+            file.display(),
+            flown.describe()
+        )));
+    }
+    if let Number::Meeting(target) = number
+        && flown.plan.sir() < target * (1.0 - options.tolerance)
+    {
+        return Err(Failure::unmet(format!(
+            "--out {}: not written: {relays} relays by themselves reach {sir:.2} dB, and the target is {:.2} dB; ask for more by --uavs",
+            file.display(),
+            db(target)
+        )));
+    }
+    let text = match &options.scenario {
+        Some(scenario) => std::fs::read_to_string(scenario)
+            .map_err(|error| Failure::input(format!("{}: {error}", scenario.display())))?,
+        None => DEFAULT.to_owned(),
+    };
+    let text = with_plan(&text, &planned(&flown, method, options.tolerance))
+        .map_err(|why| Failure::input(format!("--out {}: {why}", file.display())))?;
+    save(file, "--out", &text)?;
+    Ok(format!(
+        "{}: the scenario with its plan, {relays} relays that reach {sir:.3} dB by themselves; next:\n  \
+         cargo provision --scenario {} --all --out-dir DIR\n",
+        file.display(),
+        file.display()
+    ))
+}
+
+fn db(sir: f64) -> f64 {
+    10.0 * sir.log10()
+}
+
+/// Writes `text` to `file`, which `option` names.
+pub(crate) fn save(file: &Path, option: &str, text: &str) -> Result<(), Failure> {
+    std::fs::write(file, text)
+        .map_err(|error| Failure::input(format!("{option} {}: {error}", file.display())))
+}

@@ -1,0 +1,314 @@
+//! `cargo provision`: what is written into one drone before it flies, from a scenario.
+
+mod options;
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use clap::Parser as _;
+use uav_relay::{Adjust, ChannelLoad, Local, Measure, Settings};
+use uav_relay_scenario::{Interference, PlannedMethod, Scenario, mission};
+use uav_relay_sim::command::{self, Failure};
+use uav_relay_sim::simulator::medium::access::OVERHEAD;
+use uav_relay_tools::plan::carried::is_current;
+use uav_relay_tools::plan::flown::{Flown, flown};
+use uav_relay_tools::provision::block::Flight;
+use uav_relay_tools::provision::config::{ADDRESS, LEN, Secret};
+use uav_relay_tools::provision::summary::{Heading, summary};
+use uav_relay_tools::provision::{folder, key};
+
+use options::{Method, Options};
+
+/// What is written, after what the scenario and its plan leave to say.
+struct Asked<'a> {
+    options: &'a Options,
+    scenario: Scenario,
+    /// The scenario, as a message names it.
+    name: String,
+    uavs: u16,
+    method: Method,
+    tolerance: f64,
+}
+
+fn main() -> ExitCode {
+    match Options::try_parse() {
+        Ok(options) => {
+            let line = run(&options).map(|line| command::print(&line));
+            command::ended(line.map_err(Failure::input))
+        }
+        Err(error) => command::usage(&error),
+    }
+}
+
+fn run(options: &Options) -> Result<String, String> {
+    let asked = Asked::new(options)?;
+    let Asked {
+        scenario,
+        name,
+        uavs,
+        ..
+    } = &asked;
+    if let Some(index) = options.index
+        && index > *uavs
+    {
+        return Err(format!("--index {index}: must be within 1 to {uavs}"));
+    }
+    if let Some(line) = mission::left_out(scenario, *uavs) {
+        return Err(format!("{name}: {line}"));
+    }
+    let secret = secret(options)?;
+    let flight = asked.flight(secret)?;
+    let flown = asked.flown()?;
+    let said = match (&options.out, options.index, &options.folder.out_dir) {
+        (Some(file), Some(index), _) => {
+            let block = flight
+                .block(index)
+                .map_err(|error| format!("{name}: {error}"))?;
+            std::fs::write(file, block)
+                .map_err(|error| format!("{}: --out cannot be written: {error}", file.display()))?;
+            format!(
+                "{}: relay {index} of {uavs}, network {}; {LEN} bytes for {ADDRESS:#010x}\n",
+                file.display(),
+                options.network
+            )
+        }
+        (_, _, Some(dir)) => asked.folder(&flight, flown.as_ref(), dir)?,
+        _ => {
+            return Err(
+                "--index and --out, or --all and --out-dir: one of both is needed".to_owned(),
+            );
+        }
+    };
+    if secret.is_none() {
+        command::complain("no --key-file: frames are not signed, and anybody can send some");
+    }
+    Ok(said)
+}
+
+impl<'a> Asked<'a> {
+    /// What the options and the scenario's plan say together.
+    fn new(options: &'a Options) -> Result<Self, String> {
+        let scenario = match &options.scenario {
+            Some(file) => Scenario::load(file).map_err(|error| error.to_string())?,
+            None => Scenario::default(),
+        };
+        let name = options.scenario.as_ref().map_or_else(
+            || "default scenario".to_owned(),
+            |file| file.display().to_string(),
+        );
+        let plan = scenario.plan.as_ref();
+        let other = |option: &str, has: &str| {
+            format!("{option}: {name} has a [plan] with {has}; leave the option out, or plan anew")
+        };
+        let uavs = match (options.uavs, plan) {
+            (Some(uavs), Some(plan)) if uavs != plan.uavs => {
+                return Err(other(
+                    &format!("--uavs {uavs}"),
+                    &format!("uavs = {}", plan.uavs),
+                ));
+            }
+            (_, Some(plan)) => plan.uavs,
+            (Some(uavs), None) => uavs,
+            (None, None) => {
+                return Err(format!(
+                    "--uavs: is missing, and so is [plan] in {name}; allowed: 1 to 1000"
+                ));
+            }
+        };
+        let planned = plan.map(|plan| match plan.method {
+            PlannedMethod::Align => Method::Align,
+            PlannedMethod::Joint => Method::Joint,
+        });
+        let method = match (options.method, planned) {
+            (Some(method), Some(planned)) if method != planned => {
+                return Err(other(
+                    "--method",
+                    &format!("another method, {planned:?}").to_lowercase(),
+                ));
+            }
+            (method, planned) => method.or(planned).unwrap_or(Method::Align),
+        };
+        let tolerance = match (options.tolerance, plan) {
+            (Some(tolerance), Some(plan)) if tolerance.total_cmp(&plan.tolerance).is_ne() => {
+                return Err(other(
+                    &format!("--tolerance {tolerance:?}"),
+                    &format!("tolerance = {:?}", plan.tolerance),
+                ));
+            }
+            (tolerance, plan) => tolerance
+                .or(plan.map(|plan| plan.tolerance))
+                .unwrap_or(1e-4),
+        };
+        for (option, given) in [
+            ("--rounds", options.rounds.is_some()),
+            ("--explore", options.explore_m.is_some()),
+        ] {
+            if given && method != Method::Adjust {
+                return Err(format!("{option}: is for --method adjust"));
+            }
+        }
+        Ok(Self {
+            options,
+            scenario,
+            name,
+            uavs,
+            method,
+            tolerance,
+        })
+    }
+
+    /// What all drones have in common.
+    fn flight(&self, secret: Option<Secret>) -> Result<Flight, String> {
+        let options = self.options;
+        let Options { network, .. } = *options;
+        let method = match self.method {
+            Method::Align => uav_relay::Method::Align,
+            Method::Joint => uav_relay::Method::Joint,
+            Method::Adjust => uav_relay::Method::Adjust(Adjust {
+                rounds: options.rounds.unwrap_or(500),
+                explore_m: options.explore_m.unwrap_or(10.0),
+                local: Local::Fine,
+            }),
+        };
+        let flight = Flight::new(&self.scenario, self.uavs, self.tolerance, network)
+            .map_err(|error| format!("{}: {error}", self.name))?;
+        carried(options, self.uavs)?;
+        let flight = match options.speed {
+            Some(_) if !flight.has_sites() => {
+                return Err("--speed: is for a scenario with a [site]".to_owned());
+            }
+            Some(speed) => flight.no_faster_than(speed),
+            None => flight,
+        };
+        let autopilot_key = match &options.autopilot_key_file {
+            Some(_) if !flight.has_sites() => {
+                return Err("--autopilot-key-file: is for a scenario with a [site]".to_owned());
+            }
+            Some(file) => Some(key::load("--autopilot-key-file", file)?),
+            None => None,
+        };
+        Ok(flight
+            .by(method)
+            .signed(secret)
+            .signed_to_autopilots(autopilot_key)
+            .measuring(measure(options, &self.scenario)?))
+    }
+
+    /// Where the relays settle by themselves, where that is known before and needed; refuses a stand-in that loses too much.
+    fn flown(&self) -> Result<Option<Flown>, String> {
+        let is_plain = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() == 1);
+        let is_several = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() > 1);
+        if self.options.stand_in && !is_several {
+            return Err("--stand-in: is for a scenario with several [[interferer]]".to_owned());
+        }
+        if !self.scenario.knows_interference()
+            || is_plain && !self.options.folder.all && self.scenario.plan.is_none()
+        {
+            return Ok(None);
+        }
+        let method = match self.method {
+            Method::Joint => PlannedMethod::Joint,
+            // What adjust begins with.
+            Method::Align | Method::Adjust => PlannedMethod::Align,
+        };
+        // Relays that settle on nothing say so by themselves.
+        let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
+            return match self.scenario.plan {
+                Some(_) => Err(format!(
+                    "{}: [plan] is of another scenario: relays in this one settle on nothing",
+                    self.name
+                )),
+                None => Ok(None),
+            };
+        };
+        if let Some(plan) = &self.scenario.plan {
+            is_current(plan, &flown).map_err(|why| format!("{}: {why}", self.name))?;
+        }
+        if flown.is_poor() {
+            let line = format!("{}: {}", self.name, flown.describe());
+            if flown.stand_in && !self.options.stand_in {
+                return Err(format!("{line}; --stand-in has it written nevertheless"));
+            }
+            command::complain(&line);
+        }
+        Ok(Some(flown))
+    }
+
+    /// Writes the blocks of all relays, and the summary.
+    fn folder(&self, flight: &Flight, flown: Option<&Flown>, dir: &Path) -> Result<String, String> {
+        let heading = Heading {
+            scenario: self.name.clone(),
+            uavs: self.uavs,
+            network: self.options.network,
+            method: format!("{:?}", self.method).to_lowercase(),
+            signed: self.options.key_file.is_some(),
+        };
+        let places = match flown {
+            Some(flown) if self.method != Method::Adjust => flown.plan.places.as_slice(),
+            _ => &[],
+        };
+        let mut files = Vec::new();
+        for index in 1..=self.uavs {
+            let block = flight
+                .block(index)
+                .map_err(|error| format!("{}: relay {index}: {error}", self.name))?;
+            files.push((folder::name(index), block.to_vec()));
+        }
+        let text = summary(&heading, places, self.scenario.line.as_ref());
+        files.push(("summary.txt".to_owned(), text.clone().into_bytes()));
+        folder::write(dir, &files, self.options.folder.force)?;
+        Ok(format!(
+            "{}: {} blocks of {LEN} bytes, and summary.txt:\n{text}",
+            dir.display(),
+            self.uavs
+        ))
+    }
+}
+
+/// Refuses a channel that cannot carry the relays, by the timing that the firmware has.
+fn carried(options: &Options, uavs: u16) -> Result<(), String> {
+    if options.wires {
+        return Ok(());
+    }
+    let in_range = options.in_range.unwrap_or(uavs).min(uavs);
+    let load = ChannelLoad {
+        in_range,
+        overhead: u16::try_from(OVERHEAD).unwrap_or(u16::MAX),
+    };
+    let Settings { probe_after, .. } = Settings::default();
+    command::carries(options.baud, load, probe_after)
+        .map_err(|error| format!("{error}; fewer with --in-range, none with --wires"))
+}
+
+fn secret(options: &Options) -> Result<Option<Secret>, String> {
+    let Some(file) = &options.key_file else {
+        return Ok(None);
+    };
+    let seconds = || {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
+        u32::try_from(since.as_secs()).ok()
+    };
+    let epoch = options.epoch.or_else(seconds);
+    Ok(Some(Secret {
+        key: key::load("--key-file", file)?,
+        epoch: epoch.ok_or("--epoch: is needed where the clock says no time")?,
+    }))
+}
+
+fn measure(options: &Options, scenario: &Scenario) -> Result<Option<Measure>, String> {
+    let Some(samples) = options.samples else {
+        return Ok(None);
+    };
+    let Interference::Field(field) = &scenario.interference else {
+        return Err(format!(
+            "--samples {samples}: is for a scenario with a [field]"
+        ));
+    };
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "1e-30 to 1e6 by the scenario"
+    )]
+    let i_max_w = field.i_max_w as f32;
+    Ok(Some(Measure { i_max_w, samples }))
+}

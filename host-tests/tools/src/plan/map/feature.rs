@@ -1,0 +1,123 @@
+//! What there is to show of a plan, and where on earth it is.
+
+use uav_relay::{Geodetic, Placement};
+use uav_relay_scenario::{Line, Scenario};
+
+use crate::plan::found::Plan;
+
+/// One thing to show.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Feature {
+    /// What a person calls it.
+    pub name: String,
+    /// `tx`, `rx`, `relay`, `interferer` or `hop`.
+    pub kind: &'static str,
+    /// Where: one point, or the two ends of a hop.
+    pub at: Vec<Geodetic>,
+    /// Its numbers, by names with their units.
+    pub numbers: Vec<(&'static str, f64)>,
+}
+
+/// What there is to show.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Map {
+    /// What of it has a place: the sites, the relays, the interferers, then the hops from Tx on.
+    pub features: Vec<Feature>,
+    /// How high the mean sea level is above the ellipsoid, m, where the scenario says it.
+    pub geoid_m: Option<f64>,
+    /// Interferers that are too far from the line to say where on earth they are, from 1.
+    pub left_out: Vec<usize>,
+}
+
+impl Map {
+    /// The map of `plan`.
+    ///
+    /// # Errors
+    /// In one line, what the scenario lacks.
+    pub fn new(scenario: &Scenario, plan: &Plan) -> Result<Self, String> {
+        let line = scenario.line.as_ref().ok_or(
+            "site: is missing; allowed: [site] with tx and rx, each { lat_deg, lon_deg, amsl_m }, which say where on earth the line is",
+        )?;
+        let [tx, rx] = line.sites;
+        let site = |name: &str, kind, at| Feature {
+            name: name.to_owned(),
+            kind,
+            at: vec![at],
+            numbers: Vec::new(),
+        };
+        let mut features = vec![site("Tx", "tx", tx), site("Rx", "rx", rx)];
+        let mut ends = vec![tx];
+        for (index, (place, profile)) in (1..).zip(&plan.places) {
+            let at = point(line, *place)
+                .ok_or_else(|| format!("relay {index} is too far from the line"))?;
+            ends.push(at);
+            features.push(Feature {
+                name: format!("relay {index}"),
+                kind: "relay",
+                at: vec![at],
+                numbers: vec![
+                    ("index", f64::from(index)),
+                    ("x_m", place.x_m.into()),
+                    ("y_m", place.y_m.into()),
+                    ("h_m", place.altitude_m.into()),
+                    ("eirp_dbm", dbm(profile.power_w.into())),
+                ],
+            });
+        }
+        ends.push(rx);
+        let mut left_out = Vec::new();
+        for (number, (power_w, x_m, y_m)) in (1..).zip(scenario.sources()) {
+            #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]
+            let ground = Placement {
+                x_m: x_m as f32,
+                y_m: y_m as f32,
+                altitude_m: 0.0,
+            };
+            let Some(at) = point(line, ground) else {
+                left_out.push(number);
+                continue;
+            };
+            features.push(Feature {
+                name: format!("interferer {number}"),
+                kind: "interferer",
+                at: vec![at],
+                numbers: vec![("x_m", x_m), ("y_m", y_m), ("eirp_dbm", dbm(power_w))],
+            });
+        }
+        let hops = ends.iter().zip(ends.iter().skip(1)).zip(&plan.sirs);
+        for (number, ((from, to), sir)) in (1..).zip(hops) {
+            features.push(Feature {
+                name: format!("hop {number}: {:.2} dB", 10.0 * sir.log10()),
+                kind: "hop",
+                at: vec![*from, *to],
+                numbers: vec![
+                    ("hop", f64::from(number)),
+                    ("sir", *sir),
+                    ("sir_db", 10.0 * sir.log10()),
+                ],
+            });
+        }
+        Ok(Self {
+            features,
+            geoid_m: line.geoid_m,
+            left_out,
+        })
+    }
+}
+
+fn point(line: &Line, place: Placement) -> Option<Geodetic> {
+    line.axis.point(place)
+}
+
+fn dbm(power_w: f64) -> f64 {
+    10.0 * power_w.log10() + 30.0
+}
+
+/// Longitude and latitude, degrees, and the height above the mean sea level, m.
+pub(super) fn position(at: Geodetic) -> [f64; 3] {
+    [
+        f64::from(at.lon_e7) / 1e7,
+        f64::from(at.lat_e7) / 1e7,
+        f64::from(at.amsl_mm) / 1e3,
+    ]
+}

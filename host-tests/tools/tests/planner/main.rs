@@ -1,0 +1,41 @@
+//! What `cargo plan` says and refuses, line by line.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs
+)]
+
+mod closed;
+mod refusals;
+mod units;
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+fn plan(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_plan"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+/// What it prints.
+fn said(arguments: &[&str]) -> String {
+    let output = plan(arguments);
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The exit status, and the one line on standard error.
+fn refusal(arguments: &[&str]) -> (i32, String) {
+    let output = plan(arguments);
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(line.trim_end().lines().count(), 1, "{arguments:?}: {line}");
+    (output.status.code().unwrap(), line)
+}
+
+fn example(name: &str) -> String {
+    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    file.join(name).to_str().unwrap().to_owned()
+}

@@ -1,0 +1,381 @@
+//! From a plan to the blocks of all drones, without a number typed twice.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use uav_relay::Method;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::number::narrow;
+use uav_relay_tools::provision::config::{Block, secret};
+
+use super::{example, provision, reads, refusal};
+
+fn plan(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_plan"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn planned(arguments: &[&str]) -> String {
+    let output = plan(arguments);
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn text(path: &Path) -> String {
+    path.to_str().unwrap().to_owned()
+}
+
+/// The names of what is in a folder.
+fn names(dir: &Path) -> BTreeSet<String> {
+    let entries = std::fs::read_dir(dir).unwrap();
+    entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect()
+}
+
+/// The block of that relay in `dir` is the plan's, and the summary has it.
+fn is_provisioned(scenario: &Scenario, dir: &Path, index: u16, summary: &str) {
+    let plan = scenario.plan.as_ref().unwrap();
+    let block: Block = std::fs::read(dir.join(format!("relay{index}.bin")))
+        .unwrap()
+        .try_into()
+        .unwrap();
+    let config = reads(&block).unwrap();
+    assert_eq!((config.identity.network, config.identity.index), (9, index));
+    assert_eq!(config.mission.relays(), plan.uavs);
+    assert_eq!(config.method, Method::Align);
+    assert!(config.sites.is_some());
+    assert_eq!(secret(&block).unwrap().map(|secret| secret.epoch), Some(77));
+    // The table has its place, on the line and on earth; a line to type has its file.
+    let place = plan.places[usize::from(index) - 1];
+    let row = summary
+        .lines()
+        .find(|line| line.trim_start().starts_with(&format!("relay{index}.bin ")))
+        .unwrap();
+    let numbers: Vec<f64> = row
+        .split_whitespace()
+        .skip(1)
+        .map(|word| word.parse().unwrap())
+        .collect();
+    assert!(
+        (numbers[0] - place.x_m).abs() < 1e-3 && (numbers[2] - place.altitude_m).abs() < 1e-2,
+        "{row}"
+    );
+    let at = scenario.line.unwrap().axis.point(uav_relay::Placement {
+        x_m: narrow(place.x_m),
+        y_m: narrow(place.y_m),
+        altitude_m: narrow(place.altitude_m),
+    });
+    let at = at.unwrap();
+    assert!(
+        (numbers[3] * 1e7 - f64::from(at.lat_e7)).abs() < 1.5,
+        "{row}"
+    );
+    assert!(
+        (numbers[4] * 1e7 - f64::from(at.lon_e7)).abs() < 1.5,
+        "{row}"
+    );
+    assert!(
+        summary.contains(&format!("--base-address 0x080E0000 relay{index}.bin\n")),
+        "{summary}"
+    );
+}
+
+#[test]
+fn a_plan_goes_to_every_drone() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, key, dir] = ["plan.toml", "key.txt", "blocks"].map(|name| folder.path().join(name));
+    let decibels = text(&example().with_file_name("decibels.toml"));
+    let said = planned(&[
+        "--scenario",
+        &decibels,
+        "--target-sir-db",
+        "8",
+        "--out",
+        &text(&file),
+    ]);
+    let scenario = Scenario::load(&file).unwrap();
+    let plan = scenario.plan.clone().unwrap();
+    assert!(
+        said.contains(&format!("{} relays that reach", plan.uavs)),
+        "{said}"
+    );
+    assert!(plan.sir_db >= 8.0, "{}", plan.sir_db);
+    // All else is as it was.
+    let before = std::fs::read_to_string(&decibels).unwrap();
+    assert!(std::fs::read_to_string(&file).unwrap().starts_with(&before));
+
+    std::fs::write(&key, "0123456789abcdef".repeat(4)).unwrap();
+    let command = said
+        .lines()
+        .last()
+        .unwrap()
+        .trim()
+        .replace("DIR", &text(&dir));
+    let words: Vec<&str> = command.split(' ').skip(2).collect();
+    let more = [
+        "--network",
+        "9",
+        "--key-file",
+        key.to_str().unwrap(),
+        "--epoch",
+        "77",
+    ];
+    let output = provision(&[&words[..], &more].concat());
+    assert!(
+        output.status.success() && output.stderr.is_empty(),
+        "{output:?}"
+    );
+    let mut expected: BTreeSet<String> = (1..=plan.uavs)
+        .map(|index| format!("relay{index}.bin"))
+        .collect();
+    expected.insert("summary.txt".to_owned());
+    assert_eq!(names(&dir), expected);
+    let summary = std::fs::read_to_string(dir.join("summary.txt")).unwrap();
+    for index in 1..=plan.uavs {
+        is_provisioned(&scenario, &dir, index, &summary);
+    }
+    assert!(!summary.contains("0123456789abcdef"));
+
+    // What is there stays, unless it is forced; then nothing of a larger flight is left.
+    let again = refusal(&words);
+    assert!(
+        again.contains("relay1.bin is there already; --force"),
+        "{again}"
+    );
+    let small = folder.path().join("small.toml");
+    planned(&["--uavs", "2", "--out", small.to_str().unwrap()]);
+    std::fs::write(dir.join("notes.txt"), "mine").unwrap();
+    let output = provision(&[
+        "--scenario",
+        small.to_str().unwrap(),
+        "--all",
+        "--out-dir",
+        dir.to_str().unwrap(),
+        "--force",
+    ]);
+    assert!(output.status.success(), "{output:?}");
+    let left = ["notes.txt", "relay1.bin", "relay2.bin", "summary.txt"].map(str::to_owned);
+    assert_eq!(names(&dir), left.into());
+}
+
+#[test]
+fn a_joint_plan_is_flown_jointly_and_planned_anew_in_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, dir] = ["plan.toml", "blocks"].map(|name| text(&folder.path().join(name)));
+    let altitudes = text(&example().with_file_name("altitudes.toml"));
+    planned(&["--scenario", &altitudes, "--uavs", "3", "--out", &file]);
+    let line = plan(&["--scenario", &file, "--uavs", "4", "--out", &file]);
+    let line = String::from_utf8(line.stderr).unwrap();
+    assert!(
+        line.contains("is there already; --force writes over it"),
+        "{line}"
+    );
+    planned(&[
+        "--scenario",
+        &file,
+        "--uavs",
+        "4",
+        "--altitude",
+        "free",
+        "--out",
+        &file,
+        "--force",
+    ]);
+    let written = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(written.matches("[plan]").count(), 1, "{written}");
+    let output = provision(&["--scenario", &file, "--all", "--out-dir", &dir]);
+    assert!(output.status.success(), "{output:?}");
+    let block: Block = std::fs::read(Path::new(&dir).join("relay4.bin"))
+        .unwrap()
+        .try_into()
+        .unwrap();
+    assert_eq!(reads(&block).unwrap().method, Method::Joint);
+}
+
+#[test]
+fn all_or_none_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("blocks");
+    // A block that no drone takes: a field with more points than it has room for.
+    let points = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
+        .map(|x| format!("{{ x_m = {x}, alpha = 3, beta = 2 }}"))
+        .join(", ");
+    let field = format!(
+        "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[field]\ni_max_w = 1e-9\nbeta = [{points}]\n"
+    );
+    let file = folder.path().join("field.toml");
+    std::fs::write(&file, field).unwrap();
+    let wide = [
+        "--scenario",
+        file.to_str().unwrap(),
+        "--uavs",
+        "3",
+        "--all",
+        "--out-dir",
+        dir.to_str().unwrap(),
+    ];
+    let line = refusal(&wide);
+    assert!(line.contains("a drone has room for 16 points"), "{line}");
+    assert!(!dir.exists());
+    // A name that is taken by a folder cannot be written: what was named before is taken back.
+    std::fs::create_dir_all(dir.join("relay2.bin/inside")).unwrap();
+    let line = refusal(&[
+        "--uavs",
+        "3",
+        "--all",
+        "--out-dir",
+        dir.to_str().unwrap(),
+        "--force",
+    ]);
+    assert!(
+        line.starts_with("--out-dir ") && line.contains("relay2.bin"),
+        "{line}"
+    );
+    assert_eq!(names(&dir), BTreeSet::from(["relay2.bin".to_owned()]));
+}
+
+#[test]
+fn what_does_not_go_together_is_said_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, old, dir] =
+        ["plan.toml", "old.toml", "blocks"].map(|name| text(&folder.path().join(name)));
+    planned(&["--uavs", "3", "--out", &file]);
+    let written = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&old, written.replace("uav_w = 1.0 ", "uav_w = 2.0 ")).unwrap();
+    let [several, relays] =
+        ["several.toml", "scenario.toml"].map(|name| text(&example().with_file_name(name)));
+    let all = ["--all", "--out-dir", &dir];
+    for (arguments, words) in [
+        (&["--scenario", &file, "--uavs", "4"][..], "--uavs 4: "),
+        (
+            &["--scenario", &file, "--method", "joint"],
+            "has a [plan] with another method, align",
+        ),
+        (
+            &["--scenario", &file, "--tolerance", "0.01"],
+            "has a [plan] with tolerance = 0.0001",
+        ),
+        (
+            &["--scenario", &old],
+            "[plan] is of another scenario: relays in this one settle up to ",
+        ),
+        (
+            &[],
+            "--uavs: is missing, and so is [plan] in default scenario; allowed: 1 to 1000",
+        ),
+        (&["--uavs", "3", "--index", "1"], "--index"),
+        (
+            &["--uavs", "3", "--rounds", "4"],
+            "--rounds: is for --method adjust",
+        ),
+        (
+            &["--uavs", "3", "--explore", "4"],
+            "--explore: is for --method adjust",
+        ),
+        (
+            &["--uavs", "3", "--stand-in"],
+            "--stand-in: is for a scenario with several [[interferer]]",
+        ),
+        (
+            &["--scenario", &relays, "--uavs", "3"],
+            "[[relay]] index = 5: there is no such relay in a chain of 3; allowed: 1 to 3",
+        ),
+        (
+            &["--scenario", &several, "--uavs", "8"],
+            "% less than the best places: one interferer stands for all on board",
+        ),
+        (
+            &["--uavs", "3.5"],
+            "must be a whole number within 1 to 1000",
+        ),
+        (
+            &["--uavs", "3", "--network", "x"],
+            "must be a whole number within 0 to 65535",
+        ),
+        (
+            &["--uavs", "3", "--method", "algn"],
+            "must be one of align, joint, adjust; did you mean align?",
+        ),
+        (&["--uavs", "3", "--epoch", "4"], "--key-file"),
+    ] {
+        let line = refusal(&[arguments, &all].concat());
+        assert!(line.contains(words), "{arguments:?}: {line}");
+        assert!(!Path::new(&dir).exists(), "{arguments:?}");
+    }
+    let line = refusal(&["--uavs", "3", "--index", "1", "--out", &file, "--force"]);
+    assert!(line.contains("--all"), "{line}");
+}
+
+/// The very loss that is refused: what the planner finds, over what the relays settle on.
+#[test]
+fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let [out, dir] = ["block.bin", "blocks"].map(|name| text(&folder.path().join(name)));
+    let several = text(&example().with_file_name("several.toml"));
+    let report = planned(&["--scenario", &several, "--uavs", "8", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let loss = report["hypothetical"]["loss"].as_f64().unwrap();
+    assert!(loss > 0.15, "{report}");
+    let words = format!("{:.1} % less than the best places", 100.0 * loss);
+    let one = [
+        "--scenario",
+        &several,
+        "--uavs",
+        "8",
+        "--index",
+        "2",
+        "--out",
+        &out,
+    ];
+    let line = refusal(&one);
+    assert!(
+        line.contains(&words) && line.contains("cargo chain --listen"),
+        "{line}"
+    );
+    assert!(!Path::new(&out).exists());
+    let planned = plan(&["--scenario", &several, "--uavs", "8", "--out", &out]);
+    let line = String::from_utf8(planned.stderr).unwrap();
+    assert!(
+        planned.status.code() == Some(1) && line.contains(&words),
+        "{line}"
+    );
+    assert!(!Path::new(&out).exists());
+    for arguments in [
+        &one[..],
+        &[
+            "--scenario",
+            &several,
+            "--uavs",
+            "8",
+            "--all",
+            "--out-dir",
+            &dir,
+        ],
+    ] {
+        let output = provision(&[arguments, &["--stand-in"]].concat());
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success() && line.contains(&words), "{line}");
+    }
+    // Two that are next to each other lose nothing.
+    let near = std::fs::read_to_string(&several).unwrap();
+    let near = near
+        .replace("x_m = 200.0", "x_m = 790.0")
+        .replace("y_m = 300.0", "y_m = 150.0");
+    let file = folder.path().join("near.toml");
+    std::fs::write(&file, near).unwrap();
+    let output = provision(&[
+        "--scenario",
+        file.to_str().unwrap(),
+        "--uavs",
+        "8",
+        "--index",
+        "2",
+        "--out",
+        &out,
+    ]);
+    assert!(output.status.success(), "{output:?}");
+}
