@@ -1,5 +1,6 @@
 //! A command line that is wrong: one line with the option, its value and what it may be.
 
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -25,8 +26,13 @@ pub(crate) fn read<T: Parser>() -> Result<T, ExitCode> {
 
 /// Says what is wrong.
 pub(crate) fn refuse(line: &str) -> ExitCode {
-    eprintln!("{line}");
+    complain(line);
     ExitCode::from(2)
+}
+
+/// One line on standard error. Not `eprintln!`: that panics where nobody reads any more.
+pub(crate) fn complain(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// A number within `least` to `most`.

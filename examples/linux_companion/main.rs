@@ -39,7 +39,6 @@
 //!
 //! It runs on other kinds of Unix too; on a Mac the ttys are called `/dev/cu.*`.
 #![cfg_attr(unix, forbid(unsafe_code))]
-#![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(unix)]
 mod autopilot;
@@ -50,12 +49,14 @@ mod epoch;
 #[cfg(unix)]
 mod keep;
 #[cfg(unix)]
+mod kept;
+#[cfg(unix)]
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
 mod key;
 #[cfg(unix)]
-mod line;
-#[cfg(unix)]
 mod listen;
+#[cfg(unix)]
+mod log;
 #[cfg(unix)]
 mod mission;
 #[cfg(unix)]
@@ -65,11 +66,21 @@ mod ports;
 #[cfg(unix)]
 mod positions;
 #[cfg(unix)]
+mod refusals;
+#[cfg(unix)]
 mod relay;
+#[cfg(unix)]
+mod replug;
 #[cfg(unix)]
 mod report;
 #[cfg(unix)]
+mod requests;
+#[cfg(unix)]
 mod site;
+#[cfg(unix)]
+mod socket;
+#[cfg(unix)]
+mod status;
 #[cfg(unix)]
 mod system;
 #[cfg(unix)]
@@ -90,27 +101,13 @@ fn main() -> std::process::ExitCode {
     match relay::fly(&plan) {
         Ok(()) => ExitCode::SUCCESS,
         Err(line) => {
-            eprintln!("{line}");
+            command::complain(&line);
             ExitCode::FAILURE
         }
     }
 }
 
-#[cfg(not(any(unix, target_os = "none")))]
+#[cfg(not(unix))]
 fn main() {
-    println!("This example needs Linux or another Unix.");
-}
-
-#[cfg(target_os = "none")]
-use panic_halt as _;
-#[cfg(target_os = "none")]
-use stm32f4xx_hal as _;
-
-/// There are no ttys on the target: `stm32f405` is the example for it.
-#[cfg(target_os = "none")]
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    loop {
-        cortex_m::asm::wfi();
-    }
+    println!("This program needs Linux or another Unix.");
 }

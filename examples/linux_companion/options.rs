@@ -17,6 +17,7 @@ use crate::autopilot::{AutopilotPlan, SigningKey, Where};
 use crate::command::{self, named};
 use crate::key;
 use crate::listen::ListenOptions;
+use crate::log::LogOptions;
 use crate::mission::{self, MissionOptions};
 use crate::site::SiteOptions;
 
@@ -29,7 +30,7 @@ const RADIO: u16 = 12;
 /// One relay of a chain, over ttys. Options of the mission must be the same for all relays; their defaults are the paper's
 /// multi-hop scenario.
 #[derive(Parser, Debug)]
-#[command(name = "linux_companion", disable_version_flag = true)]
+#[command(name = "linux_companion", version)]
 struct Options {
     /// Which relay this is: 1 is next to the transmitter
     #[arg(long, value_name = "I", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
@@ -111,6 +112,11 @@ struct Options {
     field: Option<Field>,
     #[command(flatten)]
     listen: ListenOptions,
+    /// Unix socket that answers each connection with one JSON object of all counters, and closes it
+    #[arg(long, value_name = "SOCKET", help_heading = "Log")]
+    status_socket: Option<PathBuf>,
+    #[command(flatten)]
+    log: LogOptions,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -146,6 +152,8 @@ pub(crate) struct Plan {
     pub(crate) baud: u32,
     pub(crate) positions: Option<PathBuf>,
     pub(crate) autopilot: Option<AutopilotPlan>,
+    pub(crate) status_socket: Option<PathBuf>,
+    pub(crate) log: LogOptions,
 }
 
 /// What frames are signed with.
@@ -230,6 +238,8 @@ fn plan(options: &Options) -> Result<Plan, String> {
         baud: options.baud,
         positions: options.positions.clone(),
         autopilot: autopilot(options)?,
+        status_socket: options.status_socket.clone(),
+        log: options.log.clone(),
     })
 }
 

@@ -21,7 +21,6 @@
 //!
 //! The other files are those of `examples/linux_companion`.
 #![cfg_attr(unix, forbid(unsafe_code))]
-#![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(unix)]
 #[path = "../linux_companion/command.rs"]
@@ -37,8 +36,9 @@ mod keep;
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
 mod key;
 #[cfg(unix)]
-#[path = "../linux_companion/line.rs"]
-mod line;
+#[path = "../linux_companion/log.rs"]
+#[expect(dead_code, reason = "a relay goes on where this one ends")]
+mod log;
 #[cfg(unix)]
 #[path = "../linux_companion/mission.rs"]
 mod mission;
@@ -67,27 +67,13 @@ fn main() -> std::process::ExitCode {
     match station::upload(&plan) {
         Ok(()) => ExitCode::SUCCESS,
         Err(line) => {
-            eprintln!("{line}");
+            command::complain(&line);
             ExitCode::FAILURE
         }
     }
 }
 
-#[cfg(not(any(unix, target_os = "none")))]
+#[cfg(not(unix))]
 fn main() {
-    println!("This example needs Linux or another Unix.");
-}
-
-#[cfg(target_os = "none")]
-use panic_halt as _;
-#[cfg(target_os = "none")]
-use stm32f4xx_hal as _;
-
-/// The ground is no microcontroller: there are no ttys on the target.
-#[cfg(target_os = "none")]
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    loop {
-        cortex_m::asm::wfi();
-    }
+    println!("This program needs Linux or another Unix.");
 }

@@ -13,6 +13,7 @@ use uav_relay::{
 
 use crate::command;
 use crate::key;
+use crate::log::LogOptions;
 use crate::mission::{
     MissionOptions, altitude, band, distance, interferer, left, mission, noise, power, right,
     separation,
@@ -96,6 +97,8 @@ struct Options {
     /// New least distance between two relays, m, 0 to 1e5
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = separation)]
     new_min_separation: Option<f32>,
+    #[command(flatten)]
+    log: LogOptions,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -118,6 +121,7 @@ pub(crate) struct Plan {
     pub(crate) key: [u8; 32],
     pub(crate) epoch_file: PathBuf,
     pub(crate) timeout: Duration,
+    pub(crate) log: LogOptions,
 }
 
 /// Reads the command line; where there is nothing to run, help or the mistake has been printed.
@@ -165,6 +169,7 @@ fn plan(options: Options) -> Result<Plan, String> {
         baud: options.baud,
         tty: options.tty,
         epoch_file: options.epoch_file,
+        log: options.log,
     })
 }
 

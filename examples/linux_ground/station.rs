@@ -11,11 +11,14 @@ use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Ground, Instant, Key, Progress, Side};
 
 use crate::epoch;
-use crate::line::line;
+use crate::log::Log;
 use crate::options::Plan;
 use crate::site::Between;
-use crate::system::{now, on_signals};
+use crate::system::{now, on_stop};
 use crate::tty::Tty;
+
+/// How long the last lines may take.
+const LAST_LINES: std::time::Duration = std::time::Duration::from_millis(500);
 
 /// A tty, and what it has not taken yet.
 struct Wire {
@@ -28,7 +31,7 @@ struct Wire {
 /// # Errors
 /// One line that says why it does not.
 pub(crate) fn upload(plan: &Plan) -> Result<(), String> {
-    let stop = on_signals()?;
+    let stop = on_stop()?;
     let mut wire = Wire {
         tty: Tty::open("--tty", &plan.tty, plan.baud)?,
         outgoing: Vec::new(),
@@ -38,7 +41,8 @@ pub(crate) fn upload(plan: &Plan) -> Result<(), String> {
         key: Key::new(plan.key),
         epoch: epoch::next(&plan.epoch_file)?,
     };
-    started(plan, wire.tty.name(), auth.epoch)?;
+    let log = Log::open(&plan.log)?;
+    started(&log, plan, auth.epoch);
     let mut ground = Ground::new(&plan.loaded, plan.end, plan.network, plan.wiring, auth);
     let begun = now(clock);
     ground
@@ -50,10 +54,13 @@ pub(crate) fn upload(plan: &Plan) -> Result<(), String> {
         wire.turn(&mut ground, now(clock));
         if ground.progress() != last {
             last = ground.progress();
-            say(now(clock), plan, last)?;
+            say(&log, now(clock), plan, last);
         }
         match last {
-            Progress::Flown { .. } => return Ok(()),
+            Progress::Flown { .. } => {
+                log.flush(LAST_LINES);
+                return Ok(());
+            }
             Progress::Outdated { version } => return Err(outdated(plan, version)),
             _ => {}
         }
@@ -116,53 +123,52 @@ const fn name(plan: &Plan) -> &'static str {
     }
 }
 
-fn started(plan: &Plan, tty: &str, epoch: u32) -> Result<(), String> {
+fn started(log: &Log, plan: &Plan, epoch: u32) {
     let (end, relays, network) = (name(plan), plan.loaded.relays(), plan.network);
     let (base, baud) = (digest(&plan.loaded), plan.baud);
-    line(
+    let tty = plan.tty.display();
+    log.tell(
         Instant::ZERO,
+        "started",
         format_args!(
-            "started: {end} of {relays} relays, network {network}, loaded mission 0x{base:04x}, {tty}, {baud} baud"
+            "{end} of {relays} relays, network {network}, loaded mission 0x{base:04x}, --tty {tty}, {baud} baud"
         ),
-    )?;
-    line(
+    );
+    log.tell(
         Instant::ZERO,
-        format_args!("signed: frames carry a tag, epoch {epoch}"),
-    )
+        "signed",
+        format_args!("frames carry a tag, epoch {epoch}"),
+    );
 }
 
-fn say(now: Instant, plan: &Plan, progress: Progress) -> Result<(), String> {
+fn say(log: &Log, now: Instant, plan: &Plan, progress: Progress) {
     let version = plan.upload.version();
     match progress {
         Progress::Offering => {
             let digest = plan.upload.id().digest;
+            let what = format!("version {version}, mission 0x{digest:04x}");
             match plan.upload.sites() {
-                Some(sites) => line(
-                    now,
-                    format_args!(
-                        "offering: version {version}, mission 0x{digest:04x}, {}",
-                        Between(sites)
-                    ),
-                ),
-                None => line(
-                    now,
-                    format_args!("offering: version {version}, mission 0x{digest:04x}"),
-                ),
+                Some(sites) => {
+                    log.tell(now, "offering", format_args!("{what}, {}", Between(sites)));
+                }
+                None => log.tell(now, "offering", format_args!("{what}")),
             }
         }
-        Progress::Held { by } => line(
+        Progress::Held { by } => log.tell(
             now,
-            format_args!("held: relay {by} holds version {version}, and the others are asked"),
+            "held",
+            format_args!("relay {by} holds version {version}, and the others are asked"),
         ),
-        Progress::Flown { by, view } => line(
+        Progress::Flown { by, view } => log.tell(
             now,
+            "flown",
             format_args!(
-                "flown: relay {by} flies version {version}, view {} of the chain",
+                "relay {by} flies version {version}, view {} of the chain",
                 view.number()
             ),
         ),
         // The others are the program's end.
-        _ => Ok(()),
+        _ => {}
     }
 }
 

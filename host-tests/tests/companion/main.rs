@@ -4,6 +4,7 @@
 mod binary;
 mod ending;
 mod flying;
+mod hub;
 mod idle;
 mod listening;
 mod mavsdk;
@@ -16,6 +17,7 @@ mod positions;
 mod process;
 mod pty;
 mod signed;
+mod stays;
 mod unplugged;
 mod upload;
 mod views;

@@ -190,10 +190,15 @@ fn a_file_that_is_of_no_use_is_named_and_not_used() {
         relay.settles_at(place[0]);
         assert_eq!(relay.has_said("resumed: flies version 5"), words.is_none());
         relay.signal(Signal::TERM);
-        let Ended { status, stderr, .. } = relay.end();
-        assert_eq!(status, Some(0));
-        assert_eq!(stderr.len(), words.iter().count(), "{stderr:?}");
-        for (line, words) in stderr.iter().zip(words) {
+        let Ended {
+            status,
+            stdout,
+            stderr,
+        } = relay.end();
+        assert_eq!((status, stderr), (Some(0), Vec::new()));
+        let said: Vec<&String> = stdout.iter().filter(|it| it.contains("  file: ")).collect();
+        assert_eq!(said.len(), words.iter().count(), "{said:?}");
+        for (line, words) in said.iter().zip(words) {
             assert!(
                 line.contains(&format!("{}: {words}", file.display())),
                 "{line}"
