@@ -45,6 +45,8 @@ mod autopilot;
 #[cfg(unix)]
 mod command;
 #[cfg(unix)]
+mod config;
+#[cfg(unix)]
 mod epoch;
 #[cfg(unix)]
 mod keep;

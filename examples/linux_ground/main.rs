@@ -26,6 +26,10 @@
 #[path = "../linux_companion/command.rs"]
 mod command;
 #[cfg(unix)]
+#[path = "../linux_companion/config.rs"]
+#[expect(dead_code, reason = "what single relays have of their own")]
+mod config;
+#[cfg(unix)]
 #[path = "../linux_companion/epoch.rs"]
 mod epoch;
 #[cfg(unix)]

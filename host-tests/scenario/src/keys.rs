@@ -19,6 +19,10 @@ pub(super) enum Rule {
     LinkOrNumber(Range),
     /// true or false.
     Flag,
+    /// A text that is not empty.
+    Text,
+    /// One of these words.
+    Word(&'static [&'static str]),
     Table(Keys),
     /// An array of tables with at least so many entries.
     Tables(Keys, usize),
@@ -34,7 +38,7 @@ pub(super) struct Key {
 /// The keys of a table.
 pub(super) type Keys = &'static [Key];
 
-const fn range(low: f64, high: f64, unit: &'static str) -> Range {
+pub(super) const fn range(low: f64, high: f64, unit: &'static str) -> Range {
     Range {
         low,
         high,
@@ -60,7 +64,7 @@ const fn required(name: &'static str, rule: Rule) -> Key {
     }
 }
 
-const fn optional(name: &'static str, rule: Rule) -> Key {
+pub(super) const fn optional(name: &'static str, rule: Rule) -> Key {
     Key {
         name,
         required: false,
@@ -200,20 +204,22 @@ impl fmt::Display for Rule {
             Whole(range) => write!(f, "a whole number, {range}"),
             LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
             Rule::Flag => f.write_str("true or false"),
-            Rule::Table(keys) => write!(f, "a table with the keys {}", names(keys)),
-            Rule::Tables(keys, 0) => write!(f, "a list of tables with the keys {}", names(keys)),
+            Rule::Text => f.write_str("a text that is not empty"),
+            Rule::Word(words) => write!(f, "one of \"{}\"", words.join("\", \"")),
+            Rule::Table(keys) => write!(f, "a table with the keys {}", names(*keys)),
+            Rule::Tables(keys, 0) => write!(f, "a list of tables with the keys {}", names(*keys)),
             Rule::Tables(keys, least) => write!(
                 f,
                 "a list of {least} or more tables with the keys {}",
-                names(keys)
+                names(*keys)
             ),
         }
     }
 }
 
 /// The names of some keys, for a message.
-pub(super) fn names(keys: Keys) -> String {
-    keys.iter()
+pub(super) fn names<'a>(keys: impl IntoIterator<Item = &'a Key>) -> String {
+    keys.into_iter()
         .map(|key| key.name)
         .collect::<Vec<_>>()
         .join(", ")
