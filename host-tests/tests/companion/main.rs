@@ -3,6 +3,7 @@
 
 mod binary;
 mod ending;
+mod file;
 mod flying;
 mod hub;
 mod idle;
@@ -17,10 +18,12 @@ mod positions;
 mod process;
 mod pty;
 mod signed;
+mod soak;
 mod stays;
 mod unplugged;
 mod upload;
 mod views;
+mod words;
 
 use std::time::{Duration, Instant};
 

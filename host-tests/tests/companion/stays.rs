@@ -15,7 +15,7 @@ use crate::process::{Ended, LIMIT, Relay};
 use crate::pty::Pty;
 
 /// What a relay says by its socket.
-fn asked(socket: &Path) -> Value {
+pub(crate) fn asked(socket: &Path) -> Value {
     let end = Instant::now() + LIMIT;
     let mut stream = loop {
         match UnixStream::connect(socket) {
@@ -30,7 +30,7 @@ fn asked(socket: &Path) -> Value {
 }
 
 /// Asks until it says so.
-fn until(socket: &Path, is_so: impl Fn(&Value) -> bool) -> Value {
+pub(crate) fn until(socket: &Path, is_so: impl Fn(&Value) -> bool) -> Value {
     let end = Instant::now() + LIMIT;
     loop {
         let said = asked(socket);

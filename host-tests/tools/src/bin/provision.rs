@@ -1,11 +1,12 @@
 //! `cargo provision`: what is written into one drone before it flies, from a scenario.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::{Parser, ValueEnum};
 use uav_relay::{Adjust, ChannelLoad, Local, Measure, Settings};
+use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::{Interference, Scenario};
 use uav_relay_sim::command::{self, Failure, MOST_BAUD};
 use uav_relay_sim::simulator::medium::access::OVERHEAD;
@@ -30,9 +31,9 @@ struct Options {
     /// Which of them this drone is, 1 (next to the transmitter) to N
     #[arg(long, value_name = "I", value_parser = clap::value_parser!(u16).range(1..=1000))]
     index: u16,
-    /// Number of the network, 0 to 65535; frames of any other are ignored
-    #[arg(long, value_name = "W", default_value_t = 1)]
-    network: u16,
+    /// Number of the network, 0 to 65535; frames of any other are ignored. Without it that of the scenario's [network], or 1
+    #[arg(long, value_name = "W")]
+    network: Option<u16>,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
     #[arg(long, value_name = "T", default_value_t = 1e-4)]
     tolerance: f64,
@@ -48,12 +49,13 @@ struct Options {
     /// In a field: the relay measures it too, and believes this many samples at a place, 100 to 1000000
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     samples: Option<u32>,
-    /// File with the network's key, 64 hexadecimal digits; without one the frames of this relay are not signed
+    /// File with the network's key, 64 hexadecimal digits; without one, and without one in the scenario's [network], the frames of this
+    /// relay are not signed
     #[arg(long, value_name = "FILE")]
     key_file: Option<PathBuf>,
     /// The least epoch to sign with, 1 to 4294967294, above any that a relay of this index has signed with by this key: it rises
     /// by itself from there. Without it the seconds of this machine's clock
-    #[arg(long, value_name = "E", requires = "key_file", value_parser = clap::value_parser!(u32).range(1..=0xFFFF_FFFE))]
+    #[arg(long, value_name = "E", value_parser = clap::value_parser!(u32).range(1..=0xFFFF_FFFE))]
     epoch: Option<u32>,
     /// Bits per second on the radio channel that the relays share, 300 to 10000000; refused where that cannot carry them
     #[arg(long, value_name = "B", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..=i64::from(MOST_BAUD)))]
@@ -113,19 +115,15 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<String, String> {
-    let Options {
-        uavs,
-        index,
-        network,
-        ..
-    } = *options;
+    let Options { uavs, index, .. } = *options;
     if index > uavs {
         return Err(format!("--index {index}: must be within 1 to {uavs}"));
     }
-    let scenario = match &options.scenario {
-        Some(file) => Scenario::load(file).map_err(|error| error.to_string())?,
-        None => Scenario::default(),
+    let (scenario, deployment) = match &options.scenario {
+        Some(file) => Deployment::load(file).map_err(|error| error.to_string())?,
+        None => Default::default(),
     };
+    let network = options.network.or(deployment.network.id).unwrap_or(NETWORK);
     let name = options
         .scenario
         .as_ref()
@@ -156,7 +154,7 @@ fn run(options: &Options) -> Result<String, String> {
         Some(file) => Some(key::load("--autopilot-key-file", file)?),
         None => None,
     };
-    let secret = secret(options)?;
+    let secret = secret(options, &deployment)?;
     let block = flight
         .by(method)
         .signed(secret)
@@ -191,9 +189,18 @@ fn carried(options: &Options) -> Result<(), String> {
         .map_err(|error| format!("{error}; fewer with --in-range, none with --wires"))
 }
 
-fn secret(options: &Options) -> Result<Option<Secret>, String> {
-    let Some(file) = &options.key_file else {
-        return Ok(None);
+fn secret(options: &Options, deployment: &Deployment) -> Result<Option<Secret>, String> {
+    // A path in the file is relative to its folder.
+    let folder = options.scenario.as_deref().and_then(Path::parent);
+    let of_file = deployment.network.key_file.as_ref();
+    let of_file = of_file.map(|file| folder.unwrap_or(Path::new("")).join(file));
+    let Some(file) = options.key_file.clone().or(of_file) else {
+        return match options.epoch {
+            Some(epoch) => Err(format!(
+                "--epoch {epoch}: is for frames that are signed, with --key-file"
+            )),
+            None => Ok(None),
+        };
     };
     let seconds = || {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
@@ -201,7 +208,7 @@ fn secret(options: &Options) -> Result<Option<Secret>, String> {
     };
     let epoch = options.epoch.or_else(seconds);
     Ok(Some(Secret {
-        key: key::load("--key-file", file)?,
+        key: key::load("--key-file", &file)?,
         epoch: epoch.ok_or("--epoch: is needed where the clock says no time")?,
     }))
 }
