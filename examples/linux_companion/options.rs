@@ -12,15 +12,16 @@ use uav_relay::{
     Adjust, ChannelLoad, Duration, Field, FieldPoint, Identity, Interference, Mission, Settings,
     Wiring,
 };
-use uav_relay_scenario::deployment::{Deployment, NETWORK};
+use uav_relay_scenario::deployment::NETWORK;
 
 use crate::autopilot::{AutopilotPlan, SigningKey, Where};
 use crate::command::{self, named};
-use crate::config::{self, Beyond, Given};
+use crate::config::Beyond;
 use crate::key;
 use crate::listen::ListenOptions;
 use crate::log::LogOptions;
 use crate::mission::{self, MissionOptions};
+use crate::section;
 use crate::site::SiteOptions;
 
 /// A frame's way through two kernels and two USB adapters, and the computing: an adapter alone may wait 16 ms.
@@ -177,35 +178,8 @@ impl std::fmt::Debug for Secret {
 
 /// Reads the command line; where there is nothing to run, help or the mistake has been printed.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
-    let (options, beyond) = command::read(section)?;
+    let (options, beyond) = command::read(section::companion)?;
     plan(&options, &beyond).map_err(|line| command::refuse(&line))
-}
-
-/// What a file says to a companion.
-fn section(deployment: &Deployment, given: &mut Given) {
-    config::network(deployment, given);
-    let own = &deployment.companion;
-    given.value("--index", own.index);
-    given.path("--upstream", own.upstream.as_ref());
-    given.path("--downstream", own.downstream.as_ref());
-    given.path("--shared", own.shared.as_ref());
-    given.path("--epoch-file", own.epoch_file.as_ref());
-    given.path("--upload-file", own.upload_file.as_ref());
-    given.path("--view-file", own.view_file.as_ref());
-    match own.autopilot.as_ref() {
-        Some(tty) if !tty.starts_with("udp:") => {
-            given.path("--autopilot", Some(&PathBuf::from(tty)));
-        }
-        other => given.value("--autopilot", other),
-    }
-    given.value("--autopilot-baud", own.autopilot_baud);
-    given.path("--autopilot-key-file", own.autopilot_key_file.as_ref());
-    given.value("--speed", own.speed_m_s);
-    given.path("--positions", own.positions.as_ref());
-    given.value("--position-error", own.position_error_m);
-    given.flag("--json", own.json);
-    given.path("--log-file", own.log_file.as_ref());
-    given.path("--status-socket", own.status_socket.as_ref());
 }
 
 fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {

@@ -11,6 +11,7 @@ use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, Upload};
 
 use crate::autopilot::Companion;
 use crate::log::Log;
+use crate::notify::Notify;
 use crate::options::Plan;
 use crate::ports::Ports;
 use crate::positions::Positions;
@@ -44,6 +45,7 @@ struct Flight {
     signs: bool,
     socket: Option<StatusSocket>,
     requests: Requests,
+    notify: Option<Notify>,
     stop: UnixStream,
 }
 
@@ -53,6 +55,7 @@ struct Flight {
 /// One line that says why it could not begin.
 pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
     let mut flight = Flight::begin(plan)?;
+    flight.notify.iter().for_each(Notify::ready);
     while flight.turn() {}
     flight.end();
     Ok(())
@@ -122,6 +125,7 @@ impl Flight {
             signs: auth.is_some(),
             socket,
             requests,
+            notify: Notify::open(),
             stop,
         })
     }
@@ -162,7 +166,9 @@ impl Flight {
         }
         self.asked(time);
         let again = self.autopilot.as_ref().map(|it| it.wake(now(self.clock)));
-        let wake = wake.into_iter().chain(again).chain(reopen).min();
+        let alive = self.notify.as_mut().and_then(|it| it.tend(time));
+        let others = [again, reopen, alive].into_iter().flatten();
+        let wake = wake.into_iter().chain(others).min();
         self.sleep(wake)
     }
 
@@ -235,6 +241,7 @@ impl Flight {
     }
 
     fn end(&mut self) {
+        self.notify.iter().for_each(Notify::stopping);
         let time = now(self.clock);
         if let Some(positions) = &self.positions {
             positions.stopped(time, &self.log);

@@ -1,14 +1,14 @@
 //! The ground's end of an upload, over a real tty: hands the chain a new mission, and ends once that is flown.
 //!
 //! ```text
-//! cargo run --example linux_ground -- --tty /dev/ttyUSB0 --end tx --of 3 \
+//! cargo ground --tty /dev/ttyUSB0 --end tx --of 3 \
 //!   --key-file network7.key --epoch-file ground.epoch --version 1 --new-interferer 80,700,-300
-//! cargo run --example linux_ground -- --help
+//! cargo ground --help
 //! ```
 //! It is the transmitter or the receiver of the chain: connect it where the relay next to that listens, or to the channel that
 //! all hear (`--shared`). `--of`, `--network` and the options of the mission say what the relays were loaded with, as `linux_companion`
-//! was given it, or as a scenario of `cargo provision` has it; of one with a field, or with another channel or tolerance than the default, it
-//! cannot speak. The options that begin with `--new-` say what is different from now on. Every upload has a larger `--version` than the
+//! was given it, or as a file has it (`--config`): another channel than the paper's, or a field, only that can say.
+//! The options that begin with `--new-` say what is different from now on. Every upload has a larger `--version` than the
 //! one before, and the epoch file is this program's own.
 //!
 //! Its lines on standard output are as those of `linux_companion`. It ends with status 0 once the chain flies the new mission, 1 if

@@ -8,7 +8,7 @@ use rustix::io::Errno;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Auth, Ground, Instant, Key, Progress, Side};
+use uav_relay::{Auth, Ground, Instant, Key, Progress, Side, Stats};
 
 use crate::epoch;
 use crate::log::Log;
@@ -69,7 +69,7 @@ pub(crate) fn upload(plan: &Plan) -> Result<(), String> {
         }
         let time = now(clock);
         if time >= end {
-            return Err(late(plan, last, ground.refused()));
+            return Err(late(plan, last, &ground));
         }
         let wake = ground.poll_timeout().map_or(end, |again| again.min(end));
         if wire.sleep(time, wake, stop.as_fd())? {
@@ -186,7 +186,7 @@ fn outdated(plan: &Plan, held: u16) -> String {
     }
 }
 
-fn late(plan: &Plan, progress: Progress, refused: u32) -> String {
+fn late(plan: &Plan, progress: Progress, ground: &Ground) -> String {
     let seconds = plan.timeout.as_micros() / 1_000_000;
     let version = plan.upload.version();
     let state = match progress {
@@ -194,9 +194,67 @@ fn late(plan: &Plan, progress: Progress, refused: u32) -> String {
             format!("relay {by} holds version {version}, and the chain does not fly it yet")
         }
         _ => format!(
-            "no relay is known to hold version {version}: out of reach, or with another key, --network or mission than 0x{:04x}",
-            digest(&plan.loaded)
+            "no relay is known to hold version {version}: {}",
+            why(plan, ground.stats())
         ),
     };
+    let refused = ground.refused();
     format!("--timeout {seconds}: {state}; {refused} frames refused")
+}
+
+/// What most likely is wrong, by what was heard.
+fn why(plan: &Plan, stats: &Stats) -> String {
+    let faults = [
+        (
+            stats.mission,
+            format!(
+                "hellos are of relays that were loaded with another mission than 0x{:04x}; say what they were loaded with",
+                digest(&plan.loaded)
+            ),
+        ),
+        (
+            stats.forged,
+            "frames have a wrong tag: is the key in --key-file that of the relays?".to_owned(),
+        ),
+        (
+            stats.unsigned,
+            "frames are not signed: relays without --key-file take no uploads".to_owned(),
+        ),
+        (
+            stats.foreign,
+            format!(
+                "frames are of another network number than --network {}",
+                plan.network
+            ),
+        ),
+        (
+            stats.version,
+            "frames are of another version of the format".to_owned(),
+        ),
+        (
+            stats.misaddressed.saturating_add(stats.overheard),
+            format!(
+                "frames are for others than the {}: are --end and --of right?",
+                name(plan)
+            ),
+        ),
+        (
+            stats.crc,
+            format!(
+                "frames are damaged: is --baud {} that of the relays?",
+                plan.baud
+            ),
+        ),
+    ];
+    let heard = stats.received.saturating_add(stats.handshakes);
+    match faults.into_iter().find(|(count, _)| *count > 0) {
+        Some((count, fault)) => format!("{count} {fault}"),
+        None if heard > 0 => "one answers, and does not take it yet".to_owned(),
+        None => format!(
+            "nothing was heard; is --tty {} the one toward the chain, and are --network {} and --baud {} those of the relays?",
+            plan.tty.display(),
+            plan.network,
+            plan.baud
+        ),
+    }
 }

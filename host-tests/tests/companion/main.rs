@@ -20,6 +20,7 @@ mod pty;
 mod signed;
 mod soak;
 mod stays;
+mod systemd;
 mod unplugged;
 mod upload;
 mod views;

@@ -124,3 +124,67 @@ fn frames_that_are_refused_say_why() {
         second.signal(Signal::TERM);
     }
 }
+
+/// An upload that does not come about, for one reason each.
+#[test]
+fn the_ground_says_what_most_likely_is_wrong() {
+    let files = Files::new();
+    let wire = Medium::new(2, QUIET);
+    let relay_options = files.options("key", "relay");
+    let mut all = vec!["--index", "1", "--of", "1", "--upstream", wire.tty(0)];
+    all.extend(["--probe-after-ms", "300", "--dead-after-ms", "900"]);
+    all.extend(relay_options.iter().map(String::as_str));
+    let mut relay = Relay::start(&all);
+    relay.line("converged: ");
+    let alone = Medium::new(1, QUIET);
+    for (more, key, tty, why) in [
+        (
+            &["--altitude", "21"][..],
+            "key",
+            wire.tty(1),
+            "loaded with another mission than 0x",
+        ),
+        (&["--network", "8"], "key", wire.tty(1), "--network 8"),
+        (
+            &[],
+            "other",
+            wire.tty(1),
+            "is the key in --key-file that of the relays?",
+        ),
+        (
+            &[],
+            "key",
+            alone.tty(0),
+            "nothing was heard; is --tty /dev/pts/",
+        ),
+        (
+            &["--end", "rx"],
+            "key",
+            wire.tty(1),
+            "are --end and --of right?",
+        ),
+    ] {
+        let options = files.options(key, "ground");
+        let mut all = vec![
+            "--tty",
+            tty,
+            "--of",
+            "1",
+            "--version",
+            "3",
+            "--timeout",
+            "5",
+        ];
+        if !more.contains(&"--end") {
+            all.extend(["--end", "tx"]);
+        }
+        all.extend(more);
+        all.extend(options.iter().map(String::as_str));
+        let line = said(Relay::ground(&all), 1);
+        assert!(
+            line.starts_with("--timeout 5: no relay is known to hold version 3: "),
+            "{line}"
+        );
+        assert!(line.contains(why), "{more:?}: {line}");
+    }
+}
