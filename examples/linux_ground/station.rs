@@ -234,7 +234,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
         (
             stats.misaddressed.saturating_add(stats.overheard),
             format!(
-                "frames are for others than the {}: are --end and --of right?",
+                "frames are heard and none is for the {}: are --key-file, --end and --of those of the relays? The log of the nearest one says more",
                 name(plan)
             ),
         ),
@@ -246,12 +246,16 @@ fn why(plan: &Plan, stats: &Stats) -> String {
             ),
         ),
     ];
-    let heard = stats.received.saturating_add(stats.handshakes);
     match faults.into_iter().find(|(count, _)| *count > 0) {
         Some((count, fault)) => format!("{count} {fault}"),
-        None if heard > 0 => "one answers, and does not take it yet".to_owned(),
+        None if stats.received > 0 => "one answers, and does not take it yet".to_owned(),
+        // A relay that flies another mission says no more than that it is there.
+        None if stats.handshakes > 0 => format!(
+            "one is there and says nothing: it was loaded with another mission than 0x{:04x}, most likely",
+            digest(&plan.loaded)
+        ),
         None => format!(
-            "nothing was heard; is --tty {} the one toward the chain, and are --network {} and --baud {} those of the relays?",
+            "nothing was heard; is --tty {} the one toward the chain, and are --network {}, --baud {}, --end and --key-file right? The log of a relay that hears this says more",
             plan.tty.display(),
             plan.network,
             plan.baud

@@ -125,66 +125,94 @@ fn frames_that_are_refused_say_why() {
     }
 }
 
-/// An upload that does not come about, for one reason each.
+/// An upload that does not come about, and why: to that end with these options.
+fn upload_fails(files: &Files, tty: &str, key: &str, more: &[&str], why: &str) {
+    let options = files.options(key, "ground");
+    let mut all = vec!["--tty", tty, "--version", "3", "--timeout", "5"];
+    all.extend(more);
+    all.extend(options.iter().map(String::as_str));
+    let line = said(Relay::ground(&all), 1);
+    assert!(
+        line.starts_with("--timeout 5: no relay is known to hold version 3: "),
+        "{line}"
+    );
+    assert!(line.contains(why), "{more:?}: {line}");
+}
+
+fn signed(files: &Files, epoch: &str, place: &[&str]) -> Relay {
+    let options = files.options("key", epoch);
+    let mut all = place.to_vec();
+    all.extend(["--probe-after-ms", "300", "--dead-after-ms", "900"]);
+    all.extend(options.iter().map(String::as_str));
+    Relay::start(&all)
+}
+
+/// A relay says nothing to somebody whom it does not know, so on a wire most mistakes are silence: then its own log has the reason.
 #[test]
-fn the_ground_says_what_most_likely_is_wrong() {
+fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
     let files = Files::new();
     let wire = Medium::new(2, QUIET);
-    let relay_options = files.options("key", "relay");
-    let mut all = vec!["--index", "1", "--of", "1", "--upstream", wire.tty(0)];
-    all.extend(["--probe-after-ms", "300", "--dead-after-ms", "900"]);
-    all.extend(relay_options.iter().map(String::as_str));
-    let mut relay = Relay::start(&all);
+    let mut relay = signed(
+        &files,
+        "relay",
+        &["--index", "1", "--of", "1", "--upstream", wire.tty(0)],
+    );
     relay.line("converged: ");
-    let alone = Medium::new(1, QUIET);
-    for (more, key, tty, why) in [
-        (
-            &["--altitude", "21"][..],
-            "key",
-            wire.tty(1),
-            "loaded with another mission than 0x",
-        ),
-        (&["--network", "8"], "key", wire.tty(1), "--network 8"),
-        (
-            &[],
-            "other",
-            wire.tty(1),
-            "is the key in --key-file that of the relays?",
-        ),
-        (
-            &[],
-            "key",
-            alone.tty(0),
-            "nothing was heard; is --tty /dev/pts/",
-        ),
-        (
-            &["--end", "rx"],
-            "key",
-            wire.tty(1),
-            "are --end and --of right?",
-        ),
-    ] {
-        let options = files.options(key, "ground");
-        let mut all = vec![
-            "--tty",
-            tty,
-            "--of",
-            "1",
-            "--version",
-            "3",
-            "--timeout",
-            "5",
-        ];
-        if !more.contains(&"--end") {
-            all.extend(["--end", "tx"]);
-        }
-        all.extend(more);
-        all.extend(options.iter().map(String::as_str));
-        let line = said(Relay::ground(&all), 1);
-        assert!(
-            line.starts_with("--timeout 5: no relay is known to hold version 3: "),
-            "{line}"
-        );
-        assert!(line.contains(why), "{more:?}: {line}");
-    }
+    let tx = ["--of", "1", "--end", "tx"];
+    let other = [&tx[..], &["--altitude", "21"]].concat();
+    upload_fails(
+        &files,
+        wire.tty(1),
+        "key",
+        &other,
+        "loaded with another mission than 0x",
+    );
+    let other = [&tx[..], &["--network", "8"]].concat();
+    upload_fails(
+        &files,
+        wire.tty(1),
+        "key",
+        &other,
+        "nothing was heard; is --tty /dev/pts/",
+    );
+    relay.line("not taken: ");
+    upload_fails(
+        &files,
+        wire.tty(1),
+        "other",
+        &tx,
+        "are --network 1, --baud 115200, --end and --key-file right?",
+    );
+    assert!(relay.line("not taken: ").contains("have a wrong tag"));
+}
+
+/// On a channel it hears the others talk.
+#[test]
+fn on_a_channel_the_ground_says_what_most_likely_is_wrong() {
+    let files = Files::new();
+    let channel = Medium::new(3, QUIET);
+    let mut relays: Vec<Relay> = [("1", 0), ("2", 1)]
+        .into_iter()
+        .map(|(index, tty)| {
+            let place = ["--index", index, "--of", "2", "--shared", channel.tty(tty)];
+            signed(&files, &format!("relay{index}"), &place)
+        })
+        .collect();
+    relays[0].line("converged: ");
+    let tx = ["--of", "2", "--end", "tx", "--shared"];
+    let other = [&tx[..], &["--network", "8"]].concat();
+    upload_fails(
+        &files,
+        channel.tty(2),
+        "key",
+        &other,
+        "of another network number than --network 8",
+    );
+    upload_fails(
+        &files,
+        channel.tty(2),
+        "other",
+        &tx,
+        "none is for the transmitter: are --key-file, --end",
+    );
 }
