@@ -29,17 +29,17 @@ pub(crate) fn read<T: Parser>(
 fn first(text: &str) -> String {
     let mut lines = text.lines().map(str::trim);
     let wrong: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
-    let mut line = wrong.join(" ").trim_start_matches("error: ").to_owned();
+    let line = wrong.join(" ").trim_start_matches("error: ").to_owned();
     let meant = lines
         .filter(|line| line.starts_with("tip: ") && line.contains("similar"))
         .find_map(|line| {
             line.split_once("exists: ")
                 .or_else(|| line.split_once("exist: "))
         });
-    if let Some((_, meant)) = meant {
-        line += &format!("; did you mean {meant}?");
+    match meant {
+        Some((_, meant)) => format!("{line}; did you mean {meant}?"),
+        None => line,
     }
-    line
 }
 
 /// Says what is wrong.

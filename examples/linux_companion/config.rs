@@ -172,7 +172,7 @@ fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
             given.value("--interferer", Some(one));
         }
         Interference::Unknown => given.value("--interferer", Some("unknown")),
-        other => field = Some(other),
+        other @ Interference::Field(_) => field = Some(other),
     }
     if let Some(listen) = &scenario.listen {
         given.flag("--listen", Some(true));

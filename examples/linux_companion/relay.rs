@@ -237,7 +237,7 @@ impl Flight {
         {
             autopilot.noticed(*events);
         }
-        found.first().is_none_or(|events| events.is_empty())
+        found.first().is_none_or(PollFlags::is_empty)
     }
 
     fn end(&mut self) {

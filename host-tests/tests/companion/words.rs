@@ -53,7 +53,7 @@ fn a_port_that_cannot_be_opened_says_why() {
     let folder = tempfile::tempdir().unwrap();
     let secret = folder.path().join("tty");
     std::fs::write(&secret, "").unwrap();
-    std::fs::set_permissions(&secret, std::fs::Permissions::from_mode(0)).unwrap();
+    std::fs::set_permissions(&secret, std::fs::Permissions::from_mode(0o0)).unwrap();
     let mut faults = vec![
         (folder.path().to_owned(), "is a directory, and no tty"),
         (
