@@ -35,7 +35,7 @@ const RADIO: u16 = 12;
 #[derive(Parser, Debug)]
 #[command(name = "linux_companion", version)]
 struct Options {
-    /// TOML file with the scenario, as `cargo chain` and `cargo plan` read it, and sections [network] and [companion]: what it says, options
+    /// TOML file with the scenario, as `cargo chain` and `cargo plan` read it, and sections `network` and `companion`: what it says, options
     /// of the command line say otherwise
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,

@@ -28,7 +28,7 @@ use crate::site::{SiteOptions, site};
 #[derive(Parser, Debug)]
 #[command(name = "linux_ground", disable_version_flag = true)]
 struct Options {
-    /// TOML file with the scenario that the relays were loaded with, and sections [network] and [ground]: what it says, options of the
+    /// TOML file with the scenario that the relays were loaded with, and sections `network` and `ground`: what it says, options of the
     /// command line say otherwise
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,

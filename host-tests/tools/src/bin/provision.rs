@@ -31,7 +31,7 @@ struct Options {
     /// Which of them this drone is, 1 (next to the transmitter) to N
     #[arg(long, value_name = "I", value_parser = clap::value_parser!(u16).range(1..=1000))]
     index: u16,
-    /// Number of the network, 0 to 65535; frames of any other are ignored. Without it that of the scenario's [network], or 1
+    /// Number of the network, 0 to 65535; frames of any other are ignored. Without it that of the scenario's section `network`, or 1
     #[arg(long, value_name = "W")]
     network: Option<u16>,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
@@ -49,7 +49,7 @@ struct Options {
     /// In a field: the relay measures it too, and believes this many samples at a place, 100 to 1000000
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     samples: Option<u32>,
-    /// File with the network's key, 64 hexadecimal digits; without one, and without one in the scenario's [network], the frames of this
+    /// File with the network's key, 64 hexadecimal digits; without one, and without one in the scenario's section `network`, the frames of this
     /// relay are not signed
     #[arg(long, value_name = "FILE")]
     key_file: Option<PathBuf>,
