@@ -24,6 +24,7 @@ pub(crate) fn asked(socket: &Path) -> Value {
             Err(_) => std::thread::sleep(Duration::from_millis(20)),
         }
     };
+    stream.set_read_timeout(Some(LIMIT)).unwrap();
     let mut text = String::new();
     stream.read_to_string(&mut text).unwrap();
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"))
