@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use rustix::event::PollFlags;
+use serde_json::{Value, json};
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::trust::Mistrust;
@@ -14,16 +15,16 @@ use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
 use uav_relay::flight::axis::Axis;
 use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Duration, Event, Instant, Relay, Sites};
+use uav_relay::{Event, Instant, Relay, Sites};
 
-use crate::line::line;
-use crate::tty::Tty;
-
-/// Between two tries to open it.
-const AGAIN: Duration = Duration::from_millis(1_000);
+use crate::log::Log;
+use crate::replug::Replug;
 
 /// What waits for a tty that is slow, at most, bytes: some seconds of what is said.
 const WAITING: usize = 4_096;
+
+/// What its lines are about.
+const EVENT: &str = "autopilot";
 
 /// The number of this link in what is signed.
 const LINK: u8 = 0;
@@ -67,7 +68,7 @@ pub(crate) struct AutopilotPlan {
 
 #[derive(Debug)]
 enum Port {
-    Tty(Tty),
+    Tty(Replug),
     Udp(UdpSocket),
 }
 
@@ -78,11 +79,9 @@ pub(crate) struct Companion {
     link: Autopilot,
     /// Between which sites it flies.
     between: Sites,
-    port: Option<Port>,
-    open_at: Instant,
-    /// Whether it was said that it is gone.
-    told_gone: bool,
+    port: Port,
     waiting: Vec<u8>,
+    state: Option<&'static str>,
 }
 
 impl Companion {
@@ -101,53 +100,60 @@ impl Companion {
             link,
             between: plan.sites,
             plan: plan.clone(),
-            port: Some(port),
-            open_at: now,
-            told_gone: false,
+            port,
             waiting: Vec::new(),
+            state: None,
         })
     }
 
     /// Says what is flown by what.
-    ///
-    /// # Errors
-    /// As every line: where standard output takes it no more.
-    pub(crate) fn started(&self) -> Result<(), String> {
+    pub(crate) fn started(&self, log: &Log) {
         let (place, pace) = (&self.plan.place, self.plan.pace);
-        line(
+        log.tell(
             Instant::ZERO,
+            EVENT,
             format_args!(
-                "autopilot: by {place}, {} m/s at most; flies once its pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
+                "by {place}, {} m/s at most; flies once its pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
                 pace.speed_m_s
             ),
-        )?;
+        );
         if self.plan.key.is_some() {
-            let what = "autopilot: frames are signed, and only what is signed with its key counts";
-            line(Instant::ZERO, format_args!("{what}"))?;
+            let what = "frames are signed, and only what is signed with its key counts";
+            log.tell(Instant::ZERO, EVENT, format_args!("{what}"));
         }
-        Ok(())
     }
 
     /// Says what was not believed.
-    ///
-    /// # Errors
-    /// As every line: where standard output takes it no more.
-    pub(crate) fn stopped(&self, now: Instant) -> Result<(), String> {
-        match self.link.refused() {
-            0 => Ok(()),
-            refused => line(
+    pub(crate) fn stopped(&self, now: Instant, log: &Log) {
+        let refused = self.link.refused();
+        if refused > 0 {
+            log.tell(
                 now,
-                format_args!("autopilot: {refused} frames refused by their signatures"),
-            ),
+                EVENT,
+                format_args!("{refused} frames refused by their signatures"),
+            );
         }
     }
 
+    /// What it has counted, and how it is.
+    pub(crate) fn status(&self) -> Value {
+        let port = match &self.port {
+            Port::Tty(tty) => tty.status(),
+            Port::Udp(_) => json!({ "port": self.plan.place.to_string(), "open": true }),
+        };
+        json!({
+            "port": port,
+            "state": self.state,
+            "flown": self.link.is_flown(),
+            "frames_refused": self.link.refused(),
+        })
+    }
+
     /// Moves bytes either way; hands the relay where the drone is and whether its setpoints are flown, and the autopilot the setpoint.
-    ///
-    /// # Errors
-    /// As every line: where standard output takes it no more.
-    pub(crate) fn drive(&mut self, now: Instant, relay: &mut Relay) -> Result<(), String> {
-        self.reopen(now)?;
+    pub(crate) fn drive(&mut self, now: Instant, log: &Log, relay: &mut Relay) {
+        if let Port::Tty(tty) = &mut self.port {
+            tty.tend(now, log);
+        }
         self.follow(now, relay);
         let mut bytes = [0; 1_024];
         while let Some(count) = self.read(&mut bytes) {
@@ -170,9 +176,11 @@ impl Companion {
         }
         self.flush();
         while let Some(event) = self.link.poll_event() {
-            said(now, event)?;
+            if let AutopilotEvent::State(state) = event {
+                self.state = Some(word(state));
+            }
+            said(now, log, event);
         }
-        Ok(())
     }
 
     /// Between the sites of a mission that has just been adopted, before anything is told that is along its line.
@@ -194,58 +202,31 @@ impl Companion {
     /// When to come back at the latest.
     pub(crate) fn wake(&self, now: Instant) -> Instant {
         let link = self.link.poll_timeout(now);
-        if self.port.is_some() {
-            link
-        } else {
-            link.min(self.open_at.max(now))
-        }
+        let again = match &self.port {
+            Port::Tty(tty) => tty.wake(),
+            Port::Udp(_) => None,
+        };
+        again.map_or(link, |again| link.min(again.max(now)))
     }
 
     /// What to sleep on.
     pub(crate) fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
-        match self.port.as_ref()? {
-            Port::Tty(tty) => Some((tty.as_fd(), tty.interest())),
+        match &self.port {
+            Port::Tty(tty) => tty.interest(),
             Port::Udp(socket) => Some((socket.as_fd(), PollFlags::IN)),
         }
     }
 
     /// Takes note of what poll(2) has found.
     pub(crate) fn noticed(&mut self, events: PollFlags) {
-        if let Some(Port::Tty(tty)) = &mut self.port {
+        if let Port::Tty(tty) = &mut self.port {
             tty.noticed(events);
         }
     }
 
-    fn reopen(&mut self, now: Instant) -> Result<(), String> {
-        let failure = match &self.port {
-            Some(Port::Tty(tty)) => tty.failure().map(ToOwned::to_owned),
-            _ => None,
-        };
-        if let Some(failure) = failure {
-            self.port = None;
-            self.waiting.clear();
-            self.open_at = now + AGAIN;
-            if !core::mem::replace(&mut self.told_gone, true) {
-                line(
-                    now,
-                    format_args!("autopilot: {failure}; tried again every second"),
-                )?;
-            }
-        }
-        if self.port.is_none() && self.open_at <= now {
-            self.open_at = now + AGAIN;
-            if let Ok(port) = port(&self.plan.place) {
-                self.port = Some(port);
-                self.told_gone = false;
-                line(now, format_args!("autopilot: {} is back", self.plan.place))?;
-            }
-        }
-        Ok(())
-    }
-
     /// How many bytes have come; none where there are none.
     fn read(&mut self, into: &mut [u8]) -> Option<usize> {
-        let count = match self.port.as_mut()? {
+        let count = match &mut self.port {
             Port::Tty(tty) => tty.read(into).ok(),
             // Nobody there yet is no reason to give up.
             Port::Udp(socket) => socket.recv(into).ok(),
@@ -256,16 +237,16 @@ impl Companion {
     fn send(&mut self, frame: &[u8]) {
         match &self.port {
             // One that does not take it is too slow for the next one as well: the newest counts.
-            Some(Port::Udp(socket)) => drop(socket.send(frame)),
-            Some(Port::Tty(_)) if self.waiting.len() + frame.len() <= WAITING => {
+            Port::Udp(socket) => drop(socket.send(frame)),
+            Port::Tty(_) if self.waiting.len() + frame.len() <= WAITING => {
                 self.waiting.extend_from_slice(frame);
             }
-            _ => {}
+            Port::Tty(_) => {}
         }
     }
 
     fn flush(&mut self) {
-        if let Some(Port::Tty(tty)) = &mut self.port
+        if let Port::Tty(tty) = &mut self.port
             && !self.waiting.is_empty()
         {
             let sent = tty.write(&self.waiting).unwrap_or(0);
@@ -274,15 +255,16 @@ impl Companion {
     }
 }
 
-fn said(now: Instant, event: AutopilotEvent) -> Result<(), String> {
+fn said(now: Instant, log: &Log, event: AutopilotEvent) {
     match event {
-        AutopilotEvent::Found(kind) => line(now, format_args!("autopilot: found {}", called(kind))),
-        AutopilotEvent::Restarted => line(now, format_args!("autopilot: was switched off and on")),
-        AutopilotEvent::Refused => line(
+        AutopilotEvent::Found(kind) => {
+            log.tell(now, EVENT, format_args!("found {}", called(kind)));
+        }
+        AutopilotEvent::Restarted => log.tell(now, EVENT, format_args!("was switched off and on")),
+        AutopilotEvent::Refused => log.tell(
             now,
-            format_args!(
-                "autopilot: does not fly where it is told to; is the place outside its fence?"
-            ),
+            EVENT,
+            format_args!("does not fly where it is told to; is the place outside its fence?"),
         ),
         AutopilotEvent::State(state) => {
             let what = match state {
@@ -292,12 +274,24 @@ fn said(now: Instant, event: AutopilotEvent) -> Result<(), String> {
                 State::Engaged => "flies to the relay's setpoints",
                 State::Blind => "no position; keeps its last target",
             };
-            line(now, format_args!("autopilot: {what}"))
+            let fields = json!({ "state": word(state) });
+            log.say(now, EVENT, fields, format_args!("{what}"));
         }
         AutopilotEvent::Mistrusted(why) => {
-            line(now, format_args!("autopilot: {}", mistrusted(why)))
+            log.tell(now, EVENT, format_args!("{}", mistrusted(why)));
         }
-        other => line(now, format_args!("autopilot: {other:?}")),
+        other => log.tell(now, EVENT, format_args!("{other:?}")),
+    }
+}
+
+/// A state in one word, for programs.
+const fn word(state: State) -> &'static str {
+    match state {
+        State::Silent => "silent",
+        State::Grounded => "grounded",
+        State::Standby => "standby",
+        State::Engaged => "engaged",
+        State::Blind => "blind",
     }
 }
 
@@ -333,7 +327,7 @@ const fn called(kind: Kind) -> &'static str {
 
 fn port(place: &Where) -> Result<Port, String> {
     match place {
-        Where::Tty(path, baud) => Tty::open("--autopilot", path, *baud).map(Port::Tty),
+        Where::Tty(path, baud) => Replug::open("--autopilot", path, *baud).map(Port::Tty),
         Where::Udp(address) => socket(address)
             .map(Port::Udp)
             .map_err(|error| format!("{place}: {error}")),

@@ -19,8 +19,8 @@ pub(crate) struct ListenOptions {
     /// How long after an agreement the first relay asks what is heard, s, 0.01 to 1e5; without it 5, with --following 1
     #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.01, 1e5))]
     listen_every: Option<f32>,
-    /// After so long what was heard counts half, s, 0.01 to 1e6; without it 60, with --following 16 over the number of relays
-    #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.01, 1e6))]
+    /// After so long what was heard counts half, s, 0.01 to 1e12; without it 60, with --following 16 over the number of relays
+    #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.01, 1e12))]
     listen_half_life: Option<f32>,
     /// By how much one measurement is off, relative, 0.001 to 1; without it 0.03, for a SiK radio rather 0.1
     #[arg(long, value_name = "E", requires = "listen", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-3, 1.0))]
@@ -43,7 +43,7 @@ impl ListenOptions {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "1e4 to 1e12"
+            reason = "1e4 to 1e18"
         )]
         let micros = |seconds: f32| Duration::from_micros((f64::from(seconds) * 1e6) as u64);
         self.listen.then(|| Listen {

@@ -1,9 +1,9 @@
 //! A relay on a Linux companion computer, over real ttys: USB adapters, the UART of a header, telemetry radios.
 //!
 //! ```text
-//! cargo run --example linux_companion -- --index 2 --of 3 --upstream /dev/ttyUSB0 --downstream /dev/ttyUSB1
-//! cargo run --example linux_companion -- --index 2 --of 3 --shared /dev/ttyUSB0      # one radio for all
-//! cargo run --example linux_companion -- --help
+//! cargo companion --index 2 --of 3 --upstream /dev/ttyUSB0 --downstream /dev/ttyUSB1
+//! cargo companion --index 2 --of 3 --shared /dev/ttyUSB0      # one radio for all
+//! cargo companion --help
 //! ```
 //! The first relay needs no `--upstream`, the last one no `--downstream`. All relays of a chain are given the same `--of`,
 //! `--baud`, `--network` and mission; a neighbour that was given another mission is reported.
@@ -17,47 +17,59 @@
 //! fly and hears where the drone is, so its setpoints keep drones apart on their way. With `--positions` it is told where the drone is by
 //! another program, which flies to the setpoints that are printed. Without either nothing keeps drones apart, and it says so.
 //!
-//! Every event is one line on standard output; an f32 also as its bits. It ends with status 0 at Ctrl-C or SIGTERM, 1 when a tty fails (let systemd start it again),
-//! 2 when the options are wrong.
+//! `--config` reads all of that from one file, the scenario of the other tools with sections of its own.
+//!
+//! Every event is one line on standard output or in a file; an f32 also as its bits. In flight neither a port that vanishes nor a full disk nor
+//! a reader that stops ends it or holds it up. It ends with status 0 at Ctrl-C or SIGTERM, 1 where it cannot begin, 2 when the options are wrong.
 //!
 //! | file | one idea |
 //! | --- | --- |
 //! | `options.rs` | the command line, checked |
+//! | `config.rs`, `section.rs` | the file, as options before those of the command line; the companion's part of it |
 //! | `mission.rs`, `command.rs` | the part of it that is the mission; what is said of a mistake |
 //! | `listen.rs` | the part of it that is how the chain finds its interferer |
 //! | `tty.rs` | a tty that never blocks, as a `SerialPort` |
+//! | `replug.rs` | the same, opened again whenever it vanishes: all bytes of a port pass here |
 //! | `ports.rs` | the ttys of either wiring, and sleep until one of them or a timer needs the relay |
-//! | `site.rs`, `autopilot.rs` | where the line is on earth; the autopilot, opened again whenever it vanishes |
+//! | `site.rs`, `autopilot.rs` | where the line is on earth; the autopilot |
 //! | `positions.rs` | where the drone is, and what is heard there, from a FIFO |
 //! | `relay.rs` | the loop |
-//! | `report.rs`, `line.rs` | the lines it prints |
+//! | `report.rs`, `log.rs` | the lines it says; how they are written without ever waiting |
+//! | `refusals.rs` | why frames are refused, in words |
+//! | `status.rs`, `socket.rs` | all that is counted, as JSON; a socket that tells it |
 //! | `key.rs`, `epoch.rs` | what frames are signed with, from files |
 //! | `uploads.rs` | the newest mission that was uploaded, in a file |
 //! | `views.rs` | what it has said in the votes on views, in a file |
-//! | `keep.rs` | a file that is written whole or not at all |
-//! | `system.rs` | time and signals |
+//! | `keep.rs`, `kept.rs` | a file that is written whole or not at all; one that is written in flight |
+//! | `system.rs`, `requests.rs` | time; signals that end it, and those that ask something of it |
+//! | `notify.rs` | what systemd is told |
 //!
 //! It runs on other kinds of Unix too; on a Mac the ttys are called `/dev/cu.*`.
 #![cfg_attr(unix, forbid(unsafe_code))]
-#![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(unix)]
 mod autopilot;
 #[cfg(unix)]
 mod command;
 #[cfg(unix)]
+mod config;
+#[cfg(unix)]
 mod epoch;
 #[cfg(unix)]
 mod keep;
 #[cfg(unix)]
+mod kept;
+#[cfg(unix)]
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
 mod key;
 #[cfg(unix)]
-mod line;
-#[cfg(unix)]
 mod listen;
 #[cfg(unix)]
+mod log;
+#[cfg(unix)]
 mod mission;
+#[cfg(unix)]
+mod notify;
 #[cfg(unix)]
 mod options;
 #[cfg(unix)]
@@ -65,11 +77,23 @@ mod ports;
 #[cfg(unix)]
 mod positions;
 #[cfg(unix)]
+mod refusals;
+#[cfg(unix)]
 mod relay;
+#[cfg(unix)]
+mod replug;
 #[cfg(unix)]
 mod report;
 #[cfg(unix)]
+mod requests;
+#[cfg(unix)]
+mod section;
+#[cfg(unix)]
 mod site;
+#[cfg(unix)]
+mod socket;
+#[cfg(unix)]
+mod status;
 #[cfg(unix)]
 mod system;
 #[cfg(unix)]
@@ -90,27 +114,13 @@ fn main() -> std::process::ExitCode {
     match relay::fly(&plan) {
         Ok(()) => ExitCode::SUCCESS,
         Err(line) => {
-            eprintln!("{line}");
+            command::complain(&line);
             ExitCode::FAILURE
         }
     }
 }
 
-#[cfg(not(any(unix, target_os = "none")))]
+#[cfg(not(unix))]
 fn main() {
-    println!("This example needs Linux or another Unix.");
-}
-
-#[cfg(target_os = "none")]
-use panic_halt as _;
-#[cfg(target_os = "none")]
-use stm32f4xx_hal as _;
-
-/// There are no ttys on the target: `stm32f405` is the example for it.
-#[cfg(target_os = "none")]
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    loop {
-        cortex_m::asm::wfi();
-    }
+    println!("This program needs Linux or another Unix.");
 }

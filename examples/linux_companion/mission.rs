@@ -7,6 +7,13 @@ use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig,
 
 use crate::command::{named, number};
 
+/// The interferer of the paper's multi-hop scenario.
+const PAPERS: Interference = Interference::Source(Interferer {
+    power_w: 80.0,
+    x_m: 500.0,
+    y_m: 400.0,
+});
+
 /// The options of a mission but for the number of relays.
 #[derive(Args, Debug)]
 pub(crate) struct MissionOptions {
@@ -32,9 +39,9 @@ pub(crate) struct MissionOptions {
     #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = power)]
     pub(crate) uav_power: f32,
     /// Interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7); or `unknown`, to relays
-    /// that listen
-    #[arg(long, value_name = "P,X,Y", default_value = "80,500,400", allow_hyphen_values = true, value_parser = guess)]
-    pub(crate) interferer: Interference,
+    /// that listen; without it 80,500,400
+    #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = guess)]
+    pub(crate) interferer: Option<Interference>,
     /// Noise power at every receiver, W, 0 to 1
     #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = noise)]
     pub(crate) noise: f32,
@@ -44,7 +51,12 @@ pub(crate) struct MissionOptions {
 }
 
 impl MissionOptions {
-    /// The parameters, for so many relays in this interference.
+    /// What disturbs the hops: what was given, else the `field` of a file, else the paper's interferer.
+    pub(crate) fn interference(&self, field: Option<Interference>) -> Interference {
+        self.interferer.or(field).unwrap_or(PAPERS)
+    }
+
+    /// The parameters, for so many relays in this interference, over this channel or that of the paper.
     ///
     /// # Errors
     /// One line that says what is wrong.
@@ -52,10 +64,14 @@ impl MissionOptions {
         &self,
         relays: u16,
         interference: Interference,
+        channel: Option<Channel>,
     ) -> Result<MissionConfig, String> {
         // 2 GHz, excess losses of 0.1 dB with line of sight and 21 dB without: as the simulator has them, to the bit.
-        let channel =
-            Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).map_err(|error| error.to_string())?;
+        let channel = match channel {
+            Some(channel) => channel,
+            None => Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)
+                .map_err(|error| error.to_string())?,
+        };
         Ok(MissionConfig {
             relays,
             distance_m: self.distance,

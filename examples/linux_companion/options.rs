@@ -12,12 +12,16 @@ use uav_relay::{
     Adjust, ChannelLoad, Duration, Field, FieldPoint, Identity, Interference, Mission, Settings,
     Wiring,
 };
+use uav_relay_scenario::deployment::NETWORK;
 
 use crate::autopilot::{AutopilotPlan, SigningKey, Where};
 use crate::command::{self, named};
+use crate::config::Beyond;
 use crate::key;
 use crate::listen::ListenOptions;
+use crate::log::LogOptions;
 use crate::mission::{self, MissionOptions};
+use crate::section;
 use crate::site::SiteOptions;
 
 /// A frame's way through two kernels and two USB adapters, and the computing: an adapter alone may wait 16 ms.
@@ -29,13 +33,17 @@ const RADIO: u16 = 12;
 /// One relay of a chain, over ttys. Options of the mission must be the same for all relays; their defaults are the paper's
 /// multi-hop scenario.
 #[derive(Parser, Debug)]
-#[command(name = "linux_companion", disable_version_flag = true)]
+#[command(name = "linux_companion", version)]
 struct Options {
+    /// TOML file with the scenario, as `cargo chain` and `cargo plan` read it, and sections `network` and `companion`: what it says, options
+    /// of the command line say otherwise
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
     /// Which relay this is: 1 is next to the transmitter
-    #[arg(long, value_name = "I", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, value_name = "I", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 1000))]
     index: u16,
     /// Number of relays, 1 to 1000
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 1000))]
     of: u16,
     /// Tty toward the transmitter; relay 1 needs one only where that uploads missions
     #[arg(long, value_name = "TTY")]
@@ -47,10 +55,10 @@ struct Options {
     #[arg(long, value_name = "TTY")]
     shared: Option<PathBuf>,
     /// Bit/s on every tty, 1200 to 4000000
-    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1_200..=4_000_000))]
+    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u32>(text, 1_200, 4_000_000))]
     baud: u32,
     /// Number of the network; frames of any other are ignored
-    #[arg(long, value_name = "W", default_value_t = 7, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(0..))]
+    #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 0, 65_535))]
     network: u16,
     /// File with the network's key, 64 hexadecimal digits: frames carry a tag, and only frames with one count
     #[arg(long, value_name = "FILE", requires = "epoch_file")]
@@ -67,10 +75,10 @@ struct Options {
     #[arg(long, value_name = "FILE")]
     view_file: Option<PathBuf>,
     /// Milliseconds of silence after which a neighbour is asked for a sign of life
-    #[arg(long, value_name = "MS", default_value_t = 5_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
+    #[arg(long, value_name = "MS", default_value_t = 5_000, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 3_600_000))]
     probe_after_ms: u64,
     /// Milliseconds of silence after which it counts as lost, above those of --probe-after-ms
-    #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
+    #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 3_600_000))]
     dead_after_ms: u64,
     /// FIFO with a line `x_m y_m altitude_m` whenever the autopilot knows better where the drone is, twice a second or more often:
     /// setpoints then keep drones apart on their way. With --listen a line may end with the interference that was heard there, W
@@ -85,7 +93,7 @@ struct Options {
     )]
     autopilot: Option<String>,
     /// Bit/s on its tty, 1200 to 4000000
-    #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1_200..=4_000_000))]
+    #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u32>(text, 1_200, 4_000_000))]
     autopilot_baud: u32,
     /// File with the key that the autopilot signs with, 64 hexadecimal digits: then only what is signed with it counts, and what is said
     /// to the autopilot is signed
@@ -111,6 +119,11 @@ struct Options {
     field: Option<Field>,
     #[command(flatten)]
     listen: ListenOptions,
+    /// Unix socket that answers each connection with one JSON object of all counters, and closes it
+    #[arg(long, value_name = "SOCKET", help_heading = "Log")]
+    status_socket: Option<PathBuf>,
+    #[command(flatten)]
+    log: LogOptions,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -146,6 +159,8 @@ pub(crate) struct Plan {
     pub(crate) baud: u32,
     pub(crate) positions: Option<PathBuf>,
     pub(crate) autopilot: Option<AutopilotPlan>,
+    pub(crate) status_socket: Option<PathBuf>,
+    pub(crate) log: LogOptions,
 }
 
 /// What frames are signed with.
@@ -163,10 +178,11 @@ impl std::fmt::Debug for Secret {
 
 /// Reads the command line; where there is nothing to run, help or the mistake has been printed.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
-    plan(&command::read()?).map_err(|line| command::refuse(&line))
+    let (options, beyond) = command::read(section::companion)?;
+    plan(&options, &beyond).map_err(|line| command::refuse(&line))
 }
 
-fn plan(options: &Options) -> Result<Plan, String> {
+fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
     let Options { index, of, .. } = *options;
     if index > of {
         return Err(format!(
@@ -180,13 +196,6 @@ fn plan(options: &Options) -> Result<Plan, String> {
             options.probe_after_ms + 1
         ));
     }
-    if options.field.is_some() && options.method != Method::Align {
-        let method = options.method.to_possible_value();
-        return Err(format!(
-            "--method {}: must be align with --field",
-            method.as_ref().map_or("", |method| method.get_name())
-        ));
-    }
     let ttys = ttys(options)?;
     let wiring = match ttys {
         Ttys::Pair { .. } => Wiring::Pair,
@@ -197,10 +206,13 @@ fn plan(options: &Options) -> Result<Plan, String> {
         Wiring::Pair => byte_time(options.baud).times(frame),
         Wiring::Shared => carried(options)?,
     };
-    let mission = mission(options)?;
+    let mission = mission(options, beyond)?;
+    let mut profiles = beyond.profiles.iter();
+    let own = profiles.find(|(of, _)| *of == index);
+    let profile = own.map_or(mission.config().common, |(_, profile)| *profile);
     let guard = GuardConfig {
         hover_m: options.position_error,
-        ..GuardConfig::of(&mission, mission.config().common)
+        ..GuardConfig::of(&mission, profile)
     };
     let settings = Settings {
         guard: (options.positions.is_some() || options.autopilot.is_some()).then_some(guard),
@@ -212,6 +224,7 @@ fn plan(options: &Options) -> Result<Plan, String> {
         listen: options.listen.listen(options.of),
         wiring,
         sited: options.autopilot.is_some(),
+        profile: own.map(|_| profile),
         hop_time: Duration::from_micros(turns.as_micros() + LATENCY.as_micros()),
         probe_after: Duration::from_millis(options.probe_after_ms),
         dead_after: Duration::from_millis(options.dead_after_ms),
@@ -230,6 +243,8 @@ fn plan(options: &Options) -> Result<Plan, String> {
         baud: options.baud,
         positions: options.positions.clone(),
         autopilot: autopilot(options)?,
+        status_socket: options.status_socket.clone(),
+        log: options.log.clone(),
     })
 }
 
@@ -336,13 +351,22 @@ fn ttys(options: &Options) -> Result<Ttys, String> {
     })
 }
 
-fn mission(options: &Options) -> Result<Mission, String> {
+fn mission(options: &Options, beyond: &Beyond) -> Result<Mission, String> {
     let given = &options.mission;
-    let interference = options.field.map_or(given.interferer, Interference::Field);
+    let field = options.field.map(Interference::Field).or(beyond.field);
+    let interference = given.interference(field);
     if interference == Interference::Unknown && !options.listen.is_on() {
         return Err("--interferer unknown: must be P,X,Y without --listen".to_owned());
     }
-    mission::mission(given.config(options.of, interference)?, "--")
+    if matches!(interference, Interference::Field(_)) && options.method != Method::Align {
+        let method = options.method.to_possible_value();
+        return Err(format!(
+            "--method {}: must be align with --field",
+            method.as_ref().map_or("", |method| method.get_name())
+        ));
+    }
+    let config = given.config(options.of, interference, beyond.channel)?;
+    mission::mission(config, "--")
 }
 
 /// The mission wants its field for as long as the program runs.

@@ -1,19 +1,21 @@
 //! The ttys of either wiring, and sleep until one of them or a timer needs the relay.
 
-use std::os::fd::{AsFd, BorrowedFd};
+use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
-use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, Shared, byte_time};
+use serde_json::{Value, json};
+use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, SerialStats, Shared, byte_time};
 use uav_relay::{Instant, Relay};
 
+use crate::log::Log;
 use crate::options::Ttys;
-use crate::tty::Tty;
+use crate::replug::Replug;
 
 /// A tty, or the end of the chain: nobody is there.
 #[derive(Debug)]
-pub(crate) struct End(Option<Tty>);
+pub(crate) struct End(Option<Replug>);
 
 impl SerialPort for End {
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
@@ -26,7 +28,7 @@ impl SerialPort for End {
     }
 
     fn has_left(&mut self) -> Result<Option<bool>, Fault> {
-        self.0.as_mut().map_or(Ok(None), Tty::has_left)
+        self.0.as_mut().map_or(Ok(None), Replug::has_left)
     }
 }
 
@@ -37,15 +39,6 @@ pub(crate) enum Ports {
     Shared(Box<Shared<End>>),
 }
 
-/// Why [`Ports::sleep`] returned.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Woken {
-    /// There may be something to do.
-    Work,
-    /// The program was told to end.
-    Stop,
-}
-
 impl Ports {
     /// Opens them.
     ///
@@ -53,7 +46,9 @@ impl Ports {
     /// One line that names the tty.
     pub(crate) fn open(ttys: &Ttys, baud: u32) -> Result<Self, String> {
         let link = |option, path: Option<&_>| {
-            let tty = path.map(|path| Tty::open(option, path, baud)).transpose()?;
+            let tty = path
+                .map(|path| Replug::open(option, path, baud))
+                .transpose()?;
             Ok::<_, String>(SerialLink::new(End(tty), byte_time(baud)))
         };
         Ok(match ttys {
@@ -85,7 +80,38 @@ impl Ports {
         }
     }
 
-    pub(crate) fn ttys(&mut self) -> impl Iterator<Item = &mut Tty> {
+    /// Opens again what has vanished, when it is time to, and says when to come back for that.
+    pub(crate) fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
+        self.ttys()
+            .filter_map(|tty| {
+                tty.tend(now, log);
+                tty.wake()
+            })
+            .min()
+    }
+
+    /// Their names, as options give them.
+    pub(crate) fn names(&mut self) -> Vec<String> {
+        self.ttys().map(|tty| tty.to_string()).collect()
+    }
+
+    /// What they have counted: bytes, and what went wrong with them.
+    pub(crate) fn status(&mut self) -> Value {
+        let links = match self {
+            Self::Pair(pair) => vec![*pair.upstream.stats(), *pair.downstream.stats()],
+            Self::Shared(shared) => vec![*shared.channel.stats()],
+        };
+        let sum = |of: fn(&SerialStats) -> u32| links.iter().map(of).fold(0, u32::saturating_add);
+        let ports: Vec<Value> = self.ttys().map(|tty| tty.status()).collect();
+        json!({
+            "ports": ports,
+            "frames_dropped": sum(|link| link.dropped),
+            "reads_failed": sum(|link| link.other),
+            "writes_failed": sum(|link| link.write),
+        })
+    }
+
+    fn ttys(&mut self) -> impl Iterator<Item = &mut Replug> {
         let (first, second) = match self {
             Self::Pair(pair) => (pair.upstream.port_mut(), Some(pair.downstream.port_mut())),
             Self::Shared(shared) => (shared.channel.port_mut(), None),
@@ -96,42 +122,35 @@ impl Ports {
             .filter_map(|end| end.0.as_mut())
     }
 
-    /// Sleeps until a tty has bytes, or room after it had none, `stop` has bytes, or `other` what it waits for; for `at_most`, or for
-    /// ever. Says what was found at `other`, too.
+    /// Sleeps until a tty has bytes, or room after it had none, or one of `others` what it waits for; for `at_most`, or for ever. What was
+    /// found at each of `others`.
     ///
     /// # Errors
-    /// One line if it is not possible to sleep.
+    /// What the system says where it is not possible to sleep.
     pub(crate) fn sleep(
         &mut self,
         at_most: Option<Duration>,
-        stop: BorrowedFd<'_>,
-        other: Option<(BorrowedFd<'_>, PollFlags)>,
-    ) -> Result<(Woken, PollFlags), String> {
+        others: &[(BorrowedFd<'_>, PollFlags)],
+    ) -> Result<Vec<PollFlags>, Errno> {
         // Longer than a Timespec can be is for ever.
         let timeout = at_most.and_then(|span| Timespec::try_from(span).ok());
-        let ttys: Vec<&mut Tty> = self.ttys().collect();
-        let mut fds = vec![PollFd::from_borrowed_fd(stop, PollFlags::IN)];
-        let on_ttys = ttys
+        let mut ttys: Vec<&mut Replug> = self.ttys().filter(|tty| tty.is_open()).collect();
+        let on_ttys = ttys.iter().filter_map(|tty| tty.interest());
+        let mut fds: Vec<PollFd<'_>> = others
             .iter()
-            .map(|tty| PollFd::from_borrowed_fd(tty.as_fd(), tty.interest()));
-        fds.extend(on_ttys);
-        fds.extend(other.map(|(fd, interest)| PollFd::from_borrowed_fd(fd, interest)));
+            .copied()
+            .chain(on_ttys)
+            .map(|(fd, interest)| PollFd::from_borrowed_fd(fd, interest))
+            .collect();
         match poll(&mut fds, timeout.as_ref()) {
-            Ok(_) => {}
-            Err(Errno::INTR) => return Ok((Woken::Work, PollFlags::empty())),
-            Err(error) => return Err(format!("cannot sleep: {error}")),
+            Ok(_) | Err(Errno::INTR) => {}
+            Err(error) => return Err(error),
         }
         let mut found: Vec<PollFlags> = fds.iter().map(PollFd::revents).collect();
-        let stopped = !found.remove(0).is_empty();
-        let at_other = if other.is_some() {
-            found.pop().unwrap_or(PollFlags::empty())
-        } else {
-            PollFlags::empty()
-        };
-        for (tty, events) in ttys.into_iter().zip(found) {
+        let on_ttys = found.split_off(others.len());
+        for (tty, events) in ttys.iter_mut().zip(on_ttys) {
             tty.noticed(events);
         }
-        let woken = if stopped { Woken::Stop } else { Woken::Work };
-        Ok((woken, at_other))
+        Ok(found)
     }
 }

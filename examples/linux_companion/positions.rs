@@ -9,10 +9,13 @@ use rustix::fs::{FileType, Mode, OFlags, fstat, open};
 use rustix::io::{Errno, read};
 use uav_relay::{Instant, Placement, Sample};
 
-use crate::line::line;
+use crate::log::Log;
 
 /// No line is longer.
 const LONGEST: usize = 200;
+
+/// Buffers that are read at once, at most.
+const READS: usize = 16;
 
 /// An open FIFO.
 #[derive(Debug)]
@@ -55,22 +58,21 @@ impl Positions {
     }
 
     /// The newest of the positions that have come since, and every measurement is handed to `heard`; the first line that is neither is said.
-    ///
-    /// # Errors
-    /// One line if it can not be read, or standard output takes no more.
+    /// Work: [`READS`] buffers at most, whoever writes how much.
     pub(crate) fn newest(
         &mut self,
         now: Instant,
+        log: &Log,
         heard: &mut impl FnMut(Sample),
-    ) -> Result<Option<Placement>, String> {
+    ) -> Option<Placement> {
         let mut newest = None;
         let mut buffer = [0; 4096];
-        loop {
+        for _ in 0..READS {
             let count = match read(&self.fd, &mut buffer) {
-                Ok(0) | Err(Errno::WOULDBLOCK) => return Ok(newest),
-                Ok(count) => count,
+                Ok(count @ 1..) => count,
                 Err(Errno::INTR) => continue,
-                Err(error) => return Err(format!("{}: {error}", self.name)),
+                // This end holds the other one open as well, so there is no end, and no other error that a FIFO has.
+                _ => break,
             };
             for &byte in buffer.get(..count).unwrap_or_default() {
                 if byte != b'\n' {
@@ -84,38 +86,48 @@ impl Positions {
                         newest = place.or(newest);
                         sample.into_iter().for_each(&mut *heard);
                     }
-                    _ => self.refuse(now)?,
+                    _ => self.refuse(now, log),
                 }
                 self.begun.clear();
             }
         }
+        newest
     }
 
-    fn refuse(&mut self, now: Instant) -> Result<(), String> {
+    fn refuse(&mut self, now: Instant, log: &Log) {
         self.bad += 1;
         if self.bad > 1 {
-            return Ok(());
+            return;
         }
         let text = String::from_utf8_lossy(&self.begun);
-        line(
+        log.tell(
             now,
+            "position",
             format_args!(
-                "position: {text:?} is not x_m y_m altitude_m{}; more of these are only counted",
+                "{text:?} is not x_m y_m altitude_m{}; more of these are only counted",
                 if self.listens {
                     " [power_w] or receiver power_w, a power within 1e-30 to 1e6"
                 } else {
                     ""
                 }
             ),
-        )
+        );
+    }
+
+    /// Lines that were none.
+    pub(crate) const fn bad(&self) -> u64 {
+        self.bad
     }
 
     /// How many lines were no position, if any were.
-    pub(crate) fn stopped(&self, now: Instant) -> Result<(), String> {
-        if self.bad == 0 {
-            return Ok(());
+    pub(crate) fn stopped(&self, now: Instant, log: &Log) {
+        if self.bad > 0 {
+            log.tell(
+                now,
+                "position",
+                format_args!("{} lines were none", self.bad),
+            );
         }
-        line(now, format_args!("position: {} lines were none", self.bad))
     }
 }
 
@@ -126,15 +138,17 @@ impl fmt::Display for Positions {
 }
 
 /// Says whether drones are kept apart.
-pub(crate) fn started(positions: Option<&Positions>) -> Result<(), String> {
+pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     match positions {
-        Some(positions) => line(
+        Some(positions) => log.tell(
             Instant::ZERO,
-            format_args!("guarded: setpoints keep drones apart on their way, by {positions}"),
+            "guarded",
+            format_args!("setpoints keep drones apart on their way, by {positions}"),
         ),
-        None => line(
+        None => log.tell(
             Instant::ZERO,
-            format_args!("unguarded: no --positions, nothing keeps drones apart on their way"),
+            "unguarded",
+            format_args!("no --positions, nothing keeps drones apart on their way"),
         ),
     }
 }

@@ -1,14 +1,16 @@
-//! What the program says, one line each on standard output: seconds since the start, what happened, and every f32 also
-//! as its bits, so that two relays (or a relay and a simulation) can be compared exactly.
+//! What the relay says, one line each: what happened, and every f32 also as its bits, so that two relays (or a relay and a simulation) can
+//! be compared exactly.
 
 use std::fmt;
 
+use serde_json::json;
 use uav_relay::sensing::belief::{Belief, Told};
 use uav_relay::wire::digest::digest;
 use uav_relay::{Event, Identity, Instant, Mission, Placement, Relay, Side, Stats, Upload};
 
-use crate::line::line;
+use crate::log::Log;
 use crate::site::Between;
+use crate::status::{at, counted};
 
 /// An f32 for people and, exactly, for programs.
 struct Exact(f32);
@@ -23,14 +25,17 @@ impl fmt::Display for Exact {
 /// Writes the lines of one relay.
 #[derive(Debug)]
 pub(crate) struct Report {
+    log: Log,
     identity: Identity,
+    /// As many as were loaded: nodes keep their numbers when some are lost.
     relays: u16,
     digest: u16,
 }
 
 impl Report {
-    pub(crate) fn new(identity: Identity, mission: &Mission) -> Self {
+    pub(crate) fn new(log: Log, identity: Identity, mission: &Mission) -> Self {
         Self {
+            log,
             identity,
             relays: mission.relays(),
             digest: digest(mission),
@@ -38,194 +43,292 @@ impl Report {
     }
 
     /// Who listens where. The digest of the mission is the same at all relays if they were given the same one.
-    ///
-    /// # Errors
-    /// As every line: where standard output takes it no more.
-    pub(crate) fn started(&self, ttys: &[String], baud: u32) -> Result<(), String> {
+    pub(crate) fn started(&self, ttys: &[String], baud: u32) {
         let Identity { network, index } = self.identity;
         let (relays, digest) = (self.relays, self.digest);
-        let ttys = if ttys.is_empty() {
+        let names = if ttys.is_empty() {
             "no tty".to_owned()
         } else {
             ttys.join(", ")
         };
-        line(
+        self.log.say(
             Instant::ZERO,
+            "started",
+            json!({
+                "index": index, "relays": relays, "network": network, "mission": digest, "ports": ttys, "baud": baud,
+                "version": env!("CARGO_PKG_VERSION"),
+            }),
             format_args!(
-                "started: relay {index} of {relays}, network {network}, mission 0x{digest:04x}, {ttys}, {baud} baud"
+                "relay {index} of {relays}, network {network}, mission 0x{digest:04x}, {names}, {baud} baud"
             ),
-        )
+        );
     }
 
     /// With which epoch frames are signed, if they are.
-    #[expect(clippy::unused_self, reason = "as the other lines")]
-    pub(crate) fn signs(&self, epoch: Option<u32>) -> Result<(), String> {
+    pub(crate) fn signs(&self, epoch: Option<u32>) {
         match epoch {
-            Some(epoch) => line(
+            Some(epoch) => self.log.say(
                 Instant::ZERO,
-                format_args!("signed: frames carry a tag, epoch {epoch}"),
+                "signed",
+                json!({ "epoch": epoch }),
+                format_args!("frames carry a tag, epoch {epoch}"),
             ),
-            None => line(
+            None => self.log.tell(
                 Instant::ZERO,
-                format_args!("unsigned: no --key-file, anybody can send frames"),
+                "unsigned",
+                format_args!("no --key-file, anybody can send frames"),
             ),
         }
     }
 
     /// That the relay flies what was uploaded before this start.
-    #[expect(clippy::unused_self, reason = "as the other lines")]
-    pub(crate) fn resumed(&self, relay: &Relay) -> Result<(), String> {
-        line(
+    pub(crate) fn resumed(&self, relay: &Relay) {
+        let version = relay.version();
+        self.log.say(
             Instant::ZERO,
-            format_args!(
-                "resumed: flies version {} of the mission, uploaded before this start",
-                relay.version()
-            ),
-        )
+            "resumed",
+            json!({ "version": version }),
+            format_args!("flies version {version} of the mission, uploaded before this start"),
+        );
     }
 
     /// That the relay stands by what it has said in the votes on views before this start.
-    #[expect(clippy::unused_self, reason = "as the other lines")]
-    pub(crate) fn stands_by(&self) -> Result<(), String> {
-        line(
+    pub(crate) fn stands_by(&self) {
+        self.log.tell(
             Instant::ZERO,
+            "stands by",
             format_args!(
-                "stands by: what it has said in votes before this start; before another flight remove its --view-file"
+                "what it has said in votes before this start; before another flight remove its --view-file"
             ),
-        )
+        );
     }
 
-    pub(crate) fn event(&self, now: Instant, event: Event, relay: &Relay) -> Result<(), String> {
+    pub(crate) fn event(&self, now: Instant, event: Event, relay: &Relay) {
+        let tell = |word: &str, text: fmt::Arguments<'_>| self.log.tell(now, word, text);
         match event {
-            Event::SetpointChanged => match relay.setpoint() {
-                Some(place) => fly_to(now, place),
-                None => Ok(()),
-            },
-            Event::Converged => {
-                let target = relay.target().unwrap_or_default();
-                let db = 10.0 * target.log10();
-                line(
-                    now,
-                    format_args!("converged: target SIR {:.6}, {db:.3} dB", Exact(target)),
-                )
+            Event::SetpointChanged => {
+                if let Some(place) = relay.setpoint() {
+                    self.fly_to(now, place);
+                }
             }
-            Event::Infeasible => line(now, format_args!("infeasible: no target can be met")),
-            Event::NeighbourLost { side, node } => line(
-                now,
+            Event::Converged => self.converged(now, relay.target().unwrap_or_default()),
+            Event::Infeasible => tell("infeasible", format_args!("no target can be met")),
+            Event::Adopted => self.adopted(now, relay),
+            Event::Reformed => self.reformed(now, relay),
+            Event::Believed => self.believed(now, relay.belief()),
+            Event::LeaseLapsed => tell(
+                "lapsed",
                 format_args!(
-                    "lost: no sign of life from {} {}; look for that drone",
-                    self.node(node),
-                    stream(side)
+                    "not all relays can be reached; holds its place and asks for a new view"
                 ),
             ),
-            Event::NeighbourBack { side, node } => line(
-                now,
-                format_args!("back: {} {} is heard", self.node(node), stream(side)),
-            ),
-            Event::NotHeard { node } => line(
-                now,
+            Event::NoQuorum => tell(
+                "no quorum",
                 format_args!(
-                    "not heard: {} does not hear this relay; look at this one's transmitter and that one's receiver",
-                    self.node(node)
+                    "too few relays can be reached; bring the missing ones into reach, or land these"
                 ),
             ),
-            Event::MissionMismatch { node } => line(
-                now,
-                format_args!(
-                    "mismatch: {} flies another mission than 0x{:04x}; load both with the same one",
-                    self.node(node),
-                    self.digest
-                ),
-            ),
-            Event::KeyMismatch { node } => line(
-                now,
-                format_args!(
-                    "key: {} signs with another key, or somebody does in its name; give both the same --key-file",
-                    self.node(node)
-                ),
-            ),
-            Event::EpochWentBack { node } => line(
-                now,
-                format_args!(
-                    "epoch: that of {0} went back and it is refused; raise the number in the --epoch-file of {0} and start it again",
-                    self.node(node)
-                ),
-            ),
-            Event::IndexTaken { node } if relay.stands_down() => line(
-                now,
-                format_args!(
-                    "index taken: another relay flies as relay {node}, and this one stands down; land one and give it its own --index"
-                ),
-            ),
-            Event::IndexTaken { node } => line(
-                now,
-                format_args!(
-                    "index taken: two relays fly as relay {node}; land one and give it its own --index"
-                ),
-            ),
-            Event::LeaseLapsed => line(
-                now,
-                format_args!(
-                    "lapsed: not all relays can be reached; holds its place and asks for a new view"
-                ),
-            ),
-            Event::NoQuorum => line(
-                now,
-                format_args!(
-                    "no quorum: too few relays can be reached; bring the missing ones into reach, or land these"
-                ),
-            ),
-            Event::UploadRefused { why } => line(now, format_args!("refused: an upload; {why}")),
+            Event::UploadRefused { why } => tell("refused", format_args!("an upload; {why}")),
             Event::Uploaded => {
                 let version = relay.upload().map_or(0, Upload::version);
-                line(
+                self.log.say(
                     now,
-                    format_args!("uploaded: holds version {version} of the mission"),
-                )
+                    "uploaded",
+                    json!({ "version": version }),
+                    format_args!("holds version {version} of the mission"),
+                );
             }
-            Event::Adopted => adopted(now, relay),
-            Event::Reformed => line(
-                now,
+            Event::InterfererUnclear => tell(
+                "unclear",
                 format_args!(
-                    "formed anew: relay {} of {}, view {}",
-                    relay.index(),
-                    relay.mission().relays(),
-                    relay.view().number()
+                    "what the relays hear is not of one source on the ground, or says too little; the last belief is kept"
                 ),
             ),
-            Event::Believed => believed(now, relay.belief()),
-            other => line(now, format_args!("event: {other:?}")),
+            other => self.of_a_node(now, other, relay),
         }
     }
 
-    pub(crate) fn stopped(&self, now: Instant, stats: &Stats) -> Result<(), String> {
-        line(
+    /// Events about another node.
+    fn of_a_node(&self, now: Instant, event: Event, relay: &Relay) {
+        let (node, side) = match event {
+            Event::NeighbourLost { side, node } | Event::NeighbourBack { side, node } => {
+                (node, Some(side))
+            }
+            Event::NotHeard { node }
+            | Event::MissionMismatch { node }
+            | Event::KeyMismatch { node }
+            | Event::EpochWentBack { node }
+            | Event::IndexTaken { node }
+            | Event::SensorOff { node } => (node, None),
+            other => return self.log.tell(now, "event", format_args!("{other:?}")),
+        };
+        let name = self.name(node);
+        let stream = side.map_or("", stream);
+        let fields = json!({ "node": node, "name": name, "side": side.map(|_| stream) });
+        let say = |word: &str, text: fmt::Arguments<'_>| self.log.say(now, word, fields, text);
+        match event {
+            Event::NeighbourLost { .. } => say(
+                "lost",
+                format_args!("no sign of life from {name} {stream}; look for that drone"),
+            ),
+            Event::NeighbourBack { .. } => {
+                say("back", format_args!("{name} {stream} is heard"));
+            }
+            Event::NotHeard { .. } => say(
+                "not heard",
+                format_args!(
+                    "{name} does not hear this relay; look at this one's transmitter and that one's receiver"
+                ),
+            ),
+            Event::MissionMismatch { .. } => say(
+                "mismatch",
+                format_args!(
+                    "{name} flies another mission than 0x{:04x}; load both with the same one",
+                    self.flown(relay)
+                ),
+            ),
+            Event::KeyMismatch { .. } => say(
+                "key",
+                format_args!(
+                    "{name} signs with another key, or somebody does in its name; give both the same --key-file"
+                ),
+            ),
+            Event::EpochWentBack { .. } => say(
+                "epoch",
+                format_args!(
+                    "that of {name} went back and it is refused; raise the number in the --epoch-file of {name} and start it again"
+                ),
+            ),
+            Event::SensorOff { .. } => say(
+                "sensor",
+                format_args!(
+                    "{name} hears something else than all the others and is left out; look at its receiver"
+                ),
+            ),
+            _ if relay.stands_down() => say(
+                "index taken",
+                format_args!(
+                    "another relay flies as relay {node}, and this one stands down; land one and give it its own --index"
+                ),
+            ),
+            _ => say(
+                "index taken",
+                format_args!(
+                    "two relays fly as relay {node}; land one and give it its own --index"
+                ),
+            ),
+        }
+    }
+
+    pub(crate) fn stopped(&self, now: Instant, stats: &Stats) {
+        self.log.say(
             now,
+            "stopped",
+            counted(stats),
             format_args!(
-                "stopped: relay {}, {} frames sent, {} received, {} refused",
+                "relay {}, {} frames sent, {} received, {} refused",
                 self.identity.index,
                 stats.sent,
                 stats.received,
                 stats.rejected()
             ),
-        )
+        );
     }
 
-    fn node(&self, node: u16) -> String {
+    /// What a node is called. Its number is that of its start, whoever was lost since: the receiver's is one above the last relay's.
+    pub(crate) fn name(&self, node: u16) -> String {
         match node {
             0 => "the transmitter".to_owned(),
             _ if node > self.relays => "the receiver".to_owned(),
             _ => format!("relay {node}"),
         }
     }
-}
 
-/// Which mission is flown, and between which sites, if they are other ones than those that were loaded.
-fn adopted(now: Instant, relay: &Relay) -> Result<(), String> {
-    let what = format_args!("adopted: flies version {} of the mission", relay.version());
-    match relay.sites() {
-        Some(sites) => line(now, format_args!("{what}, {}", Between(sites))),
-        None => line(now, what),
+    /// The digest of the mission that is flown: that of the start, or of an upload.
+    fn flown(&self, relay: &Relay) -> u16 {
+        match relay.upload() {
+            Some(upload) if relay.version() == upload.version() => upload.id().digest,
+            _ => self.digest,
+        }
+    }
+
+    /// Which mission is flown, and between which sites, if they are other ones than those that were loaded.
+    fn adopted(&self, now: Instant, relay: &Relay) {
+        let version = relay.version();
+        let fields = json!({ "version": version });
+        match relay.sites() {
+            Some(sites) => self.log.say(
+                now,
+                "adopted",
+                fields,
+                format_args!("flies version {version} of the mission, {}", Between(sites)),
+            ),
+            None => self.log.say(
+                now,
+                "adopted",
+                fields,
+                format_args!("flies version {version} of the mission"),
+            ),
+        }
+    }
+
+    fn reformed(&self, now: Instant, relay: &Relay) {
+        let (index, relays) = (relay.index(), relay.mission().relays());
+        let view = relay.view().number();
+        self.log.say(
+            now,
+            "formed anew",
+            json!({ "index": index, "relays": relays, "view": view }),
+            format_args!("relay {index} of {relays}, view {view}"),
+        );
+    }
+
+    fn converged(&self, now: Instant, target: f32) {
+        let db = 10.0 * target.log10();
+        self.log.say(
+            now,
+            "converged",
+            json!({ "target_sir": target, "target_sir_db": db }),
+            format_args!("target SIR {:.6}, {db:.3} dB", Exact(target)),
+        );
+    }
+
+    /// What is believed of the interference from now on.
+    fn believed(&self, now: Instant, told: Told) {
+        let tell = |text: fmt::Arguments<'_>| self.log.tell(now, "believed", text);
+        match told.belief {
+            Belief::Source { source, receiver_w } => self.log.say(
+                now,
+                "believed",
+                json!({
+                    "power_w": source.power_w, "x_m": source.x_m, "y_m": source.y_m, "receiver_w": receiver_w,
+                }),
+                format_args!(
+                    "interferer {} W, x {} m, y {} m; at the receiver {receiver_w:.3e} W",
+                    Exact(source.power_w),
+                    Exact(source.x_m),
+                    Exact(source.y_m)
+                ),
+            ),
+            Belief::Unknown(spread) => tell(format_args!("nothing is known; spread {spread:?}")),
+            Belief::Mission => tell(format_args!("what the mission says")),
+        }
+    }
+
+    /// Where to fly, for people and other programs: `place.x_m` metres from the transmitter toward the receiver,
+    /// `place.y_m` to the right of that line as seen from above, at `place.altitude_m` above the ground.
+    fn fly_to(&self, now: Instant, place: Placement) {
+        self.log.say(
+            now,
+            "setpoint",
+            at(place),
+            format_args!(
+                "x {} m, y {} m, altitude {} m",
+                Exact(place.x_m),
+                Exact(place.y_m),
+                Exact(place.altitude_m)
+            ),
+        );
     }
 }
 
@@ -234,38 +337,4 @@ const fn stream(side: Side) -> &'static str {
         Side::Upstream => "upstream",
         Side::Downstream => "downstream",
     }
-}
-
-/// What is believed of the interference from now on.
-fn believed(now: Instant, told: Told) -> Result<(), String> {
-    match told.belief {
-        Belief::Source { source, receiver_w } => line(
-            now,
-            format_args!(
-                "believed: interferer {} W, x {} m, y {} m; at the receiver {receiver_w:.3e} W",
-                Exact(source.power_w),
-                Exact(source.x_m),
-                Exact(source.y_m)
-            ),
-        ),
-        Belief::Unknown(spread) => line(
-            now,
-            format_args!("believed: nothing is known; spread {spread:?}"),
-        ),
-        Belief::Mission => line(now, format_args!("believed: what the mission says")),
-    }
-}
-
-/// Where to fly, for people and other programs: `place.x_m` metres from the transmitter toward the receiver,
-/// `place.y_m` to the right of that line as seen from above, at `place.altitude_m` above the ground.
-fn fly_to(now: Instant, place: Placement) -> Result<(), String> {
-    line(
-        now,
-        format_args!(
-            "setpoint: x {} m, y {} m, altitude {} m",
-            Exact(place.x_m),
-            Exact(place.y_m),
-            Exact(place.altitude_m)
-        ),
-    )
 }

@@ -50,15 +50,16 @@ pub(crate) struct Between(pub(crate) Sites);
 
 impl fmt::Display for Between {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let part = |number: i32, unit: f64| f64::from(number) / unit;
         let Sites { tx, rx } = self.0;
-        for (name, at) in [("between", tx), (" and", rx)] {
-            let (lat, lon) = (part(at.lat_e7, 1e7), part(at.lon_e7, 1e7));
-            let amsl_m = part(at.amsl_mm, 1e3);
-            write!(f, "{name} {lat:.7},{lon:.7},{amsl_m:.3}")?;
-        }
-        Ok(())
+        write!(f, "between {} and {}", degrees(tx), degrees(rx))
     }
+}
+
+/// A site as options give it.
+pub(crate) fn degrees(at: Geodetic) -> String {
+    let part = |number: i32, unit: f64| f64::from(number) / unit;
+    let (lat, lon) = (part(at.lat_e7, 1e7), part(at.lon_e7, 1e7));
+    format!("{lat:.7},{lon:.7},{:.3}", part(at.amsl_mm, 1e3))
 }
 
 /// Latitude, longitude, height.

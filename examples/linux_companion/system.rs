@@ -16,11 +16,21 @@ pub(crate) fn now(clock: Clock) -> Instant {
 ///
 /// # Errors
 /// One line that says what does not work.
-pub(crate) fn on_signals() -> Result<UnixStream, String> {
+pub(crate) fn on_stop() -> Result<UnixStream, String> {
+    on(&[SIGINT, SIGTERM])
+}
+
+/// A stream that gets a byte at each of these signals.
+///
+/// # Errors
+/// One line that says what does not work.
+pub(crate) fn on(signals: &[i32]) -> Result<UnixStream, String> {
     let pipe = || -> io::Result<UnixStream> {
         let (ours, theirs) = UnixStream::pair()?;
-        signal_hook::low_level::pipe::register(SIGINT, theirs.try_clone()?)?;
-        signal_hook::low_level::pipe::register(SIGTERM, theirs)?;
+        ours.set_nonblocking(true)?;
+        for &signal in signals {
+            signal_hook::low_level::pipe::register(signal, theirs.try_clone()?)?;
+        }
         Ok(ours)
     };
     pipe().map_err(|error| format!("cannot wait for signals: {error}"))

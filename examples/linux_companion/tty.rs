@@ -32,6 +32,11 @@ impl Tty {
         let fd = configured(path, baud).map_err(|error| match error {
             Errno::WOULDBLOCK => format!("{name}: is in use already"),
             Errno::NOTTY => format!("{name}: is no tty"),
+            Errno::NOENT => format!("{name}: No such file: is it plugged in?"),
+            Errno::ISDIR => format!("{name}: is a directory, and no tty"),
+            Errno::ACCESS => format!(
+                "{name}: may not be opened by this user; on most systems the group dialout may"
+            ),
             Errno::INVAL => format!("{name}: does not do {baud} bit/s"),
             error => format!("{name}: {error}"),
         })?;
@@ -41,10 +46,6 @@ impl Tty {
             full: false,
             failure: None,
         })
-    }
-
-    pub(crate) fn name(&self) -> &str {
-        &self.name
     }
 
     /// What to sleep on: bytes that come in, and room if there was none.
@@ -79,7 +80,7 @@ impl Tty {
         match result {
             Ok(count) => Ok(Some(count)),
             Err(Errno::AGAIN | Errno::INTR) => Ok(None),
-            Err(Errno::IO) => {
+            Err(Errno::IO | Errno::NXIO | Errno::NODEV) => {
                 self.fail("is gone");
                 Err(Fault::Other)
             }
@@ -112,6 +113,9 @@ impl SerialPort for Tty {
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
+        if self.failure.is_some() {
+            return Ok(bytes.len());
+        }
         let result = rustix::io::write(&self.fd, bytes);
         let count = self.done(result)?.unwrap_or(0);
         self.full = count < bytes.len();

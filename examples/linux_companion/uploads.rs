@@ -8,9 +8,10 @@ use std::path::Path;
 use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::upload::LENGTH;
-use uav_relay::{Mission, Upload};
+use uav_relay::{Instant, Mission, Upload};
 
-use crate::keep::keep;
+use crate::kept::Kept;
+use crate::log::Log;
 
 /// Bytes of the file.
 const STORED: usize = LENGTH + 4;
@@ -20,7 +21,7 @@ const STORED: usize = LENGTH + 4;
 /// # Errors
 /// One line that names the file and says why it is of no use.
 pub(crate) fn load(file: &Path, mission: &Mission) -> Result<Option<Upload>, String> {
-    let named = |error: &str| format!("--upload-file {}: {error}; not used", file.display());
+    let named = |error: &str| format!("--upload-file {}: {error}", file.display());
     let bytes = match std::fs::read(file) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
@@ -42,21 +43,45 @@ fn parse(bytes: &[u8]) -> Option<Upload> {
     Upload::decode(upload).filter(|_| *check == sum(upload))
 }
 
-/// Writes it down.
-///
-/// # Errors
-/// One line that names the file and what is wrong.
-pub(crate) fn store(file: &Path, upload: &Upload) -> Result<(), String> {
-    let mut bytes = [0; STORED];
-    let (body, check) = bytes.split_at_mut(LENGTH);
-    // It has room for every upload.
-    upload.encode(body);
-    check.copy_from_slice(&sum(body));
-    keep(file, &bytes).map_err(|error| {
-        let version = upload.version();
-        let file = file.display();
-        format!("--upload-file {file}: version {version} cannot be written: {error}")
-    })
+/// The file in flight: what is to be in it, until it is.
+#[derive(Debug)]
+pub(crate) struct Uploads {
+    kept: Kept,
+    unstored: Option<[u8; STORED]>,
+}
+
+impl Uploads {
+    pub(crate) fn new(file: &Path) -> Self {
+        Self {
+            kept: Kept::new("--upload-file", file),
+            unstored: None,
+        }
+    }
+
+    /// Has it written down by the next [`tend`](Self::tend).
+    pub(crate) fn take(&mut self, upload: &Upload) {
+        let mut bytes = [0; STORED];
+        let (body, check) = bytes.split_at_mut(LENGTH);
+        // It has room for every upload.
+        upload.encode(body);
+        check.copy_from_slice(&sum(body));
+        self.unstored = Some(bytes);
+    }
+
+    /// Writes down what is not yet. What cannot be kept is flown all the same.
+    pub(crate) fn tend(&mut self, now: Instant, log: &Log) {
+        if let Some(bytes) = &self.unstored
+            && self.kept.is_due(now)
+            && self.kept.put(now, log, bytes)
+        {
+            self.unstored = None;
+        }
+    }
+
+    /// How often it could not be written.
+    pub(crate) const fn failures(&self) -> u64 {
+        self.kept.failures()
+    }
 }
 
 fn sum(bytes: &[u8]) -> [u8; 4] {

@@ -4,17 +4,22 @@
 //! It is of one flight. Before another one the file is removed.
 
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use uav_relay::wire::crc::CRC_32C;
-use uav_relay::{Relay, ViewRecord};
+use uav_relay::{Instant, Relay, ViewRecord};
 
-use crate::keep::keep;
+use crate::kept::Kept;
+use crate::log::Log;
+
+const OPTION: &str = "--view-file";
 
 /// The file, and what stands in it.
 pub(crate) struct Views {
-    file: Option<PathBuf>,
+    kept: Option<Kept>,
     stored: Option<ViewRecord>,
+    /// What was to be written last.
+    tried: Option<ViewRecord>,
 }
 
 impl Views {
@@ -37,8 +42,9 @@ impl Views {
             },
         };
         Ok(Self {
-            file: file.map(Path::to_owned),
+            kept: file.map(|file| Kept::new(OPTION, file)),
             stored,
+            tried: None,
         })
     }
 
@@ -47,27 +53,31 @@ impl Views {
         self.stored.as_ref()
     }
 
-    /// One line about a record that the relay does not take.
-    pub(crate) fn refused(&self, error: &str) -> String {
-        let file = self.file.as_deref().unwrap_or(Path::new(""));
-        named(file, error)
-    }
-
-    /// Writes down what `relay` has said, if that has changed. Where it cannot be written it is tried again at the next call, and the
-    /// relay flies on: a drone in the air is not to be switched off for it.
-    pub(crate) fn keep(&mut self, relay: &Relay) {
-        let Some(file) = &self.file else { return };
+    /// Writes down what `relay` has said, if that has changed. Where it cannot be written it is tried again, and the relay flies on: a drone
+    /// in the air is not to be switched off for it.
+    pub(crate) fn keep(&mut self, now: Instant, log: &Log, relay: &Relay) {
+        let Some(kept) = &mut self.kept else { return };
         let record = relay.view_record();
-        if self.stored == Some(record) {
+        let tried = self.tried.replace(record) == Some(record);
+        if self.stored == Some(record) || tried && !kept.is_due(now) {
             return;
         }
         let body = record.to_bytes();
         let bytes = [&body[..], &sum(&body)].concat();
-        match keep(file, &bytes) {
-            Ok(()) => self.stored = Some(record),
-            Err(error) => eprintln!("{}", named(file, &format!("cannot be written: {error}"))),
+        if kept.put(now, log, &bytes) {
+            self.stored = Some(record);
         }
     }
+
+    /// How often it could not be written.
+    pub(crate) fn failures(&self) -> u64 {
+        self.kept.as_ref().map_or(0, Kept::failures)
+    }
+}
+
+/// One line about a record that the relay does not take.
+pub(crate) fn refused(file: Option<&Path>, error: &str) -> String {
+    named(file.unwrap_or(Path::new("")), error)
 }
 
 fn parse(bytes: &[u8]) -> Option<ViewRecord> {
@@ -76,7 +86,7 @@ fn parse(bytes: &[u8]) -> Option<ViewRecord> {
 }
 
 fn named(file: &Path, error: &str) -> String {
-    format!("--view-file {}: {error}", file.display())
+    format!("{OPTION} {}: {error}", file.display())
 }
 
 fn sum(bytes: &[u8]) -> [u8; 4] {

@@ -1,14 +1,14 @@
 //! The ground's end of an upload, over a real tty: hands the chain a new mission, and ends once that is flown.
 //!
 //! ```text
-//! cargo run --example linux_ground -- --tty /dev/ttyUSB0 --end tx --of 3 \
+//! cargo ground --tty /dev/ttyUSB0 --end tx --of 3 \
 //!   --key-file network7.key --epoch-file ground.epoch --version 1 --new-interferer 80,700,-300
-//! cargo run --example linux_ground -- --help
+//! cargo ground --help
 //! ```
 //! It is the transmitter or the receiver of the chain: connect it where the relay next to that listens, or to the channel that
 //! all hear (`--shared`). `--of`, `--network` and the options of the mission say what the relays were loaded with, as `linux_companion`
-//! was given it, or as a scenario of `cargo provision` has it; of one with a field, or with another channel or tolerance than the default, it
-//! cannot speak. The options that begin with `--new-` say what is different from now on. Every upload has a larger `--version` than the
+//! was given it, or as a file has it (`--config`): another channel than the paper's, or a field, only that can say.
+//! The options that begin with `--new-` say what is different from now on. Every upload has a larger `--version` than the
 //! one before, and the epoch file is this program's own.
 //!
 //! Its lines on standard output are as those of `linux_companion`. It ends with status 0 once the chain flies the new mission, 1 if
@@ -21,11 +21,14 @@
 //!
 //! The other files are those of `examples/linux_companion`.
 #![cfg_attr(unix, forbid(unsafe_code))]
-#![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(unix)]
 #[path = "../linux_companion/command.rs"]
 mod command;
+#[cfg(unix)]
+#[path = "../linux_companion/config.rs"]
+#[expect(dead_code, reason = "what single relays have of their own")]
+mod config;
 #[cfg(unix)]
 #[path = "../linux_companion/epoch.rs"]
 mod epoch;
@@ -37,8 +40,9 @@ mod keep;
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
 mod key;
 #[cfg(unix)]
-#[path = "../linux_companion/line.rs"]
-mod line;
+#[path = "../linux_companion/log.rs"]
+#[expect(dead_code, reason = "a relay goes on where this one ends")]
+mod log;
 #[cfg(unix)]
 #[path = "../linux_companion/mission.rs"]
 mod mission;
@@ -67,27 +71,13 @@ fn main() -> std::process::ExitCode {
     match station::upload(&plan) {
         Ok(()) => ExitCode::SUCCESS,
         Err(line) => {
-            eprintln!("{line}");
+            command::complain(&line);
             ExitCode::FAILURE
         }
     }
 }
 
-#[cfg(not(any(unix, target_os = "none")))]
+#[cfg(not(unix))]
 fn main() {
-    println!("This example needs Linux or another Unix.");
-}
-
-#[cfg(target_os = "none")]
-use panic_halt as _;
-#[cfg(target_os = "none")]
-use stm32f4xx_hal as _;
-
-/// The ground is no microcontroller: there are no ttys on the target.
-#[cfg(target_os = "none")]
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    loop {
-        cortex_m::asm::wfi();
-    }
+    println!("This program needs Linux or another Unix.");
 }

@@ -10,9 +10,12 @@ use uav_relay::{
     Band, Duration, Geodetic, Interference, Interferer, Mission, MissionConfig, Profile, Side,
     Sites, Upload, Wiring,
 };
+use uav_relay_scenario::deployment::{Deployment, NETWORK};
 
 use crate::command;
+use crate::config::{self, Beyond, Given};
 use crate::key;
+use crate::log::LogOptions;
 use crate::mission::{
     MissionOptions, altitude, band, distance, interferer, left, mission, noise, power, right,
     separation,
@@ -25,6 +28,10 @@ use crate::site::{SiteOptions, site};
 #[derive(Parser, Debug)]
 #[command(name = "linux_ground", disable_version_flag = true)]
 struct Options {
+    /// TOML file with the scenario that the relays were loaded with, and sections `network` and `ground`: what it says, options of the
+    /// command line say otherwise
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
     /// Tty toward the relay next to this end of the chain
     #[arg(long, value_name = "TTY")]
     tty: PathBuf,
@@ -35,10 +42,10 @@ struct Options {
     #[arg(long, value_name = "END", value_enum)]
     end: End,
     /// Bit/s on the tty, 1200 to 4000000
-    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1_200..=4_000_000))]
+    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u32>(text, 1_200, 4_000_000))]
     baud: u32,
     /// Number of the network
-    #[arg(long, value_name = "W", default_value_t = 7, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(0..))]
+    #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 0, 65_535))]
     network: u16,
     /// File with the network's key, 64 hexadecimal digits
     #[arg(long, value_name = "FILE")]
@@ -47,13 +54,13 @@ struct Options {
     #[arg(long, value_name = "FILE")]
     epoch_file: PathBuf,
     /// Version of the new mission, 1 to 65535: larger than that of every upload before
-    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 65_535))]
     version: u16,
     /// Seconds after which it gives up, 1 to 86400
-    #[arg(long, value_name = "S", default_value_t = 300, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    #[arg(long, value_name = "S", default_value_t = 300, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 86_400))]
     timeout: u64,
     /// Number of relays, 1 to 1000
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 1000))]
     of: u16,
     #[command(flatten)]
     loaded: MissionOptions,
@@ -96,6 +103,8 @@ struct Options {
     /// New least distance between two relays, m, 0 to 1e5
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = separation)]
     new_min_separation: Option<f32>,
+    #[command(flatten)]
+    log: LogOptions,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -118,16 +127,34 @@ pub(crate) struct Plan {
     pub(crate) key: [u8; 32],
     pub(crate) epoch_file: PathBuf,
     pub(crate) timeout: Duration,
+    pub(crate) log: LogOptions,
 }
 
 /// Reads the command line; where there is nothing to run, help or the mistake has been printed.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
-    plan(command::read()?).map_err(|line| command::refuse(&line))
+    let (options, beyond) = command::read(section)?;
+    plan(options, &beyond).map_err(|line| command::refuse(&line))
 }
 
-fn plan(options: Options) -> Result<Plan, String> {
-    let interference = options.loaded.interferer;
-    let loaded = mission(options.loaded.config(options.of, interference)?, "--")?;
+/// What a file says to the ground.
+fn section(deployment: &Deployment, given: &mut Given) {
+    config::network(deployment, given);
+    let own = &deployment.ground;
+    given.path("--tty", own.tty.as_ref());
+    given.flag("--shared", own.shared);
+    given.value("--end", own.end.as_ref());
+    given.path("--epoch-file", own.epoch_file.as_ref());
+    given.value("--timeout", own.timeout_s);
+    given.flag("--json", own.json);
+    given.path("--log-file", own.log_file.as_ref());
+}
+
+fn plan(options: Options, beyond: &Beyond) -> Result<Plan, String> {
+    let interference = options.loaded.interference(beyond.field);
+    let base = options
+        .loaded
+        .config(options.of, interference, beyond.channel)?;
+    let loaded = mission(base, "--")?;
     let sited = options.sites.of(options.loaded.distance)?;
     let (sites, along_m) = match moved(&options, sited)? {
         Some((sites, along_m)) => (Some(sites), Some(along_m)),
@@ -165,6 +192,7 @@ fn plan(options: Options) -> Result<Plan, String> {
         baud: options.baud,
         tty: options.tty,
         epoch_file: options.epoch_file,
+        log: options.log,
     })
 }
 

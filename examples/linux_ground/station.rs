@@ -8,14 +8,17 @@ use rustix::io::Errno;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Auth, Ground, Instant, Key, Progress, Side};
+use uav_relay::{Auth, Ground, Instant, Key, Progress, Side, Stats};
 
 use crate::epoch;
-use crate::line::line;
+use crate::log::Log;
 use crate::options::Plan;
 use crate::site::Between;
-use crate::system::{now, on_signals};
+use crate::system::{now, on_stop};
 use crate::tty::Tty;
+
+/// How long the last lines may take.
+const LAST_LINES: std::time::Duration = std::time::Duration::from_millis(500);
 
 /// A tty, and what it has not taken yet.
 struct Wire {
@@ -28,7 +31,7 @@ struct Wire {
 /// # Errors
 /// One line that says why it does not.
 pub(crate) fn upload(plan: &Plan) -> Result<(), String> {
-    let stop = on_signals()?;
+    let stop = on_stop()?;
     let mut wire = Wire {
         tty: Tty::open("--tty", &plan.tty, plan.baud)?,
         outgoing: Vec::new(),
@@ -38,7 +41,8 @@ pub(crate) fn upload(plan: &Plan) -> Result<(), String> {
         key: Key::new(plan.key),
         epoch: epoch::next(&plan.epoch_file)?,
     };
-    started(plan, wire.tty.name(), auth.epoch)?;
+    let log = Log::open(&plan.log)?;
+    started(&log, plan, auth.epoch);
     let mut ground = Ground::new(&plan.loaded, plan.end, plan.network, plan.wiring, auth);
     let begun = now(clock);
     ground
@@ -50,10 +54,13 @@ pub(crate) fn upload(plan: &Plan) -> Result<(), String> {
         wire.turn(&mut ground, now(clock));
         if ground.progress() != last {
             last = ground.progress();
-            say(now(clock), plan, last)?;
+            say(&log, now(clock), plan, last);
         }
         match last {
-            Progress::Flown { .. } => return Ok(()),
+            Progress::Flown { .. } => {
+                log.flush(LAST_LINES);
+                return Ok(());
+            }
             Progress::Outdated { version } => return Err(outdated(plan, version)),
             _ => {}
         }
@@ -62,7 +69,7 @@ pub(crate) fn upload(plan: &Plan) -> Result<(), String> {
         }
         let time = now(clock);
         if time >= end {
-            return Err(late(plan, last, ground.refused()));
+            return Err(late(plan, last, &ground));
         }
         let wake = ground.poll_timeout().map_or(end, |again| again.min(end));
         if wire.sleep(time, wake, stop.as_fd())? {
@@ -116,53 +123,52 @@ const fn name(plan: &Plan) -> &'static str {
     }
 }
 
-fn started(plan: &Plan, tty: &str, epoch: u32) -> Result<(), String> {
+fn started(log: &Log, plan: &Plan, epoch: u32) {
     let (end, relays, network) = (name(plan), plan.loaded.relays(), plan.network);
     let (base, baud) = (digest(&plan.loaded), plan.baud);
-    line(
+    let tty = plan.tty.display();
+    log.tell(
         Instant::ZERO,
+        "started",
         format_args!(
-            "started: {end} of {relays} relays, network {network}, loaded mission 0x{base:04x}, {tty}, {baud} baud"
+            "{end} of {relays} relays, network {network}, loaded mission 0x{base:04x}, --tty {tty}, {baud} baud"
         ),
-    )?;
-    line(
+    );
+    log.tell(
         Instant::ZERO,
-        format_args!("signed: frames carry a tag, epoch {epoch}"),
-    )
+        "signed",
+        format_args!("frames carry a tag, epoch {epoch}"),
+    );
 }
 
-fn say(now: Instant, plan: &Plan, progress: Progress) -> Result<(), String> {
+fn say(log: &Log, now: Instant, plan: &Plan, progress: Progress) {
     let version = plan.upload.version();
     match progress {
         Progress::Offering => {
             let digest = plan.upload.id().digest;
+            let what = format!("version {version}, mission 0x{digest:04x}");
             match plan.upload.sites() {
-                Some(sites) => line(
-                    now,
-                    format_args!(
-                        "offering: version {version}, mission 0x{digest:04x}, {}",
-                        Between(sites)
-                    ),
-                ),
-                None => line(
-                    now,
-                    format_args!("offering: version {version}, mission 0x{digest:04x}"),
-                ),
+                Some(sites) => {
+                    log.tell(now, "offering", format_args!("{what}, {}", Between(sites)));
+                }
+                None => log.tell(now, "offering", format_args!("{what}")),
             }
         }
-        Progress::Held { by } => line(
+        Progress::Held { by } => log.tell(
             now,
-            format_args!("held: relay {by} holds version {version}, and the others are asked"),
+            "held",
+            format_args!("relay {by} holds version {version}, and the others are asked"),
         ),
-        Progress::Flown { by, view } => line(
+        Progress::Flown { by, view } => log.tell(
             now,
+            "flown",
             format_args!(
-                "flown: relay {by} flies version {version}, view {} of the chain",
+                "relay {by} flies version {version}, view {} of the chain",
                 view.number()
             ),
         ),
         // The others are the program's end.
-        _ => Ok(()),
+        _ => {}
     }
 }
 
@@ -180,7 +186,7 @@ fn outdated(plan: &Plan, held: u16) -> String {
     }
 }
 
-fn late(plan: &Plan, progress: Progress, refused: u32) -> String {
+fn late(plan: &Plan, progress: Progress, ground: &Ground) -> String {
     let seconds = plan.timeout.as_micros() / 1_000_000;
     let version = plan.upload.version();
     let state = match progress {
@@ -188,9 +194,71 @@ fn late(plan: &Plan, progress: Progress, refused: u32) -> String {
             format!("relay {by} holds version {version}, and the chain does not fly it yet")
         }
         _ => format!(
-            "no relay is known to hold version {version}: out of reach, or with another key, --network or mission than 0x{:04x}",
-            digest(&plan.loaded)
+            "no relay is known to hold version {version}: {}",
+            why(plan, ground.stats())
         ),
     };
+    let refused = ground.refused();
     format!("--timeout {seconds}: {state}; {refused} frames refused")
+}
+
+/// What most likely is wrong, by what was heard.
+fn why(plan: &Plan, stats: &Stats) -> String {
+    let faults = [
+        (
+            stats.mission,
+            format!(
+                "hellos are of relays that were loaded with another mission than 0x{:04x}; say what they were loaded with",
+                digest(&plan.loaded)
+            ),
+        ),
+        (
+            stats.forged,
+            "frames have a wrong tag: is the key in --key-file that of the relays?".to_owned(),
+        ),
+        (
+            stats.unsigned,
+            "frames are not signed: relays without --key-file take no uploads".to_owned(),
+        ),
+        (
+            stats.foreign,
+            format!(
+                "frames are of another network number than --network {}",
+                plan.network
+            ),
+        ),
+        (
+            stats.version,
+            "frames are of another version of the format".to_owned(),
+        ),
+        (
+            stats.misaddressed.saturating_add(stats.overheard),
+            format!(
+                "frames are heard and none is for the {}: are --key-file, --end and --of those of the relays? The log of the nearest one says more",
+                name(plan)
+            ),
+        ),
+        (
+            stats.crc,
+            format!(
+                "frames are damaged: is --baud {} that of the relays?",
+                plan.baud
+            ),
+        ),
+    ];
+    match faults.into_iter().find(|(count, _)| *count > 0) {
+        Some((count, fault)) => format!("{count} {fault}"),
+        None if stats.received > 0 => "one answers, and does not take it yet".to_owned(),
+        // A relay that flies another mission says no more than that it is there.
+        None if stats.handshakes > 0 => format!(
+            "one is there and says nothing: it was loaded with another mission than 0x{:04x}, most likely",
+            digest(&plan.loaded)
+        ),
+        None => format!(
+            "nothing was heard; is --tty {} the one toward the chain, and are --network {}, --baud {}, --end and --key-file right? The log of a relay that hears this says more",
+            plan.tty.display(),
+            plan.network,
+            plan.baud
+        ),
+    }
 }

@@ -18,12 +18,13 @@ use crate::relay::signed::{greeting, say};
 use crate::sensing::level::is_level;
 use crate::settings::Wiring;
 use crate::side::Side;
+use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
-use crate::wire::frame::{self, FrameBuf, Header};
+use crate::wire::frame::{self, FrameBuf, FrameError, Header};
 use crate::wire::message::{Hello, Message};
 use crate::wire::session::{Checked, Session};
 use crate::wire::upload::{Upload, UploadError};
@@ -109,7 +110,7 @@ pub struct Ground {
     deframer: Deframer,
     session: Session,
     counter: u32,
-    refused: u32,
+    stats: Stats,
 }
 
 impl Ground {
@@ -145,7 +146,7 @@ impl Ground {
             deframer: Deframer::new(),
             session: Session::new(auth),
             counter: 0,
-            refused: 0,
+            stats: Stats::default(),
         }
     }
 
@@ -195,16 +196,34 @@ impl Ground {
     }
 
     /// Intact frames to this node that were none of a relay that it may hear, or came before.
-    pub const fn refused(&self) -> u32 {
-        self.refused
+    pub fn refused(&self) -> u32 {
+        let stats = &self.stats;
+        let unknown = stats.unsigned.saturating_add(stats.misaddressed);
+        let untrue = stats.forged.saturating_add(stats.replayed);
+        let other = stats.mission.saturating_add(stats.malformed);
+        unknown.saturating_add(untrue).saturating_add(other)
+    }
+
+    /// What it has counted of the frames that came in, as a relay does. `mission` are relays that were loaded with another one, `foreign`
+    /// frames of another network, `overheard` those to another node, and `crc` all that are damaged.
+    pub const fn stats(&self) -> &Stats {
+        &self.stats
     }
 
     /// Takes in bytes, however they are cut; at most one tag for each 19 of them.
     pub fn handle_bytes(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             if let Some(Ok(plain)) = self.deframer.push(byte) {
-                let Ok(frame) = frame::open(plain) else {
-                    continue;
+                let frame = match frame::open(plain) {
+                    Ok(frame) => frame,
+                    Err(FrameError::Version) => {
+                        bump(&mut self.stats.version);
+                        continue;
+                    }
+                    Err(_) => {
+                        bump(&mut self.stats.crc);
+                        continue;
+                    }
                 };
                 let Header {
                     network,
@@ -212,31 +231,40 @@ impl Ground {
                     destination,
                     ..
                 } = frame.header;
-                if network != self.network || destination != self.node {
+                if network != self.network {
+                    bump(&mut self.stats.foreign);
+                    continue;
+                }
+                if destination != self.node {
+                    bump(&mut self.stats.overheard);
                     continue;
                 }
                 let distance = sender.abs_diff(self.node);
                 let near = (1..=self.within).contains(&distance);
-                let checked = if near {
-                    self.session.check(sender, &frame)
-                } else {
-                    Checked::Unsigned
-                };
-                match checked {
+                if !near {
+                    bump(&mut self.stats.misaddressed);
+                    continue;
+                }
+                match self.session.check(sender, &frame) {
                     Checked::Fresh { .. } => match Message::decode(frame.body) {
                         Ok(Message::Hello(hello)) if hello.mission == self.base => {
+                            bump(&mut self.stats.received);
                             self.answered(sender, distance, hello);
                         }
-                        _ => self.refused = self.refused.saturating_add(1),
+                        Ok(Message::Hello(_)) => bump(&mut self.stats.mission),
+                        _ => bump(&mut self.stats.malformed),
                     },
                     Checked::Handshake { first } => {
+                        bump(&mut self.stats.handshakes);
                         self.due |= first && self.is_under_way();
                         if first && self.level_w > 0.0 {
                             self.untold |= bit(distance);
                         }
                     }
-                    Checked::Unproven => {}
-                    _ => self.refused = self.refused.saturating_add(1),
+                    Checked::Unproven => bump(&mut self.stats.handshakes),
+                    Checked::Unsigned => bump(&mut self.stats.unsigned),
+                    Checked::Forged => bump(&mut self.stats.forged),
+                    Checked::Replayed | Checked::WentBack => bump(&mut self.stats.replayed),
                 }
             }
         }

@@ -3,9 +3,10 @@
 use serde_path_to_error::Segment;
 use toml::{Table, Value};
 
+use crate::deployment_keys::SECTIONS;
 use crate::error::{Problem, ScenarioError, cut, quote};
 use crate::keys::Rule::{LinkOrNumber, Number, Whole};
-use crate::keys::{FILE, Key, Keys, Rule, names};
+use crate::keys::{FILE, Key, Rule, names};
 
 /// A mistake in the value of a key.
 pub(super) fn mistake(
@@ -26,7 +27,12 @@ pub(super) fn mistake(
 
 /// Checks shape, known and required keys, and every range. A scalar of the wrong type is left for serde to find.
 pub(super) fn table(file: &str, table: &Table) -> Result<(), ScenarioError> {
-    Check { file }.table("", table, FILE)
+    Check { file }.table("", table, sections())
+}
+
+/// Every section that a file may have: of the scenario, and of what is deployed with it.
+fn sections() -> impl Iterator<Item = &'static Key> + Clone {
+    FILE.iter().chain(SECTIONS)
 }
 
 struct Check<'a> {
@@ -34,12 +40,16 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    fn table(&self, path: &str, table: &Table, keys: Keys) -> Result<(), ScenarioError> {
-        if let Some((name, value)) = table
-            .iter()
-            .find(|(name, _)| keys.iter().all(|key| key.name != *name))
-        {
-            let allowed = format!("the keys {}{}", names(keys), nearest(name, keys));
+    fn table(
+        &self,
+        path: &str,
+        table: &Table,
+        keys: impl IntoIterator<Item = &'static Key> + Clone,
+    ) -> Result<(), ScenarioError> {
+        let is_known = |name: &str| keys.clone().into_iter().any(|key| key.name == name);
+        if let Some((name, value)) = table.iter().find(|(name, _)| !is_known(name)) {
+            let meant = nearest(name, keys.clone());
+            let allowed = format!("the keys {}{meant}", names(keys));
             // The name is the file's own, and a quoted key may be as long as the file.
             let path = join(path, &cut(name));
             return Err(mistake(
@@ -50,7 +60,7 @@ impl Check<'_> {
                 allowed,
             ));
         }
-        for key in keys {
+        for key in keys.clone() {
             let path = join(path, key.name);
             match table.get(key.name) {
                 Some(value) => {
@@ -67,9 +77,10 @@ impl Check<'_> {
                             &path,
                             None,
                             Problem::Missing,
-                            key.instead(keys).fold(rule.to_string(), |said, other| {
-                                format!("{said}, or {} instead, {}", other.name, other.rule)
-                            }),
+                            key.instead(keys.clone())
+                                .fold(rule.to_string(), |said, other| {
+                                    format!("{said}, or {} instead, {}", other.name, other.rule)
+                                }),
                         ));
                     }
                 },
@@ -124,11 +135,12 @@ impl Check<'_> {
             (Whole(range), Value::Integer(whole)) if !range.holds(*whole as f64) => {
                 fail(Problem::OutOfRange)
             }
+            (Rule::Text, Value::String(text)) if text.is_empty() => fail(Problem::OutOfRange),
             (Rule::Choice(texts), Value::String(text)) if !texts.contains(&text.as_str()) => {
                 fail(Problem::UnknownChoice)
             }
-            (Whole(_) | Rule::Flag | Rule::Choice(_), _) => Ok(()),
-            (Rule::Table(keys), Value::Table(table)) => self.table(path, table, keys),
+            (Whole(_) | Rule::Flag | Rule::Text | Rule::Choice(_), _) => Ok(()),
+            (Rule::Table(keys), Value::Table(table)) => self.table(path, table, *keys),
             (Rule::Tables(_, least), Value::Array(list)) if list.len() < *least => {
                 fail(Problem::EmptyList)
             }
@@ -152,9 +164,9 @@ impl Check<'_> {
 const ALIKE: f64 = 0.8;
 
 /// The known key that is most like an unknown one, where one is.
-fn nearest(name: &str, keys: Keys) -> String {
+fn nearest(name: &str, keys: impl IntoIterator<Item = &'static Key>) -> String {
     let alike = keys
-        .iter()
+        .into_iter()
         .map(|key| (strsim::jaro_winkler(name, key.name), key.name));
     alike
         .filter(|(alike, _)| *alike >= ALIKE)
@@ -187,19 +199,20 @@ pub(super) fn wrong_type(
     path: &serde_path_to_error::Path,
 ) -> ScenarioError {
     let mut value = None;
-    let mut allowed = format!("the keys {}", names(FILE));
-    let (mut here, mut keys) = (Some(table), FILE);
+    let mut allowed = format!("the keys {}", names(sections()));
+    let mut keys: Vec<&Key> = sections().collect();
+    let mut here = Some(table);
     let mut list = None;
     for segment in path {
         match segment {
             Segment::Map { key } => {
-                let Some(known) = keys.iter().find(|known| known.name == key) else {
+                let Some(known) = keys.iter().find(|known| known.name == key).copied() else {
                     break;
                 };
                 value = here.and_then(|table| table.get(key));
                 allowed = known.rule.to_string();
                 if let Rule::Table(inner) | Rule::Tables(inner, _) = known.rule {
-                    keys = inner;
+                    keys = inner.iter().collect();
                 }
             }
             Segment::Seq { index } => value = list.and_then(|list: &Vec<Value>| list.get(*index)),

@@ -25,6 +25,8 @@ pub(super) enum Rule {
     Flag,
     /// One of these texts.
     Choice(&'static [&'static str]),
+    /// A text that is not empty.
+    Text,
     Table(Keys),
     /// An array of tables with at least so many entries.
     Tables(Keys, usize),
@@ -50,7 +52,7 @@ pub(super) struct Key {
 /// The keys of a table.
 pub(super) type Keys = &'static [Key];
 
-const fn range(low: f64, high: f64, unit: &'static str) -> Range {
+pub(super) const fn range(low: f64, high: f64, unit: &'static str) -> Range {
     Range {
         low,
         high,
@@ -77,7 +79,7 @@ const fn required(name: &'static str, rule: Rule) -> Key {
     }
 }
 
-const fn optional(name: &'static str, rule: Rule) -> Key {
+pub(super) const fn optional(name: &'static str, rule: Rule) -> Key {
     Key {
         name,
         need: Need::Never,
@@ -247,12 +249,15 @@ impl Key {
     }
 
     /// The keys that would do in its place, of those of its table.
-    pub(super) fn instead(&self, keys: Keys) -> impl Iterator<Item = &'static Key> {
+    pub(super) fn instead(
+        &self,
+        keys: impl IntoIterator<Item = &'static Key>,
+    ) -> impl Iterator<Item = &'static Key> {
         let names = match self.need {
             Need::Unless(names) => names,
             _ => &[],
         };
-        keys.iter().filter(|key| names.contains(&key.name))
+        keys.into_iter().filter(|key| names.contains(&key.name))
     }
 }
 
@@ -300,13 +305,14 @@ impl fmt::Display for Rule {
             Whole(range) => write!(f, "a whole number, {range}"),
             LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
             Rule::Flag => f.write_str("true or false"),
+            Rule::Text => f.write_str("a text that is not empty"),
             Rule::Choice(texts) => write!(f, "\"{}\"", texts.join("\" or \"")),
-            Rule::Table(keys) => write!(f, "a table with the keys {}", names(keys)),
-            Rule::Tables(keys, 0) => write!(f, "a list of tables with the keys {}", names(keys)),
+            Rule::Table(keys) => write!(f, "a table with the keys {}", names(*keys)),
+            Rule::Tables(keys, 0) => write!(f, "a list of tables with the keys {}", names(*keys)),
             Rule::Tables(keys, least) => write!(
                 f,
                 "a list of {least} or more tables with the keys {}",
-                names(keys)
+                names(*keys)
             ),
         }
     }
@@ -332,8 +338,8 @@ fn collect(table: &str, keys: Keys, names: &mut Vec<String>) {
 }
 
 /// The names of some keys, for a message.
-pub(super) fn names(keys: Keys) -> String {
-    keys.iter()
+pub(super) fn names<'a>(keys: impl IntoIterator<Item = &'a Key>) -> String {
+    keys.into_iter()
         .map(|key| key.name)
         .collect::<Vec<_>>()
         .join(", ")

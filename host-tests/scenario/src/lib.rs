@@ -5,6 +5,7 @@
 //! | [`Scenario`] | a scenario file, read and checked |
 //! | [`mission`] | from a scenario to the mission that relays fly |
 //! | [`scene`], [`hypothetical`] | several interferers whose powers add up, and the one that stands for them |
+//! | [`deployment`] | what the programs of a chain need beside the scenario, in sections of the same file |
 //! | [`number`] | from the f64 of files to the f32 of relays |
 //!
 //! A file is read in three passes, each with one job: `check` compares its shape, its keys and every range with
@@ -13,6 +14,8 @@
 //! what is allowed.
 
 mod check;
+pub mod deployment;
+mod deployment_keys;
 mod error;
 mod file;
 pub mod hypothetical;
@@ -58,7 +61,23 @@ impl Scenario {
     pub fn parse(file_name: &str, text: &str) -> Result<Self, ScenarioError> {
         let table = read::table_of(file_name, text)?;
         check::table(file_name, &table)?;
-        let raw = file::from_table(file_name, &table)?;
+        let (scenario, sections) = deployment::split(table);
+        // Other programs use them; a mistake in one is a mistake here, too.
+        deployment::from_table(file_name, &sections)?;
+        let raw = file::from_table(file_name, &scenario)?;
         file::build(file_name, raw)
+    }
+}
+
+impl deployment::Deployment {
+    /// Reads both parts of a file: the scenario, and the sections.
+    ///
+    /// # Errors
+    /// As [`Scenario::load`].
+    pub fn load(path: &Path) -> Result<(Scenario, Self), ScenarioError> {
+        let (name, text) = (path.display().to_string(), read::text_of(path)?);
+        let scenario = Scenario::parse(&name, &text)?;
+        let (_, sections) = deployment::split(read::table_of(&name, &text)?);
+        Ok((scenario, deployment::from_table(&name, &sections)?))
     }
 }

@@ -1,4 +1,4 @@
-//! The examples as programs. `cargo test` at the root has built them already, `cargo test -p host-tests` has not, and there is
+//! The programs. `cargo test` at the root has built them already, `cargo test -p host-tests` has not, and there is
 //! no variable with its place as there is for a package's own binaries: so cargo is asked, which builds what is missing.
 
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub(crate) fn ground() -> &'static Path {
     PATH.get_or_init(|| build("linux_ground"))
 }
 
-fn build(example: &str) -> PathBuf {
+fn build(program: &str) -> PathBuf {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = manifest.parent().expect("the workspace is one up");
     // The target folder of these tests, so that nothing is built twice. Cargo holds no lock on it while tests run.
@@ -25,18 +25,25 @@ fn build(example: &str) -> PathBuf {
     let mut cargo = Command::new(env!("CARGO"));
     cargo
         .current_dir(root)
-        .args(["build", "--locked", "--example", example])
+        .args([
+            "build",
+            "--locked",
+            "--package",
+            "uav-relay-linux",
+            "--bin",
+            program,
+        ])
         .args(["--message-format", "json-render-diagnostics"])
         .arg("--target-dir")
         .arg(target.expect("the folder for temporary files is in it"))
         .stderr(Stdio::inherit());
     let output = cargo.output().unwrap();
-    assert!(output.status.success(), "{example} does not build");
+    assert!(output.status.success(), "{program} does not build");
     String::from_utf8(output.stdout)
         .unwrap()
         .lines()
         .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
-        .filter(|message| message["target"]["name"] == example)
+        .filter(|message| message["target"]["name"] == program)
         .find_map(|message| message["executable"].as_str().map(PathBuf::from))
         .expect("cargo names the executable")
 }

@@ -3,7 +3,9 @@
 
 mod binary;
 mod ending;
+mod file;
 mod flying;
+mod hub;
 mod idle;
 mod listening;
 mod mavsdk;
@@ -16,9 +18,13 @@ mod positions;
 mod process;
 mod pty;
 mod signed;
+mod soak;
+mod stays;
+mod systemd;
 mod unplugged;
 mod upload;
 mod views;
+mod words;
 
 use std::time::{Duration, Instant};
 

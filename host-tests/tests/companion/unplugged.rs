@@ -15,8 +15,8 @@ fn a_port_that_vanishes_is_opened_again() {
     for _ in 0..2 {
         let (_, sleeps) = flight.relay.cost();
         flight.drone.order("unplug");
-        let line = flight.relay.line("is gone; tried again every second");
-        assert!(line.contains("autopilot: --autopilot /"), "{line}");
+        let line = flight.relay.line("is gone; tried again until it is back");
+        assert!(line.contains("port lost: --autopilot /"), "{line}");
         flight.relay.line("autopilot: silent");
         std::thread::sleep(Duration::from_millis(1_500));
         let (_, after) = flight.relay.cost();
@@ -35,7 +35,7 @@ fn a_port_that_vanishes_is_opened_again() {
 
     // An autopilot that was switched off with its port is asked again for what it is to say.
     flight.drone.order("unplug");
-    flight.relay.line("is gone; tried again every second");
+    flight.relay.line("is gone; tried again until it is back");
     flight.drone.order("reboot");
     flight.drone.forget();
     flight.drone.order("plug");

@@ -16,7 +16,7 @@ use uav_relay::{
 use uav_relay::{View, ViewId};
 
 /// The network that every simulated relay belongs to.
-pub(super) const NETWORK: u16 = 1;
+pub(super) use uav_relay_scenario::deployment::NETWORK;
 
 /// Flags in the second word of a frame: a tag follows, the body is a handshake.
 const SIGNED: u8 = 0x10;

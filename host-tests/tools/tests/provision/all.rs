@@ -265,7 +265,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
         ),
         (
             &[],
-            "--uavs: is missing, and so is [plan] in default scenario; allowed: 1 to 1000",
+            "--uavs: is missing, and so are [plan] and network.relays in default scenario; allowed: 1 to 1000",
         ),
         (&["--uavs", "3", "--index", "1"], "--index"),
         (

@@ -2,12 +2,13 @@
 
 mod options;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Parser as _;
 use uav_relay::{Adjust, ChannelLoad, Local, Measure, Settings};
+use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, mission};
 use uav_relay_sim::command::{self, Failure};
 use uav_relay_sim::simulator::medium::access::OVERHEAD;
@@ -26,6 +27,8 @@ struct Asked<'a> {
     scenario: Scenario,
     /// The scenario, as a message names it.
     name: String,
+    network: u16,
+    key_file: Option<PathBuf>,
     uavs: u16,
     method: Method,
     tolerance: f64,
@@ -57,7 +60,7 @@ fn run(options: &Options) -> Result<String, String> {
     if let Some(line) = mission::left_out(scenario, *uavs) {
         return Err(format!("{name}: {line}"));
     }
-    let secret = secret(options)?;
+    let secret = asked.secret()?;
     let flight = asked.flight(secret)?;
     let flown = asked.flown()?;
     let said = match (&options.out, options.index, &options.folder.out_dir) {
@@ -70,7 +73,7 @@ fn run(options: &Options) -> Result<String, String> {
             format!(
                 "{}: relay {index} of {uavs}, network {}; {LEN} bytes for {ADDRESS:#010x}\n",
                 file.display(),
-                options.network
+                asked.network
             )
         }
         (_, _, Some(dir)) => asked.folder(&flight, flown.as_ref(), dir)?,
@@ -89,10 +92,15 @@ fn run(options: &Options) -> Result<String, String> {
 impl<'a> Asked<'a> {
     /// What the options and the scenario's plan say together.
     fn new(options: &'a Options) -> Result<Self, String> {
-        let scenario = match &options.scenario {
-            Some(file) => Scenario::load(file).map_err(|error| error.to_string())?,
-            None => Scenario::default(),
+        let (scenario, Deployment { network, .. }) = match &options.scenario {
+            Some(file) => Deployment::load(file).map_err(|error| error.to_string())?,
+            None => Default::default(),
         };
+        // A path in the file is relative to its folder.
+        let folder = options.scenario.as_deref().and_then(Path::parent);
+        let of_file = network
+            .key_file
+            .map(|file| folder.unwrap_or(Path::new("")).join(file));
         let name = options.scenario.as_ref().map_or_else(
             || "default scenario".to_owned(),
             |file| file.display().to_string(),
@@ -109,12 +117,11 @@ impl<'a> Asked<'a> {
                 ));
             }
             (_, Some(plan)) => plan.uavs,
-            (Some(uavs), None) => uavs,
-            (None, None) => {
-                return Err(format!(
-                    "--uavs: is missing, and so is [plan] in {name}; allowed: 1 to 1000"
-                ));
-            }
+            (uavs, None) => uavs.or(network.relays).ok_or_else(|| {
+                format!(
+                    "--uavs: is missing, and so are [plan] and network.relays in {name}; allowed: 1 to 1000"
+                )
+            })?,
         };
         let planned = plan.map(|plan| match plan.method {
             PlannedMethod::Align => Method::Align,
@@ -152,6 +159,8 @@ impl<'a> Asked<'a> {
             options,
             scenario,
             name,
+            network: options.network.or(network.id).unwrap_or(NETWORK),
+            key_file: options.key_file.clone().or(of_file),
             uavs,
             method,
             tolerance,
@@ -161,7 +170,6 @@ impl<'a> Asked<'a> {
     /// What all drones have in common.
     fn flight(&self, secret: Option<Secret>) -> Result<Flight, String> {
         let options = self.options;
-        let Options { network, .. } = *options;
         let method = match self.method {
             Method::Align => uav_relay::Method::Align,
             Method::Joint => uav_relay::Method::Joint,
@@ -171,7 +179,7 @@ impl<'a> Asked<'a> {
                 local: Local::Fine,
             }),
         };
-        let flight = Flight::new(&self.scenario, self.uavs, self.tolerance, network)
+        let flight = Flight::new(&self.scenario, self.uavs, self.tolerance, self.network)
             .map_err(|error| format!("{}: {error}", self.name))?;
         carried(options, self.uavs)?;
         let flight = match options.speed {
@@ -235,14 +243,35 @@ impl<'a> Asked<'a> {
         Ok(Some(flown))
     }
 
+    /// What all frames are signed with.
+    fn secret(&self) -> Result<Option<Secret>, String> {
+        let Some(file) = &self.key_file else {
+            return match self.options.epoch {
+                Some(epoch) => Err(format!(
+                    "--epoch {epoch}: is for frames that are signed, with --key-file"
+                )),
+                None => Ok(None),
+            };
+        };
+        let seconds = || {
+            let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
+            u32::try_from(since.as_secs()).ok()
+        };
+        let epoch = self.options.epoch.or_else(seconds);
+        Ok(Some(Secret {
+            key: key::load("--key-file", file)?,
+            epoch: epoch.ok_or("--epoch: is needed where the clock says no time")?,
+        }))
+    }
+
     /// Writes the blocks of all relays, and the summary.
     fn folder(&self, flight: &Flight, flown: Option<&Flown>, dir: &Path) -> Result<String, String> {
         let heading = Heading {
             scenario: self.name.clone(),
             uavs: self.uavs,
-            network: self.options.network,
+            network: self.network,
             method: format!("{:?}", self.method).to_lowercase(),
-            signed: self.options.key_file.is_some(),
+            signed: self.key_file.is_some(),
         };
         let places = match flown {
             Some(flown) if self.method != Method::Adjust => flown.plan.places.as_slice(),
@@ -279,21 +308,6 @@ fn carried(options: &Options, uavs: u16) -> Result<(), String> {
     let Settings { probe_after, .. } = Settings::default();
     command::carries(options.baud, load, probe_after)
         .map_err(|error| format!("{error}; fewer with --in-range, none with --wires"))
-}
-
-fn secret(options: &Options) -> Result<Option<Secret>, String> {
-    let Some(file) = &options.key_file else {
-        return Ok(None);
-    };
-    let seconds = || {
-        let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
-        u32::try_from(since.as_secs()).ok()
-    };
-    let epoch = options.epoch.or_else(seconds);
-    Ok(Some(Secret {
-        key: key::load("--key-file", file)?,
-        epoch: epoch.ok_or("--epoch: is needed where the clock says no time")?,
-    }))
 }
 
 fn measure(options: &Options, scenario: &Scenario) -> Result<Option<Measure>, String> {

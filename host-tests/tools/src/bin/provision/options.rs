@@ -16,15 +16,15 @@ pub(crate) struct Options {
     /// Scenario file (TOML); without it the paper's multi-hop scenario
     #[arg(long, value_name = "FILE")]
     pub(crate) scenario: Option<PathBuf>,
-    /// Number of relays, 1 to 1000; without it that of the scenario's plan
+    /// Number of relays, 1 to 1000; without it that of the scenario's plan or section `network`
     #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1000))]
     pub(crate) uavs: Option<u16>,
     /// Which of them this drone is, 1 (next to the transmitter) to N
     #[arg(long, value_name = "I", required_unless_present = "all", value_parser = whole::<u16>(1, 1000))]
     pub(crate) index: Option<u16>,
-    /// Number of the network, 0 to 65535; frames of any other are ignored
-    #[arg(long, value_name = "W", default_value_t = 1, value_parser = whole(0, u16::MAX))]
-    pub(crate) network: u16,
+    /// Number of the network, 0 to 65535; frames of any other are ignored. Without it that of the scenario's section `network`, or 1
+    #[arg(long, value_name = "W", value_parser = whole(0, u16::MAX))]
+    pub(crate) network: Option<u16>,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1; without it that of the scenario's plan, or 1e-4
     #[arg(long, value_name = "T", value_parser = |text: &str| number(text, 1e-6, 0.1))]
     pub(crate) tolerance: Option<f64>,
@@ -40,12 +40,13 @@ pub(crate) struct Options {
     /// In a field: the relay measures it too, and believes this many samples at a place, 100 to 1000000
     #[arg(long, value_name = "S", value_parser = whole::<u32>(100, 1_000_000))]
     pub(crate) samples: Option<u32>,
-    /// File with the network's key, 64 hexadecimal digits; without one the frames of this relay are not signed
+    /// File with the network's key, 64 hexadecimal digits; without one, and without one in the scenario's section `network`, the frames of
+    /// this relay are not signed
     #[arg(long, value_name = "FILE")]
     pub(crate) key_file: Option<PathBuf>,
     /// The least epoch to sign with, 1 to 4294967294, above any that a relay of this index has signed with by this key: it rises
     /// by itself from there. Without it the seconds of this machine's clock
-    #[arg(long, value_name = "E", requires = "key_file", value_parser = whole::<u32>(1, 0xFFFF_FFFE))]
+    #[arg(long, value_name = "E", value_parser = whole::<u32>(1, 0xFFFF_FFFE))]
     pub(crate) epoch: Option<u32>,
     /// Bits per second on the radio channel that the relays share, 300 to 10000000; refused where that cannot carry them
     #[arg(long, value_name = "B", default_value_t = 115_200, value_parser = whole(300, MOST_BAUD))]

@@ -1,0 +1,216 @@
+//! One file for all tools: what a scenario file says, as the options that would say it, before those of the command line.
+//!
+//! So each number has one check and one name, and an option that is given in both places is that of the command line.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use clap::Parser;
+use uav_relay::{Channel, Interference, Profile};
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::deployment::Deployment;
+use uav_relay_scenario::mission;
+
+use crate::site::degrees;
+
+/// The tolerance on the SIR that every relay of a chain is given.
+const TOLERANCE: f64 = 1e-4;
+
+/// What only a file can say.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Beyond {
+    /// The channel; without it that of the paper.
+    pub(crate) channel: Option<Channel>,
+    /// The field, where the file has one.
+    pub(crate) field: Option<Interference>,
+    /// What single relays have of their own.
+    pub(crate) profiles: Vec<(u16, Profile)>,
+}
+
+/// Options that a file gives: their names, and their values; none for those without one.
+#[derive(Debug, Default)]
+pub(crate) struct Given {
+    options: Vec<(&'static str, Option<OsString>)>,
+    folder: PathBuf,
+}
+
+impl Given {
+    /// An option with a value, if there is one.
+    pub(crate) fn value(&mut self, name: &'static str, value: Option<impl ToString>) {
+        let value = value.map(|value| value.to_string().into());
+        self.options.extend(value.map(|value| (name, Some(value))));
+    }
+
+    /// An option with a path, which is relative to the folder of the file.
+    pub(crate) fn path(&mut self, name: &'static str, path: Option<&PathBuf>) {
+        let path = path.map(|path| self.folder.join(path).into_os_string());
+        self.options.extend(path.map(|path| (name, Some(path))));
+    }
+
+    /// An option without a value.
+    pub(crate) fn flag(&mut self, name: &'static str, is: Option<bool>) {
+        if is == Some(true) {
+            self.options.push((name, None));
+        }
+    }
+
+    /// The same less what the command line says, and less what it says otherwise.
+    fn less(mut self, line: &[OsString]) -> Self {
+        let says = |name: &str| {
+            let with_value = format!("{name}=");
+            line.iter().any(|word| {
+                let word = word.to_string_lossy();
+                word == name || word.starts_with(&with_value)
+            })
+        };
+        self.options.retain(|(name, _)| !says(name));
+        for (one, others) in OTHERWISE {
+            if says(one) {
+                self.options.retain(|(name, _)| !others.contains(name));
+            }
+        }
+        self
+    }
+}
+
+/// Options of the command line, and those of a file whose place they take.
+const OTHERWISE: [(&str, &[&str]); 6] = [
+    ("--shared", &["--upstream", "--downstream"]),
+    ("--upstream", &["--shared"]),
+    ("--downstream", &["--shared"]),
+    ("--interferer", &["--field"]),
+    ("--field", &["--interferer"]),
+    (
+        "--positions",
+        &[
+            "--autopilot",
+            "--autopilot-baud",
+            "--autopilot-key-file",
+            "--speed",
+        ],
+    ),
+];
+
+/// The words of the command line, behind those of the file that `--config` names among them; and what only that can say. `section` is the
+/// program's own part of it.
+///
+/// # Errors
+/// One line that says what is wrong with the file.
+pub(crate) fn read<T: Parser>(
+    section: fn(&Deployment, &mut Given),
+) -> Result<(Vec<OsString>, Beyond), String> {
+    let mut words = std::env::args_os();
+    let program = words.next().unwrap_or_default();
+    let line: Vec<OsString> = words.collect();
+    let Some(file) = named(&line) else {
+        return Ok((
+            std::iter::once(program).chain(line).collect(),
+            Beyond::default(),
+        ));
+    };
+    let (scenario, deployment) =
+        Deployment::load(&file).map_err(|error| format!("--config {error}"))?;
+    let mut given = Given {
+        folder: file.parent().map(Path::to_owned).unwrap_or_default(),
+        ..Given::default()
+    };
+    let has = T::command();
+    let beyond = flown(&scenario, &mut given)
+        .map_err(|error| format!("--config {}: {error}", file.display()))?;
+    section(&deployment, &mut given);
+    given.options.retain(|(name, _)| {
+        has.get_arguments()
+            .any(|arg| arg.get_long() == name.strip_prefix("--"))
+    });
+    let given = given.less(&line);
+    let words = given
+        .options
+        .into_iter()
+        .flat_map(|(name, value)| std::iter::once(name.into()).chain(value));
+    Ok((
+        std::iter::once(program).chain(words).chain(line).collect(),
+        beyond,
+    ))
+}
+
+/// The file that the command line names.
+fn named(line: &[OsString]) -> Option<PathBuf> {
+    line.iter().enumerate().find_map(|(at, word)| {
+        if word == "--config" {
+            return line.get(at + 1).map(PathBuf::from);
+        }
+        let word = word.to_str()?;
+        word.strip_prefix("--config=").map(PathBuf::from)
+    })
+}
+
+/// The scenario, as options of a mission.
+fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
+    // For one relay: how many there are is in another section, or on the command line.
+    let (mission, profiles) =
+        mission::mission(scenario, 1, TOLERANCE).map_err(|error| error.to_string())?;
+    let config = mission.config();
+    if let Some(line) = &scenario.line {
+        let [tx, rx] = line.sites;
+        given.value("--site-tx", Some(degrees(tx)));
+        given.value("--site-rx", Some(degrees(rx)));
+    }
+    given.value("--distance", Some(config.distance_m));
+    given.value("--altitude", Some(config.common.altitude_m));
+    let (band, lateral) = (config.band, config.lateral);
+    given.value("--band", Some(format!("{},{}", band.least_m, band.most_m)));
+    given.value("--lateral-min-m", Some(lateral.least_m));
+    given.value("--lateral-max-m", Some(lateral.most_m));
+    given.value("--tx-power", Some(config.tx_power_w));
+    given.value("--uav-power", Some(config.common.power_w));
+    given.value("--noise", Some(config.noise_w));
+    given.value("--min-separation", Some(config.min_separation_m));
+    let mut field = None;
+    match config.interference {
+        Interference::Source(one) => {
+            let one = format!("{},{},{}", one.power_w, one.x_m, one.y_m);
+            given.value("--interferer", Some(one));
+        }
+        Interference::Unknown => given.value("--interferer", Some("unknown")),
+        other @ Interference::Field(_) => field = Some(other),
+    }
+    if let Some(listen) = &scenario.listen {
+        given.flag("--listen", Some(true));
+        given.flag("--following", Some(listen.following));
+        given.value("--listen-every", listen.every_s);
+        given.value("--listen-half-life", listen.half_life_s);
+        given.value("--listen-error", listen.relative_error);
+    }
+    let profiles = if scenario.relays.is_empty() {
+        profiles
+    } else {
+        let (_, all) = mission::mission(&unspaced(scenario), 1_000, TOLERANCE)
+            .map_err(|error| error.to_string())?;
+        all
+    };
+    Ok(Beyond {
+        channel: Some(config.channel),
+        field,
+        profiles,
+    })
+}
+
+/// The scenario with room for any number of relays.
+fn unspaced(scenario: &Scenario) -> Scenario {
+    Scenario {
+        min_separation_m: 0.0,
+        ..scenario.clone()
+    }
+}
+
+/// The sections that every program reads.
+pub(crate) fn network(deployment: &Deployment, given: &mut Given) {
+    let network = &deployment.network;
+    given.value("--network", network.id);
+    given.value("--of", network.relays);
+    given.path("--key-file", network.key_file.as_ref());
+    given.value("--method", network.method.as_ref());
+    given.value("--baud", network.baud);
+    given.value("--probe-after-ms", network.probe_after_ms);
+    given.value("--dead-after-ms", network.dead_after_ms);
+}

@@ -1,0 +1,248 @@
+//! The lines of the program. A thread of its own writes them, so whoever does not read them, or a disk that is full, holds up nobody: a
+//! line that cannot be written is dropped and counted, and the next one that can be says how many were.
+
+use std::fmt;
+use std::fs::File;
+use std::io::Write as _;
+use std::os::fd::AsFd as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::time::{Duration, Instant as Clock, SystemTime};
+
+use clap::Args;
+use serde_json::{Map, Value, json};
+use uav_relay::Instant;
+
+/// Lines that wait for a slow reader, at most.
+const QUEUE: usize = 1_024;
+
+/// How the lines are written, and where.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Log")]
+pub(crate) struct LogOptions {
+    /// Every line is one JSON object
+    #[arg(long)]
+    json: bool,
+    /// File that the lines are added to, in place of standard output; made if it is missing
+    #[arg(long, value_name = "FILE")]
+    log_file: Option<PathBuf>,
+}
+
+enum Order {
+    Line(Instant, String),
+    /// All before it has been written, or dropped.
+    Flush(SyncSender<()>),
+}
+
+/// What the two sides of the queue share.
+#[derive(Debug, Default)]
+struct Shared {
+    dropped: AtomicU64,
+    reopen: AtomicBool,
+}
+
+/// Takes lines. No call waits, and none fails.
+#[derive(Clone, Debug)]
+pub(crate) struct Log {
+    orders: SyncSender<Order>,
+    shared: Arc<Shared>,
+    json: bool,
+}
+
+impl Log {
+    /// Begins to write.
+    ///
+    /// # Errors
+    /// One line that names the file that cannot be opened.
+    pub(crate) fn open(options: &LogOptions) -> Result<Self, String> {
+        let out = Out::open(options.log_file.as_deref())?;
+        let (orders, taken) = sync_channel(QUEUE);
+        let shared = Arc::new(Shared::default());
+        let mut writer = Writer {
+            out,
+            torn: false,
+            told: 0,
+            json: options.json,
+            shared: Arc::clone(&shared),
+        };
+        std::thread::Builder::new()
+            .name("log".to_owned())
+            .spawn(move || writer.serve(&taken))
+            .map_err(|error| format!("cannot start the log: {error}"))?;
+        Ok(Self {
+            orders,
+            shared,
+            json: options.json,
+        })
+    }
+
+    /// One line: what happened at `now`, in one word or two and for people; `fields` are for programs alone.
+    pub(crate) fn say(&self, now: Instant, event: &str, fields: Value, text: fmt::Arguments<'_>) {
+        let line = rendered(self.json, now, event, fields, &text.to_string());
+        if self.orders.try_send(Order::Line(now, line)).is_err() {
+            self.shared.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// The same without fields.
+    pub(crate) fn tell(&self, now: Instant, event: &str, text: fmt::Arguments<'_>) {
+        self.say(now, event, Value::Null, text);
+    }
+
+    /// Opens the file again before the next line, as after it was moved away.
+    pub(crate) fn reopen(&self) {
+        self.shared.reopen.store(true, Ordering::Relaxed);
+    }
+
+    /// Lines that nobody took.
+    pub(crate) fn dropped(&self) -> u64 {
+        self.shared.dropped.load(Ordering::Relaxed)
+    }
+
+    /// Waits until all lines are written, but no longer than `at_most`.
+    pub(crate) fn flush(&self, at_most: Duration) {
+        let end = Clock::now() + at_most;
+        let (done, heard) = sync_channel(1);
+        while let Err(TrySendError::Full(_)) = self.orders.try_send(Order::Flush(done.clone())) {
+            if Clock::now() >= end {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let left = end.saturating_duration_since(Clock::now());
+        let heard = heard.recv_timeout(left);
+        debug_assert!(heard != Err(RecvTimeoutError::Disconnected));
+    }
+}
+
+/// Where lines go.
+struct Out {
+    file: File,
+    path: Option<PathBuf>,
+}
+
+impl Out {
+    fn open(path: Option<&Path>) -> Result<Self, String> {
+        let file = match path {
+            Some(path) => {
+                appended(path).map_err(|error| format!("--log-file {}: {error}", path.display()))?
+            }
+            // Not `Stdout`: what is in its buffer would be written at the end of the program, which may take for ever.
+            None => std::io::stdout()
+                .as_fd()
+                .try_clone_to_owned()
+                .map_err(|error| format!("standard output: {error}"))?
+                .into(),
+        };
+        Ok(Self {
+            file,
+            path: path.map(Path::to_owned),
+        })
+    }
+}
+
+fn appended(path: &Path) -> std::io::Result<File> {
+    File::options().append(true).create(true).open(path)
+}
+
+/// The other side of the queue.
+struct Writer {
+    out: Out,
+    /// Whether the last line was written in part.
+    torn: bool,
+    /// Dropped lines that were spoken of.
+    told: u64,
+    json: bool,
+    shared: Arc<Shared>,
+}
+
+impl Writer {
+    fn serve(&mut self, orders: &Receiver<Order>) {
+        for order in orders {
+            match order {
+                Order::Line(now, line) => self.line(now, &line),
+                Order::Flush(done) => drop(done.try_send(())),
+            }
+        }
+    }
+
+    fn line(&mut self, now: Instant, line: &str) {
+        if self.shared.reopen.swap(false, Ordering::Relaxed)
+            && let Some(path) = &self.out.path
+            && let Ok(file) = appended(path)
+        {
+            self.out.file = file;
+            self.torn = false;
+        }
+        let dropped = self.shared.dropped.load(Ordering::Relaxed);
+        let mut text = String::new();
+        if self.torn {
+            text.push('\n');
+        }
+        if dropped > self.told {
+            let more = dropped - self.told;
+            let fields = json!({ "dropped": dropped });
+            let said = format!("{more} lines dropped, nobody took them");
+            text += &rendered(self.json, now, "log", fields, &said);
+        }
+        text += line;
+        if self.put(text.as_bytes()) {
+            self.told = dropped;
+        } else {
+            self.shared.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Whether all of it was written.
+    fn put(&mut self, mut bytes: &[u8]) -> bool {
+        while !bytes.is_empty() {
+            match self.out.file.write(bytes) {
+                Ok(count @ 1..) => {
+                    bytes = bytes.get(count..).unwrap_or_default();
+                    self.torn = !bytes.is_empty();
+                }
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                _ => return false,
+            }
+        }
+        true
+    }
+}
+
+/// A line with its end: the time of day in UTC, that since the start, what happened.
+fn rendered(json: bool, now: Instant, event: &str, fields: Value, text: &str) -> String {
+    let time = humantime::format_rfc3339_millis(SystemTime::now()).to_string();
+    let micros = now.as_micros();
+    if json {
+        let mut entry = Map::new();
+        if let Value::Object(fields) = fields {
+            entry.extend(fields);
+        }
+        entry.insert("time".to_owned(), time.into());
+        entry.insert(
+            "monotonic_s".to_owned(),
+            (f64::from(u32::try_from(micros / 1_000).unwrap_or(u32::MAX)) / 1e3).into(),
+        );
+        entry.insert("event".to_owned(), event.into());
+        entry.insert("text".to_owned(), text.into());
+        return format!("{}\n", Value::Object(entry));
+    }
+    let (seconds, millis) = (micros / 1_000_000, micros / 1_000 % 1_000);
+    let text = printable(text);
+    format!("{time} {seconds:>6}.{millis:03} s  {event}: {text}\n")
+}
+
+/// A name with a line feed in it must not make two lines.
+fn printable(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for sign in text.chars() {
+        if sign.is_control() {
+            out.extend(sign.escape_default());
+        } else {
+            out.push(sign);
+        }
+    }
+    out
+}

@@ -1,0 +1,72 @@
+//! Why frames that arrive are refused, in words: said once for each reason.
+
+use uav_relay::{Duration, Instant, Stats};
+
+/// Between two looks at the counters.
+const EVERY: Duration = Duration::from_millis(2_000);
+
+/// So many frames between two looks are no accident.
+const MANY: u32 = 3;
+
+/// So many damaged ones, and none that is whole, are no noise.
+const DAMAGED: u32 = 10;
+
+/// What was seen, and what was said.
+#[derive(Debug, Default)]
+pub(crate) struct Refusals {
+    last: Stats,
+    look_at: Instant,
+    told: [bool; 5],
+}
+
+impl Refusals {
+    /// A reason that was not said before, if there is one now.
+    pub(crate) fn look(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
+        if now < self.look_at {
+            return None;
+        }
+        self.look_at = now + EVERY;
+        let last = core::mem::replace(&mut self.last, *stats);
+        let more = |of: fn(&Stats) -> u32| of(stats).saturating_sub(of(&last));
+        let whole = more(|stats| stats.received) + more(|stats| stats.handshakes);
+        let damaged =
+            more(|stats| stats.crc) + more(|stats| stats.truncated) + more(|stats| stats.oversized);
+        let (foreign, forged) = (more(|stats| stats.foreign), more(|stats| stats.forged));
+        let (unsigned, version) = (more(|stats| stats.unsigned), more(|stats| stats.version));
+        let reasons = [
+            (
+                foreign >= MANY,
+                foreign,
+                "are of another network number: is --network the same at all relays?",
+            ),
+            (
+                forged >= MANY && more(|stats| stats.handshakes) == 0,
+                forged,
+                "have a wrong tag: is the key in --key-file the same at all relays?",
+            ),
+            (
+                signs && unsigned >= MANY,
+                unsigned,
+                "are not signed: has the other one a --key-file?",
+            ),
+            (
+                version >= MANY,
+                version,
+                if signs {
+                    "are of another version of the format: is the other one's software of the same age?"
+                } else {
+                    "are signed, and this relay has no --key-file; or they are of another version of the format"
+                },
+            ),
+            (
+                whole == 0 && damaged >= DAMAGED,
+                damaged,
+                "are damaged: is --baud the same at both ends?",
+            ),
+        ];
+        let new = |((is, count, why), told): ((bool, u32, &str), &mut bool)| {
+            (is && !core::mem::replace(told, true)).then(|| format!("{count} frames {why}"))
+        };
+        reasons.into_iter().zip(&mut self.told).find_map(new)
+    }
+}

@@ -1,0 +1,157 @@
+//! A tty that is opened again whenever it vanishes: a cable that comes loose is no reason to leave the air.
+
+use std::fmt;
+use std::os::fd::{AsFd as _, BorrowedFd};
+use std::path::{Path, PathBuf};
+
+use rustix::event::PollFlags;
+use serde_json::{Value, json};
+use uav_relay::serial::{Fault, SerialPort};
+use uav_relay::{Duration, Instant};
+
+use crate::log::Log;
+use crate::tty::Tty;
+
+/// The first pause before it is tried again; each is twice the one before, up to [`LONGEST`].
+const FIRST: Duration = Duration::from_millis(250);
+const LONGEST: Duration = Duration::from_millis(4_000);
+
+/// A tty by its name, there or not.
+///
+/// All that comes and goes over a port passes through its `read` and `write`.
+#[derive(Debug)]
+pub(crate) struct Replug {
+    option: &'static str,
+    path: PathBuf,
+    baud: u32,
+    tty: Option<Tty>,
+    again_at: Instant,
+    pause: Duration,
+    counts: Counts,
+}
+
+/// What a port has carried.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts {
+    read: u64,
+    written: u64,
+    /// Bytes for a port that was not there.
+    lost: u64,
+    times_gone: u32,
+}
+
+impl Replug {
+    /// Opens it. That has to work once: a wrong name is a mistake, a cable that comes loose is not.
+    ///
+    /// # Errors
+    /// One line that names the option and what is wrong.
+    pub(crate) fn open(option: &'static str, path: &Path, baud: u32) -> Result<Self, String> {
+        Ok(Self {
+            option,
+            path: path.to_owned(),
+            baud,
+            tty: Some(Tty::open(option, path, baud)?),
+            again_at: Instant::ZERO,
+            pause: FIRST,
+            counts: Counts::default(),
+        })
+    }
+
+    /// Gives a tty up that is of no use any more, and opens it again when it is time to. Each is said once.
+    pub(crate) fn tend(&mut self, now: Instant, log: &Log) {
+        let failure = self.tty.as_ref().and_then(Tty::failure);
+        if let Some(failure) = failure {
+            let fields = json!({ "option": self.option, "port": self.path.display().to_string() });
+            log.say(
+                now,
+                "port lost",
+                fields,
+                format_args!("{failure}; tried again until it is back"),
+            );
+            self.tty = None;
+            self.counts.times_gone = self.counts.times_gone.saturating_add(1);
+            self.again_at = now + self.pause;
+        }
+        if self.tty.is_none() && self.again_at <= now {
+            self.pause = self.pause.times(2).min(LONGEST);
+            self.again_at = now + self.pause;
+            if let Ok(tty) = Tty::open(self.option, &self.path, self.baud) {
+                self.tty = Some(tty);
+                let fields =
+                    json!({ "option": self.option, "port": self.path.display().to_string() });
+                log.say(now, "port back", fields, format_args!("{self} is back"));
+            }
+        }
+    }
+
+    /// When it is to be tried again.
+    pub(crate) fn wake(&self) -> Option<Instant> {
+        self.tty.is_none().then_some(self.again_at)
+    }
+
+    /// What to sleep on.
+    pub(crate) fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
+        self.tty.as_ref().map(|tty| (tty.as_fd(), tty.interest()))
+    }
+
+    /// Takes note of what poll(2) has found.
+    pub(crate) fn noticed(&mut self, events: PollFlags) {
+        if let Some(tty) = &mut self.tty {
+            tty.noticed(events);
+        }
+    }
+
+    /// Whether it is there.
+    pub(crate) const fn is_open(&self) -> bool {
+        self.tty.is_some()
+    }
+
+    /// What it has counted.
+    pub(crate) fn status(&self) -> Value {
+        json!({
+            "option": self.option,
+            "port": self.path.display().to_string(),
+            "open": self.is_open(),
+            "bytes_in": self.counts.read,
+            "bytes_out": self.counts.written,
+            "bytes_lost": self.counts.lost,
+            "times_gone": self.counts.times_gone,
+        })
+    }
+}
+
+impl fmt::Display for Replug {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.option, self.path.display())
+    }
+}
+
+impl SerialPort for Replug {
+    fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
+        let Some(tty) = &mut self.tty else {
+            return Ok(0);
+        };
+        let count = tty.read(into)?;
+        if count > 0 {
+            self.counts.read += count as u64;
+            // One that dies as soon as it is opened is not tried more often for it.
+            self.pause = FIRST;
+        }
+        Ok(count)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
+        let Some(tty) = &mut self.tty else {
+            // What is of today is of no use when it is back.
+            self.counts.lost += bytes.len() as u64;
+            return Ok(bytes.len());
+        };
+        let count = tty.write(bytes)?;
+        self.counts.written += count as u64;
+        Ok(count)
+    }
+
+    fn has_left(&mut self) -> Result<Option<bool>, Fault> {
+        self.tty.as_mut().map_or(Ok(None), Tty::has_left)
+    }
+}

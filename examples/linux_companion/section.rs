@@ -1,0 +1,34 @@
+//! The companion's own part of the file, as options.
+
+use std::path::PathBuf;
+
+use uav_relay_scenario::deployment::Deployment;
+
+use crate::config::{Given, network};
+
+/// What a file says to a companion.
+pub(crate) fn companion(deployment: &Deployment, given: &mut Given) {
+    network(deployment, given);
+    let own = &deployment.companion;
+    given.value("--index", own.index);
+    given.path("--upstream", own.upstream.as_ref());
+    given.path("--downstream", own.downstream.as_ref());
+    given.path("--shared", own.shared.as_ref());
+    given.path("--epoch-file", own.epoch_file.as_ref());
+    given.path("--upload-file", own.upload_file.as_ref());
+    given.path("--view-file", own.view_file.as_ref());
+    match own.autopilot.as_ref() {
+        Some(tty) if !tty.starts_with("udp:") => {
+            given.path("--autopilot", Some(&PathBuf::from(tty)));
+        }
+        other => given.value("--autopilot", other),
+    }
+    given.value("--autopilot-baud", own.autopilot_baud);
+    given.path("--autopilot-key-file", own.autopilot_key_file.as_ref());
+    given.value("--speed", own.speed_m_s);
+    given.path("--positions", own.positions.as_ref());
+    given.value("--position-error", own.position_error_m);
+    given.flag("--json", own.json);
+    given.path("--log-file", own.log_file.as_ref());
+    given.path("--status-socket", own.status_socket.as_ref());
+}

@@ -1,0 +1,59 @@
+//! What a relay has counted and how it is, as one JSON object.
+
+use serde_json::{Value, json};
+use uav_relay::{Placement, Relay, Stats};
+
+/// A place, m.
+pub(crate) fn at(place: Placement) -> Value {
+    json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
+}
+
+/// How the relay is.
+pub(crate) fn of_relay(relay: &Relay, name: impl Fn(u16) -> String) -> Value {
+    let [upstream, downstream] = relay
+        .neighbours()
+        .map(|node| node.map(|node| json!({ "node": node, "name": name(node) })));
+    json!({
+        "index": relay.index(),
+        "relays": relay.mission().relays(),
+        "view": relay.view().number(),
+        "version": relay.version(),
+        "setpoint": relay.setpoint().map(at),
+        "target_sir": relay.target(),
+        "stands_down": relay.stands_down(),
+        "has_lease": relay.lease().is_some(),
+        "upstream": upstream,
+        "downstream": downstream,
+        "counters": counted(relay.stats()),
+    })
+}
+
+/// Every counter of `stats`.
+pub(crate) fn counted(stats: &Stats) -> Value {
+    json!({
+        "sent": stats.sent,
+        "repeats": stats.repeats,
+        "sweeps": stats.sweeps,
+        "received": stats.received,
+        "repeated": stats.repeated,
+        "overheard": stats.overheard,
+        "refused": stats.rejected(),
+        "oversized": stats.oversized,
+        "truncated": stats.truncated,
+        "crc": stats.crc,
+        "version": stats.version,
+        "handshakes": stats.handshakes,
+        "unsigned": stats.unsigned,
+        "forged": stats.forged,
+        "replayed": stats.replayed,
+        "malformed": stats.malformed,
+        "foreign": stats.foreign,
+        "misaddressed": stats.misaddressed,
+        "misdirected": stats.misdirected,
+        "mission": stats.mission,
+        "view": stats.view,
+        "views": stats.views,
+        "stale": stats.stale,
+        "samples_refused": stats.samples_refused,
+    })
+}

@@ -1,0 +1,344 @@
+//! What does not end a relay, nor holds it up: a port that vanishes, a reader that stops or goes, a full disk, a hang-up.
+
+use std::os::unix::net::UnixStream;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Resource, Rlimit, Signal, kill_process, prlimit};
+use serde_json::Value;
+use std::io::{Read, Write};
+use std::path::Path;
+
+use crate::binary::companion;
+use crate::hub::Hub;
+use crate::process::{Ended, LIMIT, Relay};
+use crate::pty::Pty;
+
+/// What a relay says by its socket.
+pub(crate) fn asked(socket: &Path) -> Value {
+    let end = Instant::now() + LIMIT;
+    let mut stream = loop {
+        match UnixStream::connect(socket) {
+            Ok(stream) => break stream,
+            Err(error) if Instant::now() > end => panic!("{}: {error}", socket.display()),
+            Err(_) => std::thread::sleep(Duration::from_millis(20)),
+        }
+    };
+    stream.set_read_timeout(Some(LIMIT)).unwrap();
+    let mut text = String::new();
+    stream.read_to_string(&mut text).unwrap();
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"))
+}
+
+/// Asks until it says so.
+pub(crate) fn until(socket: &Path, is_so: impl Fn(&Value) -> bool) -> Value {
+    let end = Instant::now() + LIMIT;
+    loop {
+        let said = asked(socket);
+        if is_so(&said) {
+            return said;
+        }
+        assert!(Instant::now() < end, "{said:#}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+#[test]
+fn a_port_that_vanishes_comes_back_and_the_other_one_goes_on() {
+    let hub = Hub::new(2);
+    let other = Pty::new();
+    let socket = hub.folder().join("status");
+    let mut relay = Relay::start(&[
+        "--index",
+        "2",
+        "--of",
+        "3",
+        "--upstream",
+        hub.name(0).to_str().unwrap(),
+        "--downstream",
+        other.path().to_str().unwrap(),
+        "--probe-after-ms",
+        "200",
+        "--status-socket",
+        socket.to_str().unwrap(),
+    ]);
+    relay.line("started: ");
+    for time in 1..=2_u64 {
+        hub.pull(0);
+        let line = relay.line("is gone; tried again until it is back");
+        assert!(line.contains("port lost: --upstream "), "{line}");
+        let sent = |said: &Value| said["links"]["ports"][1]["bytes_out"].as_u64().unwrap();
+        let before = sent(&asked(&socket));
+        until(&socket, |said| sent(said) > before + 20);
+        hub.plug(0);
+        relay.line("port back: --upstream ");
+        let said = until(&socket, |said| said["links"]["ports"][0]["open"] == true);
+        assert_eq!(said["links"]["ports"][0]["times_gone"], time);
+    }
+    let again = relay.lines_with("port ");
+    assert!(again.is_empty(), "once each: {again:?}");
+}
+
+/// A relay whose standard output and error are these; told to end, it does.
+struct Bare(Child);
+
+impl Bare {
+    fn start(options: &[&str], stdout: Stdio, stderr: Stdio) -> Self {
+        let child = Command::new(companion())
+            .args(options)
+            .stdin(Stdio::null())
+            .stdout(stdout)
+            .stderr(stderr)
+            .spawn();
+        Self(child.unwrap())
+    }
+
+    fn signal(&self, signal: Signal) {
+        kill_process(Pid::from_child(&self.0), signal).unwrap();
+    }
+
+    fn end(mut self) -> Option<i32> {
+        self.signal(Signal::TERM);
+        let end = Instant::now() + Duration::from_secs(20);
+        while Instant::now() < end {
+            if let Some(status) = self.0.try_wait().unwrap() {
+                return status.code();
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        panic!("it does not end");
+    }
+}
+
+impl Drop for Bare {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A reader that stops fills the pipe, then the queue; one that goes closes it; `/dev/full` takes nothing.
+#[test]
+fn nobody_who_reads_is_no_reason_to_leave_the_air() {
+    let (kept, stopped) = std::io::pipe().unwrap();
+    let (gone, closed) = std::io::pipe().unwrap();
+    drop(gone);
+    let full = std::fs::File::options()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    for (name, stdout) in [
+        ("stopped", Stdio::from(stopped)),
+        ("closed", Stdio::from(closed)),
+        ("full", Stdio::from(full)),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let socket = folder.path().join("status");
+        let socket_name = socket.to_str().unwrap();
+        let options = ["--index", "1", "--of", "1", "--status-socket", socket_name];
+        let relay = Bare::start(&options, stdout, Stdio::null());
+        asked(&socket);
+        // Every one is a line of some 1 500 bytes: 64 KiB in the pipe, 1 024 lines in the queue.
+        let end = Instant::now() + LIMIT;
+        let mut dropped = 0;
+        while dropped < 10 {
+            assert!(Instant::now() < end, "{name}: {dropped} dropped");
+            relay.signal(Signal::USR1);
+            let asked_at = Instant::now();
+            dropped = asked(&socket)["lines_dropped"].as_u64().unwrap();
+            assert!(asked_at.elapsed() < Duration::from_secs(2), "{name}");
+        }
+        assert_eq!(relay.end(), Some(0), "{name}");
+    }
+    drop(kept);
+}
+
+/// Nobody reads what it says of a mistake, either.
+#[test]
+fn a_closed_standard_error_is_no_panic() {
+    for options in [&["--index", "0"][..], &["--help"], &["--version"]] {
+        for program in [companion(), crate::binary::ground()] {
+            let (gone, closed) = std::io::pipe().unwrap();
+            drop(gone);
+            let status = Command::new(program)
+                .args(options)
+                .stdout(closed.try_clone().unwrap())
+                .stderr(closed)
+                .status()
+                .unwrap();
+            assert!(
+                matches!(status.code(), Some(0 | 2)),
+                "{options:?}: {status}"
+            );
+        }
+    }
+}
+
+/// Who connects and reads nothing, or sends, is not waited for.
+#[test]
+fn the_socket_answers_one_object_whoever_else_is_stuck() {
+    let folder = tempfile::tempdir().unwrap();
+    let socket = folder.path().join("status");
+    let options = ["--index", "1", "--of", "1", "--status-socket"];
+    let options = [&options[..], &[socket.to_str().unwrap()]].concat();
+    let mut relay = Relay::start(&options);
+    relay.line("converged: ");
+    let mut stuck: Vec<UnixStream> = (0..20)
+        .map(|_| UnixStream::connect(&socket).unwrap())
+        .collect();
+    for stream in &mut stuck {
+        let _ = stream.write(b"GET / HTTP/1.1\r\n\r\n");
+    }
+    let said = asked(&socket);
+    assert_eq!(said["relay"]["index"], 1);
+    assert_eq!(said["relay"]["downstream"]["name"], Value::Null);
+    assert!(said["relay"]["setpoint"]["x_m"].is_f64(), "{said:#}");
+    assert_eq!(said["relay"]["counters"]["refused"], 0);
+    // A second one of the same name is refused; a name that was left behind is not.
+    let Ended { status, stderr, .. } = Relay::start(&options).end();
+    assert_eq!((status, stderr.len()), (Some(1), 1));
+    assert!(stderr[0].contains("is in use already"), "{stderr:?}");
+    drop(relay);
+    assert!(socket.exists(), "it was killed");
+    Relay::start(&options).line("started: ");
+    std::fs::remove_file(&socket).unwrap();
+    std::fs::write(&socket, "").unwrap();
+    let Ended { stderr, .. } = Relay::start(&options).end();
+    assert!(
+        stderr[0].contains("another file of that name"),
+        "{stderr:?}"
+    );
+}
+
+#[test]
+fn the_log_is_moved_away_and_opened_again_at_a_hang_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log, moved) = (folder.path().join("log"), folder.path().join("log.1"));
+    let options = ["--index", "1", "--of", "1", "--json", "--log-file"];
+    let relay = Relay::start(&[&options[..], &[log.to_str().unwrap()]].concat());
+    let has = |file: &Path, event: &str| {
+        let end = Instant::now() + LIMIT;
+        loop {
+            let text = std::fs::read_to_string(file).unwrap_or_default();
+            let entries: Vec<Value> = text
+                .lines()
+                .map(|line| serde_json::from_str(line).unwrap())
+                .collect();
+            if let Some(entry) = entries.iter().find(|entry| entry["event"] == event) {
+                return entry.clone();
+            }
+            assert!(Instant::now() < end, "no {event} in {text}");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    };
+    let converged = has(&log, "converged");
+    assert!(converged["target_sir"].as_f64().unwrap() > 0.0);
+    assert!(converged["monotonic_s"].is_f64());
+    let time = converged["time"].as_str().unwrap();
+    let since = time.parse::<Stamp>().unwrap();
+    assert!(since.0 < 60, "{time}");
+    std::fs::rename(&log, &moved).unwrap();
+    relay.signal(Signal::HUP);
+    has(&log, "hang-up");
+    relay.signal(Signal::USR1);
+    assert!(has(&log, "status")["relay"]["counters"]["sent"].is_u64());
+    relay.signal(Signal::TERM);
+    has(&log, "stopped");
+    assert!(has(&moved, "started")["index"] == 1);
+}
+
+/// Seconds that a time of RFC 3339 in UTC is away from now, by the system's own `date`.
+struct Stamp(u64);
+
+impl std::str::FromStr for Stamp {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let output = Command::new("date")
+            .args(["--date", text, "+%s"])
+            .output()
+            .map_err(|error| error.to_string())?;
+        let then: u64 = String::from_utf8_lossy(&output.stdout)
+            .trim()
+            .parse()
+            .map_err(|_| format!("{text} is no time"))?;
+        let now = std::time::UNIX_EPOCH.elapsed().unwrap().as_secs();
+        if !text.ends_with('Z') {
+            return Err(format!("{text} is not in UTC"));
+        }
+        Ok(Self(now.abs_diff(then)))
+    }
+}
+
+/// From now on no file of that process may grow, as on a full disk; or again.
+pub(crate) fn fill_disk(relay: Pid, full: bool) {
+    let limit = Rlimit {
+        current: full.then_some(0),
+        maximum: None,
+    };
+    prlimit(Some(relay), Resource::Fsize, limit).unwrap();
+}
+
+#[test]
+fn a_full_disk_is_said_once_and_the_relay_stays_in_the_air() {
+    let hub = Hub::new(2);
+    let start = |index: usize| {
+        let number = index.to_string();
+        Relay::start(&[
+            "--index",
+            &number,
+            "--of",
+            "2",
+            "--shared",
+            hub.name(index - 1).to_str().unwrap(),
+            "--probe-after-ms",
+            "500",
+            "--dead-after-ms",
+            "1500",
+            "--view-file",
+            hub.folder().join(format!("view{index}")).to_str().unwrap(),
+        ])
+    };
+    let (mut first, mut second) = (start(1), start(2));
+    first.line("converged: ");
+    second.line("converged: ");
+    fill_disk(first.pid(), true);
+    // Another view needs another record.
+    drop(second);
+    let line = first.line("cannot be written: ");
+    assert!(line.contains("file: --view-file /"), "{line}");
+    second = start(2);
+    first.line("back: relay 2");
+    second.line("setpoint: ");
+    std::thread::sleep(Duration::from_millis(2_500));
+    let more = first.lines_with("cannot be written");
+    assert!(more.is_empty(), "once: {more:?}");
+    fill_disk(first.pid(), false);
+    first.line("is written again, after ");
+    first.signal(Signal::TERM);
+    assert_eq!(first.end().status, Some(0));
+}
+
+/// What a start cannot keep is no start: a number of an epoch must not be used twice.
+#[test]
+fn an_epoch_that_cannot_be_kept_is_refused_at_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let key = folder.path().join("key");
+    std::fs::write(&key, "5ec2".repeat(16)).unwrap();
+    let Ended { status, stderr, .. } = Relay::start(&[
+        "--index",
+        "1",
+        "--of",
+        "1",
+        "--key-file",
+        key.to_str().unwrap(),
+        "--epoch-file",
+        "/proc/self/epoch",
+    ])
+    .end();
+    assert_eq!((status, stderr.len()), (Some(1), 1), "{stderr:?}");
+    assert!(
+        stderr[0].contains("--epoch-file /proc/self/epoch: cannot be written"),
+        "{stderr:?}"
+    );
+}

@@ -1,0 +1,98 @@
+//! The companion as a service: its unit, and what it tells systemd.
+
+use std::os::unix::net::UnixDatagram;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use crate::binary::companion;
+use crate::process::LIMIT;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}
+
+/// Where systemd is installed it finds nothing to say about the unit.
+#[test]
+fn the_unit_is_one_that_systemd_takes() {
+    let unit = root().join("examples/linux_companion/uav-relay@.service");
+    let text = std::fs::read_to_string(unit).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("uav-relay@.service");
+    // The program is looked for, and is not installed here.
+    let installed = "/usr/local/bin/linux_companion";
+    assert!(text.contains(installed));
+    let text = text.replace(installed, companion().to_str().unwrap());
+    let verified = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        let mut analyze = Command::new("systemd-analyze");
+        analyze.arg("verify").arg("--man=no").arg(&file);
+        analyze.output()
+    };
+    let Ok(output) = verified(&text) else {
+        println!("skipped: systemd-analyze is not installed");
+        return;
+    };
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success() && !said.contains("uav-relay@"),
+        "{said}"
+    );
+    let wrong = text.replace("WatchdogSec=10", "WatchdogSec=soon");
+    let output = verified(&wrong).unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("uav-relay@"), "it verifies anything: {said}");
+}
+
+/// The options in the unit, and the file that it names, are such that the program takes.
+#[test]
+fn the_example_file_is_whole() {
+    let file = root().join("examples/drone.toml");
+    let options = ["--config", file.to_str().unwrap(), "--index", "2"];
+    let relay = crate::process::Relay::start(&options);
+    let ended = relay.end();
+    // All that is wrong is that there is no key.
+    assert_eq!(ended.status, Some(2));
+    let key = root().join("examples/network7.key");
+    let line = format!("--key-file {}: cannot be read: ", key.display());
+    assert!(ended.stderr[0].starts_with(&line), "{:?}", ended.stderr);
+}
+
+#[test]
+fn it_says_that_it_is_ready_and_alive() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = folder.path().join("notify");
+    let socket = UnixDatagram::bind(&name).unwrap();
+    socket.set_read_timeout(Some(LIMIT)).unwrap();
+    let mut child = Command::new(companion())
+        .args(["--index", "1", "--of", "1"])
+        .env("NOTIFY_SOCKET", &name)
+        .env("WATCHDOG_USEC", "400000")
+        .env_remove("WATCHDOG_PID")
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let heard = || {
+        let mut buffer = [0; 64];
+        let count = socket.recv(&mut buffer).unwrap();
+        String::from_utf8(buffer[..count].to_vec()).unwrap()
+    };
+    assert_eq!(heard(), "READY=1");
+    assert_eq!(heard(), "WATCHDOG=1");
+    let begun = Instant::now();
+    for _ in 0..10 {
+        assert_eq!(heard(), "WATCHDOG=1");
+    }
+    let took = begun.elapsed();
+    println!("10 signs of life in {} ms", took.as_millis());
+    assert!(
+        took > Duration::from_millis(1_800),
+        "every 200 ms: {took:?}"
+    );
+    kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
+    while heard() != "STOPPING=1" {}
+    assert!(child.wait().unwrap().success());
+}
