@@ -5,6 +5,8 @@
 use core::cell::RefCell;
 
 use cortex_m::interrupt::Mutex;
+use cortex_m::peripheral::NVIC;
+use cortex_m::singleton;
 use stm32f4xx_hal::gpio::{PA9, PA10};
 use stm32f4xx_hal::pac::{Interrupt, USART1, interrupt};
 use stm32f4xx_hal::rcc::Rcc;
@@ -35,7 +37,6 @@ const LONGEST: usize = size_of::<FrameBytes>();
 const PAUSE: Duration = Duration::from_millis(10);
 
 static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
-static AUTOPILOT_QUEUES: Mutex<RefCell<Queues<OUTGOING, RECEIVED>>> = Queues::new();
 
 /// The port that nobody serves yet.
 pub(crate) type Uart = Serial<USART1>;
@@ -53,7 +54,7 @@ pub(crate) struct Autopilot {
     loaded: uav_relay::Sites,
     #[cfg(feature = "upload")]
     between: uav_relay::Sites,
-    port: Port<OUTGOING, RECEIVED>,
+    port: Port,
     /// What the relay was told last of whether its setpoint is flown.
     flown: Option<bool>,
     /// The SIR that the hop to this relay is to reach, as a factor and in decibels.
@@ -79,10 +80,16 @@ impl Autopilot {
         log::flies(&course);
         let mut link = Link::new(course.axis, course.pace, now);
         sign(&mut link, now).ok()?;
-        let port = port::open(uart, Interrupt::USART1, &AUTOPILOT, &AUTOPILOT_QUEUES);
+        let port = port::open(
+            uart,
+            Interrupt::USART1,
+            || NVIC::pend(Interrupt::USART1),
+            &AUTOPILOT,
+            singleton!(AUTOPILOT_QUEUES: Queues<OUTGOING, RECEIVED> = Queues::new())?,
+        );
         #[cfg(feature = "upload")]
         let loaded = ends(sites);
-        cortex_m::singleton!(LINK: Autopilot = Autopilot {
+        singleton!(LINK: Autopilot = Autopilot {
             link,
             #[cfg(feature = "upload")]
             loaded,
@@ -207,5 +214,5 @@ fn sign(_: &mut Link, _: Instant) -> Result<(), CannotSign> {
 
 #[interrupt]
 fn USART1() {
-    port::serve(&AUTOPILOT, &AUTOPILOT_QUEUES);
+    port::serve(&AUTOPILOT);
 }

@@ -18,7 +18,6 @@
 //! | `wires.rs` | its pins and interrupts |
 //! | `drone.rs` | what a drone does, whatever its links are |
 //! | `autopilot.rs`, `grounded.rs` | the autopilot with the feature `flight`, and without |
-//! | `config/` | the configuration, byte by byte |
 //! | `course.rs` | the line on earth that it flies along |
 //! | `epoch.rs` | with the feature `auth`, the number that rises at every start |
 //! | `uploads.rs` | with the feature `upload`, the missions that were uploaded in flight |
@@ -40,9 +39,6 @@ mod autopilot;
 mod board;
 #[cfg(target_os = "none")]
 mod clock;
-#[cfg(target_os = "none")]
-#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
-mod config;
 #[cfg(all(target_os = "none", feature = "flight"))]
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
 mod course;
@@ -71,6 +67,9 @@ mod uploads;
 mod views;
 #[cfg(target_os = "none")]
 mod wires;
+
+#[cfg(target_os = "none")]
+use uav_relay_block as config;
 
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]

@@ -16,10 +16,6 @@ mod board;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/clock.rs"]
 mod clock;
-#[cfg(target_os = "none")]
-#[path = "../stm32f405/config/mod.rs"]
-#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
-mod config;
 #[cfg(all(target_os = "none", feature = "flight"))]
 #[path = "../stm32f405/course.rs"]
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
@@ -58,6 +54,9 @@ mod uploads;
 #[path = "../stm32f405/views.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod views;
+
+#[cfg(target_os = "none")]
+use uav_relay_block as config;
 
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
