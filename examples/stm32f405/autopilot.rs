@@ -5,7 +5,6 @@
 use core::cell::RefCell;
 
 use cortex_m::interrupt::Mutex;
-use cortex_m::peripheral::NVIC;
 use cortex_m::singleton;
 use stm32f4xx_hal::gpio::{PA9, PA10};
 use stm32f4xx_hal::pac::{Interrupt, USART1, interrupt};
@@ -83,7 +82,6 @@ impl Autopilot {
         let port = port::open(
             uart,
             Interrupt::USART1,
-            || NVIC::pend(Interrupt::USART1),
             &AUTOPILOT,
             singleton!(AUTOPILOT_QUEUES: Queues<OUTGOING, RECEIVED> = Queues::new())?,
         );

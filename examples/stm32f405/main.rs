@@ -16,7 +16,8 @@
 //! | --- | --- |
 //! | `main.rs` | this variant, put together |
 //! | `wires.rs` | its pins and interrupts |
-//! | `drone.rs` | what a drone does, whatever its links are |
+//! | `drone.rs` | what a drone is by its configuration, whatever its links are |
+//! | `turns.rs` | its main loop |
 //! | `autopilot.rs`, `grounded.rs` | the autopilot with the feature `flight`, and without |
 //! | `course.rs` | the line on earth that it flies along |
 //! | `epoch.rs` | with the feature `auth`, the number that rises at every start |
@@ -59,6 +60,8 @@ mod kept;
 mod log;
 #[cfg(target_os = "none")]
 mod port;
+#[cfg(target_os = "none")]
+mod turns;
 #[cfg(all(target_os = "none", feature = "upload"))]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
@@ -83,7 +86,7 @@ fn main() -> ! {
     let Some(drone) = drone::begin(Wiring::Pair, uart, clock.now()) else {
         board::stop()
     };
-    drone::fly(clock, links, drone)
+    turns::fly(clock, links, drone)
 }
 
 /// The links, in a place of their own in RAM; a function of its own, so that the stack it needs is given back.

@@ -3,11 +3,12 @@
 use core::cell::RefCell;
 
 use cortex_m::interrupt::{Mutex, free};
+use cortex_m::peripheral::NVIC;
 use stm32f4xx_hal::nb;
 use stm32f4xx_hal::pac::Interrupt;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::serial::{Config, Error, Event, Instance, Serial};
-use uav_relay::serial::{ByteQueues, Fault, InterruptEnd, QueuedPort};
+use uav_relay::serial::{ByteQueues, Fault, InterruptEnd, Pend, QueuedPort};
 
 use super::{board, clock};
 
@@ -25,7 +26,16 @@ pub(crate) type Queues<const OUT: usize = OUTGOING, const IN: usize = RECEIVED> 
     ByteQueues<IN, OUT>;
 
 /// The main loop's end of a port.
-pub(crate) type Port = QueuedPort<'static, fn()>;
+pub(crate) type Port = QueuedPort<'static, Serves>;
+
+/// The interrupt that serves a port.
+pub(crate) struct Serves(Interrupt);
+
+impl Pend for Serves {
+    fn pend(&mut self) {
+        NVIC::pend(self.0);
+    }
+}
 
 /// What the interrupt of a port has: its UART, and its end of the queues.
 pub(crate) struct Served<U: Instance> {
@@ -65,12 +75,11 @@ pub(crate) fn config() -> Config {
 pub(crate) fn open<U: Instance, const OUT: usize, const IN: usize>(
     mut uart: Serial<U>,
     interrupt: Interrupt,
-    pend: fn(),
     slot: &'static Slot<U>,
     queues: &'static mut Queues<OUT, IN>,
 ) -> Port {
     uart.listen(Event::RxNotEmpty);
-    let (end, port) = queues.split(pend);
+    let (end, port) = queues.split(Serves(interrupt));
     free(|cs| {
         if let Ok(mut place) = slot.borrow(cs).try_borrow_mut() {
             *place = Some(Served { uart, end });

@@ -5,7 +5,6 @@
 use core::cell::RefCell;
 
 use cortex_m::interrupt::{Mutex, free};
-use cortex_m::peripheral::NVIC;
 use cortex_m::singleton;
 use heapless::Vec;
 use stm32f4xx_hal::pac::{Interrupt, UART4, interrupt};
@@ -44,8 +43,7 @@ pub(crate) fn start(uart: Serial<UART4>) {
     let Some(queues) = singleton!(QUEUES: Queues<ROOM, RECEIVED> = Queues::new()) else {
         return;
     };
-    let pend = || NVIC::pend(Interrupt::UART4);
-    let port = port::open(uart, Interrupt::UART4, pend, &UART, queues);
+    let port = port::open(uart, Interrupt::UART4, &UART, queues);
     with(|log| log.port = Some(port));
 }
 

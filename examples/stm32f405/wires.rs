@@ -11,7 +11,6 @@
 use core::cell::RefCell;
 
 use cortex_m::interrupt::Mutex;
-use cortex_m::peripheral::NVIC;
 use cortex_m::singleton;
 use stm32f4xx_hal::pac::{self, Interrupt, USART2, USART3, interrupt};
 use stm32f4xx_hal::prelude::*;
@@ -45,14 +44,12 @@ pub(crate) fn start() -> Option<(Clock, Port, Port, Uart)> {
     let upstream = port::open(
         upstream,
         Interrupt::USART2,
-        || NVIC::pend(Interrupt::USART2),
         &UPSTREAM,
         singleton!(UPSTREAM_QUEUES: Queues = Queues::new())?,
     );
     let downstream = port::open(
         downstream,
         Interrupt::USART3,
-        || NVIC::pend(Interrupt::USART3),
         &DOWNSTREAM,
         singleton!(DOWNSTREAM_QUEUES: Queues = Queues::new())?,
     );

@@ -46,6 +46,9 @@ mod log;
 mod port;
 #[cfg(target_os = "none")]
 mod radio;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/turns.rs"]
+mod turns;
 #[cfg(all(target_os = "none", feature = "upload"))]
 #[path = "../stm32f405/uploads.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
@@ -70,7 +73,7 @@ fn main() -> ! {
     let Some(drone) = drone::begin(Wiring::Shared, uart, clock.now()) else {
         board::stop()
     };
-    drone::fly(clock, channel, drone)
+    turns::fly(clock, channel, drone)
 }
 
 /// The link, in a place of its own in RAM; a function of its own, so that the stack it needs is given back.

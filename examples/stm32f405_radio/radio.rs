@@ -11,7 +11,6 @@
 use core::cell::RefCell;
 
 use cortex_m::interrupt::Mutex;
-use cortex_m::peripheral::NVIC;
 use cortex_m::singleton;
 use stm32f4xx_hal::gpio::{Output, PA1};
 use stm32f4xx_hal::pac::{self, Interrupt, USART2, interrupt};
@@ -46,7 +45,6 @@ pub(crate) fn start() -> Option<(Clock, Port, DriverEnable, Uart)> {
     let radio = port::open(
         radio,
         Interrupt::USART2,
-        || NVIC::pend(Interrupt::USART2),
         &RADIO,
         singleton!(RADIO_QUEUES: Queues = Queues::new())?,
     );

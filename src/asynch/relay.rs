@@ -66,12 +66,12 @@ impl<'a> AsyncRelay<'a> {
     ///
     /// Constant work each time it is polled.
     pub fn next_event(&self) -> impl Future<Output = Event> + '_ {
-        poll_fn(|cx| match self.lend(Relay::poll_event).flatten() {
-            Some(event) => Poll::Ready(event),
-            None => {
+        poll_fn(|cx| {
+            let event = self.lend(Relay::poll_event).flatten();
+            if event.is_none() {
                 keep(&self.listener, cx);
-                Poll::Pending
             }
+            event.map_or(Poll::Pending, Poll::Ready)
         })
     }
 

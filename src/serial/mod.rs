@@ -103,7 +103,7 @@ use embedded_hal::digital::OutputPin;
 
 pub use link::{NoPin, READ_LIMIT, SerialLink, byte_time};
 pub use port::{Fault, Io, Nb, SerialPort};
-pub use queue::{ByteQueues, InterruptEnd, QueuedPort, queue_depth};
+pub use queue::{ByteQueues, InterruptEnd, Pend, QueuedPort, queue_depth};
 pub use stats::SerialStats;
 
 use crate::relay::{Port, Relay, Transmit};

@@ -27,7 +27,11 @@
 //! // What the interrupt does: a byte has come in, and the UART takes one.
 //! interrupt.received(Ok(7));
 //! let mut data_register = None;
-//! let more = interrupt.send(|byte| data_register.replace(byte).is_none());
+//! let more = interrupt.send(|byte| {
+//!     let free = data_register.is_none();
+//!     data_register = data_register.or(Some(byte));
+//!     free
+//! });
 //! assert!(data_register == Some(1) && more, "it stays enabled until the last byte is handed over");
 //!
 //! let mut bytes = [0; 8];
@@ -75,6 +79,18 @@ pub const fn queue_depth(baud: u32, longest: Duration) -> usize {
     bits.div_ceil(10_000_000).saturating_add(3) as usize
 }
 
+/// What has the interrupt of a UART come and send: a function, or for a port that is to have a name a type of its own.
+pub trait Pend {
+    /// Has it come: `NVIC::pend`, or its flag for an empty data register.
+    fn pend(&mut self);
+}
+
+impl<F: FnMut()> Pend for F {
+    fn pend(&mut self) {
+        self();
+    }
+}
+
 /// Bytes between an interrupt and the main loop: fewer than `IN` that have come in, and fewer than `OUT` on their way out (a frame of
 /// [`MAX_FRAME`](crate::wire::frame::MAX_FRAME) at least, so that the main loop can sleep meanwhile).
 #[derive(Debug)]
@@ -105,8 +121,8 @@ impl<const IN: usize, const OUT: usize> ByteQueues<IN, OUT> {
         }
     }
 
-    /// The end of the interrupt, and that of the main loop, which calls `pend` to have the interrupt come and send.
-    pub fn split<K: FnMut()>(&mut self, pend: K) -> (InterruptEnd<'_>, QueuedPort<'_, K>) {
+    /// The end of the interrupt, and that of the main loop, which uses `pend` to have the interrupt come and send.
+    pub fn split<K: Pend>(&mut self, pend: K) -> (InterruptEnd<'_>, QueuedPort<'_, K>) {
         let (puts, takes) = sides(&self.received, &mut self.in_marks);
         let (queues, sends) = sides(&self.outgoing, &mut self.out_marks);
         let interrupt = InterruptEnd {
@@ -199,7 +215,7 @@ impl<K> QueuedPort<'_, K> {
     }
 }
 
-impl<K: FnMut()> SerialPort for QueuedPort<'_, K> {
+impl<K: Pend> SerialPort for QueuedPort<'_, K> {
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
         let mut count = 0;
         for place in into {
@@ -222,7 +238,7 @@ impl<K: FnMut()> SerialPort for QueuedPort<'_, K> {
         let fits = |&&byte: &&u8| self.outgoing.put(byte);
         let count = bytes.iter().take_while(fits).count();
         // The interrupt owns the UART and sees to the rest.
-        (self.pend)();
+        self.pend.pend();
         Ok(count)
     }
 

@@ -29,6 +29,25 @@ fn five_settle_where_the_polled_ones_do() {
     }
 }
 
+/// What of the guide needs a HAL is what is built.
+#[test]
+fn the_guide_shows_what_is_built() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let read = |name: &str| std::fs::read_to_string(root.join(name)).unwrap();
+    let built = [
+        read("examples/embassy/pico2/src/bin/wires.rs"),
+        read("examples/embassy/app/src/lib.rs"),
+    ];
+    let guide = read("src/docs/firmware.md");
+    let shown: Vec<&str> = (guide.split("```rust,ignore\n").skip(1))
+        .map(|rest| rest.split("```").next().unwrap())
+        .collect();
+    assert_eq!(shown.len(), built.len());
+    for (shown, built) in shown.iter().zip(&built) {
+        assert!(built.contains(shown), "{shown}");
+    }
+}
+
 /// The lines that were said something on at other times, or something else.
 fn differing(one: &Flown, other: &Flown) -> Vec<usize> {
     let lines = one.lines.iter().zip(&other.lines);
