@@ -79,12 +79,7 @@ impl Autopilot {
         log::flies(&course);
         let mut link = Link::new(course.axis, course.pace, now);
         sign(&mut link, now).ok()?;
-        let port = port::open(
-            uart,
-            Interrupt::USART1,
-            &AUTOPILOT,
-            singleton!(AUTOPILOT_QUEUES: Queues<OUTGOING, RECEIVED> = Queues::new())?,
-        );
+        let port = open(uart)?;
         #[cfg(feature = "upload")]
         let loaded = ends(sites);
         singleton!(LINK: Autopilot = Autopilot {
@@ -184,6 +179,17 @@ impl Autopilot {
             }
         }
     }
+}
+
+/// Has its interrupt serve the port. On their way to their place the queues are on the stack, which is given back.
+#[inline(never)]
+fn open(uart: Uart) -> Option<Port> {
+    Some(port::open(
+        uart,
+        Interrupt::USART1,
+        &AUTOPILOT,
+        singleton!(AUTOPILOT_QUEUES: Queues<OUTGOING, RECEIVED> = Queues::new())?,
+    ))
 }
 
 /// It is to sign, and cannot.

@@ -216,6 +216,7 @@ impl<K> QueuedPort<'_, K> {
 }
 
 impl<K: Pend> SerialPort for QueuedPort<'_, K> {
+    #[inline(never)] // what it needs would stay on the stack of `SerialLink::receive`, below the relay's deepest call
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
         let mut count = 0;
         for place in into {
