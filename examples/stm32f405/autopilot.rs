@@ -20,9 +20,9 @@ use uav_relay::serial::SerialPort as _;
 use uav_relay::{Duration, Event, Instant, Mission, Relay};
 
 use super::config::{self, Sites};
-use super::course::course;
 #[cfg(feature = "upload")]
 use super::course::ends;
+use super::course::{Course, course};
 use super::port::{self, OUTGOING, Port, Queues, Slot};
 use super::{board, log};
 
@@ -77,13 +77,26 @@ impl Autopilot {
     ) -> Option<&'static mut Self> {
         let course = course(sites, mission).map_err(log::off_course).ok()?;
         log::flies(&course);
-        let mut link = Link::new(course.axis, course.pace, now);
-        sign(&mut link, now).ok()?;
+        Self::along(&course, uart, sites, now)
+    }
+
+    /// The link along that course: apart, so that what it is made on is not on the stack while the course is computed.
+    #[inline(never)]
+    fn along(
+        course: &Course,
+        uart: Uart,
+        #[cfg_attr(
+            not(feature = "upload"),
+            expect(unused_variables, reason = "nothing moves them")
+        )]
+        sites: &Sites,
+        now: Instant,
+    ) -> Option<&'static mut Self> {
         let port = open(uart)?;
         #[cfg(feature = "upload")]
         let loaded = ends(sites);
-        singleton!(LINK: Autopilot = Autopilot {
-            link,
+        let autopilot = singleton!(LINK: Autopilot = Autopilot {
+            link: Link::new(course.axis, course.pace, now),
             #[cfg(feature = "upload")]
             loaded,
             #[cfg(feature = "upload")]
@@ -91,7 +104,9 @@ impl Autopilot {
             port,
             flown: None,
             target: None,
-        })
+        })?;
+        sign(&mut autopilot.link, now).ok()?;
+        Some(autopilot)
     }
 
     /// Between the sites of a mission that has just been adopted, before anything is told that is along its line.
@@ -110,6 +125,7 @@ impl Autopilot {
     }
 
     /// Takes what has come, and hands the relay what follows from it.
+    #[inline(never)] // its stack is given back
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
         #[cfg(feature = "upload")]
         self.follow(now, relay);
