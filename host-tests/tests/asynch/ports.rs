@@ -9,6 +9,7 @@ use std::task::{Context, Poll, Waker};
 
 use embedded_hal::digital::{ErrorType as PinType, OutputPin};
 use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
+use futures_util::task::LocalSpawnExt as _;
 use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::{Instant, Port, Wiring};
@@ -81,7 +82,7 @@ impl Read for Flood {
     }
 }
 
-/// Polls a future that never completes, this often, with a clock that goes on a byte time each time.
+/// Polls a future that never completes.
 fn poll<F: Future>(future: std::pin::Pin<&mut F>, cx: &mut Context<'_>) {
     assert!(future.poll(cx).is_pending());
 }
@@ -292,7 +293,6 @@ fn the_pin_is_high_while_bytes_leave_and_little_longer() {
                 embassy_futures::join::join(ports.run(&relay, &time), counted).await;
             }
         };
-        use futures_util::task::LocalSpawnExt as _;
         pool.spawner().spawn_local(task).unwrap();
         time.run(&mut pool, Instant::from_millis(20_000));
         let (edges, heard) = (edges.borrow(), &air.borrow().heard);
