@@ -2,6 +2,8 @@
 #![forbid(unsafe_code)]
 #![doc = include_str!("tour.md")]
 
+#[cfg(feature = "async")]
+pub mod asynch;
 pub mod channel;
 mod channel_load;
 #[cfg(doc)]

@@ -5,6 +5,8 @@
 //! semihosting, which traps on a board without a debugger: this image is not one to flash.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
+#[cfg(all(target_os = "none", feature = "async"))]
+mod asynch;
 #[cfg(target_os = "none")]
 mod auth;
 #[cfg(target_os = "none")]
@@ -60,6 +62,8 @@ mod image {
         stack::stack();
         auth::auth();
         upload::upload();
+        #[cfg(feature = "async")]
+        super::asynch::runners();
         hprintln!("done 1");
         debug::exit(debug::EXIT_SUCCESS);
         counter::stop()

@@ -5,6 +5,7 @@
 use core::cell::RefCell;
 
 use cortex_m::interrupt::Mutex;
+use cortex_m::singleton;
 use stm32f4xx_hal::gpio::{PA9, PA10};
 use stm32f4xx_hal::pac::{Interrupt, USART1, interrupt};
 use stm32f4xx_hal::rcc::Rcc;
@@ -19,9 +20,9 @@ use uav_relay::serial::SerialPort as _;
 use uav_relay::{Duration, Event, Instant, Mission, Relay};
 
 use super::config::{self, Sites};
-use super::course::course;
 #[cfg(feature = "upload")]
 use super::course::ends;
+use super::course::{Course, course};
 use super::port::{self, OUTGOING, Port, Queues, Slot};
 use super::{board, log};
 
@@ -35,7 +36,6 @@ const LONGEST: usize = size_of::<FrameBytes>();
 const PAUSE: Duration = Duration::from_millis(10);
 
 static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
-static AUTOPILOT_QUEUES: Mutex<RefCell<Queues<OUTGOING, RECEIVED>>> = Queues::new();
 
 /// The port that nobody serves yet.
 pub(crate) type Uart = Serial<USART1>;
@@ -53,7 +53,7 @@ pub(crate) struct Autopilot {
     loaded: uav_relay::Sites,
     #[cfg(feature = "upload")]
     between: uav_relay::Sites,
-    port: Port<OUTGOING, RECEIVED>,
+    port: Port,
     /// What the relay was told last of whether its setpoint is flown.
     flown: Option<bool>,
     /// The SIR that the hop to this relay is to reach, as a factor and in decibels.
@@ -77,13 +77,26 @@ impl Autopilot {
     ) -> Option<&'static mut Self> {
         let course = course(sites, mission).map_err(log::off_course).ok()?;
         log::flies(&course);
-        let mut link = Link::new(course.axis, course.pace, now);
-        sign(&mut link, now).ok()?;
-        let port = port::open(uart, Interrupt::USART1, &AUTOPILOT, &AUTOPILOT_QUEUES);
+        Self::along(&course, uart, sites, now)
+    }
+
+    /// The link along that course: apart, so that what it is made on is not on the stack while the course is computed.
+    #[inline(never)]
+    fn along(
+        course: &Course,
+        uart: Uart,
+        #[cfg_attr(
+            not(feature = "upload"),
+            expect(unused_variables, reason = "nothing moves them")
+        )]
+        sites: &Sites,
+        now: Instant,
+    ) -> Option<&'static mut Self> {
+        let port = open(uart)?;
         #[cfg(feature = "upload")]
         let loaded = ends(sites);
-        cortex_m::singleton!(LINK: Autopilot = Autopilot {
-            link,
+        let autopilot = singleton!(LINK: Autopilot = Autopilot {
+            link: Link::new(course.axis, course.pace, now),
             #[cfg(feature = "upload")]
             loaded,
             #[cfg(feature = "upload")]
@@ -91,7 +104,9 @@ impl Autopilot {
             port,
             flown: None,
             target: None,
-        })
+        })?;
+        sign(&mut autopilot.link, now).ok()?;
+        Some(autopilot)
     }
 
     /// Between the sites of a mission that has just been adopted, before anything is told that is along its line.
@@ -110,6 +125,7 @@ impl Autopilot {
     }
 
     /// Takes what has come, and hands the relay what follows from it.
+    #[inline(never)] // its stack is given back
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
         #[cfg(feature = "upload")]
         self.follow(now, relay);
@@ -181,6 +197,17 @@ impl Autopilot {
     }
 }
 
+/// Has its interrupt serve the port. On their way to their place the queues are on the stack, which is given back.
+#[inline(never)]
+fn open(uart: Uart) -> Option<Port> {
+    Some(port::open(
+        uart,
+        Interrupt::USART1,
+        &AUTOPILOT,
+        singleton!(AUTOPILOT_QUEUES: Queues<OUTGOING, RECEIVED> = Queues::new())?,
+    ))
+}
+
 /// It is to sign, and cannot.
 struct CannotSign;
 
@@ -207,5 +234,5 @@ fn sign(_: &mut Link, _: Instant) -> Result<(), CannotSign> {
 
 #[interrupt]
 fn USART1() {
-    port::serve(&AUTOPILOT, &AUTOPILOT_QUEUES);
+    port::serve(&AUTOPILOT);
 }

@@ -1,102 +1,24 @@
-//! The drone, whatever its links are: it reads its configuration, runs its relay, and flies where that says.
+//! The drone, whatever its links are: what it is by its configuration.
 
-use embedded_hal::digital::OutputPin;
-#[cfg(feature = "upload")]
-use uav_relay::Event;
 use uav_relay::guard::config::GuardConfig;
-use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
 use uav_relay::wire::auth::Auth;
 #[cfg(feature = "auth")]
 use uav_relay::wire::auth::Key;
-use uav_relay::{Instant, Relay, Sample, Settings, Wiring};
+use uav_relay::{Instant, Relay, Settings, Wiring};
 
 use super::autopilot::{Autopilot, Uart};
-use super::clock::Clock;
 #[cfg(feature = "auth")]
 use super::journal::Journal;
 use super::{board, config, kept, log};
 #[cfg(feature = "auth")]
 use super::{epoch, flash};
 
-/// What the links of both variants have in common.
-pub(crate) trait Links {
-    /// Moves bytes between the ports and the relay, and says when to be called again. What the relay has said is kept between what
-    /// comes in and what is sent.
-    fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant>;
-
-    /// Logs the counters of each link.
-    fn log_counters(&self);
-}
-
-impl<U: SerialPort, D: SerialPort> Links for Pair<U, D> {
-    fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant> {
-        let Drone { relay, views, .. } = drone;
-        self.poll_keeping(now, relay, &mut |relay| views.keep(relay))
-    }
-
-    fn log_counters(&self) {
-        log::link_counters(SerialLink::stats(&self.upstream));
-        log::link_counters(SerialLink::stats(&self.downstream));
-    }
-}
-
-impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
-    fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant> {
-        let Drone { relay, views, .. } = drone;
-        self.poll_keeping(now, relay, &mut |relay| views.keep(relay))
-    }
-
-    fn log_counters(&self) {
-        log::link_counters(self.channel.stats());
-    }
-}
-
 /// The relay, what it has said, and the autopilot, if it is told where to fly; in places of their own in RAM, since the stack would
 /// have to hold them.
 pub(crate) struct Drone {
-    relay: &'static mut Relay,
-    views: &'static mut kept::Views,
-    autopilot: Option<&'static mut Autopilot>,
-}
-
-/// Flies for good.
-pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -> ! {
-    loop {
-        let now = clock.now();
-        let relay = &mut *drone.relay;
-        while let Some(sample) = measured() {
-            relay.handle_sample(now, sample);
-        }
-        if let Some(autopilot) = &mut drone.autopilot {
-            autopilot.listen(now, relay);
-        }
-        let wake = links.poll(clock.now(), &mut drone);
-        let relay = &mut *drone.relay;
-        while let Some(event) = relay.poll_event() {
-            log::event(event, relay);
-            // The control of the proof that no panic is reachable: with this one the image must not link.
-            #[cfg(panic_on_purpose)]
-            assert!(
-                relay.setpoint().is_none_or(|place| place.x_m < 1e6),
-                "put there on purpose"
-            );
-            if let Some(autopilot) = &mut drone.autopilot {
-                autopilot.tell(event);
-            }
-            #[cfg(feature = "upload")]
-            if event == Event::Uploaded {
-                kept::keep_upload(relay);
-            }
-        }
-        if log::asked() {
-            log::counters(relay);
-            links.log_counters();
-        }
-        // With what the neighbours have just changed.
-        let soon = drone.autopilot.as_mut();
-        let soon = soon.map(|autopilot| autopilot.fly(now, relay));
-        clock.sleep(wake.into_iter().chain(soon).min());
-    }
+    pub(crate) relay: &'static mut Relay,
+    pub(crate) views: &'static mut kept::Views,
+    pub(crate) autopilot: Option<&'static mut Autopilot>,
 }
 
 /// The drone by its configuration; `None` where there is none to fly by.
@@ -210,10 +132,4 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
     }
     log::cannot_sign();
     Err(CannotSign)
-}
-
-/// Replace this by what your receiver has measured since it was asked last, if the configuration has the relay measure, or listen: then with
-/// where the drone was. Of a field, once that says enough, `Relay::restart` at the leader has the chain agree again.
-const fn measured() -> Option<Sample> {
-    None
 }

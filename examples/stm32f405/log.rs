@@ -61,7 +61,7 @@ pub(crate) fn off_course(error: CourseError) {
     }
 }
 
-#[cfg(not(feature = "flight"))]
+#[allow(dead_code, reason = "for an image that tells no autopilot")]
 pub(crate) fn no_flight() {
     defmt::error!("configuration refused: it has sites, and this image was built without flight");
 }

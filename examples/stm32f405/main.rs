@@ -16,9 +16,9 @@
 //! | --- | --- |
 //! | `main.rs` | this variant, put together |
 //! | `wires.rs` | its pins and interrupts |
-//! | `drone.rs` | what a drone does, whatever its links are |
+//! | `drone.rs` | what a drone is by its configuration, whatever its links are |
+//! | `turns.rs` | its main loop |
 //! | `autopilot.rs`, `grounded.rs` | the autopilot with the feature `flight`, and without |
-//! | `config/` | the configuration, byte by byte |
 //! | `course.rs` | the line on earth that it flies along |
 //! | `epoch.rs` | with the feature `auth`, the number that rises at every start |
 //! | `uploads.rs` | with the feature `upload`, the missions that were uploaded in flight |
@@ -40,9 +40,6 @@ mod autopilot;
 mod board;
 #[cfg(target_os = "none")]
 mod clock;
-#[cfg(target_os = "none")]
-#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
-mod config;
 #[cfg(all(target_os = "none", feature = "flight"))]
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
 mod course;
@@ -63,6 +60,8 @@ mod kept;
 mod log;
 #[cfg(target_os = "none")]
 mod port;
+#[cfg(target_os = "none")]
+mod turns;
 #[cfg(all(target_os = "none", feature = "upload"))]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
@@ -71,6 +70,9 @@ mod uploads;
 mod views;
 #[cfg(target_os = "none")]
 mod wires;
+
+#[cfg(target_os = "none")]
+use uav_relay_block as config;
 
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
@@ -84,7 +86,7 @@ fn main() -> ! {
     let Some(drone) = drone::begin(Wiring::Pair, uart, clock.now()) else {
         board::stop()
     };
-    drone::fly(clock, links, drone)
+    turns::fly(clock, links, drone)
 }
 
 /// The links, in a place of their own in RAM; a function of its own, so that the stack it needs is given back.

@@ -30,7 +30,7 @@ pub(crate) const fn signs_to_autopilot() {}
 #[cfg(all(feature = "flight", not(feature = "mavlink-signing")))]
 pub(crate) const fn cannot_sign_to_autopilot() {}
 
-#[cfg(not(feature = "flight"))]
+#[allow(dead_code, reason = "for an image that tells no autopilot")]
 pub(crate) const fn no_flight() {}
 
 #[cfg(feature = "flight")]

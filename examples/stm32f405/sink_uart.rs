@@ -5,12 +5,13 @@
 use core::cell::RefCell;
 
 use cortex_m::interrupt::{Mutex, free};
+use cortex_m::singleton;
 use heapless::Vec;
 use stm32f4xx_hal::pac::{Interrupt, UART4, interrupt};
 use stm32f4xx_hal::serial::Serial;
 use uav_relay::serial::SerialPort;
 
-use crate::port::{self, Port, Queues, Slot};
+use crate::port::{self, Port, Queues, RECEIVED, Slot};
 
 /// Room for the longest frame, the relay's counters.
 type Frame = Vec<u8, 160>;
@@ -19,7 +20,7 @@ type Frame = Vec<u8, 160>;
 const ROOM: usize = 1024;
 
 struct Log {
-    port: Option<Port<ROOM>>,
+    port: Option<Port>,
     encoder: defmt::Encoder,
     frame: Frame,
     /// Whether the frame is longer than there is room for.
@@ -29,7 +30,6 @@ struct Log {
 }
 
 static UART: Slot<UART4> = Mutex::new(RefCell::new(None));
-static QUEUES: Mutex<RefCell<Queues<ROOM>>> = Queues::new();
 static LOG: Mutex<RefCell<Log>> = Mutex::new(RefCell::new(Log {
     port: None,
     encoder: defmt::Encoder::new(),
@@ -40,7 +40,10 @@ static LOG: Mutex<RefCell<Log>> = Mutex::new(RefCell::new(Log {
 
 /// Opens the port of the log.
 pub(crate) fn start(uart: Serial<UART4>) {
-    let port = port::open(uart, Interrupt::UART4, &UART, &QUEUES);
+    let Some(queues) = singleton!(QUEUES: Queues<ROOM, RECEIVED> = Queues::new()) else {
+        return;
+    };
+    let port = port::open(uart, Interrupt::UART4, &UART, queues);
     with(|log| log.port = Some(port));
 }
 
@@ -125,5 +128,5 @@ fn with(work: impl FnOnce(&mut Log)) {
 
 #[interrupt]
 fn UART4() {
-    port::serve(&UART, &QUEUES);
+    port::serve(&UART);
 }

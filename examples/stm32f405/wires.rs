@@ -11,6 +11,7 @@
 use core::cell::RefCell;
 
 use cortex_m::interrupt::Mutex;
+use cortex_m::singleton;
 use stm32f4xx_hal::pac::{self, Interrupt, USART2, USART3, interrupt};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
@@ -18,12 +19,10 @@ use stm32f4xx_hal::serial::Serial;
 
 use super::autopilot::{self, Uart};
 use super::clock::Clock;
-use super::port::{self, OUTGOING, Port, Queues, Slot};
+use super::port::{self, Port, Queues, Slot};
 
 static UPSTREAM: Slot<USART2> = Mutex::new(RefCell::new(None));
 static DOWNSTREAM: Slot<USART3> = Mutex::new(RefCell::new(None));
-static UPSTREAM_QUEUES: Mutex<RefCell<Queues<OUTGOING>>> = Queues::new();
-static DOWNSTREAM_QUEUES: Mutex<RefCell<Queues<OUTGOING>>> = Queues::new();
 
 /// Sets the board up, once only: its clock, the ports toward transmitter and receiver, and the one of the autopilot.
 pub(crate) fn start() -> Option<(Clock, Port, Port, Uart)> {
@@ -42,22 +41,27 @@ pub(crate) fn start() -> Option<(Clock, Port, Port, Uart)> {
     let autopilot = autopilot::uart(chip.USART1, a.pa9, a.pa10, &mut rcc)?;
     let upstream = Serial::new(chip.USART2, (a.pa2, a.pa3), port::config(), &mut rcc).ok()?;
     let downstream = Serial::new(chip.USART3, (b.pb10, b.pb11), port::config(), &mut rcc).ok()?;
-    let upstream = port::open(upstream, Interrupt::USART2, &UPSTREAM, &UPSTREAM_QUEUES);
+    let upstream = port::open(
+        upstream,
+        Interrupt::USART2,
+        &UPSTREAM,
+        singleton!(UPSTREAM_QUEUES: Queues = Queues::new())?,
+    );
     let downstream = port::open(
         downstream,
         Interrupt::USART3,
         &DOWNSTREAM,
-        &DOWNSTREAM_QUEUES,
+        singleton!(DOWNSTREAM_QUEUES: Queues = Queues::new())?,
     );
     Some((clock, upstream, downstream, autopilot))
 }
 
 #[interrupt]
 fn USART2() {
-    port::serve(&UPSTREAM, &UPSTREAM_QUEUES);
+    port::serve(&UPSTREAM);
 }
 
 #[interrupt]
 fn USART3() {
-    port::serve(&DOWNSTREAM, &DOWNSTREAM_QUEUES);
+    port::serve(&DOWNSTREAM);
 }

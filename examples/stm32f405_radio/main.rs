@@ -16,10 +16,6 @@ mod board;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/clock.rs"]
 mod clock;
-#[cfg(target_os = "none")]
-#[path = "../stm32f405/config/mod.rs"]
-#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
-mod config;
 #[cfg(all(target_os = "none", feature = "flight"))]
 #[path = "../stm32f405/course.rs"]
 #[expect(unreachable_pub, reason = "the tools on the ground have it public")]
@@ -50,6 +46,9 @@ mod log;
 mod port;
 #[cfg(target_os = "none")]
 mod radio;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/turns.rs"]
+mod turns;
 #[cfg(all(target_os = "none", feature = "upload"))]
 #[path = "../stm32f405/uploads.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
@@ -58,6 +57,9 @@ mod uploads;
 #[path = "../stm32f405/views.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod views;
+
+#[cfg(target_os = "none")]
+use uav_relay_block as config;
 
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
@@ -71,7 +73,7 @@ fn main() -> ! {
     let Some(drone) = drone::begin(Wiring::Shared, uart, clock.now()) else {
         board::stop()
     };
-    drone::fly(clock, channel, drone)
+    turns::fly(clock, channel, drone)
 }
 
 /// The link, in a place of its own in RAM; a function of its own, so that the stack it needs is given back.

@@ -11,6 +11,7 @@
 use core::cell::RefCell;
 
 use cortex_m::interrupt::Mutex;
+use cortex_m::singleton;
 use stm32f4xx_hal::gpio::{Output, PA1};
 use stm32f4xx_hal::pac::{self, Interrupt, USART2, interrupt};
 use stm32f4xx_hal::prelude::*;
@@ -19,10 +20,9 @@ use stm32f4xx_hal::serial::Serial;
 
 use super::autopilot::{self, Uart};
 use super::clock::Clock;
-use super::port::{self, OUTGOING, Port, Queues, Slot};
+use super::port::{self, Port, Queues, Slot};
 
 static RADIO: Slot<USART2> = Mutex::new(RefCell::new(None));
-static RADIO_QUEUES: Mutex<RefCell<Queues<OUTGOING>>> = Queues::new();
 
 /// High while this relay sends.
 pub(crate) type DriverEnable = PA1<Output>;
@@ -42,11 +42,16 @@ pub(crate) fn start() -> Option<(Clock, Port, DriverEnable, Uart)> {
     }
     let autopilot = autopilot::uart(chip.USART1, a.pa9, a.pa10, &mut rcc)?;
     let radio = Serial::new(chip.USART2, (a.pa2, a.pa3), port::config(), &mut rcc).ok()?;
-    let radio = port::open(radio, Interrupt::USART2, &RADIO, &RADIO_QUEUES);
+    let radio = port::open(
+        radio,
+        Interrupt::USART2,
+        &RADIO,
+        singleton!(RADIO_QUEUES: Queues = Queues::new())?,
+    );
     Some((clock, radio, a.pa1.into_push_pull_output(), autopilot))
 }
 
 #[interrupt]
 fn USART2() {
-    port::serve(&RADIO, &RADIO_QUEUES);
+    port::serve(&RADIO);
 }

@@ -2,6 +2,7 @@
 //!
 //! | page | what it answers |
 //! | --- | --- |
+//! | [`firmware`] | from an empty crate to a relay that flies: in a loop, by interrupts, with Embassy |
 //! | [`planning`] | how many relays, where, and whether that is the best there is |
 //! | [`lost_relays`] | what happens when a relay falls silent, comes back, or the chain is split |
 //! | [`uploads`] | how a flying chain is given a new mission |
@@ -9,6 +10,9 @@
 //! | [`flight`] | how a drone flies to its place, and who flies it |
 //! | [`security`] | what signed frames protect, and what not |
 //! | [`wire_format`] | every byte on the wire, enough for another implementation |
+
+#[doc = include_str!("firmware.md")]
+pub mod firmware {}
 
 #[doc = include_str!("planning.md")]
 pub mod planning {}

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`port`] | a port that never blocks, made of [`embedded_hal_nb`] ([`Nb`]) or [`embedded_io`] ([`Io`]) |
 //! | [`link`] | one port with the frames that wait for it and its driver-enable pin |
+//! | [`queue`] | bytes between an interrupt and the main loop, for a UART that holds one byte |
 //! | [`stats`] | local faults, counted |
 //! | this one | the relay and its links: [`Pair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`Shared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
 //!
@@ -13,6 +14,11 @@
 //! comes in, whichever is first. The time is always later than `now`; with bytes still to be written or read, or a pin to be
 //! lowered, it is one byte time ahead, which keeps a line without a FIFO busy. A port that takes nothing is tried less and
 //! less often, at last every 128 byte times: wake up when it takes bytes again, if it can tell.
+//!
+//! # A UART that holds one byte
+//! Between two polls a relay may compute for 3 ms (16 MHz), and at 115 200 baud a byte lasts 87 us. A UART without a FIFO or DMA needs an
+//! interrupt that fetches bytes meanwhile: [`ByteQueues`] has both ends, and [`queue_depth`] says how deep. An executor with
+//! asynchronous ports is what `asynch` is for (feature `async`).
 //!
 //! # What does not fit
 //! A link has room for two frames of full length. A frame that does not fit any more is dropped and counted in
@@ -89,12 +95,15 @@
 
 pub mod link;
 pub mod port;
+pub mod queue;
+mod ring;
 pub mod stats;
 
 use embedded_hal::digital::OutputPin;
 
 pub use link::{NoPin, READ_LIMIT, SerialLink, byte_time};
 pub use port::{Fault, Io, Nb, SerialPort};
+pub use queue::{ByteQueues, InterruptEnd, Pend, QueuedPort, queue_depth};
 pub use stats::SerialStats;
 
 use crate::relay::{Port, Relay, Transmit};

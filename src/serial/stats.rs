@@ -31,7 +31,7 @@ pub struct SerialStats {
 
 impl SerialStats {
     /// Counts a read that failed.
-    pub(super) fn read_failed(&mut self, fault: Fault) {
+    pub(crate) fn read_failed(&mut self, fault: Fault) {
         bump(match fault {
             Fault::Overrun => &mut self.overrun,
             Fault::Framing => &mut self.framing,

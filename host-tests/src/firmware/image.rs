@@ -27,10 +27,12 @@ pub fn build(examples: &[&str], smallest: bool) -> Result<PathBuf, String> {
         .current_dir(root)
         .args(["build", "--locked", "--package", "uav-relay"])
         .args(["--profile", PROFILE, "--target", TARGET])
-        .args(["--features", "defmt", "--target-dir"])
+        .arg("--target-dir")
         .arg(&folder);
     if smallest {
-        command.arg("--no-default-features");
+        command.args(["--no-default-features", "--features", "defmt"]);
+    } else {
+        command.args(["--features", "defmt,async"]);
     }
     for example in examples {
         command.args(["--example", example]);

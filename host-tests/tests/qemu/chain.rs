@@ -94,6 +94,23 @@ fn five_of_the_smallest_image_settle_there_too() {
     }
 }
 
+/// The runner of `uav_relay::asynch`, on an executor of its own.
+#[test]
+fn five_on_asynchronous_ports_settle_there_too() {
+    let flight = paper(5);
+    let expected = simulated(&flight);
+    for faults in [Faults::default(), BAD_DAY] {
+        let mut fleet = Fleet::of(Image::Asynchronous, &flight, faults, 1);
+        assert_eq!(fleet.places(), expected, "{faults:?}");
+        for drone in 1..=5 {
+            let counters = fleet.counters(drone);
+            for name in ["malformed", "misaddressed"] {
+                assert_eq!(counters.counter(name), Some(0), "{}", counters.text);
+            }
+        }
+    }
+}
+
 /// Asked for a method that it was built without, a drone says so, and does not fly.
 #[test]
 fn the_smallest_image_refuses_what_it_cannot_do() {

@@ -24,12 +24,13 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
 /// And for each drone of the fleet, since all share this machine.
 const PATIENCE_A_DRONE: Duration = Duration::from_secs(10);
 
-/// What is flashed: the two variants, and the first of them with Algorithm 1 alone.
+/// What is flashed: the two variants, the first of them with Algorithm 1 alone, and on asynchronous ports.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Image {
     Wires,
     Radio,
     Smallest,
+    Asynchronous,
 }
 
 impl Image {
@@ -38,6 +39,7 @@ impl Image {
             Self::Wires => "stm32f405",
             Self::Radio => "stm32f405_radio",
             Self::Smallest => "smallest",
+            Self::Asynchronous => "stm32f405_async",
         }
     }
 }
@@ -53,14 +55,15 @@ pub(crate) fn image(example: &str) -> PathBuf {
         // Built otherwise, an example has the same name: the smallest is put aside first.
         let folder = build(&[wires], true);
         std::fs::copy(folder.join(wires), folder.join(Image::Smallest.name())).unwrap();
-        build(&[wires, Image::Radio.name(), "golden"], false)
+        let asynchronous = Image::Asynchronous.name();
+        build(&[wires, Image::Radio.name(), asynchronous, "golden"], false)
     });
     folder.join(example)
 }
 
 /// The strings of the log of an image.
 fn table(which: Image) -> &'static Table {
-    static TABLES: [OnceLock<Table>; 3] = [const { OnceLock::new() }; 3];
+    static TABLES: [OnceLock<Table>; 4] = [const { OnceLock::new() }; 4];
     TABLES[which as usize].get_or_init(|| log::table(&image(which.name())))
 }
 
@@ -147,7 +150,9 @@ impl Fleet {
             std::thread::spawn(move || log::listen(console, drone, table, &lines));
         }
         let (mut hearers, in_range) = match which {
-            Image::Wires | Image::Smallest => (network::chain(blocks.len()), 1),
+            Image::Wires | Image::Smallest | Image::Asynchronous => {
+                (network::chain(blocks.len()), 1)
+            }
             Image::Radio => (network::radio(blocks.len(), 2), 2),
         };
         if let Some(socket) = transmitter {

@@ -2,7 +2,7 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`config`] | the block, byte by byte; the firmware's own files |
+//! | [`config`] | the block, byte by byte; a crate of its own, as the firmware has it |
 //! | [`course`] | the line on earth that its sites make; the firmware's own file |
 //! | [`key`] | the network's key, from a file; the Linux companion's own file |
 //! | [`block`] | from a scenario to the block of one drone |
@@ -10,11 +10,11 @@
 //! | [`summary`] | what is in that folder, and what to type |
 
 pub mod block;
-#[path = "../../../../examples/stm32f405/config/mod.rs"]
-pub mod config;
 #[path = "../../../../examples/stm32f405/course.rs"]
 pub mod course;
 pub mod folder;
 #[path = "../../../../examples/linux_companion/key.rs"]
 pub mod key;
 pub mod summary;
+
+pub use uav_relay_block as config;

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use uav_relay_xtask::toolchain::{llvm_tool, succeeds};
 
-use super::steps::{CARGO_FUZZ, NIGHTLY, OLDEST, TARGET};
+use super::steps::{CARGO_FUZZ, NIGHTLY, OLDEST, TARGET, TARGET_V8M};
 
 /// Programs of Debian's packages of the same name: the emulator that runs the firmware, and Wireshark without windows, which reads
 /// captures.
@@ -30,11 +30,16 @@ const TO_EDIT: [Needed; 2] = [
     ),
 ];
 
-const FOR_THE_REST: [Needed; 4] = [
+const FOR_THE_REST: [Needed; 5] = [
     (
         TARGET,
         &["rustc", "--print", "target-libdir", "--target", TARGET],
         &["target", "add", TARGET],
+    ),
+    (
+        TARGET_V8M,
+        &["rustc", "--print", "target-libdir", "--target", TARGET_V8M],
+        &["target", "add", TARGET_V8M],
     ),
     (
         "llvm-tools",

@@ -7,6 +7,9 @@ use uav_relay_xtask::FUZZ_TARGETS;
 /// The target the firmware is built for.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
+/// The target of the Embassy board that is no STM32.
+pub(crate) const TARGET_V8M: &str = "thumbv8m.main-none-eabihf";
+
 /// The oldest compiler the crate promises to build with, as `rust-version` in Cargo.toml has it.
 pub(crate) const OLDEST: &str = env!("CARGO_PKG_RUST_VERSION");
 
@@ -23,7 +26,8 @@ const SETS: [&str; 7] = [
 
 /// Tests that are done in seconds, one or two of each part: placements, the chain, what goes on the air, the links, the flash,
 /// the guard.
-const QUICK_TESTS: [&str; 9] = [
+const QUICK_TESTS: [&str; 10] = [
+    "asynch",
     "exact",
     "flash",
     "flights",
@@ -99,9 +103,10 @@ pub(crate) fn all() -> Vec<Step> {
         ..step("documentation", "cargo doc --workspace --no-deps --locked")
     });
     steps.extend(firmware());
+    steps.extend(embassy());
     steps.push(step("cost, and no panic", "cargo cost"));
     for (name, features) in [
-        ("oldest compiler", "--features=defmt"),
+        ("oldest compiler", "--features=defmt,async"),
         ("oldest compiler, no features", "--no-default-features"),
     ] {
         let check = "cargo check -p uav-relay --locked --target-dir target/oldest";
@@ -137,8 +142,34 @@ fn clippy() -> Vec<Step> {
     vec![
         on_target("clippy, target", ""),
         on_target("clippy, target, no features", "--no-default-features"),
-        on_target("clippy, target, its log", "--features defmt"),
+        on_target(
+            "clippy, target, its log, asynchronous",
+            "--features defmt,async",
+        ),
     ]
+}
+
+/// The Embassy examples, a workspace of their own: as the rest is checked, for both chips.
+fn embassy() -> Vec<Step> {
+    const MANIFEST: &str = "--manifest-path examples/embassy/Cargo.toml";
+    let mut steps = vec![step(
+        "Embassy, formatting",
+        format!("cargo fmt {MANIFEST} --all --check"),
+    )];
+    for (package, target) in [("relay-stm32f405", TARGET), ("relay-pico2", TARGET_V8M)] {
+        let what = format!(
+            "{MANIFEST} -p relay-app -p {package} --locked --target {target} --target-dir target/embassy"
+        );
+        steps.push(step(
+            format!("Embassy, clippy, {package}"),
+            format!("cargo clippy {what} --profile firmware -- -D warnings"),
+        ));
+        steps.push(step(
+            format!("Embassy, {package}"),
+            format!("cargo build {what} --profile firmware"),
+        ));
+    }
+    steps
 }
 
 /// The library and a chain, with these features alone.
@@ -169,6 +200,7 @@ fn firmware() -> Vec<Step> {
     vec![
         build("firmware", ""),
         build("firmware, no features", "--no-default-features"),
+        build("firmware, asynchronous", "--features async"),
         build("firmware, its log by the probe", "--features rtt"),
     ]
 }

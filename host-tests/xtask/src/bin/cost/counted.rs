@@ -47,6 +47,9 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     ));
     rows.extend(table(&counted, SIGNED)?);
     rows.extend(table(&counted, UPLOADED)?);
+    // An image of its own: with more in it the compiler makes other choices in all of it.
+    let runners = count(&build("cost", &["--features", "async"])?)?;
+    rows.extend(table(&runners, RUNNERS)?);
     Ok(rows)
 }
 
@@ -95,6 +98,41 @@ const SIGNED: &[Counted] = &[
         "a replayed sweep, refused",
         "instructions",
         &["refused"],
+        None,
+    ),
+];
+
+/// Of what moves bytes between ports and a relay.
+const RUNNERS: &[Counted] = &[
+    (
+        "a full sweep on polled ports, bytes in to bytes out",
+        "instructions",
+        &["polled_sweep"],
+        None,
+    ),
+    (
+        "the same on asynchronous ports",
+        "instructions",
+        &["async_sweep"],
+        None,
+    ),
+    (
+        "a poll of both polled ports with nothing to do",
+        "instructions",
+        &["polled_idle"],
+        None,
+    ),
+    (
+        "the same of asynchronous ports",
+        "instructions",
+        &["async_idle"],
+        None,
+    ),
+    ("RAM of two polled links", "bytes", &["polled_size"], None),
+    (
+        "RAM of two asynchronous links and the future that runs them",
+        "bytes",
+        &["async_size"],
         None,
     ),
 ];

@@ -1,6 +1,6 @@
 //! What is written into a drone once, apart from the image: which relay it is, and what it flies.
 //!
-//! One block at the start of the last flash sector, [`ADDRESS`], which no image reaches (`memory.x`) and no update touches.
+//! One block in a sector of the flash of its own, which no image reaches and no update touches: of an STM32F405 at [`ADDRESS`].
 //! `cargo provision` writes it from a scenario. All numbers are little-endian, floats as in IEEE 754:
 //!
 //! | byte | type | what |
@@ -59,10 +59,13 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | `mod.rs` | the table, and how it is read |
+//! | `lib.rs` | the table, and how it is read |
 //! | `types.rs` | what a block says, and what may be wrong with it |
 //! | `reader.rs` | numbers out of bytes |
 //! | `write.rs` | the block of what it is to say, on the ground alone |
+
+#![cfg_attr(target_os = "none", no_std)]
+#![forbid(unsafe_code)]
 
 mod reader;
 mod types;

@@ -1,0 +1,194 @@
+//! What the runners cost around a relay: a full sweep from the bytes of one port to those of the other, on polled ports and on
+//! asynchronous ones.
+
+use core::cell::Cell;
+use core::convert::Infallible;
+use core::future::{Future, pending, poll_fn};
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
+
+use cortex_m_semihosting::hprintln;
+use embedded_io_async::{ErrorType, Read, Write};
+use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, Clock};
+use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, byte_time};
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{FrameBuf, Instant, Mission, Phase, Relay, Settings};
+
+use super::counter::{instructions, relay, sends};
+use super::missions::mission;
+
+/// Bytes that come in at once, and those that have gone out.
+struct Memory {
+    coming: Cell<(FrameBuf, usize, usize)>,
+    gone: Cell<usize>,
+}
+
+impl Memory {
+    const fn new(frame: FrameBuf, len: usize) -> Self {
+        Self {
+            coming: Cell::new((frame, 0, len)),
+            gone: Cell::new(0),
+        }
+    }
+
+    fn take(&self, into: &mut [u8]) -> usize {
+        let (frame, from, len) = self.coming.get();
+        let bytes = frame.get(from..len).unwrap_or_default();
+        let count = bytes.len().min(into.len());
+        for (place, byte) in into.iter_mut().zip(bytes) {
+            *place = *byte;
+        }
+        self.coming.set((frame, from + count, len));
+        count
+    }
+
+    fn give(&self, bytes: &[u8]) -> usize {
+        self.gone.set(self.gone.get() + bytes.len());
+        bytes.len()
+    }
+}
+
+/// One port, however it is asked.
+#[derive(Clone, Copy)]
+struct End<'m>(&'m Memory);
+
+impl SerialPort for End<'_> {
+    fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
+        Ok(self.0.take(into))
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
+        Ok(self.0.give(bytes))
+    }
+
+    fn has_left(&mut self) -> Result<Option<bool>, Fault> {
+        Ok(None)
+    }
+}
+
+impl ErrorType for End<'_> {
+    type Error = Infallible;
+}
+
+impl Read for End<'_> {
+    async fn read(&mut self, into: &mut [u8]) -> Result<usize, Infallible> {
+        poll_fn(|_| match self.0.take(into) {
+            0 => Poll::Pending,
+            count => Poll::Ready(Ok(count)),
+        })
+        .await
+    }
+}
+
+impl Write for End<'_> {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        Ok(self.0.give(bytes))
+    }
+
+    async fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+/// A time that stands still.
+struct Still(Instant);
+
+impl Clock for Still {
+    fn now(&self) -> Instant {
+        self.0
+    }
+
+    fn sleep_until(&self, at: Instant) -> impl Future<Output = ()> {
+        let passed = self.0 >= at;
+        async move {
+            if !passed {
+                pending::<()>().await;
+            }
+        }
+    }
+}
+
+/// The middle of three relays, and the sweep that the first one sends it.
+fn before() -> Option<(Relay, FrameBuf, usize, Instant)> {
+    const THREE: Mission = mission(3);
+    let settings = Settings {
+        predict: false,
+        ..Settings::default()
+    };
+    let mut head = relay(1, settings, THREE);
+    let mut now = Instant::ZERO;
+    while head.phase() == Phase::Planning {
+        now = head.poll_timeout().unwrap_or(now);
+        head.handle_timeout(now);
+    }
+    let (frame, len) = sends(&mut head, now)?;
+    Some((relay(2, settings, THREE), frame, len, now))
+}
+
+/// Both runners, from the same moment on.
+pub(crate) fn runners() {
+    let byte_time = byte_time(115_200);
+    let Some((mut middle, frame, len, now)) = before() else {
+        return;
+    };
+    let (up, down) = (Memory::new(frame, len), Memory::new([0; MAX_FRAME], 0));
+    let mut ports = Pair::new(
+        SerialLink::new(End(&up), byte_time),
+        SerialLink::new(End(&down), byte_time),
+    );
+    let mut polls = 0;
+    let mut polled = 0;
+    while down.gone.get() == 0 && polls < 9 {
+        polled += instructions(|| ports.poll(now, &mut middle));
+        polls += 1;
+    }
+    hprintln!("polled_sweep {}", polled);
+    hprintln!("polled_polls {}", polls);
+    hprintln!("polled_gone {}", down.gone.get());
+    ports.poll(now, &mut middle);
+    hprintln!(
+        "polled_idle {}",
+        instructions(|| ports.poll(now, &mut middle))
+    );
+    let polled_size = size_of_val(&ports);
+    hprintln!("polled_size {}", polled_size);
+    awaited(byte_time);
+}
+
+fn awaited(byte_time: uav_relay::Duration) {
+    let Some((mut middle, frame, len, now)) = before() else {
+        return;
+    };
+    let (up, down) = (
+        Memory::new([0; MAX_FRAME], 0),
+        Memory::new([0; MAX_FRAME], 0),
+    );
+    let time = Still(now);
+    let relay = AsyncRelay::new(&mut middle);
+    let mut ports = AsyncPair::new(
+        AsyncLink::new(End(&up), End(&up), byte_time),
+        AsyncLink::new(End(&down), End(&down), byte_time),
+    );
+    let run = ports.run(&relay, &time);
+    hprintln!("async_size {}", size_of_val(&run));
+    let mut run = pin!(run);
+    let mut cx = Context::from_waker(Waker::noop());
+    let mut poll = || {
+        // It goes on for good.
+        let _ = run.as_mut().poll(&mut cx);
+    };
+    // Everybody waits for bytes.
+    poll();
+    poll();
+    up.coming.set((frame, 0, len));
+    let (mut polls, mut total) = (0, 0);
+    while down.gone.get() == 0 && polls < 9 {
+        total += instructions(&mut poll);
+        polls += 1;
+    }
+    hprintln!("async_sweep {}", total);
+    hprintln!("async_polls {}", polls);
+    hprintln!("async_gone {}", down.gone.get());
+    poll();
+    hprintln!("async_idle {}", instructions(&mut poll));
+}

@@ -1,0 +1,83 @@
+//! The Raspberry Pi Pico 2: its configuration block, its seed, and its UARTs.
+//!
+//! | what | where |
+//! | --- | --- |
+//! | toward the transmitter, or the radio | UART0: TX GP0, RX GP1 |
+//! | toward the receiver | UART1: TX GP4, RX GP5 |
+//! | the radio's driver enable | GP2: high while this relay sends |
+//! | log | the debug probe (RTT) |
+#![no_std]
+#![forbid(unsafe_code)]
+
+use defmt_rtt as _;
+use embassy_rp::flash::{Blocking, Flash};
+use embassy_rp::peripherals::{FLASH, TRNG, UART0, UART1};
+use embassy_rp::trng::Trng;
+use embassy_rp::uart::{
+    BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config,
+};
+use embassy_rp::{Peri, bind_interrupts};
+use panic_probe as _;
+use relay_app::{BAUD, BUFFER};
+use static_cell::StaticCell;
+use uav_relay_block::{Block, LEN};
+
+bind_interrupts!(
+    /// Who handles which interrupt.
+    pub struct Irqs {
+        UART0_IRQ => BufferedInterruptHandler<UART0>;
+        UART1_IRQ => BufferedInterruptHandler<UART1>;
+        TRNG_IRQ => embassy_rp::trng::InterruptHandler<TRNG>;
+    }
+);
+
+/// Bytes of the flash.
+const FLASH_SIZE: usize = 4 * 1024 * 1024;
+
+/// Where the configuration block begins, in the flash: its last sector.
+const BLOCK: u32 = 0x3F_F000;
+
+/// The configuration block; blank where it cannot be read.
+pub fn block(flash: Peri<'_, FLASH>) -> Block {
+    let mut block = [0xFF; LEN];
+    let mut flash = Flash::<_, Blocking, FLASH_SIZE>::new_blocking(flash);
+    if flash.blocking_read(BLOCK, &mut block).is_err() {
+        block.fill(0xFF);
+    }
+    block
+}
+
+/// Differs from one start to the next.
+pub fn seed(trng: Peri<'_, TRNG>) -> u32 {
+    Trng::new(trng, Irqs, embassy_rp::trng::Config::default()).blocking_next_u32()
+}
+
+/// Reader and writer of UART0.
+pub fn uart0(
+    uart: Peri<'static, UART0>,
+    tx: Peri<'static, embassy_rp::peripherals::PIN_0>,
+    rx: Peri<'static, embassy_rp::peripherals::PIN_1>,
+) -> (BufferedUartRx, BufferedUartTx) {
+    static BUFFERS: StaticCell<[[u8; BUFFER]; 2]> = StaticCell::new();
+    let [sent, received] = BUFFERS.init([[0; BUFFER]; 2]);
+    let (tx, rx) = BufferedUart::new(uart, tx, rx, Irqs, sent, received, config()).split();
+    (rx, tx)
+}
+
+/// Reader and writer of UART1.
+pub fn uart1(
+    uart: Peri<'static, UART1>,
+    tx: Peri<'static, embassy_rp::peripherals::PIN_4>,
+    rx: Peri<'static, embassy_rp::peripherals::PIN_5>,
+) -> (BufferedUartRx, BufferedUartTx) {
+    static BUFFERS: StaticCell<[[u8; BUFFER]; 2]> = StaticCell::new();
+    let [sent, received] = BUFFERS.init([[0; BUFFER]; 2]);
+    let (tx, rx) = BufferedUart::new(uart, tx, rx, Irqs, sent, received, config()).split();
+    (rx, tx)
+}
+
+fn config() -> Config {
+    let mut config = Config::default();
+    config.baudrate = BAUD;
+    config
+}

@@ -1,0 +1,17 @@
+//! A relay on an STM32F405 with a UART to each neighbour.
+#![no_std]
+#![no_main]
+
+use embassy_executor::Spawner;
+use relay_stm32f405::{block, seed, usart2, usart3};
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    let chip = embassy_stm32::init(embassy_stm32::Config::default());
+    let block = block(chip.FLASH);
+    let upstream = usart2(chip.USART2, chip.PA2, chip.PA3);
+    let downstream = usart3(chip.USART3, chip.PB10, chip.PB11);
+    if let (Ok(upstream), Ok(downstream)) = (upstream, downstream) {
+        match relay_app::fly(&block, seed(), upstream, downstream).await {}
+    }
+}

@@ -1,0 +1,72 @@
+//! One task, the time, and sleep: all that `uav_relay::asynch` wants of an executor. All its unsafe is here.
+
+use core::cell::{Cell, RefCell};
+use core::future::{Future, poll_fn};
+use core::pin::Pin;
+use core::task::{Context, Poll, RawWaker, RawWakerVTable, Waker};
+
+use uav_relay::Instant;
+
+use super::clock::{self, Clock};
+
+/// The board's clock, and when the task wants to be polled at the latest.
+pub(crate) struct Time {
+    clock: RefCell<Clock>,
+    next: Cell<Option<Instant>>,
+}
+
+impl Time {
+    pub(crate) const fn new(clock: Clock) -> Self {
+        Self {
+            clock: RefCell::new(clock),
+            next: Cell::new(None),
+        }
+    }
+}
+
+impl uav_relay::asynch::Clock for Time {
+    fn now(&self) -> Instant {
+        match self.clock.try_borrow_mut() {
+            Ok(mut clock) => clock.now(),
+            Err(_) => Instant::from_micros(clock::micros()),
+        }
+    }
+
+    fn sleep_until(&self, at: Instant) -> impl Future<Output = ()> {
+        poll_fn(move |_| {
+            if self.now() >= at {
+                return Poll::Ready(());
+            }
+            let next = self.next.get().map_or(at, |next| next.min(at));
+            self.next.set(Some(next));
+            Poll::Pending
+        })
+    }
+}
+
+/// Polls `task` whenever an interrupt has brought something, it has woken itself, or its time has come; then calls `also`.
+pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl FnMut()) -> ! {
+    let waker = waker();
+    let mut cx = Context::from_waker(&waker);
+    loop {
+        time.next.set(None);
+        // It goes on for good.
+        let _ = task.as_mut().poll(&mut cx);
+        also();
+        if let Ok(mut clock) = time.clock.try_borrow_mut() {
+            clock.sleep(time.next.get());
+        }
+    }
+}
+
+/// Has the only task there is polled again.
+fn waker() -> Waker {
+    const WAKES: RawWakerVTable = RawWakerVTable::new(
+        |_| RawWaker::new(core::ptr::null(), &WAKES),
+        |_| clock::wake(),
+        |_| clock::wake(),
+        |_| {},
+    );
+    // SAFETY: its functions touch no more than a static that is atomic.
+    unsafe { Waker::from_raw(RawWaker::new(core::ptr::null(), &WAKES)) }
+}

@@ -1,0 +1,151 @@
+//! The relay of `stm32f405` on asynchronous ports: the same wires, drone and log, run by `uav_relay::asynch` on an executor of 30 lines.
+//!
+//! It is here to be compared with the polled one (`cargo cost`), and to be flown in the emulator (`cargo test --test qemu`), where
+//! Embassy's start-up waits for good for a clock that QEMU does not have. For a board of your own begin with `examples/embassy`. It has
+//! no autopilot: a drone whose block has sites takes no part.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | `main.rs` | this variant, put together |
+//! | `executor.rs` | one task, the time, and sleep; all its unsafe |
+//! | `ports.rs` | the halves of a port that an interrupt serves |
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/grounded.rs"]
+#[allow(dead_code, reason = "what only polled ports call")]
+mod autopilot;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/board.rs"]
+mod board;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/clock.rs"]
+mod clock;
+#[cfg(all(target_os = "none", feature = "flight"))]
+#[path = "../stm32f405/course.rs"]
+#[allow(dead_code, unreachable_pub, reason = "what the log names")]
+mod course;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/drone.rs"]
+mod drone;
+#[cfg(all(target_os = "none", feature = "auth"))]
+#[path = "../stm32f405/epoch.rs"]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod epoch;
+#[cfg(target_os = "none")]
+mod executor;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/flash.rs"]
+mod flash;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/journal.rs"]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod journal;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/kept.rs"]
+mod kept;
+#[cfg(target_os = "none")]
+#[cfg_attr(feature = "defmt", path = "../stm32f405/log.rs")]
+#[cfg_attr(not(feature = "defmt"), path = "../stm32f405/silent.rs")]
+#[allow(dead_code, reason = "what only an autopilot logs")]
+mod log;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/port.rs"]
+mod port;
+#[cfg(target_os = "none")]
+mod ports;
+#[cfg(all(target_os = "none", feature = "upload"))]
+#[path = "../stm32f405/uploads.rs"]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod uploads;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/views.rs"]
+#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
+mod views;
+#[cfg(target_os = "none")]
+#[path = "../stm32f405/wires.rs"]
+mod wires;
+
+#[cfg(target_os = "none")]
+use uav_relay_block as config;
+
+#[cfg(target_os = "none")]
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    use uav_relay::Wiring;
+
+    let Some((mut clock, upstream, downstream, uart)) = wires::start() else {
+        board::stop()
+    };
+    // Without a configuration to fly by a drone sleeps for good.
+    let Some(drone) = drone::begin(Wiring::Pair, uart, clock.now()) else {
+        board::stop()
+    };
+    fly(clock, upstream, downstream, drone)
+}
+
+/// Flies for good.
+#[cfg(target_os = "none")]
+fn fly(
+    clock: clock::Clock,
+    upstream: port::Port,
+    downstream: port::Port,
+    drone: drone::Drone,
+) -> ! {
+    use core::cell::RefCell;
+    use core::pin::pin;
+
+    use embassy_futures::select::select;
+    use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay};
+    use uav_relay::serial::byte_time;
+
+    let time = executor::Time::new(clock);
+    let drone::Drone {
+        relay,
+        views,
+        autopilot: None,
+    } = drone
+    else {
+        board::stop()
+    };
+    let relay = AsyncRelay::new(relay);
+    let (upstream, downstream) = (RefCell::new(upstream), RefCell::new(downstream));
+    let link = |port| {
+        let (rx, tx) = ports::halves(port, &time);
+        AsyncLink::new(rx, tx, byte_time(port::BAUD))
+    };
+    let mut ports = AsyncPair::new(link(&upstream), link(&downstream));
+    let mut keep = |relay: &uav_relay::Relay| views.keep(relay);
+    let runs = ports.run_keeping(&relay, &time, &mut keep);
+    executor::run(pin!(select(runs, tell(&relay))), &time, || {
+        if log::asked() {
+            relay.look(log::counters);
+            for port in [uav_relay::Port::Upstream, uav_relay::Port::Downstream] {
+                log::link_counters(&relay.stats(port));
+            }
+        }
+    })
+}
+
+/// Logs what happens, and keeps what was uploaded.
+#[cfg(target_os = "none")]
+async fn tell(relay: &uav_relay::asynch::AsyncRelay<'_>) -> core::convert::Infallible {
+    loop {
+        let event = relay.next_event().await;
+        relay.look(|relay| {
+            log::event(event, relay);
+            #[cfg(feature = "upload")]
+            if event == uav_relay::Event::Uploaded {
+                kept::keep_upload(relay);
+            }
+        });
+    }
+}
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    println!(
+        "The firmware of a relay on an STM32F405, with an asynchronous serial port to each neighbour.\n\
+         Build it with: cargo build --profile firmware --target thumbv7em-none-eabihf --example stm32f405_async --features async"
+    );
+}

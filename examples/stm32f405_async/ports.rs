@@ -1,0 +1,71 @@
+//! The halves of a port that an interrupt serves, as asynchronous ports. The executor polls its one task after every byte that comes in.
+
+use core::cell::RefCell;
+use core::future::poll_fn;
+use core::task::Poll;
+
+use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
+use uav_relay::Duration;
+use uav_relay::asynch::Clock as _;
+use uav_relay::serial::SerialPort as _;
+
+use super::executor::Time;
+use super::port::Port;
+
+/// So long a full port is left alone; 11 bytes leave meanwhile.
+const PAUSE: Duration = Duration::from_millis(1);
+
+/// What reads.
+pub(crate) struct Rx<'p>(&'p RefCell<Port>);
+
+/// What writes.
+pub(crate) struct Tx<'p> {
+    port: &'p RefCell<Port>,
+    time: &'p Time,
+}
+
+/// Both halves of a port.
+pub(crate) const fn halves<'p>(port: &'p RefCell<Port>, time: &'p Time) -> (Rx<'p>, Tx<'p>) {
+    (Rx(port), Tx { port, time })
+}
+
+impl ErrorType for Rx<'_> {
+    type Error = ErrorKind;
+}
+
+impl ErrorType for Tx<'_> {
+    type Error = ErrorKind;
+}
+
+impl Read for Rx<'_> {
+    async fn read(&mut self, into: &mut [u8]) -> Result<usize, ErrorKind> {
+        poll_fn(|_| {
+            let read = self.0.try_borrow_mut().map(|mut port| port.read(into));
+            match read {
+                Ok(Ok(0)) | Err(_) => Poll::Pending,
+                Ok(Ok(count)) => Poll::Ready(Ok(count)),
+                Ok(Err(_)) => Poll::Ready(Err(ErrorKind::Other)),
+            }
+        })
+        .await
+    }
+}
+
+impl Write for Tx<'_> {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+        loop {
+            let wrote = self.port.try_borrow_mut().map(|mut port| port.write(bytes));
+            match wrote {
+                Ok(Ok(0)) | Err(_) => {
+                    self.time.sleep_until(self.time.now() + PAUSE).await;
+                }
+                Ok(Ok(count)) => return Ok(count),
+                Ok(Err(_)) => return Err(ErrorKind::Other),
+            }
+        }
+    }
+
+    async fn flush(&mut self) -> Result<(), ErrorKind> {
+        Ok(())
+    }
+}

@@ -1,0 +1,165 @@
+//! Chains of relays on asynchronous ports, each a task of one executor; and the same chain on ports that are polled, to compare with.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use futures_executor::LocalPool;
+use futures_util::task::LocalSpawnExt as _;
+use host_tests::fixtures;
+use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, AsyncShared};
+use uav_relay::serial::SerialStats;
+use uav_relay::{Event, Instant, Mission, Placement, Port, Relay, Settings, Wiring};
+
+use crate::time::Time;
+use crate::wire::{BYTE_TIME, Fate, Heard, Rx, Shared, Tx, line};
+
+/// Relay `index` of `relays` in the paper's scenario.
+pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
+    let mission = Mission::try_new(fixtures::paper(relays)).unwrap();
+    let settings = Settings {
+        wiring,
+        ..Settings::default()
+    };
+    fixtures::relay(mission, index, settings)
+}
+
+/// Whose writer has what fate: its relay, and its port.
+pub(crate) type Trouble = Option<(u16, Port, Fate)>;
+
+fn fate(trouble: Trouble, index: u16, port: Port) -> Fate {
+    match trouble {
+        Some((of, at, fate)) if (of, at) == (index, port) => fate,
+        _ => Fate::Well,
+    }
+}
+
+/// What has become of one relay.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct Drone {
+    pub(crate) setpoint: Option<Placement>,
+    pub(crate) events: Vec<(Instant, Event)>,
+    pub(crate) rejected: u32,
+    /// Upstream or shared, and downstream.
+    pub(crate) counted: [SerialStats; 2],
+}
+
+/// What has become of a chain.
+pub(crate) struct Flown {
+    pub(crate) drones: Vec<Drone>,
+    /// What was said on each line, in the order along the chain; those toward the receiver first.
+    pub(crate) lines: Vec<Vec<Heard>>,
+}
+
+/// A task for every relay, and one for the firmware beside it, until this time.
+pub(crate) fn fly(
+    wiring: Wiring,
+    relays: u16,
+    capacity: usize,
+    trouble: Trouble,
+    until: Instant,
+) -> Flown {
+    let time = Time::default();
+    let mut pool = LocalPool::new();
+    let count = usize::from(relays);
+    let lines: Vec<Shared> = match wiring {
+        Wiring::Shared => vec![line(count, capacity)],
+        Wiring::Pair => (0..2 * (count + 1)).map(|_| line(2, capacity)).collect(),
+    };
+    let drones: Vec<Rc<RefCell<Drone>>> = (0..count).map(|_| Rc::default()).collect();
+    for (index, drone) in (1..=relays).zip(&drones) {
+        let at = usize::from(index);
+        let (lines, drone) = (lines.clone(), Rc::clone(drone));
+        let time = time.clone();
+        let rx = |line: &Shared, end| Rx {
+            line: Rc::clone(line),
+            end,
+            time: time.clone(),
+        };
+        let tx = |line: &Shared, end, port| Tx {
+            line: Rc::clone(line),
+            end,
+            time: time.clone(),
+            fate: fate(trouble, index, port),
+        };
+        // Every wire has its sender at end 0.
+        let task: std::pin::Pin<Box<dyn Future<Output = ()>>> = match wiring {
+            Wiring::Pair => {
+                let [from_up, to_down] = [&lines[at - 1], &lines[at]];
+                let [to_up, from_down] = [&lines[count + at], &lines[count + 1 + at]];
+                let up = AsyncLink::new(rx(from_up, 1), tx(to_up, 0, Port::Upstream), BYTE_TIME);
+                let down = AsyncLink::new(
+                    rx(from_down, 1),
+                    tx(to_down, 0, Port::Downstream),
+                    BYTE_TIME,
+                );
+                let mut ports = AsyncPair::new(up, down);
+                let time = time.clone();
+                Box::pin(async move {
+                    let mut relay = relay(relays, index, wiring);
+                    let relay = AsyncRelay::new(&mut relay);
+                    embassy_futures::join::join(
+                        ports.run(&relay, &time),
+                        firmware(&relay, &time, &drone),
+                    )
+                    .await;
+                })
+            }
+            Wiring::Shared => {
+                let [rx, tx] = [&lines[0]; 2];
+                let link = AsyncLink::new(
+                    Rx {
+                        line: Rc::clone(rx),
+                        end: at - 1,
+                        time: time.clone(),
+                    },
+                    Tx {
+                        line: Rc::clone(tx),
+                        end: at - 1,
+                        time: time.clone(),
+                        fate: fate(trouble, index, Port::Shared),
+                    },
+                    BYTE_TIME,
+                );
+                let mut ports = AsyncShared::new(link);
+                let time = time.clone();
+                Box::pin(async move {
+                    let mut relay = relay(relays, index, wiring);
+                    let relay = AsyncRelay::new(&mut relay);
+                    embassy_futures::join::join(
+                        ports.run(&relay, &time),
+                        firmware(&relay, &time, &drone),
+                    )
+                    .await;
+                })
+            }
+        };
+        pool.spawner().spawn_local(task).unwrap();
+    }
+    time.run(&mut pool, until);
+    Flown {
+        drones: drones.iter().map(|drone| drone.borrow().clone()).collect(),
+        lines: lines
+            .iter()
+            .map(|line| line.borrow().heard.clone())
+            .collect(),
+    }
+}
+
+/// Takes note of what happens.
+async fn firmware(relay: &AsyncRelay<'_>, time: &Time, drone: &RefCell<Drone>) {
+    use uav_relay::asynch::Clock as _;
+    loop {
+        let event = relay.next_event().await;
+        let mut drone = drone.borrow_mut();
+        drone.events.push((time.now(), event));
+        relay.with(|relay| {
+            drone.setpoint = relay.setpoint();
+            drone.rejected = relay.stats().rejected();
+        });
+        drone.counted = [Port::Upstream, Port::Downstream].map(|port| relay.stats(port));
+    }
+}
+
+pub(crate) fn setpoints(flown: &Flown) -> Vec<Option<Placement>> {
+    flown.drones.iter().map(|drone| drone.setpoint).collect()
+}

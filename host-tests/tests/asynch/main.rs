@@ -1,0 +1,126 @@
+//! Relays on asynchronous ports: a chain on an executor with virtual time, ports that are stuck, fail, or never have enough.
+
+mod chain;
+mod polled;
+mod ports;
+mod time;
+mod wire;
+
+use chain::{Flown, fly, setpoints};
+use uav_relay::serial::SerialStats;
+use uav_relay::{Event, Instant, Port, Side, Wiring};
+use wire::Fate;
+
+const END: Instant = Instant::from_millis(20_000);
+
+#[test]
+fn five_settle_where_the_polled_ones_do() {
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        let expected = polled::places(wiring, 5);
+        assert!(expected.iter().all(Option::is_some), "{wiring:?}");
+        for capacity in [1, 16, 1_000] {
+            let flown = fly(wiring, 5, capacity, None, END);
+            assert_eq!(setpoints(&flown), expected, "{wiring:?} {capacity}");
+            for drone in &flown.drones {
+                assert_eq!(drone.rejected, 0, "{wiring:?} {capacity}");
+                assert_eq!(drone.counted, [SerialStats::default(); 2]);
+            }
+        }
+    }
+}
+
+/// What of the guide needs a HAL is what is built.
+#[test]
+fn the_guide_shows_what_is_built() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let read = |name: &str| std::fs::read_to_string(root.join(name)).unwrap();
+    let built = [
+        read("examples/embassy/pico2/src/bin/wires.rs"),
+        read("examples/embassy/app/src/lib.rs"),
+    ];
+    let guide = read("src/docs/firmware.md");
+    let shown: Vec<&str> = (guide.split("```rust,ignore\n").skip(1))
+        .map(|rest| rest.split("```").next().unwrap())
+        .collect();
+    assert_eq!(shown.len(), built.len());
+    for (shown, built) in shown.iter().zip(&built) {
+        assert!(built.contains(shown), "{shown}");
+    }
+}
+
+/// The lines that were said something on at other times, or something else.
+fn differing(one: &Flown, other: &Flown) -> Vec<usize> {
+    let lines = one.lines.iter().zip(&other.lines);
+    let all = lines.enumerate().filter(|(_, (one, other))| one != other);
+    all.map(|(at, _)| at).collect()
+}
+
+/// A writer that is stuck for good and one whose bytes get lost are the same to everybody else: every frame of every other line, and
+/// every event, comes at the same microsecond.
+#[test]
+fn a_stuck_port_delays_nobody() {
+    let until = Instant::from_millis(60_000);
+    for (port, line) in [(Port::Upstream, 5 + 3), (Port::Downstream, 3)] {
+        let [stuck, cut] = [Fate::Stuck, Fate::Cut]
+            .map(|fate| fly(Wiring::Pair, 5, 16, Some((3, port, fate)), until));
+        assert_eq!(differing(&stuck, &cut), [line], "{port:?}");
+        assert!(stuck.lines[line].is_empty() && cut.lines[line].len() > 10);
+        let frames: usize = stuck.lines.iter().map(Vec::len).sum();
+        println!(
+            "{port:?} of relay 3 stuck: {frames} frames elsewhere, none at another microsecond"
+        );
+        assert!(frames > 500, "{frames}");
+        for (stuck, cut) in stuck.drones.iter().zip(&cut.drones) {
+            assert_eq!((&stuck.events, stuck.setpoint), (&cut.events, cut.setpoint));
+        }
+        // It hears at the port where it cannot speak, and the neighbour there cannot hear it.
+        let lost = |drone: usize, side| {
+            let mut events = stuck.drones[drone].events.iter();
+            events.any(
+                |(_, event)| matches!(event, Event::NeighbourLost { side: at, .. } if *at == side),
+            )
+        };
+        let (deaf, side) = match port {
+            Port::Upstream => (1, Side::Downstream),
+            _ => (3, Side::Upstream),
+        };
+        assert!(lost(deaf, side), "{port:?}: nobody has missed it");
+        let well = match port {
+            Port::Upstream => Side::Downstream,
+            _ => Side::Upstream,
+        };
+        assert!(!lost(2, well), "{port:?}: the other neighbour is there");
+        let dropped = stuck.drones[2].counted.map(|stats| stats.dropped);
+        let at = usize::from(port == Port::Downstream);
+        assert!(dropped[at] > 0 && dropped[1 - at] == 0, "{dropped:?}");
+    }
+}
+
+#[test]
+fn a_stuck_radio_delays_nobody_who_shares_its_channel() {
+    let until = Instant::from_millis(60_000);
+    let stuck = fly(
+        Wiring::Shared,
+        5,
+        16,
+        Some((3, Port::Shared, Fate::Stuck)),
+        until,
+    );
+    assert!(
+        stuck.drones[2].counted[0].dropped == 0,
+        "frames wait in the relay"
+    );
+    let places = setpoints(&stuck);
+    assert!(
+        [0, 1, 3, 4].iter().all(|at| places[*at].is_some()),
+        "{places:?}"
+    );
+    let reformed = |drone: usize| {
+        let mut events = stuck.drones[drone].events.iter();
+        events.any(|(_, event)| matches!(event, Event::Reformed))
+    };
+    assert!(
+        [0, 1, 3, 4].into_iter().all(reformed),
+        "the others close up"
+    );
+}

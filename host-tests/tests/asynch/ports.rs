@@ -1,0 +1,335 @@
+//! What one runner promises of its ports: bytes that are read get to the relay, a frame that is cut short is ended, nobody starves, and
+//! the pin is high while bytes leave.
+
+use std::cell::{Cell, RefCell};
+use std::future::{pending, poll_fn};
+use std::pin::pin;
+use std::rc::Rc;
+use std::task::{Context, Poll, Waker};
+
+use embedded_hal::digital::{ErrorType as PinType, OutputPin};
+use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
+use futures_util::task::LocalSpawnExt as _;
+use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
+use uav_relay::wire::deframe::Deframer;
+use uav_relay::{Instant, Port, Wiring};
+
+use crate::chain::relay;
+use crate::time::Time;
+use crate::wire::{BYTE_TIME, Fate, Rx, Tx, line};
+
+/// Takes so many bytes of each write, and of some writes none, or fails.
+#[derive(Default)]
+struct Taker {
+    taken: Rc<RefCell<Vec<u8>>>,
+    /// Writes until one that never completes.
+    writes: Rc<Cell<usize>>,
+    /// Every so many writes one fails.
+    fails: usize,
+    done: usize,
+}
+
+struct Silent;
+
+/// Never waits: there is always another byte, or another error.
+struct Flood {
+    fails: bool,
+}
+
+impl ErrorType for Taker {
+    type Error = ErrorKind;
+}
+impl ErrorType for Silent {
+    type Error = ErrorKind;
+}
+impl ErrorType for Flood {
+    type Error = ErrorKind;
+}
+
+impl Write for Taker {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+        if self.writes.get() == 0 {
+            pending::<()>().await;
+        }
+        self.writes.set(self.writes.get() - 1);
+        self.done += 1;
+        let count = bytes.len().min(7);
+        self.taken.borrow_mut().extend(&bytes[..count]);
+        if self.fails > 0 && self.done.is_multiple_of(self.fails) {
+            return Err(ErrorKind::Other);
+        }
+        Ok(count)
+    }
+
+    async fn flush(&mut self) -> Result<(), ErrorKind> {
+        Ok(())
+    }
+}
+
+impl Read for Silent {
+    async fn read(&mut self, _: &mut [u8]) -> Result<usize, ErrorKind> {
+        pending().await
+    }
+}
+
+impl Read for Flood {
+    async fn read(&mut self, into: &mut [u8]) -> Result<usize, ErrorKind> {
+        if self.fails {
+            return Err(ErrorKind::Other);
+        }
+        into.fill(3);
+        Ok(into.len())
+    }
+}
+
+/// Polls a future that never completes.
+fn poll<F: Future>(future: std::pin::Pin<&mut F>, cx: &mut Context<'_>) {
+    assert!(future.poll(cx).is_pending());
+}
+
+/// Frames that arrive whole, and those that do not.
+fn deframed(bytes: &[u8]) -> [usize; 2] {
+    let mut deframer = Deframer::new();
+    let mut counted = [0; 2];
+    for &byte in bytes {
+        match deframer.push(byte) {
+            Some(Ok(plain)) => {
+                let (body, sum) = plain.split_at(plain.len() - 4);
+                let whole = uav_relay::wire::crc::CRC_32C.checksum(body).to_le_bytes() == *sum;
+                counted[usize::from(!whole)] += 1;
+            }
+            Some(Err(_)) => counted[1] += 1,
+            None => {}
+        }
+    }
+    counted
+}
+
+/// Dropped behind any write, and run again: one frame is cut short, and all that come after it arrive.
+#[test]
+fn a_frame_that_is_cut_short_is_ended_before_the_next() {
+    for cut in 1..12 {
+        let time = Time::default();
+        let mut pool = futures_executor::LocalPool::new();
+        let taken = Rc::<RefCell<Vec<u8>>>::default();
+        let writes = Rc::new(Cell::new(cut));
+        let down = Taker {
+            taken: Rc::clone(&taken),
+            writes: Rc::clone(&writes),
+            ..Taker::default()
+        };
+        let up = Taker::default();
+        let mut ports = AsyncPair::new(
+            AsyncLink::new(Silent, up, BYTE_TIME),
+            AsyncLink::new(Silent, down, BYTE_TIME),
+        );
+        let mut relay = relay(2, 1, Wiring::Pair);
+        let relay = AsyncRelay::new(&mut relay);
+        {
+            let mut cx = Context::from_waker(Waker::noop());
+            let mut run = pin!(ports.run(&relay, &time));
+            for millis in 0..3_000 {
+                time.run(&mut pool, Instant::from_millis(millis));
+                poll(run.as_mut(), &mut cx);
+            }
+        }
+        assert_eq!(writes.get(), 0);
+        let before = taken.borrow().len();
+        let half = taken.borrow().last() != Some(&0);
+        writes.set(usize::MAX);
+        let mut cx = Context::from_waker(Waker::noop());
+        let mut run = pin!(ports.run(&relay, &time));
+        for millis in 3_000..9_000 {
+            time.run(&mut pool, Instant::from_millis(millis));
+            poll(run.as_mut(), &mut cx);
+        }
+        let taken = taken.borrow();
+        let [whole, spoiled] = deframed(&taken);
+        println!("dropped behind {before} bytes: {whole} whole frames, {spoiled} cut short");
+        assert!(whole > 5, "{cut}: {whole}");
+        assert_eq!(spoiled, usize::from(half), "{cut}");
+        // What is sent again begins behind a delimiter.
+        assert_eq!(taken[before], 0, "{cut}");
+    }
+}
+
+#[test]
+fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
+    let time = Time::default();
+    let mut pool = futures_executor::LocalPool::new();
+    let taken = Rc::<RefCell<Vec<u8>>>::default();
+    let down = Taker {
+        taken: Rc::clone(&taken),
+        writes: Rc::new(Cell::new(usize::MAX)),
+        fails: 23,
+        ..Taker::default()
+    };
+    let mut ports = AsyncPair::new(
+        AsyncLink::new(Silent, Taker::default(), BYTE_TIME),
+        AsyncLink::new(Silent, down, BYTE_TIME),
+    );
+    let mut relay = relay(2, 1, Wiring::Pair);
+    let relay = AsyncRelay::new(&mut relay);
+    let mut cx = Context::from_waker(Waker::noop());
+    let mut run = pin!(ports.run(&relay, &time));
+    for millis in 0..20_000 {
+        time.run(&mut pool, Instant::from_millis(millis));
+        poll(run.as_mut(), &mut cx);
+    }
+    let [whole, spoiled] = deframed(&taken.borrow());
+    let stats = relay.stats(Port::Downstream);
+    println!(
+        "{whole} whole frames, {spoiled} cut short, {} failed writes",
+        stats.write
+    );
+    assert!(stats.write > 5 && spoiled > 0);
+    assert!(spoiled <= usize::try_from(stats.write).unwrap());
+    let sent = relay.with(|relay| relay.stats().sent).unwrap();
+    // Every frame for this port but those that wait.
+    assert!(whole + 3 >= usize::try_from(sent).unwrap() / 2, "{sent}");
+}
+
+/// A port that always has something, or fails at once, gives the executor back, and the relay and the other port have their turns.
+#[test]
+fn a_port_that_is_always_ready_starves_nobody() {
+    for fails in [false, true] {
+        let time = Time::default();
+        let mut pool = futures_executor::LocalPool::new();
+        let taken = Rc::<RefCell<Vec<u8>>>::default();
+        let down = Taker {
+            taken: Rc::clone(&taken),
+            writes: Rc::new(Cell::new(usize::MAX)),
+            ..Taker::default()
+        };
+        let mut ports = AsyncPair::new(
+            AsyncLink::new(Flood { fails }, Taker::default(), BYTE_TIME),
+            AsyncLink::new(Silent, down, BYTE_TIME),
+        );
+        let mut relay = relay(2, 1, Wiring::Pair);
+        let relay = AsyncRelay::new(&mut relay);
+        let mut cx = Context::from_waker(Waker::noop());
+        let mut run = pin!(ports.run(&relay, &time));
+        for millis in 0..3_000 {
+            time.run(&mut pool, Instant::from_millis(millis));
+            poll(run.as_mut(), &mut cx);
+        }
+        assert!(deframed(&taken.borrow())[0] > 3, "{fails}");
+        let failed = relay.stats(Port::Upstream).other;
+        assert_eq!(failed > 10, fails, "{failed}");
+    }
+}
+
+/// Every edge, and when.
+#[derive(Clone)]
+struct Pin {
+    time: Time,
+    edges: Rc<RefCell<Vec<(Instant, bool)>>>,
+    refuses: Rc<Cell<u32>>,
+}
+
+impl PinType for Pin {
+    type Error = embedded_hal::digital::ErrorKind;
+}
+
+impl Pin {
+    fn set(&self, high: bool) -> Result<(), embedded_hal::digital::ErrorKind> {
+        if self.refuses.get() > 0 {
+            self.refuses.set(self.refuses.get() - 1);
+            return Err(embedded_hal::digital::ErrorKind::Other);
+        }
+        let mut edges = self.edges.borrow_mut();
+        if edges.last().is_none_or(|edge| edge.1 != high) {
+            edges.push((self.time.now(), high));
+        }
+        Ok(())
+    }
+}
+
+impl OutputPin for Pin {
+    fn set_low(&mut self) -> Result<(), Self::Error> {
+        self.set(false)
+    }
+
+    fn set_high(&mut self) -> Result<(), Self::Error> {
+        self.set(true)
+    }
+}
+
+/// By a writer whose `flush` does not know of a FIFO of 4 bytes.
+#[test]
+fn the_pin_is_high_while_bytes_leave_and_little_longer() {
+    for capacity in [1, 4, 16, 1_000] {
+        let time = Time::default();
+        let mut pool = futures_executor::LocalPool::new();
+        let air = line(2, capacity);
+        let pin = Pin {
+            time: time.clone(),
+            edges: Rc::default(),
+            refuses: Rc::new(Cell::new(3)),
+        };
+        let rx = Rx {
+            line: Rc::clone(&air),
+            end: 0,
+            time: time.clone(),
+        };
+        let tx = Tx {
+            line: Rc::clone(&air),
+            end: 0,
+            time: time.clone(),
+            fate: Fate::Well,
+        };
+        let edges = Rc::clone(&pin.edges);
+        let task = {
+            let time = time.clone();
+            async move {
+                let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BYTE_TIME, pin));
+                let mut relay = relay(2, 1, Wiring::Shared);
+                let relay = AsyncRelay::new(&mut relay);
+                let counted = poll_fn(|_| {
+                    // Looked at whenever this task is polled.
+                    assert!(relay.stats(Port::Shared).pin <= 3);
+                    Poll::<()>::Pending
+                });
+                embassy_futures::join::join(ports.run(&relay, &time), counted).await;
+            }
+        };
+        pool.spawner().spawn_local(task).unwrap();
+        time.run(&mut pool, Instant::from_millis(20_000));
+        let (edges, heard) = (edges.borrow(), &air.borrow().heard);
+        assert!(heard.len() > 10, "{}", heard.len());
+        assert!(edges.len() > 10, "{capacity}: {edges:?}");
+        let (mut latest, mut bursts) = (0, 0);
+        for (left, frame) in heard {
+            let begun = left.as_micros() - BYTE_TIME.as_micros() * frame.len() as u64;
+            let up = edges.iter().rev().find(|(at, _)| at.as_micros() <= begun);
+            assert_eq!(
+                up.map(|edge| edge.1),
+                Some(true),
+                "{capacity}: raised before {begun}"
+            );
+            let down = edges.iter().find(|(at, _)| at.as_micros() > begun);
+            let late = down.map_or(0, |(at, _)| at.as_micros() - left.as_micros());
+            assert!(
+                down.is_none_or(|(at, high)| !high && at >= left),
+                "{capacity}"
+            );
+            // Two byte times behind the last byte; a frame that follows at once keeps it high.
+            let follows = heard.iter().find(|next| next.0 > *left);
+            let alone = follows.is_none_or(|(at, frame)| {
+                let begun = at.as_micros() - BYTE_TIME.as_micros() * frame.len() as u64;
+                begun > left.as_micros() + 3 * BYTE_TIME.as_micros()
+            });
+            if alone {
+                latest = latest.max(late);
+                bursts += 1;
+            }
+        }
+        println!(
+            "capacity {capacity}: {bursts} bursts, lowered {latest} us behind the last byte at most"
+        );
+        assert!(
+            bursts > 5 && latest <= 3 * BYTE_TIME.as_micros(),
+            "{latest}"
+        );
+    }
+}

@@ -1,0 +1,66 @@
+//! Virtual time for any executor: it moves when nobody has anything to do, to the next thing that somebody waits for.
+
+use std::cell::{Cell, RefCell};
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::future::poll_fn;
+use std::rc::Rc;
+use std::task::{Poll, Waker};
+
+use futures_executor::LocalPool;
+use uav_relay::Instant;
+use uav_relay::asynch::Clock;
+
+#[derive(Clone, Default)]
+pub(crate) struct Time(Rc<Inner>);
+
+#[derive(Default)]
+struct Inner {
+    now: Cell<Instant>,
+    /// Who is to be woken when; the number keeps those of one instant apart, the last asked first.
+    sleepers: RefCell<BTreeMap<(Instant, Reverse<u64>), Waker>>,
+    asked: Cell<u64>,
+}
+
+impl Clock for Time {
+    fn now(&self) -> Instant {
+        self.0.now.get()
+    }
+
+    async fn sleep_until(&self, at: Instant) {
+        poll_fn(|cx| {
+            if self.0.now.get() >= at {
+                return Poll::Ready(());
+            }
+            self.0.asked.set(self.0.asked.get() + 1);
+            let key = (at, Reverse(self.0.asked.get()));
+            self.0.sleepers.borrow_mut().insert(key, cx.waker().clone());
+            Poll::Pending
+        })
+        .await;
+    }
+}
+
+impl Time {
+    /// Runs the tasks of `pool` until this time.
+    pub(crate) fn run(&self, pool: &mut LocalPool, until: Instant) {
+        loop {
+            pool.run_until_stalled();
+            let next = self.0.sleepers.borrow().keys().next().map(|key| key.0);
+            let Some(next) = next.filter(|next| *next <= until) else {
+                self.0.now.set(until);
+                return;
+            };
+            self.0.now.set(next.max(self.now()));
+            while let Some(due) = self.due() {
+                due.wake();
+            }
+        }
+    }
+
+    fn due(&self) -> Option<Waker> {
+        let mut sleepers = self.0.sleepers.borrow_mut();
+        let first = sleepers.first_entry()?;
+        (first.key().0 <= self.0.now.get()).then(|| first.remove())
+    }
+}

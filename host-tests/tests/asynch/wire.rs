@@ -1,0 +1,187 @@
+//! Asynchronous ports in memory: wires, and a channel that everybody hears, on which a byte takes its time.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::future::{pending, poll_fn};
+use std::rc::Rc;
+use std::task::{Poll, Waker};
+
+use embedded_io_async::{ErrorType, Read, Write};
+use uav_relay::asynch::Clock;
+use uav_relay::serial::byte_time;
+use uav_relay::{Duration, Instant};
+
+use crate::time::Time;
+
+pub(crate) const BYTE_TIME: Duration = byte_time(115_200);
+
+/// A frame, and when its last byte had arrived.
+pub(crate) type Heard = (Instant, Vec<u8>);
+
+/// What is wrong with a writer.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Fate {
+    Well,
+    /// From its first byte on: `write` never completes.
+    Stuck,
+    /// Its bytes take their time and arrive nowhere.
+    Cut,
+}
+
+/// What has arrived at one reader.
+#[derive(Default)]
+struct Inbox {
+    bytes: VecDeque<(Instant, u8)>,
+    waits: Option<Waker>,
+}
+
+/// One line that one end speaks on at a time, a frame long.
+pub(crate) struct Line {
+    inboxes: Vec<Inbox>,
+    /// When each byte that was taken has left, of those that may not have.
+    leaving: VecDeque<Instant>,
+    capacity: usize,
+    talker: Option<usize>,
+    frame: Vec<u8>,
+    /// Every frame that anybody has sent.
+    pub(crate) heard: Vec<Heard>,
+}
+
+pub(crate) type Shared = Rc<RefCell<Line>>;
+
+/// A line among so many ends, which takes so many bytes ahead.
+pub(crate) fn line(ends: usize, capacity: usize) -> Shared {
+    Rc::new(RefCell::new(Line {
+        inboxes: (0..ends).map(|_| Inbox::default()).collect(),
+        leaving: VecDeque::new(),
+        capacity,
+        talker: None,
+        frame: Vec::new(),
+        heard: Vec::new(),
+    }))
+}
+
+pub(crate) struct Rx {
+    pub(crate) line: Shared,
+    pub(crate) end: usize,
+    pub(crate) time: Time,
+}
+
+pub(crate) struct Tx {
+    pub(crate) line: Shared,
+    pub(crate) end: usize,
+    pub(crate) time: Time,
+    pub(crate) fate: Fate,
+}
+
+impl ErrorType for Rx {
+    type Error = Infallible;
+}
+
+impl ErrorType for Tx {
+    type Error = Infallible;
+}
+
+impl Read for Rx {
+    async fn read(&mut self, into: &mut [u8]) -> Result<usize, Infallible> {
+        loop {
+            let (count, next) = {
+                let mut line = self.line.borrow_mut();
+                let bytes = &mut line.inboxes[self.end].bytes;
+                let now = self.time.now();
+                let there = bytes.iter().take_while(|byte| byte.0 <= now).count();
+                let count = there.min(into.len());
+                for (place, (_, byte)) in into.iter_mut().zip(bytes.drain(..count)) {
+                    *place = byte;
+                }
+                (count, bytes.front().map(|byte| byte.0))
+            };
+            match next {
+                _ if count > 0 => return Ok(count),
+                Some(next) => self.time.sleep_until(next).await,
+                None => self.something().await,
+            }
+        }
+    }
+}
+
+impl Rx {
+    async fn something(&self) {
+        poll_fn(|cx| {
+            let inbox = &mut self.line.borrow_mut().inboxes[self.end];
+            if inbox.bytes.is_empty() {
+                inbox.waits = Some(cx.waker().clone());
+                Poll::Pending
+            } else {
+                Poll::Ready(())
+            }
+        })
+        .await;
+    }
+}
+
+impl Write for Tx {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        if self.fate == Fate::Stuck {
+            pending::<()>().await;
+        }
+        loop {
+            let wait = {
+                let line = &mut *self.line.borrow_mut();
+                let now = self.time.now();
+                while line.leaving.front().is_some_and(|left| *left <= now) {
+                    line.leaving.pop_front();
+                }
+                let room = line.capacity.saturating_sub(line.leaving.len());
+                if line.talker.is_none_or(|talker| talker == self.end) && room > 0 {
+                    let count = line.put(self.end, &bytes[..room.min(bytes.len())], now, self.fate);
+                    return Ok(count);
+                }
+                line.leaving.front().map_or(now + BYTE_TIME, |left| *left)
+            };
+            self.time.sleep_until(wait).await;
+        }
+    }
+
+    /// As that of a HAL with a FIFO of 4 bytes, which it does not know of.
+    async fn flush(&mut self) -> Result<(), Infallible> {
+        let left = {
+            let line = self.line.borrow();
+            let ring = line.leaving.len().saturating_sub(5);
+            ring.checked_sub(1).map(|last| line.leaving[last])
+        };
+        if let Some(left) = left {
+            self.time.sleep_until(left).await;
+        }
+        Ok(())
+    }
+}
+
+impl Line {
+    /// Puts bytes on the line, up to the end of a frame.
+    fn put(&mut self, from: usize, bytes: &[u8], now: Instant, fate: Fate) -> usize {
+        let mut count = 0;
+        for &byte in bytes {
+            let left = self.leaving.back().map_or(now, |last| now.max(*last)) + BYTE_TIME;
+            self.leaving.push_back(left);
+            self.frame.push(byte);
+            self.talker = (byte != 0).then_some(from);
+            count += 1;
+            for (_, inbox) in (self.inboxes.iter_mut().enumerate())
+                .filter(|(end, _)| *end != from && fate == Fate::Well)
+            {
+                inbox.bytes.push_back((left, byte));
+                if let Some(waits) = inbox.waits.take() {
+                    waits.wake();
+                }
+            }
+            if byte == 0 {
+                let frame = std::mem::take(&mut self.frame);
+                self.heard.push((left, frame));
+                break;
+            }
+        }
+        count
+    }
+}

@@ -1,0 +1,109 @@
+//! `cargo image`: what a board is flashed with, as `.bin`, `.hex` and `.uf2`.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use clap::Parser;
+use uav_relay_sim::command::{self, Failure};
+use uav_relay_tools::image::board::{BOARDS, Board};
+use uav_relay_tools::image::elf::{Piece, flat, pieces};
+use uav_relay_tools::image::{hex, uf2};
+use uav_relay_tools::provision::config::LEN;
+
+/// Builds the image of a board, or takes a configuration block, and writes it as .bin and .hex, for the Pico 2 as .uf2 too.
+#[derive(Parser, Debug)]
+#[command(name = "image", bin_name = "cargo image", disable_version_flag = true)]
+struct Options {
+    /// Which board: stm32f405, stm32f405-embassy or pico2
+    #[arg(long, value_name = "B", value_parser = board)]
+    board: Board,
+    /// The image with one UART to a radio that all relays share; otherwise one to each neighbour
+    #[arg(long)]
+    radio: bool,
+    /// Nothing is built: a block of `cargo provision`, for the place that the board has for it
+    #[arg(long, value_name = "FILE", conflicts_with = "radio")]
+    block: Option<PathBuf>,
+    /// The folder for the files
+    #[arg(long, value_name = "DIR", default_value = "target/images")]
+    out: PathBuf,
+}
+
+fn board(name: &str) -> Result<Board, String> {
+    Board::named(name).ok_or_else(|| {
+        let names = BOARDS.map(|board| board.name);
+        format!("one of {}", names.join(", "))
+    })
+}
+
+fn main() -> ExitCode {
+    match Options::try_parse() {
+        Ok(options) => command::ended(write(&options)),
+        Err(error) => command::usage(&error),
+    }
+}
+
+fn write(options: &Options) -> Result<(), Failure> {
+    let board = &options.board;
+    let (stem, pieces) = match &options.block {
+        Some(block) => of_block(board, block)?,
+        None => of_image(board, options.radio).map_err(Failure::unmet)?,
+    };
+    let whole = flat(&pieces).map_err(Failure::unmet)?;
+    let mut files = vec![
+        ("bin", whole.bytes.clone()),
+        ("hex", hex::file(&pieces).map_err(Failure::unmet)?.into()),
+    ];
+    if let Some(family) = board.uf2 {
+        files.push(("uf2", uf2::file(&pieces, family).map_err(Failure::unmet)?));
+    }
+    let out = &options.out;
+    std::fs::create_dir_all(out)
+        .map_err(|error| Failure::input(format!("--out {}: {error}", out.display())))?;
+    for (extension, bytes) in files {
+        let path = out.join(format!("{stem}.{extension}"));
+        std::fs::write(&path, &bytes)
+            .map_err(|error| Failure::input(format!("{}: {error}", path.display())))?;
+        println!("{}: {} bytes", path.display(), bytes.len());
+    }
+    println!(
+        "{} bytes of flash from {:#010x}",
+        whole.bytes.len(),
+        whole.address
+    );
+    Ok(())
+}
+
+/// The image that cargo builds.
+fn of_image(board: &Board, radio: bool) -> Result<(String, Vec<Piece>), String> {
+    let (arguments, elf) = board.build(radio);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let built = Command::new("cargo")
+        .args(&arguments)
+        .current_dir(&root)
+        .status();
+    if !built.is_ok_and(|status| status.success()) {
+        return Err(format!(
+            "cargo {} failed (for a missing target, type: rustup target add {})",
+            arguments.join(" "),
+            board.target
+        ));
+    }
+    let bytes =
+        std::fs::read(root.join(&elf)).map_err(|error| format!("{}: {error}", elf.display()))?;
+    Ok((board.stem(radio), pieces(&bytes)?))
+}
+
+/// A block that has been written before.
+fn of_block(board: &Board, block: &Path) -> Result<(String, Vec<Piece>), Failure> {
+    let named = |what: String| Failure::input(format!("--block {}: {what}", block.display()));
+    let bytes = std::fs::read(block).map_err(|error| named(error.to_string()))?;
+    if bytes.len() != LEN {
+        return Err(named(format!("{} bytes; a block has {LEN}", bytes.len())));
+    }
+    let stem = block.file_stem().unwrap_or_default().to_string_lossy();
+    let pieces = vec![Piece {
+        address: board.block,
+        bytes,
+    }];
+    Ok((stem.into_owned(), pieces))
+}

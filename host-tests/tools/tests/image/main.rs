@@ -1,0 +1,167 @@
+//! What a board is flashed with: the files hold the bytes of the ELF at the addresses where it stores them, as others read these files.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::expect_used)]
+
+use std::process::{Command, Output};
+
+use ihex::{Reader, Record};
+use uav_relay_tools::image::elf::{Piece, flat, pieces};
+use uav_relay_tools::image::uf2::{Family, PAGE};
+use uav_relay_tools::image::{hex, uf2};
+use uav_relay_tools::provision::config::LEN;
+
+/// An ELF of 32 bits with these segments: where they are stored, where they run, their bytes.
+fn elf(segments: &[(u32, u32, &[u8])]) -> Vec<u8> {
+    let count = u16::try_from(segments.len()).unwrap();
+    let mut file = Vec::from(*b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0");
+    let half = |file: &mut Vec<u8>, number: u16| file.extend(number.to_le_bytes());
+    let word = |file: &mut Vec<u8>, number: u32| file.extend(number.to_le_bytes());
+    half(&mut file, 2);
+    half(&mut file, 40);
+    for number in [1, 0, 52, 0, 0] {
+        word(&mut file, number);
+    }
+    for number in [52, 32, count, 40, 0, 0] {
+        half(&mut file, number);
+    }
+    let mut at = 52 + 32 * u32::from(count);
+    for (stored, runs, bytes) in segments {
+        let len = u32::try_from(bytes.len()).unwrap();
+        for number in [1, at, *runs, *stored, len, len, 4, 4] {
+            word(&mut file, number);
+        }
+        at += len;
+    }
+    for (_, _, bytes) in segments {
+        file.extend(*bytes);
+    }
+    file
+}
+
+/// Vectors, code 70 KiB behind them, and data that run in RAM.
+fn example() -> Vec<Piece> {
+    let code: Vec<u8> = (0..70_000_u32).map(|at| (at % 251) as u8).collect();
+    let file = elf(&[
+        (0x1001_1800, 0x1001_1800, &code),
+        (0x1000_0000, 0x1000_0000, &[1; 276]),
+        (0x1003_0000, 0x2000_0000, &[9; 5]),
+    ]);
+    pieces(&file).unwrap()
+}
+
+#[test]
+fn an_image_is_stored_where_its_elf_says_and_blank_in_between() {
+    let whole = flat(&example()).unwrap();
+    assert_eq!(whole.address, 0x1000_0000);
+    assert_eq!(whole.bytes.len(), 0x3_0005);
+    assert_eq!(whole.bytes[..277], [&[1; 276][..], &[0xFF]].concat());
+    assert_eq!(whole.bytes[0x1_1800..][..3], [0, 1, 2]);
+    assert_eq!(whole.bytes[0x3_0000..], [9; 5]);
+}
+
+#[test]
+fn a_reader_of_intel_hex_finds_the_same_bytes() {
+    let example = example();
+    let file = hex::file(&example).unwrap();
+    let mut found = vec![0xFF; 0x3_0005];
+    let mut above = 0;
+    let mut ended = false;
+    for record in Reader::new(&file) {
+        match record.unwrap() {
+            Record::ExtendedLinearAddress(high) => above = u32::from(high) << 16,
+            Record::Data { offset, value } => {
+                let at = (above + u32::from(offset) - 0x1000_0000) as usize;
+                found[at..at + value.len()].copy_from_slice(&value);
+            }
+            Record::EndOfFile => ended = true,
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(ended);
+    assert_eq!(found, flat(&example).unwrap().bytes);
+}
+
+#[test]
+fn a_uf2_file_has_whole_blocks_with_whole_pages() {
+    let example = example();
+    let file = uf2::file(&example, Family::RP2350).unwrap();
+    let word = |block: &[u8], at: usize| u32::from_le_bytes(block[at..at + 4].try_into().unwrap());
+    assert_eq!(file.len() % 512, 0);
+    let count = u32::try_from(file.len() / 512).unwrap();
+    // 276 bytes are 2 pages, 70 000 from the beginning of one are 274, and there is one more.
+    assert_eq!(count, 2 + 274 + 1);
+    let whole = flat(&example).unwrap().bytes;
+    for (number, block) in (0..).zip(file.chunks_exact(512)) {
+        let head = [0, 4, 8, 16, 20, 24, 28, 508].map(|at| word(block, at));
+        let expected = [
+            0x0A32_4655,
+            0x9E5D_5157,
+            0x2000,
+            256,
+            number,
+            count,
+            0xE48B_FF59,
+            0x0AB1_6F30,
+        ];
+        assert_eq!(head, expected);
+        let address = word(block, 12);
+        assert_eq!(address % PAGE, 0);
+        let from = (address - 0x1000_0000) as usize;
+        let page: Vec<u8> = (from..from + 256)
+            .map(|at| whole.get(at).copied().unwrap_or(0xFF))
+            .collect();
+        assert_eq!(block[32..288], page);
+    }
+}
+
+#[test]
+fn what_is_no_image_is_refused_in_one_line() {
+    assert!(pieces(b"no ELF").unwrap_err().starts_with("not an ELF"));
+    let nothing = pieces(&elf(&[])).unwrap_err();
+    assert_eq!(nothing, "an ELF with nothing to load");
+    let twice = elf(&[(0, 0, &[1; 8]), (4, 4, &[2; 8])]);
+    let twice = flat(&pieces(&twice).unwrap()).unwrap_err();
+    assert_eq!(twice, "two parts of the image are at 0x00000004");
+    let far = elf(&[(0, 0, &[1]), (0x2000_0000, 0, &[2])]);
+    assert!(flat(&pieces(&far).unwrap()).is_err());
+}
+
+fn image(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_image"));
+    command.args(arguments).output().unwrap()
+}
+
+#[test]
+fn a_block_becomes_files_for_its_place_and_what_is_none_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    std::fs::write(path("relay3.bin"), [5; LEN]).unwrap();
+    let done = image(&[
+        "--board",
+        "pico2",
+        "--block",
+        &path("relay3.bin"),
+        "--out",
+        &path("out"),
+    ]);
+    assert!(done.status.success(), "{done:?}");
+    let uf2 = std::fs::read(path("out/relay3.uf2")).unwrap();
+    assert_eq!(uf2.len(), 2 * 512);
+    assert_eq!(uf2[12..16], 0x103F_F000_u32.to_le_bytes());
+    std::fs::write(path("short.bin"), [5; 7]).unwrap();
+    for (arguments, says) in [
+        (
+            vec!["--board", "pico2", "--block", &path("short.bin")],
+            "7 bytes; a block has 376",
+        ),
+        (vec!["--board", "pico3"], "one of stm32f405"),
+        (
+            vec!["--board", "pico2", "--block", "nowhere.bin"],
+            "nowhere.bin",
+        ),
+    ] {
+        let refused = image(&arguments);
+        let line = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{line}");
+        assert!(line.contains(says) && line.lines().count() == 1, "{line}");
+    }
+}

@@ -1,0 +1,294 @@
+//! A relay on the asynchronous serial ports of [`embedded_io_async`]: what [`serial`](crate::serial) is for a main loop, for an executor.
+//!
+//! | file | one idea |
+//! | --- | --- |
+//! | [`clock`] | the time, as an executor has it |
+//! | [`relay`] | a relay that tasks share |
+//! | [`link`] | one port: reader, writer, frames that wait, driver-enable pin |
+//! | `frames` | the frames that wait |
+//! | this one | all of them together: [`AsyncPair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`AsyncShared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
+//!
+//! # One future
+//! `run` never completes. It is spawned as a task, or joined with others; any executor will do, since it wants no more of one than to
+//! be polled when its waker says so. Whatever else has something for the relay, or from it, is another task of the same executor, which
+//! shares the [`AsyncRelay`]: [`with`](AsyncRelay::with) for positions and samples, [`next_event`](AsyncRelay::next_event) for what
+//! happens. The time comes from a [`Clock`] of two functions.
+//!
+//! # Nobody waits for a neighbour
+//! Each port has a reader and a writer of its own, as the halves of an Embassy UART are. A writer whose `write` never completes leaves
+//! the other port, both readers and the relay's timers as they are. Two frames of full length wait for a port beside the one that is
+//! being written; with [`AsyncPair`] what does not fit is dropped and counted in [`SerialStats::dropped`](crate::serial::SerialStats::dropped),
+//! with [`AsyncShared`] it stays in the relay.
+//!
+//! Each time the future is polled, a port is read once ([`READ_LIMIT`](crate::serial::READ_LIMIT) bytes at most), the relay handles one
+//! timeout, and each writer is handed what waits. What is ready at once gives the executor back before it goes on.
+//!
+//! # When it is dropped
+//! `run` may be dropped at any `await`, and called again with the same links.
+//! - *Received bytes*: none waits in it, since a byte goes to the relay before anything else is waited for. Whether a `read` that is
+//!   dropped loses some is the reader's affair; those of Embassy's buffered UARTs do not.
+//! - *Frames*: one that is being written is gone, and the next begins behind a delimiter, so no receiver takes the one for a part of the
+//!   other. Those that wait are still sent. The relay repeats what matters.
+//! - *The pin* stays as it is, and is set by the next `run`.
+//!
+//! A write that fails is tried again in the same way: a delimiter, and the whole frame.
+//!
+//! # Example
+//! A relay and a task of the firmware on one executor; the ports stand in for those of a HAL.
+//! ```
+//! use core::future::{Future, ready};
+//! use embassy_futures::select::{Either, select};
+//! use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, Clock};
+//! use uav_relay::channel::{AirGround, Channel};
+//! use uav_relay::serial::byte_time;
+//! use uav_relay::{Band, Event, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
+//!
+//! # struct Uart;
+//! # impl embedded_io::ErrorType for Uart { type Error = core::convert::Infallible; }
+//! # impl embedded_io_async::Read for Uart {
+//! #     async fn read(&mut self, _: &mut [u8]) -> Result<usize, Self::Error> { core::future::pending().await }
+//! # }
+//! # impl embedded_io_async::Write for Uart {
+//! #     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Self::Error> { Ok(bytes.len()) }
+//! #     async fn flush(&mut self) -> Result<(), Self::Error> { Ok(()) }
+//! # }
+//! struct Time; // on a board: `embassy_time::Instant::now` and `Timer::at`
+//!
+//! impl Clock for Time {
+//!     fn now(&self) -> Instant {
+//! #       use std::{sync::OnceLock, time::Instant as Wall};
+//! #       static START: OnceLock<Wall> = OnceLock::new();
+//! #       Instant::from_micros(START.get_or_init(Wall::now).elapsed().as_micros() as u64)
+//! #       /*
+//!         ...
+//! #       */
+//!     }
+//!
+//!     fn sleep_until(&self, at: Instant) -> impl Future<Output = ()> {
+//! #       core::future::poll_fn(move |cx| {
+//! #           if self.now() >= at { return core::task::Poll::Ready(()); }
+//! #           cx.waker().wake_by_ref();
+//! #           core::task::Poll::Pending
+//! #       })
+//! #       /*
+//!         ...
+//! #       */
+//!     }
+//! }
+//!
+//! let mission = Mission::try_new(MissionConfig {
+//!     relays: 1,
+//!     distance_m: 1000.0,
+//!     min_separation_m: 4.0,
+//!     tx_power_w: 80.0,
+//!     common: Profile { altitude_m: 20.0, power_w: 1.0 },
+//!     channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?,
+//!     band: Band::at(20.0),
+//!     lateral: Band::NONE,
+//!     interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
+//!     noise_w: 0.0,
+//!     tolerance: 1e-4,
+//! })?;
+//! let identity = Identity { network: 7, index: 1 };
+//! let mut relay = Relay::new(mission, identity, Settings::default(), 1, Time.now())?;
+//! let relay = AsyncRelay::new(&mut relay);
+//! let link = || AsyncLink::new(Uart, Uart, byte_time(115_200)); // the halves of a UART
+//! let mut ports = AsyncPair::new(link(), link());
+//!
+//! let firmware = async {
+//!     while relay.next_event().await != Event::SetpointChanged {}
+//!     relay.look(|relay| relay.setpoint()).flatten()
+//! };
+//! let Either::Second(place) = embassy_futures::block_on(select(ports.run(&relay, &Time), firmware)) else {
+//!     unreachable!("`run` never completes")
+//! };
+//! assert!((place.expect("agreed on").x_m - 349.8).abs() < 0.1);
+//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! ```
+
+pub mod clock;
+mod frames;
+pub mod link;
+pub mod relay;
+
+use core::cell::RefCell;
+use core::convert::Infallible;
+
+use embassy_futures::select::{Either3, Either5, select, select3, select5};
+use embassy_futures::yield_now;
+use embedded_hal::digital::OutputPin;
+use embedded_io_async::{Read, Write};
+
+pub use clock::Clock;
+pub use link::AsyncLink;
+pub use relay::AsyncRelay;
+
+use crate::relay::{Port, Relay, Transmit};
+use crate::serial::NoPin;
+use crate::stats::bump;
+use crate::time::Instant;
+use crate::wire::frame::MAX_FRAME;
+use frames::Frames;
+use link::watched;
+
+/// Two links, one to each neighbour, full duplex unless a link has a pin.
+#[derive(Debug)]
+pub struct AsyncPair<UR, UW, DR, DW, UPin = NoPin, DPin = NoPin> {
+    upstream: AsyncLink<UR, UW, UPin>,
+    downstream: AsyncLink<DR, DW, DPin>,
+}
+
+impl<UR, UW, DR, DW, UPin, DPin> AsyncPair<UR, UW, DR, DW, UPin, DPin>
+where
+    UR: Read,
+    UW: Write,
+    DR: Read,
+    DW: Write,
+    UPin: OutputPin,
+    DPin: OutputPin,
+{
+    /// The links toward the transmitter and the receiver, for a relay whose settings say [`Wiring::Pair`](crate::Wiring::Pair).
+    pub const fn new(
+        upstream: AsyncLink<UR, UW, UPin>,
+        downstream: AsyncLink<DR, DW, DPin>,
+    ) -> Self {
+        Self {
+            upstream,
+            downstream,
+        }
+    }
+
+    /// Moves bytes between the relay and its ports, and handles its timers, for good. The head of [`asynch`](self) says how much work
+    /// that is each time, and what becomes of it when it is dropped.
+    pub async fn run(&mut self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
+        self.run_keeping(relay, clock, &mut |_| {}).await
+    }
+
+    /// The same, with a call of `keep` between what comes in and what is sent: what has to be stored before others are told it, see
+    /// [`Relay::view_record`].
+    pub async fn run_keeping(
+        &mut self,
+        relay: &AsyncRelay<'_>,
+        clock: &impl Clock,
+        keep: &mut dyn FnMut(&Relay),
+    ) -> Infallible {
+        let (hears_up, says_up, up) = self.upstream.ends(Port::Upstream, relay, clock);
+        let (hears_down, says_down, down) = self.downstream.ends(Port::Downstream, relay, clock);
+        let queues = [(Port::Upstream, up), (Port::Downstream, down)];
+        let drives = drive(relay, &queues, clock, keep);
+        // In this order: what is read goes into this turn of the relay, and what that says is written at once.
+        match select5(hears_up, hears_down, drives, says_up, says_down).await {
+            Either5::First(never)
+            | Either5::Second(never)
+            | Either5::Third(never)
+            | Either5::Fourth(never)
+            | Either5::Fifth(never) => never,
+        }
+    }
+
+    /// The links, for whoever wants their ports back.
+    pub fn release(self) -> (AsyncLink<UR, UW, UPin>, AsyncLink<DR, DW, DPin>) {
+        (self.upstream, self.downstream)
+    }
+}
+
+/// One link to a channel that all neighbours hear: a radio modem, or a half-duplex bus with a driver-enable pin.
+///
+/// Whose turn it is on the channel is the modem's to find out; this crate only keeps relays from repeating in step.
+#[derive(Debug)]
+pub struct AsyncShared<R, W, Pin = NoPin> {
+    channel: AsyncLink<R, W, Pin>,
+}
+
+impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
+    /// A link for a relay whose settings say [`Wiring::Shared`](crate::Wiring::Shared).
+    pub const fn new(channel: AsyncLink<R, W, Pin>) -> Self {
+        Self { channel }
+    }
+
+    /// As [`AsyncPair::run`].
+    pub async fn run(&mut self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
+        self.run_keeping(relay, clock, &mut |_| {}).await
+    }
+
+    /// As [`AsyncPair::run_keeping`].
+    pub async fn run_keeping(
+        &mut self,
+        relay: &AsyncRelay<'_>,
+        clock: &impl Clock,
+        keep: &mut dyn FnMut(&Relay),
+    ) -> Infallible {
+        let (hears, says, waiting) = self.channel.ends(Port::Shared, relay, clock);
+        let queues = [(Port::Shared, waiting)];
+        let drives = drive(relay, &queues, clock, keep);
+        match select3(hears, drives, says).await {
+            Either3::First(never) | Either3::Second(never) | Either3::Third(never) => never,
+        }
+    }
+
+    /// The link, for whoever wants its port back.
+    pub fn release(self) -> AsyncLink<R, W, Pin> {
+        self.channel
+    }
+}
+
+/// Handles the relay's timers and takes its frames, for good.
+async fn drive(
+    relay: &AsyncRelay<'_>,
+    queues: &[(Port, &RefCell<Frames>)],
+    clock: &impl Clock,
+    keep: &mut dyn FnMut(&Relay),
+) -> Infallible {
+    loop {
+        relay.settle();
+        let now = clock.now();
+        let wake = relay.lend(|of| turn(of, now, relay, queues, keep));
+        relay.tell();
+        let waited = match wake.flatten() {
+            Some(wake) => {
+                watched(select(relay.changes(), clock.sleep_until(wake)))
+                    .await
+                    .1
+            }
+            None => watched(relay.changes()).await.1,
+        };
+        if !waited {
+            yield_now().await;
+        }
+    }
+}
+
+/// One turn of the relay; when it wants the next one.
+fn turn(
+    of: &mut Relay,
+    now: Instant,
+    relay: &AsyncRelay<'_>,
+    queues: &[(Port, &RefCell<Frames>)],
+    keep: &mut dyn FnMut(&Relay),
+) -> Option<Instant> {
+    if of.poll_timeout().is_some_and(|at| at <= now) {
+        of.handle_timeout(now);
+    }
+    keep(of);
+    let mut frame = [0; MAX_FRAME];
+    let has_room = |(_, queue): &(Port, &RefCell<Frames>)| {
+        queue.try_borrow().is_ok_and(|queue| queue.has_room())
+    };
+    // A port without room must not hold up the other one, so what is for it is counted and gone.
+    while queues.iter().any(has_room)
+        && let Some(Transmit { port, len }) = of.poll_transmit(now, &mut frame)
+    {
+        let frame = frame.get(..len).unwrap_or_default();
+        if let Some((_, queue)) = queues.iter().find(|(at, _)| *at == port) {
+            if !queue
+                .try_borrow_mut()
+                .is_ok_and(|mut queue| queue.push(frame))
+            {
+                relay.count(port, |stats| bump(&mut stats.dropped));
+            }
+        } else {
+            relay.count(port, |stats| bump(&mut stats.unrouted));
+        }
+    }
+    of.poll_timeout()
+}

@@ -1,0 +1,338 @@
+//! Bytes between an interrupt and the main loop, for a UART without a FIFO.
+//!
+//! Such a UART holds one byte. At 115 200 baud the next one takes its place after 87 us, and a call of a [`Relay`](crate::Relay) may take 3 ms
+//! at 16 MHz: whoever reads the port between calls loses bytes. So an interrupt moves bytes between the UART and two queues, and the main
+//! loop has the other ends of them. Neither end waits for the other or keeps interrupts off. A UART with DMA, a FIFO as deep as
+//! [`queue_depth`] says, or a HAL whose driver has buffers (all of Embassy's `BufferedUart`s) needs none of this.
+//!
+//! ```
+//! use core::cell::Cell;
+//! use uav_relay::Duration;
+//! use uav_relay::serial::{ByteQueues, SerialPort, queue_depth};
+//!
+//! const BAUD: u32 = 115_200;
+//! /// The longest time that the main loop does not read: one call of the relay, and the work of the firmware.
+//! const LONGEST: Duration = Duration::from_millis(10);
+//!
+//! # let pended = &Cell::new(0);
+//! // On a board in a static, by `cortex_m::singleton!` or a `StaticCell`.
+//! let mut queues = ByteQueues::<{ queue_depth(BAUD, LONGEST) }, 256>::new();
+//! // On a board: `move || NVIC::pend(Interrupt::USART2)`.
+//! let (mut interrupt, mut port) = queues.split(move || pended.set(pended.get() + 1));
+//!
+//! // The main loop has a frame to send.
+//! assert_eq!(port.write(&[1, 2, 0])?, 3);
+//! assert_eq!(pended.get(), 1, "the interrupt is to begin sending");
+//!
+//! // What the interrupt does: a byte has come in, and the UART takes one.
+//! interrupt.received(Ok(7));
+//! let mut data_register = None;
+//! let more = interrupt.send(|byte| {
+//!     let free = data_register.is_none();
+//!     data_register = data_register.or(Some(byte));
+//!     free
+//! });
+//! assert!(data_register == Some(1) && more, "it stays enabled until the last byte is handed over");
+//!
+//! let mut bytes = [0; 8];
+//! assert_eq!(port.read(&mut bytes)?, 1);
+//! assert_eq!((bytes[0], port.lost()), (7, 0));
+//! # Ok::<(), uav_relay::serial::Fault>(())
+//! ```
+
+use core::fmt;
+use core::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, Ordering};
+
+use super::port::{Fault, SerialPort};
+use super::ring::{Emptier, Filler, Marks, sides};
+use crate::time::Duration;
+
+/// The depth of the queue of received bytes at `baud` bit/s (10 bits a byte), for a main loop that comes to read at least every
+/// `longest`: one more than what comes in meanwhile, one for the byte that says that some were lost, and one that a queue never uses.
+///
+/// | baud | 3 ms | 10 ms | 50 ms |
+/// | --- | --- | --- | --- |
+/// | 57 600 | 21 | 61 | 291 |
+/// | 115 200 | 38 | 119 | 579 |
+/// | 230 400 | 73 | 234 | 1 155 |
+/// | 921 600 | 280 | 925 | 4 611 |
+///
+/// Writing or erasing the flash may keep the main loop away for longer than any queue is deep: what is lost then the relay repeats.
+/// ```
+/// use uav_relay::{Duration, serial::queue_depth};
+///
+/// for (baud, depths) in [
+///     (57_600, [21, 61, 291]),
+///     (115_200, [38, 119, 579]),
+///     (230_400, [73, 234, 1_155]),
+///     (921_600, [280, 925, 4_611]),
+/// ] {
+///     assert_eq!([3, 10, 50].map(|millis| queue_depth(baud, Duration::from_millis(millis))), depths);
+/// }
+/// ```
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a depth beyond the address space is refused by whoever makes the queue"
+)]
+pub const fn queue_depth(baud: u32, longest: Duration) -> usize {
+    let bits = longest.as_micros().saturating_mul(baud as u64);
+    bits.div_ceil(10_000_000).saturating_add(3) as usize
+}
+
+/// What has the interrupt of a UART come and send: a function, or for a port that is to have a name a type of its own.
+pub trait Pend {
+    /// Has it come: `NVIC::pend`, or its flag for an empty data register.
+    fn pend(&mut self);
+}
+
+impl<F: FnMut()> Pend for F {
+    fn pend(&mut self) {
+        self();
+    }
+}
+
+/// Bytes between an interrupt and the main loop: fewer than `IN` that have come in, and fewer than `OUT` on their way out (a frame of
+/// [`MAX_FRAME`](crate::wire::frame::MAX_FRAME) at least, so that the main loop can sleep meanwhile).
+#[derive(Debug)]
+pub struct ByteQueues<const IN: usize, const OUT: usize> {
+    /// Received bytes, or what went wrong instead, as [`coded`].
+    received: [AtomicU16; IN],
+    outgoing: [AtomicU8; OUT],
+    in_marks: Marks,
+    out_marks: Marks,
+    lost: AtomicU32,
+}
+
+impl<const IN: usize, const OUT: usize> Default for ByteQueues<IN, OUT> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const IN: usize, const OUT: usize> ByteQueues<IN, OUT> {
+    /// Empty queues.
+    pub const fn new() -> Self {
+        Self {
+            received: [const { AtomicU16::new(0) }; IN],
+            outgoing: [const { AtomicU8::new(0) }; OUT],
+            in_marks: Marks::new(),
+            out_marks: Marks::new(),
+            lost: AtomicU32::new(0),
+        }
+    }
+
+    /// The end of the interrupt, and that of the main loop, which uses `pend` to have the interrupt come and send.
+    pub fn split<K: Pend>(&mut self, pend: K) -> (InterruptEnd<'_>, QueuedPort<'_, K>) {
+        let (puts, takes) = sides(&self.received, &mut self.in_marks);
+        let (queues, sends) = sides(&self.outgoing, &mut self.out_marks);
+        let interrupt = InterruptEnd {
+            received: puts,
+            outgoing: sends,
+            lost: &self.lost,
+            gap: false,
+        };
+        let port = QueuedPort {
+            received: takes,
+            outgoing: queues,
+            lost: &self.lost,
+            pend,
+        };
+        (interrupt, port)
+    }
+}
+
+/// What the interrupt of a UART has. Every call takes constant work a byte.
+pub struct InterruptEnd<'q> {
+    received: Filler<'q, AtomicU16>,
+    outgoing: Emptier<'q, AtomicU8>,
+    lost: &'q AtomicU32,
+    /// Whether something was lost and the main loop has not been told.
+    gap: bool,
+}
+
+impl fmt::Debug for InterruptEnd<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("InterruptEnd")
+            .field("lost", self.lost)
+            .finish_non_exhaustive()
+    }
+}
+
+impl InterruptEnd<'_> {
+    /// Takes what the UART has received: a byte, or what went wrong instead. Without room it is lost, and counted; the main loop reads
+    /// one [`Fault::Overrun`] at that place.
+    pub fn received(&mut self, item: Result<u8, Fault>) {
+        if self.gap && self.received.put(coded(Err(Fault::Overrun))) {
+            self.gap = false;
+        }
+        if self.gap || !self.received.put(coded(item)) {
+            self.gap = true;
+            // Nobody else writes it, so this needs no more than a load and a store, which every core has.
+            let lost = self.lost.load(Ordering::Relaxed).saturating_add(1);
+            self.lost.store(lost, Ordering::Relaxed);
+        }
+    }
+
+    /// Hands bytes to `take` until it does not take one, or there are none; whether some are left. Then the interrupt for an empty
+    /// data register is to stay enabled, otherwise it is not.
+    pub fn send(&mut self, mut take: impl FnMut(u8) -> bool) -> bool {
+        while let Some(byte) = self.outgoing.peek() {
+            if !take(byte) {
+                return true;
+            }
+            self.outgoing.pop();
+        }
+        false
+    }
+}
+
+/// The main loop's end: a [`SerialPort`] of which nothing waits, whatever the UART does.
+pub struct QueuedPort<'q, K> {
+    received: Emptier<'q, AtomicU16>,
+    outgoing: Filler<'q, AtomicU8>,
+    lost: &'q AtomicU32,
+    pend: K,
+}
+
+impl<K> fmt::Debug for QueuedPort<'_, K> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("QueuedPort")
+            .field("room", &self.room())
+            .field("lost", self.lost)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<K> QueuedPort<'_, K> {
+    /// How many bytes [`write`](SerialPort::write) would take now.
+    pub fn room(&self) -> usize {
+        self.outgoing.room()
+    }
+
+    /// Received bytes that were lost for want of room, since the queues were made: the main loop was away for longer than they are deep.
+    pub fn lost(&self) -> u32 {
+        self.lost.load(Ordering::Relaxed)
+    }
+}
+
+impl<K: Pend> SerialPort for QueuedPort<'_, K> {
+    #[inline(never)] // what it needs would stay on the stack of `SerialLink::receive`, below the relay's deepest call
+    fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
+        let mut count = 0;
+        for place in into {
+            match self.received.peek().map(decoded) {
+                Some(Ok(byte)) => *place = byte,
+                // What came before a fault is handed over first.
+                Some(Err(fault)) if count == 0 => {
+                    self.received.pop();
+                    return Err(fault);
+                }
+                _ => break,
+            }
+            self.received.pop();
+            count += 1;
+        }
+        Ok(count)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
+        let fits = |&&byte: &&u8| self.outgoing.put(byte);
+        let count = bytes.iter().take_while(fits).count();
+        // The interrupt owns the UART and sees to the rest.
+        self.pend.pend();
+        Ok(count)
+    }
+
+    fn has_left(&mut self) -> Result<Option<bool>, Fault> {
+        Ok(None)
+    }
+}
+
+/// A byte, or above them a fault.
+const fn coded(item: Result<u8, Fault>) -> u16 {
+    match item {
+        Ok(byte) => byte as u16,
+        Err(Fault::Overrun) => 0x100,
+        Err(Fault::Framing) => 0x101,
+        Err(Fault::Parity) => 0x102,
+        Err(Fault::Noise) => 0x103,
+        Err(Fault::Other) => 0x104,
+    }
+}
+
+const fn decoded(code: u16) -> Result<u8, Fault> {
+    let [byte, above] = code.to_le_bytes();
+    match (above, byte) {
+        (0, byte) => Ok(byte),
+        (_, 0) => Err(Fault::Overrun),
+        (_, 1) => Err(Fault::Framing),
+        (_, 2) => Err(Fault::Parity),
+        (_, 3) => Err(Fault::Noise),
+        _ => Err(Fault::Other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ByteQueues, Fault, SerialPort, coded, decoded};
+
+    #[test]
+    fn what_does_not_fit_is_counted_and_read_as_one_overrun_at_its_place() {
+        let mut queues = ByteQueues::<5, 4>::new();
+        let (mut interrupt, mut port) = queues.split(|| {});
+        for byte in 0..9 {
+            interrupt.received(Ok(byte));
+        }
+        assert_eq!(port.lost(), 5);
+        let mut bytes = [0; 3];
+        assert_eq!((port.read(&mut bytes), bytes), (Ok(3), [0, 1, 2]));
+        // Room for the overrun and for what comes behind it.
+        interrupt.received(Ok(9));
+        interrupt.received(Err(Fault::Noise));
+        assert_eq!((port.read(&mut bytes), bytes[0]), (Ok(1), 3));
+        assert_eq!(port.read(&mut bytes), Err(Fault::Overrun));
+        assert_eq!((port.read(&mut bytes), bytes[0]), (Ok(1), 9));
+        assert_eq!(port.read(&mut bytes), Err(Fault::Noise));
+        assert_eq!((port.read(&mut bytes), port.lost()), (Ok(0), 5));
+    }
+
+    #[test]
+    fn the_interrupt_sends_in_order_and_keeps_what_the_uart_does_not_take() {
+        let mut pended = 0;
+        let mut queues = ByteQueues::<4, 4>::new();
+        let (mut interrupt, mut port) = queues.split(|| pended += 1);
+        assert_eq!((port.room(), port.write(&[1, 2, 3, 4])), (3, Ok(3)));
+        let mut sent = [0; 2];
+        let mut at = 0;
+        let more = interrupt.send(|byte| {
+            sent.get_mut(at).is_some_and(|place| {
+                *place = byte;
+                at += 1;
+                true
+            })
+        });
+        assert!(more && sent == [1, 2] && port.room() == 2);
+        let mut last = 0;
+        let take = |byte| {
+            last = byte;
+            true
+        };
+        assert!(!interrupt.send(take) && last == 3);
+        assert_eq!(pended, 1);
+    }
+
+    #[test]
+    fn every_item_comes_back_from_its_code() {
+        let faults = [
+            Fault::Overrun,
+            Fault::Framing,
+            Fault::Parity,
+            Fault::Noise,
+            Fault::Other,
+        ];
+        let bytes = (0..=u8::MAX).map(Ok);
+        for item in bytes.chain(faults.map(Err)) {
+            assert_eq!(decoded(coded(item)), item);
+        }
+    }
+}
