@@ -288,9 +288,10 @@ impl<'a> Asked<'a> {
         files.push(("summary.txt".to_owned(), text.clone().into_bytes()));
         folder::write(dir, &files, self.options.folder.force)?;
         Ok(format!(
-            "{}: {} blocks of {LEN} bytes, and summary.txt:\n{text}",
+            "{}: {} blocks of {LEN} bytes, and summary.txt:\n{}\n",
             dir.display(),
-            self.uavs
+            self.uavs,
+            text.trim_end()
         ))
     }
 }

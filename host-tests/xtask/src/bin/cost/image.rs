@@ -83,7 +83,7 @@ const IMAGES: &[Image] = &[
         // Noise in every method takes 3 to 4 KiB of each image, and sensing, which solves in f64, 20 KiB of this one and the deepest stack. Of these
         // 1.4 KiB are a firmware that listens: how, from its block, and what the radio hears, to the relay.
         // That uploads may move the sites takes 3.5 KiB of it.
-        [166 * 1024, 11_008, 5_952],
+        [168 * 1024, 11_008, 5_952],
     ),
 ];
 
