@@ -4,7 +4,7 @@
 /** What a view shows, m, and how its second axis is called. */
 const VIEWS = {
   above: { x: [-250, 1250], y: [-440, 460], up: 1, ticks: [-400, -200, 0, 200] },
-  side: { x: [-250, 1250], y: [-30, 330], up: -1, ticks: [0, 100, 200, 300] },
+  side: { x: [-250, 1250], y: [-110, 330], up: -1, ticks: [0, 100, 200, 300] },
 };
 
 const SPACE = "http://www.w3.org/2000/svg";
@@ -59,9 +59,10 @@ function sign(svg, view, [x, y], kind, attributes, shape, text) {
   return group;
 }
 
-/** Puts a sign there. */
+/** Puts a sign there; on a small screen it is larger, so that a finger finds it. */
 function place(group, view, [x, y]) {
-  group.setAttribute("transform", `translate(${at(view, x, y).join(" ")})`);
+  const scale = window.innerWidth < 600 ? 1.7 : 1;
+  group.setAttribute("transform", `translate(${at(view, x, y).join(" ")}) scale(${scale})`);
 }
 
 const SHAPES = {

@@ -11,7 +11,7 @@ const LISTEN_S = 120;
 const SPEED = 3;
 
 const want = { ...BEGINNING, off: new Set() };
-const shown = { places: [], run: null, error: null, stand: null };
+const shown = { places: [], gliding: false, run: null, error: null, stand: null };
 const byId = (id) => document.getElementById(id);
 
 /** The command line of `cargo chain` for what is wanted, but for its scenario. */
@@ -117,8 +117,8 @@ function draw(moved) {
     const stand = stands ? shown.run.stands[shown.stand] : null;
     const believed = stand && stand.believed;
     if (believed && active) sign(svg, view, [believed[1] + shown.run.tx, believed[2]], "belief", {}, SHAPES.belief());
-    sign(svg, view, [jammer[0], active ? jammer[1] : 0], "jammer", handle("jammer", "Interferer", jammer[0]), SHAPES.jammer()).append(element("text", { x: 30, y: 10 }, "interferer"));
-    const crowded = all.some((relay, at) => at > 0 && relay.x - all[at - 1].x < 22);
+    sign(svg, view, [jammer[0], active ? jammer[1] : 0], "jammer", handle("jammer", "Interferer", jammer[0]), SHAPES.jammer()).append(element("text", { x: 30, y: 10 }, active ? "interferer" : ""));
+    const crowded = all.some((relay, at) => at > 0 && Math.hypot(relay.x - all[at - 1].x, second(relay) - second(all[at - 1])) < 24);
     for (const relay of all) {
       const press = active ? { id: `relay${relay.relay}`, tabindex: 0, role: "switch", "aria-checked": !want.off.has(relay.relay), "aria-label": `Relay ${relay.relay}` } : {};
       sign(svg, view, [relay.x, second(relay)], want.off.has(relay.relay) ? "relay off" : "relay", press, SHAPES.relay(), crowded ? undefined : String(relay.relay));
@@ -132,12 +132,15 @@ function glide() {
   const [from, to] = [shown.places, places()];
   shown.places = to;
   cancelAnimationFrame(glide.frame || 0);
+  shown.gliding = false;
   if (from.length !== to.length || matchMedia("(prefers-reduced-motion: reduce)").matches) return;
+  shown.gliding = true;
   const begun = performance.now();
   const turn = (now) => {
     const part = Math.min(1, (now - begun) / 350);
     const mix = (a, b) => a + (b - a) * part;
     draw(to.map((relay, at) => ({ ...relay, x: mix(from[at].x, relay.x), y: mix(from[at].y, relay.y), h: mix(from[at].h, relay.h) })));
+    shown.gliding = part < 1;
     if (part < 1) glide.frame = requestAnimationFrame(turn);
   };
   glide.frame = requestAnimationFrame(turn);
@@ -236,21 +239,29 @@ function soon() {
 }
 
 const above = byId("above");
+
+/** Where a pointer is on the line, m. */
+function point(event) {
+  const there = new DOMPoint(event.clientX, event.clientY).matrixTransform(above.getScreenCTM().inverse());
+  return [there.x + VIEWS.above.x[0], there.y + VIEWS.above.y[0]];
+}
+
 let held = null;
 above.addEventListener("pointerdown", (event) => {
   const group = event.target.closest("[tabindex]");
   if (!group) return;
   event.preventDefault();
-  group.focus();
-  held = { id: group.id, moved: false };
+  // Where relays are crowded the nearest is meant, and not the one that was drawn last.
+  const [x, y] = point(event);
+  const far = (relay) => Math.hypot(relay.x - x, relay.y - y);
+  const id = group.id.startsWith("relay") ? `relay${places().sort((a, b) => far(a) - far(b))[0].relay}` : group.id;
+  byId(id).focus();
+  held = { id };
   above.setPointerCapture(event.pointerId);
 });
 above.addEventListener("pointermove", (event) => {
   if (!held || held.id.startsWith("relay")) return;
-  held.moved = true;
-  const matrix = above.getScreenCTM().inverse();
-  const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix);
-  move(held.id, point.x + VIEWS.above.x[0], point.y + VIEWS.above.y[0]);
+  move(held.id, ...point(event));
   soon();
 });
 above.addEventListener("pointerup", () => {

@@ -73,8 +73,7 @@ impl Browser {
         for domain in ["Page.enable", "Runtime.enable", "Log.enable"] {
             browser.call(domain, &json!({}));
         }
-        let metrics =
-            json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
+        let metrics = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600});
         browser.call("Emulation.setDeviceMetricsOverride", &metrics);
         browser.call("Page.navigate", &json!({"url": url}));
         browser
@@ -141,8 +140,8 @@ impl Browser {
         }
     }
 
-    /// A finger or a mouse goes down, over there in ten steps, and up.
-    pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
+    /// A finger or a mouse goes down, over there in so many steps, and up.
+    pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2], steps: u8) {
         let mut mouse = |kind: &str, [x, y]: [f64; 2]| {
             let parameters = json!({
                 "type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1,
@@ -150,14 +149,12 @@ impl Browser {
             self.call("Input.dispatchMouseEvent", &parameters);
         };
         mouse("mousePressed", from);
-        if from != to {
-            for step in 1..=10 {
-                let part = f64::from(step) / 10.0;
-                mouse(
-                    "mouseMoved",
-                    [0, 1].map(|at| from[at] + part * (to[at] - from[at])),
-                );
-            }
+        for step in 1..=steps {
+            let part = f64::from(step) / f64::from(steps);
+            mouse(
+                "mouseMoved",
+                [0, 1].map(|at| from[at] + part * (to[at] - from[at])),
+            );
         }
         mouse("mouseReleased", to);
     }

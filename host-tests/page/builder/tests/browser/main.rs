@@ -128,7 +128,7 @@ fn a_hand_and_the_keyboard_move_the_chain() {
     let mut browser = opened(1280, 900);
     let before = sir(&mut browser);
     let [x, y] = middle(&mut browser, "jammer");
-    browser.drag([x, y], [x - 60.0, y - 200.0]);
+    browser.drag([x, y], [x - 60.0, y - 200.0], 10);
     browser.until("window.last.toml.indexOf('y_m = 400.0') < 0");
     browser.until(SETTLED);
     let dragged = sir(&mut browser);
@@ -136,7 +136,7 @@ fn a_hand_and_the_keyboard_move_the_chain() {
     is_native(&mut browser, "dragged");
 
     let [x, y] = middle(&mut browser, "rx");
-    browser.drag([x, y], [x - 100.0, y]);
+    browser.drag([x, y], [x - 100.0, y], 10);
     browser.until("window.last.toml.indexOf('distance_m = 1000.0') < 0");
     browser.until(SETTLED);
     assert!((sir(&mut browser) - dragged).abs() > 1e-6, "another way");
@@ -153,9 +153,10 @@ fn a_hand_and_the_keyboard_move_the_chain() {
     assert_eq!(browser.text("document.activeElement.id"), "jammer");
 
     // A relay is switched off by a press, and on again by the keyboard.
+    browser.until("!shown.gliding");
     let at = middle(&mut browser, "relay4");
-    browser.drag(at, at);
-    browser.until("window.last.told.report.left === 7");
+    browser.drag(at, at, 0);
+    browser.until("window.last.told.report.left === 7 && want.off.has(4)");
     is_native(&mut browser, "relay 4 is off");
     browser.run("document.getElementById('relay4').focus()");
     browser.key(" ", 32);
