@@ -7,9 +7,11 @@
 //! | [`report`] | what came of a run, as text and JSON |
 //! | [`svg`] | the same as a picture |
 //! | [`beta`] | random interference powers |
+//! | [`cli`] | `cargo chain` without its files and its terminal |
 //! | [`command`] | what the commands have in common |
 
 pub mod beta;
+pub mod cli;
 pub mod report;
 pub mod simulator;
 pub mod svg;

@@ -31,7 +31,8 @@ pub struct RelayReport {
 
 /// A linear power ratio in dB.
 pub fn db(linear: f64) -> f64 {
-    10.0 * linear.log10()
+    // The same on every machine, and in a browser.
+    10.0 * libm::log10(linear)
 }
 
 /// The SIR of every hop, from the transmitter's to the receiver's, for relays that stand at `places`.

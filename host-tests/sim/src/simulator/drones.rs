@@ -255,5 +255,5 @@ pub(super) fn sum(one: Point, other: Point) -> Point {
 pub fn apart(one: Point, other: Point) -> f64 {
     let [x, y, h] = one;
     let [other_x, other_y, other_h] = other;
-    (x - other_x).hypot(y - other_y).hypot(h - other_h)
+    libm::hypot(libm::hypot(x - other_x, y - other_y), h - other_h)
 }

@@ -8,7 +8,7 @@ use super::steps::{CARGO_FUZZ, NIGHTLY, OLDEST, TARGET, TARGET_V8M};
 
 /// Programs of Debian's packages of the same name: the emulator that runs the firmware, and Wireshark without windows, which reads
 /// captures.
-const OF_DEBIAN: [&str; 2] = ["qemu-system-arm", "tshark"];
+const OF_DEBIAN: [&str; 3] = ["qemu-system-arm", "tshark", "chromium"];
 
 /// What it is called, a command that tells whether it is there, and what rustup adds it by.
 type Needed = (

@@ -1,10 +1,10 @@
 //! Times on the command line.
 
+use crate::command::number;
 use uav_relay::Instant;
-use uav_relay_sim::command::number;
 
 /// Seconds after the start, 0 to 1e6.
-pub(crate) fn instant(text: &str) -> Option<Instant> {
+pub(super) fn instant(text: &str) -> Option<Instant> {
     let seconds = number(text, 0.0, 1e6).ok()?;
     #[expect(
         clippy::cast_possible_truncation,
@@ -16,7 +16,7 @@ pub(crate) fn instant(text: &str) -> Option<Instant> {
 }
 
 /// From one time to another: `S-E`; or from a time on: `S`.
-pub(crate) fn span(text: &str) -> Option<(Instant, Option<Instant>)> {
+pub(super) fn span(text: &str) -> Option<(Instant, Option<Instant>)> {
     if let Some(from) = instant(text) {
         return Some((from, None));
     }
@@ -29,6 +29,6 @@ pub(crate) fn span(text: &str) -> Option<(Instant, Option<Instant>)> {
 }
 
 /// The same, back.
-pub(crate) fn seconds(at: Instant) -> f64 {
+pub(super) fn seconds(at: Instant) -> f64 {
     at.as_micros() as f64 / 1e6
 }

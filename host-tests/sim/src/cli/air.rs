@@ -1,19 +1,19 @@
 //! The medium: how radios share it, how fast it is, how it loses frames, who does not hear whom, and for how long that is watched.
 
+use crate::command::{Failure, carries, number, whole};
+use crate::simulator::bursts::Bursts;
+use crate::simulator::deaf::Deaf;
+use crate::simulator::medium::Access;
+use crate::simulator::setup::Setup;
 use clap::{Args, ValueEnum};
 use uav_relay::{Instant, Wiring};
-use uav_relay_sim::command::{Failure, carries, number, whole};
-use uav_relay_sim::simulator::bursts::Bursts;
-use uav_relay_sim::simulator::deaf::Deaf;
-use uav_relay_sim::simulator::medium::Access;
-use uav_relay_sim::simulator::setup::Setup;
 
-use crate::times::{instant, span};
+use super::times::{instant, span};
 
 /// The options for that.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Links and the air")]
-pub(crate) struct Air {
+pub struct Air {
     /// How the radios share one channel, which those up to four away hear; csma unless said otherwise
     #[arg(long = "air", value_name = "A", value_enum, conflicts_with = "wires")]
     sharing: Option<Sharing>,
@@ -45,28 +45,28 @@ enum Sharing {
 
 impl Air {
     /// Whether a shared channel is asked for.
-    pub(crate) fn is_chosen(&self) -> bool {
+    pub fn is_chosen(&self) -> bool {
         self.sharing.is_some()
     }
 
     /// Whether relays may be lost by it.
-    pub(crate) fn is_eventful(&self) -> bool {
+    pub fn is_eventful(&self) -> bool {
         !self.deaf.is_empty() || self.soak.is_some()
     }
 
     /// When the run ends, if that is known.
-    pub(crate) const fn soaked(&self) -> Option<Instant> {
+    pub const fn soaked(&self) -> Option<Instant> {
         self.soak
     }
 
     /// When what begins.
-    pub(crate) fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
+    pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |deaf: &Deaf| (format!("--deaf {}:{}", deaf.by, deaf.of), deaf.from);
         self.deaf.iter().map(name)
     }
 
     /// When something happens.
-    pub(crate) fn times(&self) -> impl Iterator<Item = Instant> {
+    pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.deaf
             .iter()
             .map(|deaf| deaf.until.unwrap_or(deaf.from))
@@ -74,7 +74,7 @@ impl Air {
     }
 
     /// Whether this goes together with a chain of `uavs`.
-    pub(crate) fn agree(&self, uavs: u16) -> Result<(), Failure> {
+    pub fn agree(&self, uavs: u16) -> Result<(), Failure> {
         let wrong = self.deaf.iter().find(|deaf| {
             !(1..=uavs).contains(&deaf.by.min(deaf.of)) || deaf.by.max(deaf.of) > uavs
         });
@@ -86,7 +86,7 @@ impl Air {
     }
 
     /// Puts all of it into a run that loses `loss` of the frames, once it is known how the relays talk.
-    pub(crate) fn prepare(&self, setup: &mut Setup, loss: f64) -> Result<(), Failure> {
+    pub fn prepare(&self, setup: &mut Setup, loss: f64) -> Result<(), Failure> {
         if self.burst > 1.0 && loss <= 0.0 {
             let line = format!("--burst {}: would be ignored without --loss", self.burst);
             return Err(Failure::input(line));

@@ -1,15 +1,15 @@
 //! What may happen to the chain in the air: relays that go silent, parts that do not hear each other, an attacker, a new mission.
 
+use crate::command::{Failure, whole};
+use crate::simulator::attack::Attack;
+use crate::simulator::setup::{Partition, Setup};
 use clap::Args;
 use uav_relay::{Instant, Sites, Wiring};
-use uav_relay_sim::command::{Failure, whole};
-use uav_relay_sim::simulator::attack::Attack;
-use uav_relay_sim::simulator::setup::{Partition, Setup};
 
-use crate::air::Air;
-use crate::flight::Flight;
-use crate::times::{instant, seconds, span};
-use crate::upload::Uploads;
+use super::air::Air;
+use super::flight::Flight;
+use super::times::{instant, seconds, span};
+use super::upload::Uploads;
 
 /// The options for that.
 #[derive(Args, Debug)]
@@ -18,10 +18,10 @@ use crate::upload::Uploads;
     clippy::struct_excessive_bools,
     reason = "each is an option of its own"
 )]
-pub(crate) struct Hostile {
+pub struct Hostile {
     /// Relay I goes silent S virtual seconds after the start; the others form anew without it. Repeatable
     #[arg(long, value_name = "I@S", value_parser = one)]
-    pub(crate) kill: Vec<One>,
+    pub kill: Vec<One>,
     /// Relay I is switched on again after S seconds, with nothing left of what it knew but a mission that was uploaded.
     /// Repeatable
     #[arg(long, value_name = "I@S", value_parser = one)]
@@ -36,7 +36,7 @@ pub(crate) struct Hostile {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 100_000))]
     replay: Option<u32>,
     #[command(flatten)]
-    pub(crate) uploads: Uploads,
+    pub uploads: Uploads,
     /// Frames carry tags, with a key drawn from the seed; so they do when there is an attacker or an upload
     #[arg(long, conflicts_with = "no_auth")]
     auth: bool,
@@ -51,14 +51,14 @@ pub(crate) struct Hostile {
     #[arg(long)]
     wires: bool,
     #[command(flatten)]
-    pub(crate) air: Air,
+    pub air: Air,
     #[command(flatten)]
-    pub(crate) flight: Flight,
+    pub flight: Flight,
 }
 
 /// A relay, and when something happens to it.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct One {
+pub struct One {
     index: u16,
     at: Instant,
 }
@@ -99,7 +99,7 @@ impl Hostile {
     }
 
     /// Whether this goes together with a chain of `uavs`, and with a closed loop if there `is_loop`.
-    pub(crate) fn agree(&self, uavs: u16, is_loop: bool) -> Result<(), Failure> {
+    pub fn agree(&self, uavs: u16, is_loop: bool) -> Result<(), Failure> {
         for (name, ones) in [("--kill", &self.kill), ("--boot", &self.boot)] {
             if let Some(one) = ones.iter().find(|one| !(1..=uavs).contains(&one.index)) {
                 let line = format!("{name} {}@..: relay must be within 1 to {uavs}", one.index);
@@ -203,7 +203,7 @@ impl Hostile {
     }
 
     /// Puts all of it into a run.
-    pub(crate) fn prepare(&self, setup: &mut Setup, sites: Option<Sites>) -> Result<(), Failure> {
+    pub fn prepare(&self, setup: &mut Setup, sites: Option<Sites>) -> Result<(), Failure> {
         let pairs = |ones: &[One]| ones.iter().map(|one| (one.index, one.at)).collect();
         setup.kills = pairs(&self.kill);
         setup.boots = pairs(&self.boot);

@@ -2,81 +2,84 @@
 
 use std::path::PathBuf;
 
+use crate::command::{Failure, file, number, whole};
 use clap::{Parser, ValueEnum};
 use uav_relay_scenario::number::narrow;
-use uav_relay_sim::command::{Failure, file, number, whole};
 
-use crate::hostile::Hostile;
-use crate::listening::Listening;
+use super::hostile::Hostile;
+use super::listening::Listening;
 
 /// N simulated relays exchange real frames over simulated serial links until they hold the places that make the worst hop
 /// as good as it can be.
 #[derive(Parser, Debug)]
 #[command(name = "chain", bin_name = "cargo chain", disable_version_flag = true)]
-pub(crate) struct Options {
+pub struct Options {
     /// Scenario file (TOML); without it the paper's multi-hop scenario
     #[arg(long, value_name = "FILE")]
-    pub(crate) scenario: Option<PathBuf>,
+    pub scenario: Option<PathBuf>,
     /// Number of relays, 1 to 1000
     #[arg(long, value_name = "N", default_value_t = 8, allow_negative_numbers = true, value_parser = whole(1_u16, 1000))]
-    pub(crate) uavs: u16,
+    pub uavs: u16,
     /// How the places are found
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
-    pub(crate) method: Method,
+    pub method: Method,
     /// The fixed step of the -step methods, linear SIR, 1e-6 to 1e6; 0.1 unless said otherwise
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 1e6))]
-    pub(crate) epsilon: Option<f64>,
+    pub epsilon: Option<f64>,
     /// Rounds of `adjust` at most, 1 to 65535; 500 unless said otherwise
     #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = whole(1_u16, 65_535))]
-    pub(crate) rounds: Option<u16>,
+    pub rounds: Option<u16>,
     /// How far a relay may go up or down in one round of `adjust`, metres, 0 to 1e5; 10 unless said otherwise
     #[arg(long = "explore", value_name = "M", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 1e5).map(narrow))]
-    pub(crate) explore_m: Option<f32>,
+    pub explore_m: Option<f32>,
     /// Have `adjust` search a grid of columns by rows, 2 to 255 each, instead of from coarse to fine
     #[arg(long, value_name = "CxR", value_parser = grid)]
-    pub(crate) grid: Option<uav_relay::Local>,
+    pub grid: Option<uav_relay::Local>,
     /// The relays of a stochastic chain are told that Upsilon is everywhere what it is at Rx, fly, measure the true field where
     /// they stand, and agree again, R times, 1 to 100
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = whole(1_u8, 100))]
-    pub(crate) closed_loop: Option<u8>,
+    pub closed_loop: Option<u8>,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1; 1e-4 unless said otherwise. The -step methods have their step instead
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 0.1))]
-    pub(crate) tolerance: Option<f64>,
+    pub tolerance: Option<f64>,
     /// Probability that a frame never arrives, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
-    pub(crate) loss: f64,
+    pub loss: f64,
     /// Probability that bytes of a frame arrive changed, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
-    pub(crate) corrupt: f64,
+    pub corrupt: f64,
     /// Probability that a frame arrives twice, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
-    pub(crate) duplicate: f64,
+    pub duplicate: f64,
     /// Probability that a frame is overtaken by others, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
-    pub(crate) reorder: f64,
+    pub reorder: f64,
     /// The leader does not solve the chain beforehand; it brackets from scratch
     #[arg(long)]
-    pub(crate) no_predict: bool,
+    pub no_predict: bool,
     /// Seed of every random draw; the same seed gives the same run, byte for byte
     #[arg(long, value_name = "S", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0, u64::MAX))]
-    pub(crate) seed: u64,
+    pub seed: u64,
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
-    pub(crate) json: bool,
+    pub json: bool,
     /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
     #[arg(long, value_name = "FILE", value_parser = file)]
-    pub(crate) svg: Option<PathBuf>,
+    pub svg: Option<PathBuf>,
     /// Write every frame that is put on the air to a pcapng capture, with virtual times, for `cargo decode` and Wireshark
     #[arg(long, value_name = "FILE", value_parser = file)]
-    pub(crate) capture: Option<PathBuf>,
+    pub capture: Option<PathBuf>,
+    /// Relays that measure.
     #[command(flatten)]
-    pub(crate) listening: Listening,
+    pub listening: Listening,
+    /// What goes wrong.
     #[command(flatten)]
-    pub(crate) hostile: Hostile,
+    pub hostile: Hostile,
 }
 
+/// How the places are found.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
-pub(crate) enum Method {
+pub enum Method {
     /// Algorithm 1 with bracketed targets
     Align,
     /// Algorithm 1 with the paper's fixed step
@@ -94,7 +97,7 @@ pub(crate) enum Method {
 
 impl Options {
     /// Refuses an option that the method would ignore.
-    pub(crate) fn agree(&self, method: &str) -> Result<(), Failure> {
+    pub(super) fn agree(&self, method: &str) -> Result<(), Failure> {
         let is_step = matches!(self.method, Method::AlignStep | Method::StochasticStep);
         let is_adjust = self.method == Method::Adjust;
         let step = "has no fixed step; align-step and stochastic-step have";
@@ -139,13 +142,13 @@ fn grid_said(grid: uav_relay::Local) -> String {
 }
 
 /// An option with its value, where it was given.
-pub(crate) fn said(option: &str, value: Option<impl std::fmt::Display>) -> Option<String> {
+pub(super) fn said(option: &str, value: Option<impl std::fmt::Display>) -> Option<String> {
     value.map(|value| format!("{option} {value}"))
 }
 
 impl Method {
     /// Whether it is for a field of interference, and not for an interferer.
-    pub(crate) const fn is_for_fields(self) -> bool {
+    pub const fn is_for_fields(self) -> bool {
         matches!(self, Self::Stochastic | Self::StochasticStep)
     }
 }

@@ -1,5 +1,7 @@
 //! Missions that the ground uploads in flight: what the options say of them.
 
+use crate::command::{Failure, number};
+use crate::simulator::setup::UploadSpec;
 use clap::{Args, ValueEnum};
 use uav_relay::flight::axis::Axis;
 use uav_relay::{
@@ -7,14 +9,12 @@ use uav_relay::{
     Sites, Upload,
 };
 use uav_relay_scenario::number::narrow;
-use uav_relay_sim::command::{Failure, number};
-use uav_relay_sim::simulator::setup::UploadSpec;
 
-use crate::times::instant;
+use super::times::instant;
 
 /// The options for that.
 #[derive(Args, Debug)]
-pub(crate) struct Uploads {
+pub struct Uploads {
     /// The ground uploads the mission of the scenario with other parameters S virtual seconds after the start, and the chain
     /// flies it. Keys as in a scenario file: x_m, y_m and power_w of the interferer, altitude_m, altitude_min_m,
     /// altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m, distance_m, tx_w, uav_w; noise_w, 0 to 1; and tolerance. Where the
@@ -40,7 +40,7 @@ enum End {
 
 /// One upload, as it was asked for.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct Planned {
+struct Planned {
     text: String,
     at: Instant,
     changes: Vec<(Key, f64)>,
@@ -97,17 +97,17 @@ const KEYS: [(&str, Key, f64, f64); 20] = [
 
 impl Uploads {
     /// Whether there are any.
-    pub(crate) fn are_planned(&self) -> bool {
+    pub fn are_planned(&self) -> bool {
         !self.upload.is_empty()
     }
 
     /// Whether relays keep what was uploaded when they are switched off.
-    pub(crate) fn are_stored(&self) -> bool {
+    pub fn are_stored(&self) -> bool {
         !self.no_store
     }
 
     /// Refuses what says how they are done where there are none, and where no relay `boots` that could have stored any.
-    pub(crate) fn agree(&self, boots: bool) -> Result<(), Failure> {
+    pub fn agree(&self, boots: bool) -> Result<(), Failure> {
         let given = match (self.upload_from, self.no_store) {
             (Some(End::Tx), _) => "--upload-from tx",
             (Some(End::Rx), _) => "--upload-from rx",
@@ -126,22 +126,18 @@ impl Uploads {
     }
 
     /// When what begins.
-    pub(crate) fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
+    pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |one: &Planned| (format!("--upload {}", one.text), one.at);
         self.upload.iter().map(name)
     }
 
     /// When each of them begins.
-    pub(crate) fn times(&self) -> impl Iterator<Item = Instant> {
+    pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.upload.iter().map(|one| one.at)
     }
 
     /// All of them, in the order of their times, for relays that are loaded with `base`, between `sites` if it is known where these are.
-    pub(crate) fn of(
-        &self,
-        base: &Mission,
-        sites: Option<Sites>,
-    ) -> Result<Vec<UploadSpec>, Failure> {
+    pub fn of(&self, base: &Mission, sites: Option<Sites>) -> Result<Vec<UploadSpec>, Failure> {
         let end = match self.upload_from {
             None | Some(End::Tx) => Side::Upstream,
             Some(End::Rx) => Side::Downstream,

@@ -1,14 +1,14 @@
 //! Drones with autopilots: that there are any, and what their pilots do.
 
+use crate::command::Failure;
+use crate::simulator::fleet::spec::{FleetSpec, Takeover, somewhere};
+use crate::simulator::setup::Setup;
 use clap::Args;
 use uav_relay::Instant;
 use uav_relay::flight::axis::{Axis, LONGEST_M, SHORTEST_M};
 use uav_relay::guard::config::GuardConfig;
-use uav_relay_sim::command::Failure;
-use uav_relay_sim::simulator::fleet::spec::{FleetSpec, Takeover, somewhere};
-use uav_relay_sim::simulator::setup::Setup;
 
-use crate::times::span;
+use super::times::span;
 
 /// How far off a drone takes itself to be at most, all the time and each time that it says so, m; how much gusts move it, m/s.
 const BIAS_M: f64 = 0.5;
@@ -21,7 +21,7 @@ const HOVER_M: f32 = 1.5;
 /// The options for that.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Drones")]
-pub(crate) struct Flight {
+pub struct Flight {
     /// With drones: limited speed and acceleration, noise of their positions, gusts, an autopilot each that speaks MAVLink (PX4 and
     /// ArduCopter in turn), a pilot each who takes off and hands over, the guard; ends when all that fly hover at their places
     #[arg(long)]
@@ -32,25 +32,25 @@ pub(crate) struct Flight {
 }
 
 impl Flight {
-    pub(crate) const fn is_chosen(&self) -> bool {
+    pub const fn is_chosen(&self) -> bool {
         self.fly
     }
 
     /// When what begins.
-    pub(crate) fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
+    pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |it: &Takeover| (format!("--takeover {}", it.relay), it.from);
         self.takeover.iter().map(name)
     }
 
     /// When something happens.
-    pub(crate) fn times(&self) -> impl Iterator<Item = Instant> {
+    pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.takeover
             .iter()
             .map(|takeover| takeover.until.unwrap_or(takeover.from))
     }
 
     /// Whether this goes together with a chain of `uavs`.
-    pub(crate) fn agree(&self, uavs: u16) -> Result<(), Failure> {
+    pub fn agree(&self, uavs: u16) -> Result<(), Failure> {
         if let (false, Some(Takeover { relay, .. })) = (self.fly, self.takeover.first()) {
             let line = format!("--takeover {relay}@..: would be ignored without --fly");
             return Err(Failure::input(line));
@@ -66,7 +66,7 @@ impl Flight {
     }
 
     /// Puts the drones into a run, in order along the line.
-    pub(crate) fn prepare(&self, setup: &mut Setup, axis: Option<Axis>) -> Result<(), Failure> {
+    pub fn prepare(&self, setup: &mut Setup, axis: Option<Axis>) -> Result<(), Failure> {
         if !self.fly {
             return Ok(());
         }

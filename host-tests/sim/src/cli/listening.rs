@@ -1,20 +1,20 @@
 //! Relays that are not told of the interferers: that they listen, and how well.
 
+use crate::command::{Failure, number, whole};
+use crate::simulator::setup::Setup;
+use crate::simulator::sky::Sky;
 use clap::Args;
 use uav_relay::{Instant, Interference, Interferer, Listen, Mission, MissionConfig};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
-use uav_relay_sim::command::{Failure, number, whole};
-use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_sim::simulator::sky::Sky;
 
-use crate::options::said;
+use super::options::said;
 
 /// The options for that.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Listening")]
-pub(crate) struct Listening {
+pub struct Listening {
     /// The relays are not told the scenario's interferers: each measures, once a second, what it hears where it is, and together they
     /// find one that accounts for it. How they listen is what the scenario says of it, if it does
     #[arg(long)]
@@ -35,7 +35,7 @@ pub(crate) struct Listening {
 
 impl Listening {
     /// Refuses what says how they listen where they do not.
-    pub(crate) fn agree(&self) -> Result<(), Failure> {
+    pub fn agree(&self) -> Result<(), Failure> {
         let velocity = self
             .move_interferer
             .map(|[along, aside]| format!("{along},{aside}"));
@@ -54,7 +54,7 @@ impl Listening {
     }
 
     /// Has the relays of `setup` find the interferers of `scenario`.
-    pub(crate) fn prepare(
+    pub fn prepare(
         &self,
         setup: &mut Setup,
         scenario: &Scenario,
@@ -106,7 +106,7 @@ impl Listening {
     }
 
     /// `mission` with its interferer where it is at `then`.
-    pub(crate) fn moved(&self, mission: Mission, then: Instant) -> Mission {
+    pub fn moved(&self, mission: Mission, then: Instant) -> Mission {
         let (Some([along, aside]), Some(source)) = (self.move_interferer, mission.known_source())
         else {
             return mission;

@@ -1,0 +1,88 @@
+//! `cargo page`: the page in one file, `target/page/index.html`, which needs no server and nothing from elsewhere.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
+use wasm_bindgen_cli_support::Bindgen;
+
+/// What a browser runs.
+const TARGET: &str = "wasm32-unknown-unknown";
+
+fn main() -> ExitCode {
+    match build() {
+        Ok(page) => {
+            println!("{}", page.display());
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("page: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn build() -> Result<PathBuf, Box<dyn Error>> {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = own.ancestors().nth(3).ok_or("no folder above")?;
+    let target = root.join("target");
+    add_target()?;
+    let built = Command::new("cargo")
+        .current_dir(root)
+        .args([
+            "build",
+            "--quiet",
+            "--locked",
+            "--package",
+            "uav-relay-page",
+        ])
+        .args(["--lib", "--target", TARGET, "--profile", "browser"])
+        .status()?;
+    if !built.success() {
+        return Err(format!("cargo build --target {TARGET} failed").into());
+    }
+    let wasm = target.join(TARGET).join("browser/uav_relay_page.wasm");
+    let folder = target.join("page");
+    std::fs::create_dir_all(&folder)?;
+    // A script that is no module: a page that was opened as a file may load none.
+    Bindgen::new()
+        .input_path(wasm)
+        .no_modules(true)?
+        .typescript(false)
+        .generate(&folder)
+        .map_err(|error| format!("wasm-bindgen: {error}"))?;
+    let code = std::fs::read(folder.join("uav_relay_page_bg.wasm"))?;
+    let glue = std::fs::read_to_string(folder.join("uav_relay_page.js"))?;
+    let web = own.join("../web");
+    let part = |name: &str| std::fs::read_to_string(web.join(name));
+    let page = part("index.html")?
+        .replace("/*style*/", &part("page.css")?)
+        .replace("/*code*/", &BASE64_STANDARD.encode(code))
+        .replace("/*glue*/", &glue)
+        .replace("/*drawing*/", &part("drawing.js")?)
+        .replace("/*script*/", &part("page.js")?);
+    let file = folder.join("index.html");
+    std::fs::write(&file, page)?;
+    Ok(file)
+}
+
+/// Adds the target where rustup lacks it.
+fn add_target() -> Result<(), Box<dyn Error>> {
+    let libraries = Command::new("rustc")
+        .args(["--print", "target-libdir", "--target", TARGET])
+        .output()?;
+    let folder = String::from_utf8(libraries.stdout)?;
+    if Path::new(folder.trim()).is_dir() {
+        return Ok(());
+    }
+    let added = Command::new("rustup")
+        .args(["target", "add", TARGET])
+        .status();
+    if added.is_ok_and(|status| status.success()) {
+        Ok(())
+    } else {
+        Err(format!("the target is missing; type: rustup target add {TARGET}").into())
+    }
+}

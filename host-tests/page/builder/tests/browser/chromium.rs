@@ -1,0 +1,190 @@
+//! A headless Chromium, over its DevTools protocol.
+
+use std::io::{BufRead as _, BufReader};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use base64::Engine as _;
+use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket};
+
+/// How long a page may take, however slow the machine is.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+pub(crate) struct Browser {
+    process: Child,
+    socket: WebSocket<TcpStream>,
+    session: String,
+    number: u64,
+    errors: Vec<String>,
+    /// Its profile, which goes with it.
+    _folder: tempfile::TempDir,
+}
+
+impl Browser {
+    /// Opens `url` in a window of that size.
+    pub(crate) fn start(url: &str, width: u32, height: u32) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let mut process = Command::new("chromium")
+            .args(["--headless", "--no-sandbox", "--disable-gpu"])
+            .args(["--disable-dev-shm-usage", "--remote-debugging-port=0"])
+            .arg(format!("--user-data-dir={}", folder.path().display()))
+            .arg(format!("--window-size={width},{height}"))
+            .arg("about:blank")
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("chromium; `cargo ci` adds it");
+        let mut lines = BufReader::new(process.stderr.take().unwrap()).lines();
+        let address = lines
+            .find_map(|line| {
+                let line = line.unwrap();
+                line.strip_prefix("DevTools listening on ")
+                    .map(str::to_owned)
+            })
+            .expect("an address");
+        // Somebody has to read what it says.
+        std::thread::spawn(move || lines.for_each(drop));
+        let host = address
+            .strip_prefix("ws://")
+            .unwrap()
+            .split('/')
+            .next()
+            .unwrap();
+        let stream = TcpStream::connect(host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let (socket, _) = tungstenite::client(&*address, stream).unwrap();
+        let mut browser = Self {
+            process,
+            socket,
+            session: String::new(),
+            number: 0,
+            errors: Vec::new(),
+            _folder: folder,
+        };
+        let target = browser.call("Target.createTarget", &json!({"url": "about:blank"}));
+        let attach = json!({"targetId": target["targetId"], "flatten": true});
+        let session = browser.call("Target.attachToTarget", &attach);
+        session["sessionId"]
+            .as_str()
+            .unwrap()
+            .clone_into(&mut browser.session);
+        for domain in ["Page.enable", "Runtime.enable", "Log.enable"] {
+            browser.call(domain, &json!({}));
+        }
+        let metrics = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600});
+        browser.call("Emulation.setDeviceMetricsOverride", &metrics);
+        browser.call("Page.navigate", &json!({"url": url}));
+        browser
+    }
+
+    fn call(&mut self, method: &str, parameters: &Value) -> Value {
+        self.number += 1;
+        let mut message = json!({"id": self.number, "method": method, "params": parameters});
+        if !self.session.is_empty() {
+            message["sessionId"] = self.session.clone().into();
+        }
+        self.socket
+            .send(Message::text(message.to_string()))
+            .unwrap();
+        loop {
+            let Message::Text(text) = self.socket.read().unwrap() else {
+                continue;
+            };
+            let mut heard: Value = serde_json::from_str(&text).unwrap();
+            if heard["id"] == self.number {
+                assert!(heard["error"].is_null(), "{method}: {heard}");
+                return heard["result"].take();
+            }
+            let method = heard["method"].as_str().unwrap_or_default();
+            let is_bad = method == "Runtime.exceptionThrown"
+                || method == "Runtime.consoleAPICalled" && heard["params"]["type"] == "error"
+                || method == "Log.entryAdded" && heard["params"]["entry"]["level"] == "error";
+            if is_bad {
+                self.errors.push(heard["params"].to_string());
+            }
+        }
+    }
+
+    /// What an expression of the page's script is.
+    pub(crate) fn value(&mut self, expression: &str) -> Value {
+        let parameters =
+            json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
+        let mut result = self.call("Runtime.evaluate", &parameters);
+        assert!(
+            result["exceptionDetails"].is_null(),
+            "{expression}: {result}"
+        );
+        result["result"]["value"].take()
+    }
+
+    pub(crate) fn text(&mut self, expression: &str) -> String {
+        let value = self.value(expression);
+        value
+            .as_str()
+            .unwrap_or_else(|| panic!("{expression}: {value}"))
+            .to_owned()
+    }
+
+    pub(crate) fn run(&mut self, script: &str) {
+        self.value(&format!("(() => {{ {script}; return 0; }})()"));
+    }
+
+    /// Waits until that is so.
+    pub(crate) fn until(&mut self, condition: &str) {
+        let begun = Instant::now();
+        while self.value(&format!("Boolean({condition})")) != true {
+            assert!(begun.elapsed() < PATIENCE, "never: {condition}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// A finger or a mouse goes down, over there in so many steps, and up.
+    pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2], steps: u8) {
+        let mut mouse = |kind: &str, [x, y]: [f64; 2]| {
+            let parameters = json!({
+                "type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1,
+            });
+            self.call("Input.dispatchMouseEvent", &parameters);
+        };
+        mouse("mousePressed", from);
+        for step in 1..=steps {
+            let part = f64::from(step) / f64::from(steps);
+            mouse(
+                "mouseMoved",
+                [0, 1].map(|at| from[at] + part * (to[at] - from[at])),
+            );
+        }
+        mouse("mouseReleased", to);
+    }
+
+    pub(crate) fn key(&mut self, key: &str, code: u32) {
+        for kind in ["keyDown", "keyUp"] {
+            let parameters = json!({"type": kind, "key": key, "windowsVirtualKeyCode": code});
+            self.call("Input.dispatchKeyEvent", &parameters);
+        }
+    }
+
+    /// What the page looks like, as PNG.
+    pub(crate) fn screenshot(&mut self) -> Vec<u8> {
+        let parameters = json!({"format": "png", "captureBeyondViewport": true});
+        let picture = self.call("Page.captureScreenshot", &parameters);
+        let data = picture["data"].as_str().unwrap();
+        base64::prelude::BASE64_STANDARD.decode(data).unwrap()
+    }
+
+    /// Errors that the page has told its console.
+    pub(crate) fn errors(&mut self) -> Vec<String> {
+        // What was said before is heard by then.
+        self.value("0");
+        self.errors.clone()
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        _ = self.process.kill();
+        _ = self.process.wait();
+    }
+}

@@ -1,0 +1,308 @@
+//! A run as the options and a scenario have it.
+
+use clap::ValueEnum as _;
+use uav_relay::{Measure, Mission, Placement, Schedule, Sites, Wiring};
+use uav_relay_scenario::mission::{self, Refusal};
+use uav_relay_scenario::number::narrow;
+use uav_relay_scenario::{Interference, Scenario};
+
+use super::options::{Method, Options};
+use crate::beta::beta_w;
+use crate::command::{self, Failure};
+use crate::report::{self, AgainstAll, AirReport, ChainReport, ListenedReport, timeline};
+use crate::simulator::chain::Chain;
+use crate::simulator::faults::Faults;
+use crate::simulator::outcome::{Outcome, RelayEnd};
+use crate::simulator::setup::Setup;
+use crate::svg::{Others, Picture, room};
+
+/// A run, and what it is held against.
+#[derive(Debug)]
+pub struct Prepared<'a> {
+    options: &'a Options,
+    scenario: Scenario,
+    method: String,
+    /// What is run.
+    pub setup: Setup,
+    told: Mission,
+}
+
+/// Why nothing is run.
+#[derive(Debug)]
+pub enum Refused {
+    /// The input is wrong.
+    Failed(Failure),
+    /// The relays cannot be placed, and this is reported. With a failure where that is the input's fault.
+    Reported(Box<ChainReport>, Option<Failure>),
+}
+
+impl From<Failure> for Refused {
+    fn from(failure: Failure) -> Self {
+        Self::Failed(failure)
+    }
+}
+
+/// Samples that a relay of a closed loop takes at each place.
+const SAMPLES: u32 = 10_000;
+
+impl<'a> Prepared<'a> {
+    /// What `options` make of `scenario`, which messages call `name`; without a name it is the default scenario.
+    ///
+    /// # Errors
+    /// [`Refused`]: options that do not go together, or a chain that cannot be placed.
+    pub fn new(
+        options: &'a Options,
+        scenario: Scenario,
+        name: Option<&str>,
+    ) -> Result<Self, Refused> {
+        let is_default = name.is_none();
+        let name = name.unwrap_or("default scenario");
+        let method = options
+            .method
+            .to_possible_value()
+            .map_or_else(String::new, |value| value.get_name().to_owned());
+        if !scenario.knows_interference() {
+            let line = "interferer: is missing: without [[interferer]] a scenario with [listen] is for cargo provision alone";
+            return Err(Failure::input(line.to_owned()).into());
+        }
+        agree(options, &method, &scenario)?;
+        if let Some(line) = mission::left_out(&scenario, options.uavs) {
+            return Err(Failure::input(format!("{name}: {line}")).into());
+        }
+        let tolerance = options.tolerance.unwrap_or(1e-4);
+        let refused = |line: &str| {
+            Box::new(ChainReport::refused(
+                &method,
+                options.uavs,
+                options.seed,
+                line,
+            ))
+        };
+        let (mission, profiles) = match mission::mission(&scenario, options.uavs, tolerance) {
+            Ok(briefed) => briefed,
+            // Who has given no scenario has none of its keys before them.
+            Err(Refusal::NoRoom { .. }) if is_default => {
+                let fits = |uavs: &u16| mission::mission(&scenario, *uavs, tolerance).is_ok();
+                let most = (1..options.uavs).rev().find(fits).unwrap_or(1);
+                let line = format!(
+                    "--uavs {}: must be within 1 to {most} without a --scenario: relays keep {} m apart on {} m",
+                    options.uavs, scenario.min_separation_m, scenario.distance_m
+                );
+                return Err(Refused::Reported(
+                    refused(&line),
+                    Some(Failure::input(line)),
+                ));
+            }
+            Err(refusal @ Refusal::NoRoom { .. }) => {
+                return Err(Refused::Reported(refused(&refusal.to_string()), None));
+            }
+            Err(refusal) => return Err(Failure::input(format!("{name}: {refusal}")).into()),
+        };
+        let sites = scenario.line.map(|line| Sites {
+            tx: line.sites[0],
+            rx: line.sites[1],
+        });
+        let mut setup = setup(options, mission, sites)?;
+        let axis = scenario.line.map(|line| line.axis);
+        options.hostile.flight.prepare(&mut setup, axis)?;
+        setup.profiles = profiles;
+        setup.held = mission::held(&scenario, options.uavs);
+        let told = setup.mission;
+        options
+            .listening
+            .prepare(&mut setup, &scenario, options.uavs)?;
+        Ok(Self {
+            options,
+            scenario,
+            method,
+            setup,
+            told,
+        })
+    }
+
+    /// Flies `setup` to its end; in a closed loop as often as that measures. `watch` runs a chain until it has settled.
+    ///
+    /// # Errors
+    /// A setting that a relay refuses, and what `watch` fails with.
+    pub fn fly(
+        &self,
+        mut setup: Setup,
+        mut watch: impl FnMut(&mut Chain) -> Result<(), Failure>,
+    ) -> Result<Chain, Failure> {
+        let start = |setup| Chain::new(setup).map_err(|error| Failure::input(error.to_string()));
+        let (Interference::Field(field), Some(rounds)) =
+            (&self.scenario.interference, self.options.closed_loop)
+        else {
+            let mut chain = start(setup)?;
+            watch(&mut chain)?;
+            return Ok(chain);
+        };
+        let i_max_w = narrow(field.i_max_w);
+        setup.mission = mission::told_of_an_even_field(&setup.mission);
+        setup.settings.measure = Some(Measure {
+            i_max_w,
+            samples: SAMPLES,
+        });
+        let mut chain = start(setup)?;
+        watch(&mut chain)?;
+        for _ in 0..rounds {
+            chain.measure(SAMPLES, |place, rng| {
+                let (alpha, beta) = mission::shapes(field, f64::from(place.x_m));
+                beta_w(rng, alpha, beta, i_max_w)
+            });
+            chain.restart();
+            watch(&mut chain)?;
+        }
+        Ok(chain)
+    }
+
+    /// What came of it. It is held against what is there, whatever the relays were told: that is the setup's mission from now on.
+    pub fn report(&mut self, outcome: &Outcome) -> ChainReport {
+        let (options, scenario) = (self.options, &self.scenario);
+        let listened = ListenedReport::of(&self.setup, outcome);
+        self.setup.mission = options.listening.moved(self.told, outcome.ended);
+        let setup = &self.setup;
+        let flown = report::flown(setup, outcome);
+        let mut report = ChainReport::new(&self.method, &flown, outcome, options.seed);
+        report.channel = (setup.settings.wiring == Wiring::Shared).then_some("shared");
+        report.air = AirReport::of(setup, outcome);
+        report.listened = listened;
+        let planned = options.hostile.uploads.are_planned();
+        if let (None, false, Some(sir)) = (&listened, planned, report.sir) {
+            report.against_all = AgainstAll::of(scenario, &report.relays, sir);
+        }
+        report
+    }
+
+    /// The chain at its places, after [`report`](Self::report).
+    pub fn picture(&self, outcome: &Outcome, report: &ChainReport) -> Picture {
+        let flown = report::flown(&self.setup, outcome);
+        drawn(&flown, &self.scenario, outcome, report)
+    }
+}
+
+/// Whether the options go together, and with the scenario.
+fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Failure> {
+    options.agree(method)?;
+    options.listening.agree()?;
+    options
+        .hostile
+        .agree(options.uavs, options.closed_loop.is_some())?;
+    let is_field = matches!(scenario.interference, Interference::Field(_));
+    if options.method.is_for_fields() != is_field {
+        let line = if is_field {
+            format!(
+                "--method {method} needs an [[interferer]], and the scenario has a [field]: take stochastic or stochastic-step"
+            )
+        } else {
+            format!("--method {method} needs a --scenario with a [field] of interference")
+        };
+        return Err(Failure::input(line));
+    }
+    let uploads = options.hostile.uploads.are_planned();
+    if uploads && is_field {
+        let line = "--upload needs an [[interferer]], and the scenario has a [field]";
+        return Err(Failure::input(line));
+    }
+    if let Some(one) = mission::hypothetical(scenario) {
+        command::complain(&format!(
+            "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m stands for all, and SIRs are against it; `cargo plan` has what \
+             its places are worth against all",
+            one.power_w, one.x_m, one.y_m
+        ));
+        if uploads {
+            command::complain(
+                "note: an upload changes that one, and what it leaves out stays as it is",
+            );
+        }
+    }
+    Ok(())
+}
+
+/// What the options say of the run.
+fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Setup, Failure> {
+    let mut setup = Setup::new(mission);
+    setup.settings.schedule = match options.method {
+        Method::AlignStep | Method::StochasticStep => Schedule::FixedStep {
+            step: options.epsilon.unwrap_or(0.1),
+        },
+        _ => Schedule::Bracketed,
+    };
+    setup.settings.method = match options.method {
+        Method::Joint => uav_relay::Method::Joint,
+        Method::Adjust => uav_relay::Method::Adjust(uav_relay::Adjust {
+            rounds: options.rounds.unwrap_or(500),
+            explore_m: options.explore_m.unwrap_or(10.0),
+            local: options.grid.unwrap_or_default(),
+        }),
+        _ => uav_relay::Method::Align,
+    };
+    setup.settings.predict = !options.no_predict;
+    setup.seed = options.seed;
+    options.hostile.prepare(&mut setup, sites)?;
+    options.hostile.air.prepare(&mut setup, options.loss)?;
+    setup.faults = Faults {
+        loss: options.loss,
+        corrupt: options.corrupt,
+        duplicate: options.duplicate,
+        reorder: options.reorder,
+    };
+    Ok(setup)
+}
+
+/// The chain at its places in the mission that it flies.
+fn drawn(
+    mission: &Mission,
+    scenario: &Scenario,
+    outcome: &Outcome,
+    report: &ChainReport,
+) -> Picture {
+    let mut hop_sir: Vec<f64> = report.relays.iter().map(|relay| relay.sir).collect();
+    hop_sir.extend(report.rx_sir);
+    let silent = (1..)
+        .zip(&outcome.relays)
+        .filter(|(_, relay)| relay.killed.is_some());
+    let left_out: Vec<usize> = report.lost.iter().map(|relay| relay.index.into()).collect();
+    let lost = silent
+        .map(|(index, _)| index)
+        .filter(|index| !left_out.contains(index))
+        .collect();
+    let place = |relay: &RelayEnd| {
+        let at = |place: Placement| (f64::from(place.x_m), f64::from(place.altitude_m));
+        relay.setpoint.map_or((f64::NAN, f64::NAN), at)
+    };
+    let aside = outcome.relays.iter().map(|relay| {
+        relay
+            .setpoint
+            .map_or(f64::NAN, |place| f64::from(place.y_m))
+    });
+    let nodes = if report.relays.is_empty() && report.lost.is_empty() {
+        Vec::new()
+    } else {
+        outcome.relays.iter().map(place).collect()
+    };
+    let before = scenario.sources();
+    let believed = report.listened.and_then(|listened| listened.believed);
+    let uploaded = report.version.is_some_and(|version| version > 0);
+    let (interferers, others, others_are) =
+        if let (true, uav_relay::Interference::Source(at)) = (uploaded, mission.interference()) {
+            let now = [at.power_w, at.x_m, at.y_m].map(f64::from);
+            (vec![now.into()], before, Others::Before)
+        } else {
+            let believed = believed.map(|at| [at.power_w, at.x_m, at.y_m].map(f64::from).into());
+            (before, believed.into_iter().collect(), Others::Believed)
+        };
+    Picture {
+        title_method: report.method.clone(),
+        distance_m: f64::from(mission.config().distance_m),
+        interferers,
+        others,
+        others_are,
+        nodes,
+        room: room(mission, aside),
+        hop_sir,
+        lost,
+        left_out,
+        events: timeline::words(&report.timeline),
+    }
+}
