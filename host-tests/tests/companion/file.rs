@@ -132,7 +132,10 @@ fn what_is_wrong_with_the_file_is_named() {
             "[companion]\nspeed_m_s = 21.0",
             &["companion.speed_m_s = 21", "0.1 to 20 m/s"],
         ),
-        ("[ground]\nend = \"top\"", &["ground.end", "\"tx\" or \"rx\""]),
+        (
+            "[ground]\nend = \"top\"",
+            &["ground.end", "\"tx\" or \"rx\""],
+        ),
         (
             "[companion]\nspeed_m_s = 5.0",
             &["--autopilot", "not provided"],
