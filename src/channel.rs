@@ -104,6 +104,15 @@ impl Channel {
     /// As [`Channel::new`], with the excess losses in dB (0 to 200), the way data sheets and the paper state them. Not for a constant: a
     /// power of ten is worked out.
     ///
+    /// ```
+    /// use uav_relay::Channel;
+    /// use uav_relay::channel::AirGround;
+    ///
+    /// let channel = Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?;
+    /// assert!((channel.mu_nlos() / channel.mu_los() - 123.0).abs() < 0.1, "20.9 dB more");
+    /// # Ok::<(), uav_relay::channel::ChannelError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`ChannelError`] names the parameter that is outside its range.
     pub fn from_db(

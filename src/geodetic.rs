@@ -16,6 +16,14 @@ pub struct Geodetic {
 
 impl Geodetic {
     /// The point nearest to those numbers; `None` where one is not finite, or no latitude or longitude.
+    ///
+    /// ```
+    /// use uav_relay::Geodetic;
+    ///
+    /// let site = Geodetic::from_degrees(47.40, 8.54, 420.0).expect("a place on earth");
+    /// assert_eq!((site.lat_e7, site.amsl_mm), (474_000_000, 420_000));
+    /// assert_eq!(Geodetic::from_degrees(91.0, 0.0, 0.0), None);
+    /// ```
     pub fn from_degrees(lat_deg: f64, lon_deg: f64, amsl_m: f64) -> Option<Self> {
         let is_on_earth = lat_deg.abs() <= 90.0 && lon_deg.abs() <= 180.0 && amsl_m.abs() <= 1e6;
         is_on_earth.then(|| Self {

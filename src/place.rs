@@ -3,6 +3,14 @@
 /// A place in the air.
 ///
 /// Frame: x along the ground from the transmitter toward the receiver, y to the right of x as seen from above, h up.
+///
+/// ```
+/// use uav_relay::Placement;
+///
+/// // 300 m from the transmitter, 20 m to the right of the line, 60 m above ground.
+/// let place = Placement { x_m: 300.0, y_m: 20.0, altitude_m: 60.0 };
+/// assert!(place != Placement::on_line(300.0, 60.0));
+/// ```
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Placement {

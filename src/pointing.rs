@@ -48,6 +48,16 @@ impl Bearing {
 
     /// The bearing of the node at `to` for the one at `from`. The ground stations are placements too, at altitude 0. `None` if both
     /// are at one place.
+    ///
+    /// ```
+    /// use uav_relay::Placement;
+    /// use uav_relay::pointing::Bearing;
+    ///
+    /// let (here, there) = (Placement::on_line(300.0, 20.0), Placement::on_line(400.0, 20.0));
+    /// let bearing = Bearing::between(here, there).expect("two places");
+    /// assert!(bearing.azimuth_rad.abs() < 1e-3, "along the line");
+    /// assert!((bearing.distance_m - 100.0).abs() < 0.1);
+    /// ```
     pub fn between(from: Placement, to: Placement) -> Option<Self> {
         Self::new(
             to.x_m - from.x_m,

@@ -10,6 +10,14 @@ use crate::wire::auth::Auth;
 use crate::without_quorum::WithoutQuorum;
 
 /// Which relay this is.
+///
+/// ```
+/// use uav_relay::Identity;
+///
+/// // The second of its chain, on network 7.
+/// let identity = Identity { network: 7, index: 2 };
+/// # assert_eq!(identity.index, 2);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Identity {
@@ -77,6 +85,14 @@ pub struct Measure {
 }
 
 /// How a chain finds its interferer by what its relays hear.
+///
+/// ```
+/// use uav_relay::{Listen, Settings};
+///
+/// // Eight relays follow an interferer that moves.
+/// let settings = Settings { listen: Some(Listen::following(8)), ..Settings::default() };
+/// assert!(settings.listen.is_some_and(|listen| listen.is_valid()));
+/// ```
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Listen {
@@ -125,6 +141,17 @@ impl Listen {
 }
 
 /// What a firmware may choose.
+///
+/// ```
+/// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+/// # use paper::*;
+/// use uav_relay::{Method, Settings, Wiring};
+///
+/// // One radio channel that all hear, and places, sides and altitudes together.
+/// let settings = Settings { wiring: Wiring::Shared, method: Method::Joint, ..Settings::default() };
+/// # #[cfg(feature = "altitude")]
+/// assert!(relay(settings).setpoint().is_none());
+/// ```
 #[expect(clippy::struct_excessive_bools, reason = "settings, each for itself")]
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

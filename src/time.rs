@@ -5,6 +5,13 @@ use core::ops::Add;
 /// A point in time, in microseconds since an epoch of the caller's choosing.
 ///
 /// Arithmetic saturates: a clock that runs past the end stands still instead of wrapping.
+///
+/// ```
+/// use uav_relay::{Duration, Instant};
+///
+/// let start = Instant::from_millis(1_000);
+/// assert_eq!((start + Duration::from_micros(250)).since(start).as_micros(), 250);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Instant {

@@ -113,6 +113,17 @@ impl Field {
         clippy::panic,
         reason = "in a constant this fails the build, as documented"
     )]
+    ///
+    /// ```
+    /// use uav_relay::{Field, FieldPoint};
+    ///
+    /// // Upsilon = E[1 / I] as it was measured at two places, in 1/W.
+    /// const FIELD: Field = Field::new(&[
+    ///     FieldPoint { x_m: 0.0, upsilon_per_w: 4.0e5 },
+    ///     FieldPoint { x_m: 1000.0, upsilon_per_w: 5.0e5 },
+    /// ]);
+    /// assert_eq!(FIELD.upsilon(500.0), 4.5e5);
+    /// ```
     pub const fn new(points: &'static [FieldPoint]) -> Self {
         match Self::try_new(points) {
             Ok(field) => field,

@@ -64,6 +64,16 @@ impl GuardConfig {
     /// [room](Self::with_room_for) for that: they go no farther than it.
     ///
     /// `hover_m` is 0 and `lag` 4 s.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::guard::config::GuardConfig;
+    ///
+    /// let guard = GuardConfig::of(&MISSION, MISSION.config().common);
+    /// assert!(guard.is_valid());
+    /// assert_eq!(guard.separation_m, MISSION.config().min_separation_m);
+    /// ```
     pub fn of(mission: &Mission, profile: Profile) -> Self {
         let config = mission.config();
         Self {

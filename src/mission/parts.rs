@@ -55,6 +55,14 @@ pub enum Heading {
 }
 
 /// What a relay may choose from: altitudes, or distances to the side.
+///
+/// ```
+/// use uav_relay::Band;
+///
+/// let altitudes = Band { least_m: 20.0, most_m: 120.0 };
+/// assert_eq!(altitudes.nearest(300.0), 120.0);
+/// assert!(Band::at(20.0).is_single());
+/// ```
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Band {

@@ -30,6 +30,16 @@ const MOST_NOISE: f64 = 1e12;
 impl Mission {
     /// Checks every parameter. Usable in a constant, where [`Mission::new`] turns a mistake into a failed build.
     ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::mission::MissionError;
+    /// use uav_relay::{Mission, MissionConfig};
+    ///
+    /// let too_near = MissionConfig { distance_m: 0.5, ..*MISSION.config() };
+    /// assert_eq!(Mission::try_new(too_near).err(), Some(MissionError::Distance));
+    /// ```
+    ///
     /// # Errors
     /// [`MissionError`] names the parameter that is outside its range.
     pub const fn try_new(config: MissionConfig) -> Result<Self, MissionError> {

@@ -146,6 +146,17 @@ impl Relay {
     ///
     /// A dozen instructions a byte; a CRC for at most one frame in 16 bytes; a tag, where frames are signed, and a message, at most 16
     /// reaches, for at most one in 19. What takes longer is left to [`handle_timeout`](Self::handle_timeout).
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Instant, Port, Settings};
+    ///
+    /// let mut relay = relay(Settings::default());
+    /// // What a UART has received, however it is cut. Noise is counted, and nothing else comes of it.
+    /// relay.handle_bytes(Instant::from_millis(5), Port::Upstream, &[0x11, 0x22, 0x33, 0]);
+    /// assert_eq!(relay.stats().truncated, 1);
+    /// ```
     pub fn handle_bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
         let shared = self.wiring == Wiring::Shared;
         if shared != (port == Port::Shared) {
@@ -203,6 +214,19 @@ impl Relay {
     ///
     /// Bounded by that portion: 256 reaches while the leader predicts, the chain's hops over ten relays (or over forty where nothing
     /// changes) of the joint method, 624 places of Algorithm 2; next to nothing otherwise.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::Settings;
+    ///
+    /// let mut relay = relay(Settings::default());
+    /// // Relay 1 begins by itself: it wants to be called, portion by portion, until it has its place.
+    /// while let (None, Some(due)) = (relay.setpoint(), relay.poll_timeout()) {
+    ///     relay.handle_timeout(due);
+    /// }
+    /// assert!(relay.setpoint().is_some());
+    /// ```
     #[inline(never)] // as `poll_transmit`
     pub fn handle_timeout(&mut self, now: Instant) {
         self.node.handle_timeout(now);
@@ -211,6 +235,19 @@ impl Relay {
     /// Takes one measurement of the interference, W or linear SIR, where `Settings::measure` asks for them.
     ///
     /// Constant work. What is no use is counted as [`Stats::samples_refused`](crate::Stats::samples_refused).
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Instant, Listen, Placement, Sample, Settings};
+    ///
+    /// # #[cfg(feature = "sensing")] {
+    /// let mut relay = relay(Settings { listen: Some(Listen::default()), ..Settings::default() });
+    /// let at = Placement { x_m: 350.0, y_m: 0.0, altitude_m: 20.0 };
+    /// relay.handle_sample(Instant::from_millis(1_000), Sample::Heard { at, power_w: 2.5e-8 });
+    /// assert_eq!(relay.stats().samples_refused, 0);
+    /// # }
+    /// ```
     pub fn handle_sample(&mut self, now: Instant, sample: Sample) {
         self.node.handle_sample(now, sample);
     }
@@ -219,6 +256,20 @@ impl Relay {
     /// `Settings::guard` is set there is no setpoint before the first of these.
     ///
     /// Constant work. A place that is no number, or farther than 1e7 m, has no effect.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::guard::config::GuardConfig;
+    /// use uav_relay::{Instant, Placement, Settings};
+    ///
+    /// # #[cfg(feature = "guard")] {
+    /// let guard = GuardConfig::of(&MISSION, MISSION.config().common);
+    /// let mut relay = relay(Settings { guard: Some(guard), ..Settings::default() });
+    /// let (measured, now) = (Instant::from_millis(990), Instant::from_millis(1_000));
+    /// relay.handle_position(now, measured, Placement { x_m: 10.0, y_m: 0.0, altitude_m: 20.0 });
+    /// # }
+    /// ```
     pub fn handle_position(&mut self, now: Instant, at: Instant, place: Placement) {
         self.node.handle_position(now, at, place);
     }
@@ -231,6 +282,17 @@ impl Relay {
     /// [`handle_position`](Self::handle_position) takes in.
     ///
     /// Constant work. To say the same again has no effect.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Instant, Settings};
+    ///
+    /// let mut relay = relay(Settings::default());
+    /// // The pilot has taken the sticks; later the autopilot follows set-points again.
+    /// relay.handle_control(Instant::from_millis(1_000), false);
+    /// relay.handle_control(Instant::from_millis(9_000), true);
+    /// ```
     pub fn handle_control(&mut self, now: Instant, flown: bool) {
         self.node.handle_control(now, flown);
     }
@@ -254,6 +316,16 @@ impl Relay {
     /// Has the chain agree again, from the beginning of its method: in a closed loop, once it has measured where it stands.
     ///
     /// Only the leader (relay 1; in a field relay N) has something to begin; with any other relay nothing happens.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Instant, Phase, Settings};
+    ///
+    /// let mut relay = relay(Settings::default());
+    /// relay.restart(Instant::from_millis(1_000));
+    /// assert_eq!(relay.phase(), Phase::Planning);
+    /// ```
     pub fn restart(&mut self, now: Instant) {
         self.node.restart(now);
     }
@@ -261,6 +333,20 @@ impl Relay {
     /// Writes the next frame to be sent into `frame`, if there is one. Call until there is none.
     ///
     /// Linear in the length of the frame; a tag, where frames are signed.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::wire::frame::MAX_FRAME;
+    /// use uav_relay::{Instant, Settings};
+    ///
+    /// let mut relay = relay(Settings::default());
+    /// let mut frame = [0; MAX_FRAME];
+    /// while let Some(transmit) = relay.poll_transmit(Instant::ZERO, &mut frame) {
+    ///     let bytes = &frame[..transmit.len];
+    ///     assert_eq!(bytes.last(), Some(&0), "the delimiter; out through `transmit.port`");
+    /// }
+    /// ```
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
         let sender = self.node.member().node;
@@ -301,11 +387,39 @@ impl Relay {
     }
 
     /// The next thing the firmware should know of, if there is one. Call until there is none. Constant work.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Event, Settings};
+    ///
+    /// let mut relay = relay(Settings::default());
+    /// while relay.setpoint().is_none() {
+    ///     let due = relay.poll_timeout().expect("it has work to do");
+    ///     relay.handle_timeout(due);
+    /// }
+    /// let mut places = Vec::new();
+    /// while let Some(event) = relay.poll_event() {
+    ///     if event == Event::SetpointChanged {
+    ///         places.extend(relay.setpoint());
+    ///     }
+    /// }
+    /// assert_eq!(places.len(), 1, "fly there");
+    /// ```
     pub fn poll_event(&mut self) -> Option<Event> {
         self.node.poll_event()
     }
 
     /// When [`Relay::handle_timeout`] is to be called at the latest; after a call it is `None` or later than `now`.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Instant, Settings};
+    ///
+    /// let relay = relay(Settings::default());
+    /// assert!(relay.poll_timeout().is_some_and(|due| due >= Instant::ZERO), "sleep until then, or the next byte");
+    /// ```
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.node.poll_timeout()
     }

@@ -17,6 +17,15 @@ use crate::view::ViewId;
 impl Relay {
     /// Where to fly, once the chain has agreed, in metres in the mission's frame: to the relay's place, or with `Settings::guard` as
     /// far toward it as is safe by now.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::Settings;
+    ///
+    /// let relay = relay(Settings::default());
+    /// assert_eq!(relay.setpoint(), None, "before the first agreement: stay where you are");
+    /// ```
     pub fn setpoint(&self) -> Option<Placement> {
         self.node.setpoint()
     }
@@ -45,6 +54,14 @@ impl Relay {
     }
 
     /// Where the relay is in the protocol.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Phase, Settings};
+    ///
+    /// assert_eq!(relay(Settings::default()).phase(), Phase::Planning);
+    /// ```
     pub fn phase(&self) -> Phase {
         self.node.phase()
     }
@@ -56,6 +73,15 @@ impl Relay {
     }
 
     /// What has been counted since the relay was switched on.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Settings, Stats};
+    ///
+    /// let relay = relay(Settings::default());
+    /// assert_eq!(relay.stats(), &Stats::default(), "nothing has been heard or sent yet");
+    /// ```
     pub fn stats(&self) -> &Stats {
         self.node.stats()
     }

@@ -46,6 +46,15 @@ impl defmt::Format for Key {
 }
 
 /// How a relay proves who it is, and that its frames are of today.
+///
+/// ```
+/// use uav_relay::{Auth, Key, Settings};
+///
+/// // The network's key, and a number that is larger at every start.
+/// let auth = Auth { key: Key::new([7; 32]), epoch: 41 };
+/// let settings = Settings { auth: Some(auth), ..Settings::default() };
+/// # assert!(settings.auth.is_some());
+/// ```
 #[cfg(feature = "auth")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -61,6 +61,19 @@ pub struct Axis {
 impl Axis {
     /// The line between two sites on the ground; poles and the antimeridian are places like any other. Constant work.
     ///
+    /// ```
+    /// use uav_relay::flight::axis::Axis;
+    /// use uav_relay::{Geodetic, Placement};
+    ///
+    /// let site = |lat, lon, amsl| Geodetic::from_degrees(lat, lon, amsl).expect("a place on earth");
+    /// let axis = Axis::try_new(site(47.40, 8.54, 420.0), site(47.41, 8.55, 431.0))?;
+    /// let place = Placement { x_m: 300.0, y_m: 20.0, altitude_m: 60.0 };
+    /// let point = axis.point(place).expect("it is near the line");
+    /// let back = axis.place(point).expect("so is that");
+    /// assert!((back.x_m - place.x_m).abs() < 0.02 && (back.y_m - place.y_m).abs() < 0.02);
+    /// # Ok::<(), uav_relay::flight::axis::AxisError>(())
+    /// ```
+    ///
     /// # Errors
     /// A latitude or longitude that is not on earth, sites too near to each other or too far apart.
     #[cfg_attr(feature = "upload", inline(never))] // called from several places
