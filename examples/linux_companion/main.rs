@@ -30,6 +30,7 @@
 //! | `listen.rs` | the part of it that is how the chain finds its interferer |
 //! | `tty.rs` | a tty that never blocks, as a `SerialPort` |
 //! | `replug.rs` | the same, opened again whenever it vanishes: all bytes of a port pass here |
+//! | `tap.rs` | what goes over them, in a capture |
 //! | `ports.rs` | the ttys of either wiring, and sleep until one of them or a timer needs the relay |
 //! | `site.rs`, `autopilot.rs` | where the line is on earth; the autopilot |
 //! | `positions.rs` | where the drone is, and what is heard there, from a FIFO |
@@ -96,6 +97,8 @@ mod socket;
 mod status;
 #[cfg(unix)]
 mod system;
+#[cfg(unix)]
+mod tap;
 #[cfg(unix)]
 mod tty;
 #[cfg(unix)]

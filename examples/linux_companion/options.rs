@@ -122,6 +122,10 @@ struct Options {
     /// Unix socket that answers each connection with one JSON object of all counters, and closes it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     status_socket: Option<PathBuf>,
+    /// Write every frame that comes or goes at the ports toward other relays to a pcapng capture, for `cargo decode` and Wireshark. It takes the
+    /// place of what was there, and grows as long as the relay flies
+    #[arg(long, value_name = "FILE", help_heading = "Log")]
+    capture: Option<PathBuf>,
     #[command(flatten)]
     log: LogOptions,
 }
@@ -160,6 +164,7 @@ pub(crate) struct Plan {
     pub(crate) positions: Option<PathBuf>,
     pub(crate) autopilot: Option<AutopilotPlan>,
     pub(crate) status_socket: Option<PathBuf>,
+    pub(crate) capture: Option<PathBuf>,
     pub(crate) log: LogOptions,
 }
 
@@ -244,6 +249,7 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
         positions: options.positions.clone(),
         autopilot: autopilot(options)?,
         status_socket: options.status_socket.clone(),
+        capture: options.capture.clone(),
         log: options.log.clone(),
     })
 }

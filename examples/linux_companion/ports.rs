@@ -1,6 +1,7 @@
 //! The ttys of either wiring, and sleep until one of them or a timer needs the relay.
 
 use std::os::fd::BorrowedFd;
+use std::path::Path;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -12,6 +13,7 @@ use uav_relay::{Instant, Relay};
 use crate::log::Log;
 use crate::options::Ttys;
 use crate::replug::Replug;
+use crate::tap;
 
 /// A tty, or the end of the chain: nobody is there.
 #[derive(Debug)]
@@ -40,18 +42,18 @@ pub(crate) enum Ports {
 }
 
 impl Ports {
-    /// Opens them.
+    /// Opens them, and writes down what goes over them in `capture`, if there is one.
     ///
     /// # Errors
-    /// One line that names the tty.
-    pub(crate) fn open(ttys: &Ttys, baud: u32) -> Result<Self, String> {
+    /// One line that names the tty or the file.
+    pub(crate) fn open(ttys: &Ttys, baud: u32, capture: Option<&Path>) -> Result<Self, String> {
         let link = |option, path: Option<&_>| {
             let tty = path
                 .map(|path| Replug::open(option, path, baud))
                 .transpose()?;
             Ok::<_, String>(SerialLink::new(End(tty), byte_time(baud)))
         };
-        Ok(match ttys {
+        let mut ports = match ttys {
             Ttys::Pair {
                 upstream,
                 downstream,
@@ -64,7 +66,14 @@ impl Ports {
                 let channel = link("--shared", Some(tty.as_path()))?;
                 Self::Shared(Box::new(Shared::new(channel)))
             }
-        })
+        };
+        if let Some(capture) = capture {
+            let taps = tap::taps(capture, &ports.names())?;
+            for (tty, tap) in ports.ttys().zip(taps) {
+                tty.tapped(tap);
+            }
+        }
+        Ok(ports)
     }
 
     /// Moves what can be moved, with a call of `keep` before anything is sent, and says when to come back at the latest.

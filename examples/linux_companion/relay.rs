@@ -64,7 +64,7 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
 impl Flight {
     fn begin(plan: &Plan) -> Result<Self, String> {
         let (stop, requests) = (on_stop()?, Requests::new()?);
-        let mut ports = Ports::open(&plan.ttys, plan.baud)?;
+        let mut ports = Ports::open(&plan.ttys, plan.baud, plan.capture.as_deref())?;
         let listens = plan.settings.listen.is_some();
         let positions = plan
             .positions

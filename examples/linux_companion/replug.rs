@@ -8,8 +8,10 @@ use rustix::event::PollFlags;
 use serde_json::{Value, json};
 use uav_relay::serial::{Fault, SerialPort};
 use uav_relay::{Duration, Instant};
+use uav_relay_capture::Direction;
 
 use crate::log::Log;
+use crate::tap::Tap;
 use crate::tty::Tty;
 
 /// The first pause before it is tried again; each is twice the one before, up to [`LONGEST`].
@@ -28,6 +30,8 @@ pub(crate) struct Replug {
     again_at: Instant,
     pause: Duration,
     counts: Counts,
+    /// Where what it carries is written down, if it is.
+    tap: Option<Tap>,
 }
 
 /// What a port has carried.
@@ -54,7 +58,13 @@ impl Replug {
             again_at: Instant::ZERO,
             pause: FIRST,
             counts: Counts::default(),
+            tap: None,
         })
+    }
+
+    /// What it carries from now on is written down there.
+    pub(crate) fn tapped(&mut self, tap: Tap) {
+        self.tap = Some(tap);
     }
 
     /// Gives a tty up that is of no use any more, and opens it again when it is time to. Each is said once.
@@ -71,6 +81,16 @@ impl Replug {
             self.tty = None;
             self.counts.times_gone = self.counts.times_gone.saturating_add(1);
             self.again_at = now + self.pause;
+        }
+        if let Some(tap) = self.tap.take_if(|tap| tap.is_over()) {
+            let fields =
+                json!({ "port": self.path.display().to_string(), "left_out": tap.left_out() });
+            log.say(
+                now,
+                "capture over",
+                fields,
+                format_args!("the capture cannot be written any more, and has no more of {self}"),
+            );
         }
         if self.tty.is_none() && self.again_at <= now {
             self.pause = self.pause.times(2).min(LONGEST);
@@ -116,6 +136,7 @@ impl Replug {
             "bytes_out": self.counts.written,
             "bytes_lost": self.counts.lost,
             "times_gone": self.counts.times_gone,
+            "capture_left_out": self.tap.as_ref().map(Tap::left_out),
         })
     }
 }
@@ -136,6 +157,9 @@ impl SerialPort for Replug {
             self.counts.read += count as u64;
             // One that dies as soon as it is opened is not tried more often for it.
             self.pause = FIRST;
+            if let Some(tap) = &mut self.tap {
+                tap.take(Direction::In, into.get(..count).unwrap_or_default());
+            }
         }
         Ok(count)
     }
@@ -148,6 +172,9 @@ impl SerialPort for Replug {
         };
         let count = tty.write(bytes)?;
         self.counts.written += count as u64;
+        if let Some(tap) = &mut self.tap {
+            tap.take(Direction::Out, bytes.get(..count).unwrap_or_default());
+        }
         Ok(count)
     }
 

@@ -31,4 +31,5 @@ pub(crate) fn companion(deployment: &Deployment, given: &mut Given) {
     given.flag("--json", own.json);
     given.path("--log-file", own.log_file.as_ref());
     given.path("--status-socket", own.status_socket.as_ref());
+    given.path("--capture", own.capture.as_ref());
 }

@@ -81,6 +81,8 @@ pub struct Companion {
     pub log_file: Option<PathBuf>,
     /// The socket that tells its counters.
     pub status_socket: Option<PathBuf>,
+    /// Where what goes over its ports is written down.
+    pub capture: Option<PathBuf>,
 }
 
 /// The ground station. Paths in a file are relative to its folder.

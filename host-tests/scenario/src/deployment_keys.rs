@@ -40,6 +40,7 @@ const COMPANION: Keys = &[
     optional("json", Rule::Flag),
     optional("log_file", Text),
     optional("status_socket", Text),
+    optional("capture", Text),
 ];
 
 const GROUND: Keys = &[

@@ -2,6 +2,7 @@
 #![cfg(target_os = "linux")]
 
 mod binary;
+mod captured;
 mod ending;
 mod file;
 mod flying;
