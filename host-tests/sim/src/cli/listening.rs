@@ -9,7 +9,7 @@ use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
-use super::options::said;
+use super::said::said;
 
 /// The options for that.
 #[derive(Args, Debug)]

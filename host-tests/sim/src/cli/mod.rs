@@ -13,6 +13,7 @@ mod hostile;
 mod listening;
 mod options;
 mod prepared;
+mod said;
 mod times;
 mod upload;
 

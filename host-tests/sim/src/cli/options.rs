@@ -8,6 +8,7 @@ use uav_relay_scenario::number::narrow;
 
 use super::hostile::Hostile;
 use super::listening::Listening;
+use super::said::said;
 
 /// N simulated relays exchange real frames over simulated serial links until they hold the places that make the worst hop
 /// as good as it can be.
@@ -139,11 +140,6 @@ fn grid_said(grid: uav_relay::Local) -> String {
         uav_relay::Local::Grid { columns, rows } => format!("--grid {columns}x{rows}"),
         uav_relay::Local::Fine => "--grid".to_owned(),
     }
-}
-
-/// An option with its value, where it was given.
-pub(super) fn said(option: &str, value: Option<impl std::fmt::Display>) -> Option<String> {
-    value.map(|value| format!("{option} {value}"))
 }
 
 impl Method {

@@ -11,6 +11,7 @@ mod hearing;
 mod judge;
 mod limits;
 mod listening;
+mod receiver;
 mod recorded;
 mod start;
 mod state;

@@ -5,15 +5,9 @@ use uav_relay::{Instant, Port};
 use super::super::attack::Recorded;
 use super::super::faults::Faults;
 use super::super::queue::Happening;
+use super::receiver::Receiver;
 use super::recorded::link;
 use super::state::Chain;
-
-/// Who hears a frame, counted from 0.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Receiver {
-    Relay(usize),
-    Ground(usize),
-}
 
 impl Chain {
     /// Puts a frame on a link.

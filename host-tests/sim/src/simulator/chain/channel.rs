@@ -5,7 +5,7 @@ use uav_relay::Port;
 use super::super::medium::{Agenda, AirEvent, Sent};
 use super::super::queue::Happening;
 use super::super::record::Link;
-use super::air::Receiver;
+use super::receiver::Receiver;
 use super::state::Chain;
 
 impl Chain {

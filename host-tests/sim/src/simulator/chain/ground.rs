@@ -9,7 +9,7 @@ use super::super::outcome::{Moment, Turning};
 use super::super::queue::Happening;
 use super::super::record::Link;
 use super::super::sky::Sky;
-use super::air::Receiver;
+use super::receiver::Receiver;
 use super::state::Chain;
 
 impl Chain {

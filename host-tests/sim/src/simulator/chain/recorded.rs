@@ -6,7 +6,7 @@ use uav_relay::{Instant, Port, Side};
 
 use super::super::faults::Arrival;
 use super::super::record::{Link, OnAir};
-use super::air::Receiver;
+use super::receiver::Receiver;
 use super::state::Chain;
 
 impl Chain {
