@@ -323,8 +323,10 @@ byId("controls").addEventListener("reset", () => {
 
 byId("moving").disabled = true;
 draw();
-const bytes = Uint8Array.from(atob(CODE), (letter) => letter.charCodeAt(0));
-wasm_bindgen({ module_or_path: bytes.buffer }).then(() => {
-  run();
-  window.ready = true;
-});
+// First the picture, then the code: it is there before anybody can take hold of anything.
+requestAnimationFrame(() => setTimeout(() => {
+  wasm_bindgen({ module_or_path: fetch(`data:application/wasm;base64,${CODE}`) }).then(() => {
+    run();
+    window.ready = true;
+  });
+}));
