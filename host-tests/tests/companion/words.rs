@@ -128,12 +128,12 @@ fn frames_that_are_refused_say_why() {
 /// An upload that does not come about, and why: to that end with these options.
 fn upload_fails(files: &Files, tty: &str, key: &str, more: &[&str], why: &str) {
     let options = files.options(key, "ground");
-    let mut all = vec!["--tty", tty, "--version", "3", "--timeout", "5"];
+    let mut all = vec!["--tty", tty, "--version", "3", "--timeout", "8"];
     all.extend(more);
     all.extend(options.iter().map(String::as_str));
     let line = said(Relay::ground(&all), 1);
     assert!(
-        line.starts_with("--timeout 5: no relay is known to hold version 3: "),
+        line.starts_with("--timeout 8: no relay is known to hold version 3: "),
         "{line}"
     );
     assert!(line.contains(why), "{more:?}: {line}");
