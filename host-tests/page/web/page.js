@@ -328,5 +328,8 @@ requestAnimationFrame(() => setTimeout(() => {
   wasm_bindgen({ module_or_path: fetch(`data:application/wasm;base64,${CODE}`) }).then(() => {
     run();
     window.ready = true;
+  }).catch((error) => {
+    shown.error = `the code of the page cannot be loaded: ${error}`;
+    tell();
   });
 }));
