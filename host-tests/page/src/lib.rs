@@ -2,20 +2,23 @@
 //!
 //! | function | takes | gives |
 //! | --- | --- | --- |
-//! | [`chain`] | options as on the command line, and a scenario | the report of `cargo chain --json`, and where all were meanwhile |
+//! | [`chain`] | options as on the command line, and a scenario | the report of `cargo chain --json`, and the run from its beginning to its end |
 
 // On a microcontroller there is no browser: a plain `cargo build --target thumbv7em-none-eabihf --examples` leaves this package empty.
 #![cfg(not(target_os = "none"))]
 
+mod film;
+
 use clap::Parser as _;
 use serde::Serialize;
 use serde_json::value::RawValue;
-use uav_relay::sensing::belief::Belief;
 use uav_relay_command::{self as command, Failure};
 use uav_relay_scenario::Scenario;
 use uav_relay_sim::cli::{Options, Prepared, Refused};
-use uav_relay_sim::simulator::sky::Stand;
+use uav_relay_sim::simulator::setup::Setup;
 use wasm_bindgen::prelude::wasm_bindgen;
+
+use film::FilmTold;
 
 /// How messages call the scenario of the page.
 const NAME: &str = "the page";
@@ -32,53 +35,28 @@ struct Told {
     /// What `cargo chain --json` prints, character by character.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<Box<RawValue>>,
-    /// Where all were while relays listened.
-    stands: Vec<StandTold>,
+    /// What is played.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    film: Option<FilmTold>,
     /// What is wrong.
     #[serde(skip_serializing_if = "Option::is_none")]
     wrong: Option<String>,
 }
 
-/// Where all were at some time.
-#[derive(Serialize)]
-struct StandTold {
-    /// When, s.
-    at_s: f64,
-    /// Of each relay, m: along the line, to its right, above ground.
-    places: Vec<[f32; 3]>,
-    /// The interferer that is believed in: W, m, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    believed: Option<[f32; 3]>,
-}
-
-impl StandTold {
-    fn of(stand: &Stand) -> Self {
-        let place = |at: &uav_relay::Placement| [at.x_m, at.y_m, at.altitude_m];
-        Self {
-            at_s: stand.at.as_micros() as f64 / 1e6,
-            places: stand.places.iter().map(place).collect(),
-            believed: match stand.believed.belief {
-                Belief::Source { source, .. } => Some([source.power_w, source.x_m, source.y_m]),
-                _ => None,
-            },
-        }
-    }
-}
-
 /// Runs a chain by `options`, separated by spaces as on the command line of `cargo chain`, in the scenario of that TOML text, and gives what
-/// the page is told as JSON: `report`, `stands`, and `wrong` with one line where something is wrong.
+/// the page is told as JSON: `report`; `film` where that is asked for; and `wrong` with one line where something is wrong.
 #[wasm_bindgen]
 #[must_use]
-pub fn chain(options: &str, scenario: &str) -> String {
-    let told = run(options, scenario).unwrap_or_else(|failure| Told {
+pub fn chain(options: &str, scenario: &str, film: bool) -> String {
+    let told = run(options, scenario, film).unwrap_or_else(|failure| Told {
         report: None,
-        stands: Vec::new(),
+        film: None,
         wrong: Some(failure.line),
     });
     serde_json::to_string(&told).unwrap_or_default()
 }
 
-fn run(options: &str, scenario: &str) -> Result<Told, Failure> {
+fn run(options: &str, scenario: &str, film: bool) -> Result<Told, Failure> {
     let words = core::iter::once("chain").chain(options.split_whitespace());
     let options =
         Options::try_parse_from(words).map_err(|error| Failure::input(error.to_string()))?;
@@ -92,11 +70,15 @@ fn run(options: &str, scenario: &str) -> Result<Told, Failure> {
             return Ok(Told {
                 wrong: line.or_else(|| report.error.clone()),
                 report: Some(raw(&*report)?),
-                stands: Vec::new(),
+                film: None,
             });
         }
     };
-    let chain = run.fly(run.setup.clone(), |chain| {
+    let setup = Setup {
+        film,
+        ..run.setup.clone()
+    };
+    let chain = run.fly(setup, |chain| {
         while !chain.step(HAPPENINGS) {
             if chain.progress().1.as_micros() > LONGEST_S * 1_000_000 {
                 return Err(Failure::unmet(format!(
@@ -111,7 +93,7 @@ fn run(options: &str, scenario: &str) -> Result<Told, Failure> {
     Ok(Told {
         wrong: report.error.clone(),
         report: Some(raw(&report)?),
-        stands: outcome.stands.iter().map(StandTold::of).collect(),
+        film: film.then(|| FilmTold::of(&run, &outcome)),
     })
 }
 

@@ -1,10 +1,10 @@
 "use strict";
 // The two views, in metres. What is drawn here knows nothing of where the numbers come from.
 
-/** What a view shows, m, and how its second axis is called. */
+/** What a view shows, m, and the numbers on its second axis: y to the right of the line, which is down as seen from above, or height. */
 const VIEWS = {
-  above: { x: [-250, 1250], y: [-440, 460], up: 1, ticks: [-400, -200, 0, 200] },
-  side: { x: [-250, 1250], y: [-110, 330], up: -1, ticks: [0, 100, 200, 300] },
+  above: { x: [-250, 1250], y: [-440, 460], down: true, ticks: [-400, -200, 0, 200, 400] },
+  side: { x: [-250, 1250], y: [-110, 340], down: false, ticks: [0, 100, 200, 300] },
 };
 
 const SPACE = "http://www.w3.org/2000/svg";
@@ -17,57 +17,114 @@ function element(name, attributes, text) {
   return made;
 }
 
-/** From metres to the picture: y is to the right of the line, which is down as seen from above, and height is up. */
-function at(view, x, y) {
-  return [x - view.x[0], view.up > 0 ? y - view.y[0] : view.y[1] - y];
-}
-
-/** The empty view: axes with their numbers. */
-function frame(svg, view) {
-  const [width, height] = [view.x[1] - view.x[0], view.y[1] - view.y[0]];
-  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  svg.replaceChildren();
-  for (let x = -200; x <= 1200; x += 200) {
-    const [px] = at(view, x, 0);
-    svg.append(element("line", { class: "grid", x1: px, x2: px, y1: 0, y2: height }));
-    if (x < 1200) svg.append(element("text", { class: "tick", x: px + 6, y: height - 8 }, String(x)));
-  }
-  for (const y of view.ticks) {
-    const [, py] = at(view, 0, y);
-    svg.append(element("line", { class: "grid", x1: 0, x2: width, y1: py, y2: py }));
-    svg.append(element("text", { class: "tick", x: 6, y: py - 6 }, String(y)));
-  }
-}
-
-/** The hops through these points; the one with the least SIR stands out. */
-function hops(svg, view, points, worst) {
-  for (let hop = 1; hop < points.length; hop += 1) {
-    const [x1, y1] = at(view, ...points[hop - 1]);
-    const [x2, y2] = at(view, ...points[hop]);
-    svg.append(element("line", { class: hop - 1 === worst ? "hop worst" : "hop", x1, y1, x2, y2 }));
-  }
-}
-
-/** A sign that may be dragged or pressed, with a halo that shows where the keyboard is. */
-function sign(svg, view, [x, y], kind, attributes, shape, text) {
-  const group = element("g", { class: kind, ...attributes });
-  group.append(element("circle", { class: "halo", r: kind.startsWith("relay") ? 17 : 34 }));
-  group.append(shape);
-  if (text !== undefined) group.append(element("text", { y: 6 }, text));
-  place(group, view, [x, y]);
-  svg.append(group);
-  return group;
-}
-
-/** Puts a sign there; on a small screen it is larger, so that a finger finds it. */
-function place(group, view, [x, y]) {
-  const scale = window.innerWidth < 600 ? 1.7 : 1;
-  group.setAttribute("transform", `translate(${at(view, x, y).join(" ")}) scale(${scale})`);
-}
-
 const SHAPES = {
-  site: () => element("path", { d: "M0 -22 L20 16 L-20 16 Z" }),
-  jammer: () => element("path", { d: "M-20 -20 L20 20 M20 -20 L-20 20 M-22 -16 L-16 -22 L22 16 L16 22 Z M16 -22 L22 -16 L-16 22 L-22 16 Z" }),
-  belief: () => element("path", { d: "M-24 0 A24 24 0 1 0 24 0 A24 24 0 1 0 -24 0 M-8 0 L8 0 M0 -8 L0 8" }),
-  relay: () => element("circle", { class: "drone", r: 14 }),
+  site: () => [element("path", { d: "M0 -11 L10 8 L-10 8 Z" })],
+  jammer: () => [element("path", { d: "M-8 -11 L0 -3 L8 -11 L11 -8 L3 0 L11 8 L8 11 L0 3 L-8 11 L-11 8 L-3 0 L-11 -8 Z" })],
+  belief: () => [element("circle", { r: 13 }), element("path", { d: "M-5 0 L5 0 M0 -5 L0 5" })],
+  relay: () => [element("circle", { class: "drone", r: 8 })],
 };
+
+/** How far around a sign a hand or a finger takes hold of it, px. */
+const REACH = { site: 20, jammer: 20, relay: 14, belief: 0 };
+
+/** Relays nearer to each other on the screen than this have no numbers in them, px. */
+const CROWDED = 17;
+
+/** One view, drawn into an element that stays: signs and hops are made once, and moved after. */
+class Picture {
+  constructor(svg, view) {
+    this.svg = svg;
+    this.view = view;
+    this.size = [view.x[1] - view.x[0], view.y[1] - view.y[0]];
+    this.axes = element("g", { "aria-hidden": "true" });
+    this.hops = element("g", { "aria-hidden": "true" });
+    this.signs = new Map();
+    svg.setAttribute("viewBox", `0 0 ${this.size.join(" ")}`);
+    svg.replaceChildren(this.axes, this.hops);
+  }
+
+  /** From metres to the picture. */
+  at([x, y]) {
+    return [x - this.view.x[0], this.view.down ? y - this.view.y[0] : this.view.y[1] - y];
+  }
+
+  /** From a place on the screen to metres. */
+  metres(clientX, clientY) {
+    const there = new DOMPoint(clientX, clientY).matrixTransform(this.svg.getScreenCTM().inverse());
+    return [there.x + this.view.x[0], this.view.down ? there.y + this.view.y[0] : this.view.y[1] - there.y];
+  }
+
+  /** Metres of one pixel of the screen: signs and letters are as large on every screen. */
+  get unit() {
+    return this.size[0] / (this.svg.clientWidth || 850);
+  }
+
+  /** The axes, for the size that the picture has now. */
+  frame() {
+    const { unit, size: [width, height] } = this;
+    if (this.framed === unit) return;
+    this.framed = unit;
+    const every = unit > 2.6 ? 400 : 200;
+    const made = [];
+    for (let x = -200; x <= 1200; x += 200) {
+      const [px] = this.at([x, 0]);
+      made.push(element("line", { class: "grid", x1: px, x2: px, y1: 0, y2: height }));
+      if (x % every === 0 && px > 16 * unit && px < width - 16 * unit) made.push(this.letters(String(x), px, height - 4 * unit, "tick middle"));
+    }
+    for (const y of this.view.ticks) {
+      const [, py] = this.at([0, y]);
+      made.push(element("line", { class: "grid", x1: 0, x2: width, y1: py, y2: py }));
+      const above = py - 4 * unit;
+      if (above > 12 * unit && above < height - 20 * unit) made.push(this.letters(String(y), 3 * unit, above, "tick"));
+    }
+    this.axes.replaceChildren(...made);
+  }
+
+  letters(text, x, y, kind) {
+    return element("text", { class: kind, transform: `translate(${x} ${y}) scale(${this.unit})` }, text);
+  }
+
+  /** The hops through these points; those of `marks` by their number, from 0 at Tx, have a class of their own. */
+  chain(points, marks) {
+    while (this.hops.childElementCount > Math.max(0, points.length - 1)) this.hops.lastChild.remove();
+    while (this.hops.childElementCount < points.length - 1) this.hops.append(element("line", {}));
+    [...this.hops.children].forEach((line, hop) => {
+      const [x1, y1] = this.at(points[hop]);
+      const [x2, y2] = this.at(points[hop + 1]);
+      const now = { class: `hop ${marks.get(hop) || ""}`, x1, y1, x2, y2 };
+      for (const [key, value] of Object.entries(now)) line.setAttribute(key, value);
+    });
+  }
+
+  /** The signs that are there, each with its `id`, `shape`, `kind`, place `at`, attributes, and the text in or beside it. */
+  put(signs) {
+    const there = new Set(signs.map((sign) => sign.id));
+    for (const [id, group] of this.signs) {
+      if (there.has(id)) continue;
+      group.remove();
+      this.signs.delete(id);
+    }
+    for (const sign of signs) {
+      let group = this.signs.get(sign.id);
+      if (!group) {
+        group = element("g", sign.active ? { id: sign.id } : {});
+        group.append(element("circle", { class: "halo", r: REACH[sign.shape] }), ...SHAPES[sign.shape](), element("text", {}));
+        this.signs.set(sign.id, group);
+        this.svg.append(group);
+      }
+      const attributes = { class: `${sign.shape} ${sign.kind || ""}`, transform: `translate(${this.at(sign.at).join(" ")}) scale(${this.unit})`, ...sign.attributes };
+      for (const [key, value] of Object.entries(attributes)) if (group.getAttribute(key) !== String(value)) group.setAttribute(key, value);
+      const text = group.lastChild;
+      if (text.textContent !== (sign.text || "")) text.textContent = sign.text || "";
+      const [x, y, anchor] = { in: [0, 3.5, "middle"], left: [-14, 4, "end"], right: [14, 4, "start"], up: [0, -16, "middle"] }[sign.side || "in"];
+      text.setAttribute("x", x);
+      text.setAttribute("y", y);
+      text.setAttribute("text-anchor", anchor);
+    }
+  }
+
+  /** Whether signs there would be too near to each other for a number in each. */
+  crowds(points) {
+    return points.some(([x, y], at) => at > 0 && Math.hypot(x - points[at - 1][0], y - points[at - 1][1]) < CROWDED * this.unit);
+  }
+}

@@ -1,15 +1,44 @@
 //! `cargo page`: the page in one file, `target/page/index.html`, which needs no server and nothing from elsewhere.
 
 use std::error::Error;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use wasm_bindgen_cli_support::Bindgen;
 
 /// What a browser runs.
 const TARGET: &str = "wasm32-unknown-unknown";
+
+/// The scripts of the page, each after those that it needs.
+const SCRIPTS: [&str; 7] = [
+    "drawing.js",
+    "wish.js",
+    "engine.js",
+    "playback.js",
+    "words.js",
+    "hand.js",
+    "page.js",
+];
+
+/// What the page begins with, as its `wish.js` says it: its outcome is part of the page, so that it is to be seen before the code is there.
+const FIRST_OPTIONS: &str = "--uavs 8 --method align";
+const FIRST_SCENARIO: &str = "[geometry]
+distance_m = 1000.0
+altitude_m = 20.0
+min_separation_m = 4.0
+[power]
+tx_w = 80.0
+uav_w = 1.0
+[[interferer]]
+power_w = 80.0
+x_m = 500.0
+y_m = 400.0
+";
 
 fn main() -> ExitCode {
     match build() {
@@ -57,15 +86,27 @@ fn build() -> Result<PathBuf, Box<dyn Error>> {
     let glue = std::fs::read_to_string(folder.join("uav_relay_page.js"))?;
     let web = own.join("../web");
     let part = |name: &str| std::fs::read_to_string(web.join(name));
+    let mut scripts = String::new();
+    for name in SCRIPTS {
+        scripts += &part(name)?;
+    }
+    let first = uav_relay_page::chain(FIRST_OPTIONS, FIRST_SCENARIO, true);
     let page = part("index.html")?
         .replace("/*style*/", &part("page.css")?)
-        .replace("/*code*/", &BASE64_STANDARD.encode(code))
+        .replace("/*first*/", &first)
+        .replace("/*scripts*/", &scripts)
         .replace("/*glue*/", &glue)
-        .replace("/*drawing*/", &part("drawing.js")?)
-        .replace("/*script*/", &part("page.js")?);
+        .replace("/*code*/", &BASE64_STANDARD.encode(packed(&code)?));
     let file = folder.join("index.html");
     std::fs::write(&file, page)?;
     Ok(file)
+}
+
+/// By gzip, which a browser unpacks by itself.
+fn packed(code: &[u8]) -> std::io::Result<Vec<u8>> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(code)?;
+    encoder.finish()
 }
 
 /// Adds the target where rustup lacks it.

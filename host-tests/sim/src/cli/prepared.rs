@@ -1,7 +1,7 @@
 //! A run as the options and a scenario have it.
 
 use clap::ValueEnum as _;
-use uav_relay::{Measure, Mission, Placement, Schedule, Sites, Wiring};
+use uav_relay::{Instant, Measure, Mission, Placement, Schedule, Sites, Wiring};
 use uav_relay_scenario::mission::{self, Refusal};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::{Interference, Scenario};
@@ -172,6 +172,23 @@ impl<'a> Prepared<'a> {
             report.against_all = AgainstAll::of(scenario, &report.relays, sir);
         }
         report
+    }
+
+    /// SIR of every hop, from the transmitter's to the receiver's, linear, with these relays (index from 1, and place; in the order of the
+    /// chain) against what is there at `then`. Before anything is uploaded.
+    pub fn sirs_at(&self, then: Instant, places: &[(u16, Placement)]) -> Vec<f64> {
+        let mission = self.options.listening.moved(self.told, then);
+        let usual = mission.config().common;
+        let own = |index: u16| {
+            let mut own = self.setup.profiles.iter();
+            own.find(|(of, _)| *of == index)
+                .map_or(usual, |(_, profile)| *profile)
+        };
+        let places: Vec<_> = places
+            .iter()
+            .map(|(index, place)| (*place, own(*index)))
+            .collect();
+        report::hop_sirs(&mission, &places)
     }
 
     /// The chain at its places, after [`report`](Self::report).

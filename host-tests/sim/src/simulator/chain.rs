@@ -4,6 +4,7 @@ mod air;
 mod begin;
 mod channel;
 mod ending;
+mod filmed;
 mod fleet;
 mod flight;
 mod ground;
@@ -223,6 +224,7 @@ impl Chain {
                     medium.switch_off(index);
                 }
                 self.tell(index, Turning::Silent, None);
+                self.film(index);
                 return;
             }
             Happening::Bytes { port, bytes } => {
@@ -253,10 +255,12 @@ impl Chain {
             && let Some(transmit) = member.relay.poll_transmit(now, &mut frame)
         {
             let bytes = frame.get(..transmit.len).unwrap_or_default();
+            self.film_frame(index, transmit.port);
             self.transmit(index, transmit.port, bytes);
         }
         self.listen(index);
         self.check(index);
+        self.film(index);
         let Some(member) = self.members.get_mut(index) else {
             return;
         };

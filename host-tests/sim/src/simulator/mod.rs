@@ -8,6 +8,7 @@
 //! | [`deaf`] | a relay that does not hear another one |
 //! | [`attack`], [`forge`] | what an attacker does, and the frames it makes up |
 //! | [`queue`] | what happens when, in order |
+//! | [`film`] | what a run looks like from outside, change by change |
 //! | [`record`] | the frames that were put on the air, for a capture |
 //! | [`setup`], [`outcome`] | what a chain is run with, and what came of it |
 //! | [`sky`] | interferers that nobody told the relays of |
@@ -26,6 +27,7 @@ pub mod chain;
 pub mod deaf;
 pub mod drones;
 pub mod faults;
+pub mod film;
 pub mod fleet;
 pub mod flying;
 pub mod forge;

@@ -8,6 +8,7 @@ use uav_relay::{Duration, Instant, Placement, Profile, Side, Sites, Stats};
 use super::attack::Struck;
 use super::drones::{Nearest, Point};
 use super::faults::Injected;
+use super::film::Film;
 use super::flying::Seen;
 use super::medium::AirCounts;
 use super::sky::Stand;
@@ -204,6 +205,8 @@ pub struct Outcome {
     pub watched: Option<Watched>,
     /// Where the relays were, each time that they measured.
     pub stands: Vec<Stand>,
+    /// What it looked like, where [`Setup::film`](super::setup::Setup::film) was set.
+    pub film: Option<Film>,
 }
 
 impl Outcome {

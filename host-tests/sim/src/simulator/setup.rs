@@ -109,6 +109,8 @@ pub struct Setup {
     pub faults_end: Option<Instant>,
     /// Whether the frames on the air are kept for [`Chain::frames`](super::chain::Chain::frames).
     pub record: bool,
+    /// Whether what it looks like is kept, for [`Outcome::film`](super::outcome::Outcome::film).
+    pub film: bool,
     /// Seed of every random draw.
     pub seed: u64,
     /// The run ends at this time at the latest.
@@ -145,6 +147,7 @@ impl Setup {
             soak: None,
             faults_end: None,
             record: false,
+            film: false,
             seed: 1,
             deadline: Instant::from_millis(1_000 * 3_600 * 24 * 30),
         }

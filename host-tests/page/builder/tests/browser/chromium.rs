@@ -75,6 +75,8 @@ impl Browser {
         }
         let metrics = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600});
         browser.call("Emulation.setDeviceMetricsOverride", &metrics);
+        let touch = json!({"enabled": width < 600, "maxTouchPoints": 1});
+        browser.call("Emulation.setTouchEmulationEnabled", &touch);
         browser.call("Page.navigate", &json!({"url": url}));
         browser
     }
@@ -157,6 +159,33 @@ impl Browser {
             );
         }
         mouse("mouseReleased", to);
+    }
+
+    /// The same with a finger.
+    pub(crate) fn finger(&mut self, from: [f64; 2], to: [f64; 2], steps: u8) {
+        let mut touch = |kind: &str, points: Value| {
+            let parameters = json!({"type": kind, "touchPoints": points});
+            self.call("Input.dispatchTouchEvent", &parameters);
+        };
+        touch("touchStart", json!([{"x": from[0], "y": from[1]}]));
+        for step in 1..=steps {
+            let part = f64::from(step) / f64::from(steps);
+            let [x, y] = [0, 1].map(|at| from[at] + part * (to[at] - from[at]));
+            touch("touchMove", json!([{"x": x, "y": y}]));
+        }
+        touch("touchEnd", json!([]));
+    }
+
+    /// As who has chosen dark colours sees it.
+    pub(crate) fn prefer_dark(&mut self) {
+        let features = json!({"features": [{"name": "prefers-color-scheme", "value": "dark"}]});
+        self.call("Emulation.setEmulatedMedia", &features);
+    }
+
+    /// What a screen reader is told of: every node.
+    pub(crate) fn accessible(&mut self) -> Vec<Value> {
+        let tree = self.call("Accessibility.getFullAXTree", &json!({}));
+        tree["nodes"].as_array().unwrap().clone()
     }
 
     pub(crate) fn key(&mut self, key: &str, code: u32) {

@@ -9,6 +9,7 @@ use uav_relay::{Instant, SetupError, Wiring};
 use super::super::attack::Struck;
 use super::super::bursts::Bursts;
 use super::super::faults::Injected;
+use super::super::film::Film;
 use super::super::link::Line;
 use super::super::medium::{Access, AirCounts, Medium};
 use super::super::optima::Run;
@@ -59,6 +60,7 @@ impl Chain {
                 ahead += 1;
             }
         }
+        let film = setup.film.then(Film::default);
         let record = setup.record.then(Record::default);
         let mut chain = Self {
             stations,
@@ -86,6 +88,7 @@ impl Chain {
                 air: AirCounts::default(),
                 watched: None,
                 stands: Vec::new(),
+                film,
             },
             now: Instant::ZERO,
             happenings: 0,
@@ -140,6 +143,7 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
             stored: None,
             safe: None,
             measured: None,
+            filmed: None,
             relay,
             wake: None,
         });

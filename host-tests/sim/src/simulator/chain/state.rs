@@ -38,6 +38,8 @@ pub(super) struct Member {
     pub(super) safe: Option<Placement>,
     /// Where it has measured the interference last.
     pub(super) measured: Option<Placement>,
+    /// What it looked like when it was filmed last: whether it was on, and where it was told to fly.
+    pub(super) filmed: Option<(bool, Option<Placement>)>,
     /// The wake-up in the queue that counts: the earliest one. Any other is void.
     pub(super) wake: Option<Instant>,
 }

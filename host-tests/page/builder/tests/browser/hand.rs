@@ -1,0 +1,76 @@
+//! Mouse, finger, keyboard.
+
+use crate::numbers::is_native;
+use crate::opened::{middle, number, opened, settled, sir};
+
+#[test]
+fn a_hand_and_the_keyboard_move_the_chain() {
+    let mut browser = opened(1280, 900);
+    let before = sir(&mut browser);
+    let [x, y] = middle(&mut browser, "jammer");
+    browser.drag([x, y], [x - 60.0, y - 200.0], 10);
+    browser.until("window.last.toml.indexOf('y_m = 400.0') < 0");
+    settled(&mut browser);
+    let dragged = sir(&mut browser);
+    assert!(dragged < before, "nearer to the line: {dragged}");
+    is_native(&mut browser, "dragged");
+
+    let [x, y] = middle(&mut browser, "rx");
+    browser.drag([x, y], [x - 100.0, y], 10);
+    browser.until("window.last.toml.indexOf('distance_m = 1000.0') < 0");
+    settled(&mut browser);
+    assert!((sir(&mut browser) - dragged).abs() > 1e-6, "another way");
+    is_native(&mut browser, "another site");
+
+    let toml = browser.text("window.last.toml");
+    browser.run("byId('jammer').focus()");
+    browser.key("ArrowDown", 40);
+    let toml = serde_json::to_string(&toml).unwrap();
+    browser.until(&format!("window.last.toml !== {toml}"));
+    settled(&mut browser);
+    is_native(&mut browser, "by an arrow");
+    assert_eq!(browser.text("document.activeElement.id"), "jammer");
+
+    // A relay is switched off by a press, and on again by the keyboard.
+    let at = middle(&mut browser, "relay4");
+    browser.drag(at, at, 0);
+    browser.until("window.last.told.report.left === 7 && want.off.has(4)");
+    settled(&mut browser);
+    is_native(&mut browser, "relay 4 is off");
+    browser.run("byId('relay4').focus()");
+    browser.key(" ", 32);
+    browser.until("window.last.told.report.relays.length === 8");
+    settled(&mut browser);
+    is_native(&mut browser, "and on again");
+    // Tab comes to one relay; arrows go from that to the next.
+    let stops = "document.querySelectorAll('#above [role=switch][tabindex=\"0\"]').length";
+    assert_eq!(browser.value(stops), 1);
+    browser.key("ArrowRight", 39);
+    assert_eq!(browser.text("document.activeElement.id"), "relay5");
+    assert_eq!(browser.value(stops), 1);
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn a_finger_drags_what_it_touches_and_else_scrolls_the_page() {
+    let mut browser = opened(390, 600);
+    browser.run("byId('above').scrollIntoView({ block: 'center' })");
+    let [x, y] = middle(&mut browser, "jammer");
+    browser.finger([x, y], [x + 40.0, y - 60.0], 8);
+    browser.until("want.y < 300 && want.x > 600");
+    settled(&mut browser);
+    is_native(&mut browser, "by a finger");
+
+    let before = number(&mut browser, "window.scrollY");
+    let [x, y] = middle(&mut browser, "jammer");
+    // Beside everything, on the picture.
+    let from = [x - 150.0, y - 20.0];
+    let below = browser.value(&format!(
+        "document.elementFromPoint({}, {}).closest('svg').id",
+        from[0], from[1]
+    ));
+    assert_eq!(below, "above", "the finger is on the picture");
+    browser.finger(from, [from[0], from[1] - 150.0], 12);
+    browser.until(&format!("window.scrollY > {before} + 50"));
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}

@@ -1,0 +1,94 @@
+//! Wide and narrow, light and dark, and for who cannot see it.
+
+use crate::opened::{opened, press, root, settled};
+
+/// Signs and numbers of the axes that lie on each other, or stick out of their picture.
+const CLASHES: &str = "(() => { const clashes = []; \
+    for (const svg of document.querySelectorAll('svg')) { \
+      const out = svg.getBoundingClientRect(); \
+      const all = [...svg.querySelectorAll('text')].filter((it) => it.textContent).map((it) => [it.textContent, it.getBoundingClientRect()]); \
+      all.forEach(([name, a], at) => { \
+        if (a.left < out.left || a.right > out.right || a.top < out.top || a.bottom > out.bottom) clashes.push(`${svg.id}: ${name} sticks out`); \
+        for (const [other, b] of all.slice(at + 1)) \
+          if (a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom) clashes.push(`${svg.id}: ${name} on ${other}`); \
+      }); \
+    } return clashes; })()";
+
+#[test]
+fn it_is_laid_out_for_wide_and_for_narrow_screens() {
+    for (name, width, height) in [
+        ("wide", 1280, 900),
+        ("tablet", 800, 1100),
+        ("narrow", 390, 844),
+        ("dark", 1280, 900),
+    ] {
+        let mut browser = opened(width, height);
+        if name == "dark" {
+            browser.prefer_dark();
+            browser.run("byId('uavs').value = 4; typed()");
+            settled(&mut browser);
+            press(&mut browser, "listen");
+        }
+        let over = browser.value("document.documentElement.scrollWidth - window.innerWidth");
+        assert!(over.as_i64().unwrap() <= 0, "{name}: {over} px too wide");
+        let views = browser.value(
+            "[...document.querySelectorAll('svg')].map((svg) => svg.getBoundingClientRect().width)",
+        );
+        let least = f64::from(width) * 0.5;
+        for view in views.as_array().unwrap() {
+            assert!(view.as_f64().unwrap() > least, "{name}: {view}");
+        }
+        assert_eq!(browser.value(CLASHES).to_string(), "[]", "{name}");
+        let letters = browser.value(
+            "[...document.querySelectorAll('svg text')].filter((it) => it.textContent).map((it) => it.getBoundingClientRect().height)",
+        );
+        for height in letters.as_array().unwrap() {
+            assert!(height.as_f64().unwrap() >= 9.0, "{name}: {height} px high");
+        }
+        let picture = root().join(format!("target/page/{name}.png"));
+        std::fs::write(picture, browser.screenshot()).unwrap();
+        assert_eq!(browser.errors(), Vec::<String>::new());
+    }
+}
+
+/// What a screen reader is told.
+#[test]
+fn all_of_it_can_be_heard() {
+    let mut browser = opened(1280, 900);
+    let nodes = browser.accessible();
+    let find = |role: &str, name: &str| {
+        nodes
+            .iter()
+            .find(|node| node["role"]["value"] == role && node["name"]["value"] == name)
+            .unwrap_or_else(|| panic!("no {role} {name}"))
+    };
+    let property = |role: &str, name: &str, property: &str| {
+        let all = find(role, name)["properties"].as_array().unwrap().clone();
+        let one = all.into_iter().find(|one| one["name"] == property);
+        one.unwrap_or_else(|| panic!("no {property} of {name}"))["value"]["value"].clone()
+    };
+    assert_eq!(
+        property("slider", "Interferer", "valuetext"),
+        "x 500 m, y 400 m"
+    );
+    assert_eq!(property("slider", "Interferer", "valuemin"), -230.0);
+    assert_eq!(property("slider", "Interferer", "valuemax"), 1230.0);
+    assert_eq!(property("slider", "Receiver", "valuemin"), 50.0);
+    for relay in 1..=8 {
+        assert_eq!(
+            property("switch", &format!("Relay {relay}"), "checked"),
+            "true"
+        );
+    }
+    find("button", "Play");
+    find("slider", "Time");
+    let heard: Vec<&str> = nodes
+        .iter()
+        .filter(|node| node["role"]["value"] == "StaticText")
+        .filter_map(|node| node["name"]["value"].as_str())
+        .collect();
+    for words in ["to 1", "to Rx", "2.4655, 3.92 dB"] {
+        assert!(heard.contains(&words), "{words} is not heard: {heard:?}");
+    }
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}

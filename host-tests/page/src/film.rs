@@ -1,0 +1,153 @@
+//! A run from its beginning to its end, as the page plays it.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use uav_relay::sensing::belief::Belief;
+use uav_relay::{Instant, Placement, Side};
+use uav_relay_scenario::number::narrow;
+use uav_relay_sim::cli::Prepared;
+use uav_relay_sim::simulator::film::{Sent, Shot};
+use uav_relay_sim::simulator::outcome::Outcome;
+
+/// Moments that are shown, at most: those too near to each other are shown as one.
+const STANDS: usize = 600;
+
+/// Frames that are shown, at most: the first ones.
+const FRAMES: usize = 20_000;
+
+/// What is played.
+#[derive(Serialize)]
+pub(crate) struct FilmTold {
+    /// Every moment in which something looks different than before, in order.
+    stands: Vec<StandTold>,
+    /// Who said something, and when: s, relay, and -1 toward Tx, 1 toward Rx, 0 to all in range.
+    sent: Vec<(f64, u16, i8)>,
+}
+
+/// A moment.
+#[derive(Serialize)]
+struct StandTold {
+    /// When, s.
+    at_s: f64,
+    /// Relays that look different than before: index, whether it is on, and x, y, h in m; without a place where it was told none.
+    relays: Vec<(u16, bool, Option<[f32; 3]>)>,
+    /// SIR of every hop over those that are on and have a place, linear, against what is there then. None without a relay.
+    sirs: Vec<f32>,
+    /// Frames on any link so far.
+    messages: u64,
+    /// The interferer that the first relay believes in: W, m, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    believed: Option<[f32; 3]>,
+}
+
+/// What looks different from one moment on.
+#[derive(Default)]
+struct Change {
+    relays: BTreeMap<u16, (bool, Option<Placement>)>,
+    messages: u64,
+    /// Of relays that have listened: what they make of it.
+    believed: Option<Belief>,
+}
+
+impl FilmTold {
+    /// The film of a run with [`Setup::film`](uav_relay_sim::simulator::setup::Setup::film).
+    pub(crate) fn of(run: &Prepared<'_>, outcome: &Outcome) -> Self {
+        let film = outcome.film.clone().unwrap_or_default();
+        Self {
+            stands: stands(run, changes(&film.shots, outcome)),
+            sent: film.sent.iter().take(FRAMES).map(frame).collect(),
+        }
+    }
+}
+
+/// All changes, by when they are shown.
+fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
+    let mut changes: BTreeMap<Instant, Change> = BTreeMap::new();
+    for shot in shots {
+        let change = changes.entry(shot.at).or_default();
+        change.relays.insert(shot.relay, (shot.is_on, shot.place));
+        change.messages = shot.messages;
+    }
+    for stand in &outcome.stands {
+        changes.entry(stand.at).or_default().believed = Some(stand.believed.belief);
+    }
+    let last = changes.entry(outcome.ended).or_default();
+    last.messages = outcome.messages;
+    thinned(changes)
+}
+
+/// The same with moments that are too near to each other as one, the later one of them.
+fn thinned(all: BTreeMap<Instant, Change>) -> BTreeMap<Instant, Change> {
+    let mut all = all;
+    let mut apart_us = 1_000;
+    while all.len() > STANDS {
+        let mut kept: BTreeMap<Instant, Change> = BTreeMap::new();
+        for (at, change) in all {
+            let near = kept
+                .last_entry()
+                .filter(|last| at.as_micros() - last.key().as_micros() < apart_us);
+            let before = near.map(|last| last.remove()).unwrap_or_default();
+            let mut relays = before.relays;
+            relays.extend(change.relays);
+            let both = Change {
+                relays,
+                messages: before.messages.max(change.messages),
+                believed: change.believed.or(before.believed),
+            };
+            kept.insert(at, both);
+        }
+        all = kept;
+        apart_us *= 2;
+    }
+    all
+}
+
+fn stands(run: &Prepared<'_>, changes: BTreeMap<Instant, Change>) -> Vec<StandTold> {
+    let mut now: BTreeMap<u16, (bool, Option<Placement>)> = BTreeMap::new();
+    let mut messages = 0;
+    let mut believed = None;
+    let tell = |(at, change): (Instant, Change)| {
+        now.extend(&change.relays);
+        messages = change.messages.max(messages);
+        believed = change.believed.or(believed);
+        let mut chain: Vec<(u16, Placement)> = now
+            .iter()
+            .filter_map(|(&index, &(is_on, place))| place.filter(|_| is_on).map(|at| (index, at)))
+            .collect();
+        chain.sort_by(|(_, one), (_, other)| one.x_m.total_cmp(&other.x_m));
+        StandTold {
+            at_s: seconds(at),
+            relays: change.relays.into_iter().map(told).collect(),
+            sirs: run.sirs_at(at, &chain).into_iter().map(narrow).collect(),
+            messages,
+            believed: match believed {
+                Some(Belief::Source { source, .. }) => {
+                    Some([source.power_w, source.x_m, source.y_m])
+                }
+                _ => None,
+            },
+        }
+    };
+    changes.into_iter().map(tell).collect()
+}
+
+fn told(
+    (index, (is_on, place)): (u16, (bool, Option<Placement>)),
+) -> (u16, bool, Option<[f32; 3]>) {
+    let place = place.map(|at| [at.x_m, at.y_m, at.altitude_m]);
+    (index, is_on, place)
+}
+
+fn frame(sent: &Sent) -> (f64, u16, i8) {
+    let to = match sent.to {
+        Some(Side::Upstream) => -1,
+        Some(Side::Downstream) => 1,
+        None => 0,
+    };
+    (seconds(sent.at), sent.relay, to)
+}
+
+fn seconds(at: Instant) -> f64 {
+    at.as_micros() as f64 / 1e6
+}

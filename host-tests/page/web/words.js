@@ -1,0 +1,66 @@
+"use strict";
+// What is said beside the pictures.
+
+const byId = (id) => document.getElementById(id);
+
+const decibels = (linear) => `${(10 * Math.log10(linear)).toFixed(2)} dB`;
+
+function summary(report) {
+  if (report.sir === undefined) return "No agreement.";
+  const share = report.share_of_optimum === undefined ? "" : ` ${(100 * report.share_of_optimum).toFixed(1)} % of the best, with everything known.`;
+  return `Worst hop: SIR ${report.sir.toPrecision(5)} (${decibels(report.sir)}) with ${report.relays.length} relays; ${report.messages} messages, ${report.bytes} bytes, ${report.virtual_s.toFixed(3)} s of virtual time.${share}`;
+}
+
+/** What is to be seen at a tick that is not the last. */
+function moment(tick, worst) {
+  const sir = tick.sirs.length === 0 ? "no place agreed on yet" : `worst hop: SIR ${worst.toPrecision(5)} (${decibels(worst)})`;
+  return `At ${tick.at_s.toFixed(3)} s: ${sir}; ${tick.messages} messages.`;
+}
+
+/** A list of SIRs, that of the worst hop marked; `ends` says where each hop ends. */
+function list(sirs, ends) {
+  const [most, least] = [Math.max(...sirs), Math.min(...sirs)];
+  const all = byId("hops");
+  while (all.childElementCount > sirs.length) all.lastChild.remove();
+  while (all.childElementCount < sirs.length) {
+    const item = document.createElement("li");
+    item.append(...["span", "i", "span"].map((kind) => document.createElement(kind)));
+    all.append(item);
+  }
+  [...all.children].forEach((item, at) => {
+    const [name, bar, number] = item.children;
+    name.textContent = `to ${ends[at]}`;
+    bar.style.width = `${(100 * sirs[at]) / most}%`;
+    bar.className = sirs[at] === least ? "worst" : "";
+    number.textContent = `${sirs[at].toPrecision(5)}, ${decibels(sirs[at])}`;
+  });
+}
+
+/** What happened, each in a line. */
+function happened(timeline) {
+  byId("happened").hidden = timeline.length === 0;
+  byId("events").replaceChildren(...timeline.map((event) => {
+    const item = document.createElement("li");
+    const who = event.relay === 0 ? "Tx" : `relay ${event.relay}`;
+    const other = event.other === undefined ? "" : ` ${event.other}`;
+    const relays = event.relays === undefined ? "" : `, ${event.relays} relays`;
+    item.textContent = `${event.at_s.toFixed(3)} s: ${who} ${event.what}${other}${relays}`;
+    return item;
+  }));
+}
+
+/** Marks those that have happened by now, and has the last of them in sight. */
+function mark(told) {
+  const [box, items] = [byId("events"), byId("events").children];
+  [...items].forEach((item, at) => item.classList.toggle("coming", at >= told));
+  const last = items[told - 1];
+  if (last) box.scrollTop = last.offsetTop - box.offsetTop - box.clientHeight / 2;
+}
+
+/** Lines that help; nothing where nothing is wrong. */
+function complain(lines) {
+  const box = byId("wrong");
+  const text = lines.filter((line) => line).join("\n");
+  if (box.textContent !== text) box.textContent = text;
+  box.hidden = text === "";
+}
