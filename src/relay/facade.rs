@@ -1,4 +1,4 @@
-//! Bytes, time, measurements and what the firmware knows in; frames and events out.
+//! Bytes and time in; frames and events out.
 
 use super::incoming::{self, Addressed};
 use super::port::{Port, Transmit};
@@ -7,9 +7,6 @@ use super::signed;
 use crate::event::Event;
 use crate::mission::Mission;
 use crate::node::Node;
-use crate::node::sample::Sample;
-use crate::node::view::record::{RecordError, ViewRecord};
-use crate::place::Placement;
 use crate::settings::{Identity, Settings, SetupError, Wiring, check};
 use crate::side::Side;
 use crate::stats::bump;
@@ -232,87 +229,6 @@ impl Relay {
         self.node.handle_timeout(now);
     }
 
-    /// Takes one measurement of the interference, W or linear SIR, where `Settings::measure` asks for them.
-    ///
-    /// Constant work. What is no use is counted as [`Stats::samples_refused`](crate::Stats::samples_refused).
-    ///
-    /// ```
-    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
-    /// # use paper::*;
-    /// use uav_relay::{Instant, Listen, Placement, Sample, Settings};
-    ///
-    /// # #[cfg(feature = "sensing")] {
-    /// let mut relay = relay(Settings { listen: Some(Listen::default()), ..Settings::default() });
-    /// let at = Placement { x_m: 350.0, y_m: 0.0, altitude_m: 20.0 };
-    /// relay.handle_sample(Instant::from_millis(1_000), Sample::Heard { at, power_w: 2.5e-8 });
-    /// assert_eq!(relay.stats().samples_refused, 0);
-    /// # }
-    /// ```
-    pub fn handle_sample(&mut self, now: Instant, sample: Sample) {
-        self.node.handle_sample(now, sample);
-    }
-
-    /// Takes in where the drone was at time `at`, `x_m` and altitude: when that was measured, not when it was read. Where
-    /// `Settings::guard` is set there is no setpoint before the first of these.
-    ///
-    /// Constant work. A place that is no number, or farther than 1e7 m, has no effect.
-    ///
-    /// ```
-    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
-    /// # use paper::*;
-    /// use uav_relay::guard::config::GuardConfig;
-    /// use uav_relay::{Instant, Placement, Settings};
-    ///
-    /// # #[cfg(feature = "guard")] {
-    /// let guard = GuardConfig::of(&MISSION, MISSION.config().common);
-    /// let mut relay = relay(Settings { guard: Some(guard), ..Settings::default() });
-    /// let (measured, now) = (Instant::from_millis(990), Instant::from_millis(1_000));
-    /// relay.handle_position(now, measured, Placement { x_m: 10.0, y_m: 0.0, altitude_m: 20.0 });
-    /// # }
-    /// ```
-    pub fn handle_position(&mut self, now: Instant, at: Instant, place: Placement) {
-        self.node.handle_position(now, at, place);
-    }
-
-    /// Whether the drone flies to the setpoints from now on: not while its pilot has it, or it is on the ground. A relay is taken to be
-    /// flown until this says otherwise.
-    ///
-    /// Where `Settings::guard` is set, a relay that is not flown has no setpoint, and its neighbours are told that it may be anywhere: they
-    /// stay where they are toward it. Flown again it begins as after a start, with the next place that
-    /// [`handle_position`](Self::handle_position) takes in.
-    ///
-    /// Constant work. To say the same again has no effect.
-    ///
-    /// ```
-    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
-    /// # use paper::*;
-    /// use uav_relay::{Instant, Settings};
-    ///
-    /// let mut relay = relay(Settings::default());
-    /// // The pilot has taken the sticks; later the autopilot follows set-points again.
-    /// relay.handle_control(Instant::from_millis(1_000), false);
-    /// relay.handle_control(Instant::from_millis(9_000), true);
-    /// ```
-    pub fn handle_control(&mut self, now: Instant, flown: bool) {
-        self.node.handle_control(now, flown);
-    }
-
-    /// Relays at `side` that fell silent, or are not flown ([`handle_control`](Self::handle_control)), have landed, or were taken away: the
-    /// guard need not keep clear of them any more.
-    ///
-    /// Constant work.
-    pub fn clear_lost(&mut self, now: Instant, side: Side) {
-        self.node.clear_lost(now, side);
-    }
-
-    /// The other relay that used this one's number ([`Event::IndexTaken`]) has landed, or has another number now: this one takes part
-    /// again, if it [stands down](Self::stands_down).
-    ///
-    /// Constant work.
-    pub fn clear_index_taken(&mut self, now: Instant) {
-        self.node.clear_namesake(now);
-    }
-
     /// Has the chain agree again, from the beginning of its method: in a closed loop, once it has measured where it stands.
     ///
     /// Only the leader (relay 1; in a field relay N) has something to begin; with any other relay nothing happens.
@@ -422,23 +338,5 @@ impl Relay {
     /// ```
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.node.poll_timeout()
-    }
-
-    /// What it has said in the votes on views, to be stored whenever it has changed, *before* [`poll_transmit`](Self::poll_transmit) is
-    /// called: a promise that is forgotten is none. Constant work.
-    pub const fn view_record(&self) -> ViewRecord {
-        self.node.view_record()
-    }
-
-    /// Has a relay that has just been made, and was handed nothing but an upload yet, stand by what it had said before it was
-    /// switched off in flight: the [`view_record`](Self::view_record) that was stored last.
-    ///
-    /// Constant work.
-    ///
-    /// # Errors
-    /// [`RecordError::Base`] if it was stored by a relay that was loaded with another mission, [`RecordError::Begun`] if the relay
-    /// has begun to talk or to compute. Nothing has changed then.
-    pub fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
-        self.node.resume_view(now, record)
     }
 }

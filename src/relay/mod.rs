@@ -2,8 +2,10 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | `facade` | what goes into a relay and comes out of it |
+//! | `facade` | bytes and time into a relay, frames and events out of it |
+//! | `told` | what the firmware tells it of the world |
 //! | `readings` | what the firmware may read of it |
+//! | `records` | what it has promised, over a reboot |
 //! | `uploads` | a new mission in flight |
 //! | `port` | where frames come in and go out |
 //! | `incoming`, `signed` | a frame, without and with a tag, to the node and from it |
@@ -12,11 +14,13 @@ mod facade;
 mod incoming;
 mod port;
 mod readings;
+mod records;
 #[cfg(feature = "auth")]
 pub(crate) mod signed;
 #[cfg(feature = "auth")]
 #[cfg(test)]
 mod tests;
+mod told;
 #[cfg(feature = "upload")]
 mod uploads;
 

@@ -1,6 +1,7 @@
 //! A run from its beginning to its end, as the page plays it.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::OccupiedEntry;
 
 use serde::Serialize;
 use uav_relay::sensing::belief::Belief;
@@ -87,7 +88,7 @@ fn thinned(all: BTreeMap<Instant, Change>) -> BTreeMap<Instant, Change> {
             let near = kept
                 .last_entry()
                 .filter(|last| at.as_micros() - last.key().as_micros() < apart_us);
-            let before = near.map(|last| last.remove()).unwrap_or_default();
+            let before = near.map(OccupiedEntry::remove).unwrap_or_default();
             let mut relays = before.relays;
             relays.extend(change.relays);
             let both = Change {

@@ -102,8 +102,8 @@ fn relays_that_follow_with_one_switched_off_are_shown_where_they_are() {
         let of = kept.iter().find(|it| it["index"] == relay[0]);
         assert_eq!(relay[1] == true, of.is_some(), "{relay}: {report}");
         if let Some(of) = of {
-            let [shown, told] = [&relay[2], &of["x_m"]].map(|x| x.as_f64().unwrap() as f32);
-            assert_eq!(shown.to_bits(), told.to_bits(), "{relay}");
+            let [shown, told] = [&relay[2], &of["x_m"]].map(|x| x.as_f64().unwrap());
+            assert!((shown - told).abs() < 1e-4, "{relay}: {told}");
         }
     }
     assert_eq!(last[1][1], false, "relay 2 is off");

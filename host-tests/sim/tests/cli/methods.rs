@@ -1,0 +1,237 @@
+//! Every method through the tool itself: what scenario it needs, what it finds, how it is drawn.
+
+use serde_json::Value;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::scene::Scene;
+
+use super::{chain, example, json, refusal};
+
+#[test]
+fn the_fixed_step_reports_the_papers_sweeps() {
+    let report = json(&["--uavs", "2", "--method", "align-step", "--epsilon", "0.1"]);
+    assert_eq!(report["sweeps"].as_u64(), Some(10_245));
+    assert!((report["sir"].as_f64().unwrap() - 1.6).abs() < 1e-5);
+}
+
+#[test]
+fn a_method_says_what_scenario_it_needs() {
+    for method in ["stochastic", "stochastic-step"] {
+        let (status, line) = refusal(&["--method", method]);
+        assert_eq!(status, 2);
+        assert!(line.contains(method) && line.contains("[field]"), "{line}");
+    }
+    for method in ["align", "align-step", "adjust", "joint"] {
+        let (status, line) = refusal(&["--scenario", &example("field.toml"), "--method", method]);
+        assert_eq!(status, 2);
+        assert!(
+            line.contains(method) && line.contains("[[interferer]]"),
+            "{line}"
+        );
+    }
+    let (status, line) = refusal(&["--closed-loop", "2"]);
+    assert_eq!(status, 2);
+    assert!(line.contains("--closed-loop"), "{line}");
+    for (option, value) in [
+        ("--rounds", "0"),
+        ("--explore", "-1"),
+        ("--grid", "41"),
+        ("--grid", "1x5"),
+        ("--closed-loop", "101"),
+    ] {
+        let (status, line) = refusal(&["--method", "adjust", option, value]);
+        assert_eq!(status, 2);
+        assert!(line.contains(option), "{line}");
+    }
+}
+
+#[test]
+fn the_joint_figures_hold() {
+    let file = example("altitudes.toml");
+    for (uavs, least, best) in [
+        ("2", 0.881_45, 0.881_533_9),
+        ("5", 1.047_36, 1.047_463_5),
+        ("8", 1.235_66, 1.235_783_8),
+        ("50", 6.497_73, 6.498_377_7),
+    ] {
+        let report = json(&["--scenario", &file, "--uavs", uavs, "--method", "joint"]);
+        let sir = report["sir"].as_f64().unwrap();
+        assert!(sir >= least && sir <= best * (1.0 + 1e-6), "{uavs}: {sir}");
+        assert!(report["sweeps"].as_u64().unwrap() <= 17, "{report}");
+        let heights = report["relays"].as_array().unwrap().iter();
+        assert!(
+            heights
+                .map(|relay| relay["h_m"].as_f64().unwrap())
+                .all(|h| (20.0..=300.0).contains(&h))
+        );
+    }
+    let report = json(&["--scenario", &file, "--uavs", "50", "--method", "adjust"]);
+    let rounds: Vec<f64> = report["rounds"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|sir| sir.as_f64().unwrap())
+        .collect();
+    assert_eq!(rounds.len(), 501);
+    assert!(rounds.windows(2).all(|pair| pair[1] >= pair[0]));
+    assert!(report["sir"].as_f64().unwrap() >= 6.40, "{}", report["sir"]);
+    let grid = json(&[
+        "--scenario",
+        &file,
+        "--uavs",
+        "50",
+        "--method",
+        "adjust",
+        "--grid",
+        "41x21",
+    ]);
+    let gain = grid["sir"].as_f64().unwrap() / rounds[0];
+    assert!((gain - 1.0).abs() < 1e-6, "{gain}");
+}
+
+#[test]
+fn a_field_is_flown_by_what_was_agreed_or_by_what_is_measured() {
+    let file = example("field.toml");
+    let agreed = json(&["--scenario", &file, "--method", "stochastic"]);
+    assert_eq!(agreed["sweeps"].as_u64(), Some(1));
+    assert!(agreed["promised"].is_boolean());
+    let sir = agreed["sir"].as_f64().unwrap();
+    let step = json(&[
+        "--scenario",
+        &file,
+        "--method",
+        "stochastic-step",
+        "--epsilon",
+        "0.01",
+    ]);
+    assert!(step["sweeps"].as_u64().unwrap() > 10);
+    assert!(sir >= step["sir"].as_f64().unwrap() - 0.01);
+    let measured = |rounds: &str| {
+        let report = json(&[
+            "--scenario",
+            &file,
+            "--method",
+            "stochastic",
+            "--closed-loop",
+            rounds,
+        ]);
+        report["sir"].as_f64().unwrap()
+    };
+    assert!(measured("6") > 0.97 * sir, "{} {sir}", measured("6"));
+}
+
+#[test]
+fn a_step_that_is_too_large_says_so() {
+    let output = chain(&[
+        "--json",
+        "--scenario",
+        &example("field.toml"),
+        "--method",
+        "stochastic-step",
+        "--epsilon",
+        "0.2",
+    ]);
+    assert_eq!(output.status.code(), Some(1));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(
+        report["error"].as_str().unwrap().contains("fixed step"),
+        "{report}"
+    );
+    assert!(report.get("best_sir").is_none());
+}
+
+#[test]
+fn every_method_can_be_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    for (scenario, method) in [
+        ("altitudes.toml", "joint"),
+        ("side.toml", "joint"),
+        ("altitudes.toml", "adjust"),
+        ("field.toml", "stochastic"),
+    ] {
+        let file = folder.path().join(format!("{method}.svg"));
+        let path = file.to_str().unwrap();
+        json(&[
+            "--scenario",
+            &example(scenario),
+            "--method",
+            method,
+            "--svg",
+            path,
+        ]);
+        let svg = std::fs::read_to_string(&file).unwrap();
+        roxmltree::Document::parse(&svg).unwrap();
+        assert!(svg.contains(method) && !svg.contains("NaN"));
+    }
+}
+
+#[test]
+fn relays_of_a_scenario_keep_what_they_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("mixed.toml");
+    let text = "[geometry]\ndistance_m = 1000.0\naltitude_m = 20.0\n[power]\ntx_w = 80.0\nuav_w = 1.0\n[[interferer]]\npower_w = 80.0\nx_m = 500.0\ny_m = 400.0\n[[relay]]\nindex = 3\naltitude_m = 30.0\npower_w = 0.5\n";
+    std::fs::write(&file, text).unwrap();
+    let picture = folder.path().join("mixed.svg");
+    let report = json(&[
+        "--uavs",
+        "4",
+        "--scenario",
+        file.to_str().unwrap(),
+        "--svg",
+        picture.to_str().unwrap(),
+    ]);
+    let heights: Vec<f64> = report["relays"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|relay| relay["h_m"].as_f64().unwrap())
+        .collect();
+    assert_eq!(heights, [20.0, 20.0, 30.0, 20.0]);
+    let drawing = std::fs::read_to_string(picture).unwrap();
+    let drawing = roxmltree::Document::parse(&drawing).unwrap();
+    assert_eq!(
+        drawing
+            .descendants()
+            .filter(|node| node.has_tag_name("circle"))
+            .count(),
+        4
+    );
+}
+
+#[test]
+fn several_interferers_are_flown_as_one_and_a_note_says_so() {
+    let several = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/several.toml");
+    let output = chain(&["--json", "--uavs", "3", "--scenario", several]);
+    assert!(output.status.success());
+    let note = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        note.starts_with("note: one interferer of 79.4") && note.lines().count() == 1,
+        "{note}"
+    );
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(report["sir"].as_f64().unwrap() > 0.1, "{report}");
+    // Held against both, it is another SIR: that of a scene with both.
+    let scenario = Scenario::load(std::path::Path::new(several)).unwrap();
+    let scene = Scene::new(&scenario, 3).unwrap();
+    let relays = report["relays"].as_array().unwrap();
+    let of = |relay: &Value, key: &str| relay[key].as_f64().unwrap();
+    let places: Vec<(f64, f64)> = relays
+        .iter()
+        .map(|relay| (of(relay, "x_m"), of(relay, "h_m")))
+        .collect();
+    let all = report["all_sir"].as_f64().unwrap();
+    assert!(
+        (all / scene.chain_sir(&places) - 1.0).abs() < 1e-9,
+        "{report}"
+    );
+    let lost = 1.0 - all / report["sir"].as_f64().unwrap();
+    assert!(
+        (report["all_loss"].as_f64().unwrap() - lost).abs() < 1e-9 && lost > 0.01,
+        "{report}"
+    );
+    let table = String::from_utf8(chain(&["--uavs", "3", "--scenario", several]).stdout).unwrap();
+    assert!(
+        table.contains("against all interferers: SIR ")
+            && table.contains("% below what the relays believe"),
+        "{table}"
+    );
+}
