@@ -17,8 +17,8 @@ use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Event, Instant, Relay, Sites};
 
-use crate::log::Log;
-use crate::replug::Replug;
+use uav_relay_linux::log::Log;
+use uav_relay_linux::replug::Replug;
 
 /// What waits for a tty that is slow, at most, bytes: some seconds of what is said.
 const WAITING: usize = 4_096;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 use uav_relay::{Duration, Instant};
 
-use crate::keep::keep;
-use crate::log::Log;
+use uav_relay_linux::keep::keep;
+use uav_relay_linux::log::Log;
 
 /// Between two tries.
 const AGAIN: Duration = Duration::from_millis(1_000);

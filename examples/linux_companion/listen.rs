@@ -3,7 +3,7 @@
 use clap::Args;
 use uav_relay::{Duration, Listen};
 
-use crate::command::number;
+use uav_relay_linux::command::number;
 
 /// The options of listening.
 #[derive(Args, Debug)]

@@ -25,25 +25,19 @@
 //! | file | one idea |
 //! | --- | --- |
 //! | `options.rs` | the command line, checked |
-//! | `config.rs`, `section.rs` | the file, as options before those of the command line; the companion's part of it |
-//! | `mission.rs`, `command.rs` | the part of it that is the mission; what is said of a mistake |
+//! | `section.rs` | the companion's part of the file, as options |
 //! | `listen.rs` | the part of it that is how the chain finds its interferer |
-//! | `tty.rs` | a tty that never blocks, as a `SerialPort` |
-//! | `replug.rs` | the same, opened again whenever it vanishes: all bytes of a port pass here |
-//! | `tap.rs` | what goes over them, in a capture |
-//! | `ports.rs` | the ttys of either wiring, and sleep until one of them or a timer needs the relay |
-//! | `site.rs`, `autopilot.rs` | where the line is on earth; the autopilot |
+//! | `ports.rs` | the ttys of either wiring |
+//! | `autopilot.rs` | the autopilot |
 //! | `positions.rs` | where the drone is, and what is heard there, from a FIFO |
 //! | `relay.rs` | the loop |
-//! | `report.rs`, `log.rs` | the lines it says; how they are written without ever waiting |
-//! | `refusals.rs` | why frames are refused, in words |
-//! | `status.rs`, `socket.rs` | all that is counted, as JSON; a socket that tells it |
-//! | `key.rs`, `epoch.rs` | what frames are signed with, from files |
+//! | `report.rs` | the lines it says |
+//! | `status.rs` | how the relay is, as JSON |
 //! | `uploads.rs` | the newest mission that was uploaded, in a file |
 //! | `views.rs` | what it has said in the votes on views, in a file |
-//! | `keep.rs`, `kept.rs` | a file that is written whole or not at all; one that is written in flight |
-//! | `system.rs`, `requests.rs` | time; signals that end it, and those that ask something of it |
-//! | `notify.rs` | what systemd is told |
+//! | `kept.rs` | a file that is written in flight |
+//!
+//! What it has in common with the ground station is a library, `examples/linux`.
 //!
 //! It runs on other kinds of Unix too; on a Mac the ttys are called `/dev/cu.*`.
 #![cfg_attr(unix, forbid(unsafe_code))]
@@ -51,26 +45,9 @@
 #[cfg(unix)]
 mod autopilot;
 #[cfg(unix)]
-mod command;
-#[cfg(unix)]
-mod config;
-#[cfg(unix)]
-mod epoch;
-#[cfg(unix)]
-mod keep;
-#[cfg(unix)]
 mod kept;
 #[cfg(unix)]
-#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
-mod key;
-#[cfg(unix)]
 mod listen;
-#[cfg(unix)]
-mod log;
-#[cfg(unix)]
-mod mission;
-#[cfg(unix)]
-mod notify;
 #[cfg(unix)]
 mod options;
 #[cfg(unix)]
@@ -78,29 +55,13 @@ mod ports;
 #[cfg(unix)]
 mod positions;
 #[cfg(unix)]
-mod refusals;
-#[cfg(unix)]
 mod relay;
-#[cfg(unix)]
-mod replug;
 #[cfg(unix)]
 mod report;
 #[cfg(unix)]
-mod requests;
-#[cfg(unix)]
 mod section;
 #[cfg(unix)]
-mod site;
-#[cfg(unix)]
-mod socket;
-#[cfg(unix)]
 mod status;
-#[cfg(unix)]
-mod system;
-#[cfg(unix)]
-mod tap;
-#[cfg(unix)]
-mod tty;
 #[cfg(unix)]
 mod uploads;
 #[cfg(unix)]
@@ -117,7 +78,7 @@ fn main() -> std::process::ExitCode {
     match relay::fly(&plan) {
         Ok(()) => ExitCode::SUCCESS,
         Err(line) => {
-            command::complain(&line);
+            uav_relay_linux::command::complain(&line);
             ExitCode::FAILURE
         }
     }

@@ -15,14 +15,14 @@ use uav_relay::{
 use uav_relay_scenario::deployment::NETWORK;
 
 use crate::autopilot::{AutopilotPlan, SigningKey, Where};
-use crate::command::{self, named};
-use crate::config::Beyond;
-use crate::key;
 use crate::listen::ListenOptions;
-use crate::log::LogOptions;
-use crate::mission::{self, MissionOptions};
 use crate::section;
-use crate::site::SiteOptions;
+use uav_relay_linux::command::{self, named};
+use uav_relay_linux::config::Beyond;
+use uav_relay_linux::log::LogOptions;
+use uav_relay_linux::mission::{self, MissionOptions};
+use uav_relay_linux::site::SiteOptions;
+use uav_relay_scenario::key;
 
 /// A frame's way through two kernels and two USB adapters, and the computing: an adapter alone may wait 16 ms.
 const LATENCY: Duration = Duration::from_millis(40);

@@ -4,16 +4,16 @@ use std::os::fd::BorrowedFd;
 use std::path::Path;
 use std::time::Duration;
 
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::event::PollFlags;
 use rustix::io::Errno;
 use serde_json::{Value, json};
 use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, SerialStats, Shared, byte_time};
 use uav_relay::{Instant, Relay};
 
-use crate::log::Log;
 use crate::options::Ttys;
-use crate::replug::Replug;
-use crate::tap;
+use uav_relay_linux::log::Log;
+use uav_relay_linux::replug::Replug;
+use uav_relay_linux::{sleep, tap};
 
 /// A tty, or the end of the chain: nobody is there.
 #[derive(Debug)]
@@ -68,7 +68,7 @@ impl Ports {
             }
         };
         if let Some(capture) = capture {
-            let taps = tap::taps(capture, &ports.names())?;
+            let taps = tap::taps(env!("CARGO_BIN_NAME"), capture, &ports.names())?;
             for (tty, tap) in ports.ttys().zip(taps) {
                 tty.tapped(tap);
             }
@@ -141,25 +141,6 @@ impl Ports {
         at_most: Option<Duration>,
         others: &[(BorrowedFd<'_>, PollFlags)],
     ) -> Result<Vec<PollFlags>, Errno> {
-        // Longer than a Timespec can be is for ever.
-        let timeout = at_most.and_then(|span| Timespec::try_from(span).ok());
-        let mut ttys: Vec<&mut Replug> = self.ttys().filter(|tty| tty.is_open()).collect();
-        let on_ttys = ttys.iter().filter_map(|tty| tty.interest());
-        let mut fds: Vec<PollFd<'_>> = others
-            .iter()
-            .copied()
-            .chain(on_ttys)
-            .map(|(fd, interest)| PollFd::from_borrowed_fd(fd, interest))
-            .collect();
-        match poll(&mut fds, timeout.as_ref()) {
-            Ok(_) | Err(Errno::INTR) => {}
-            Err(error) => return Err(error),
-        }
-        let mut found: Vec<PollFlags> = fds.iter().map(PollFd::revents).collect();
-        let on_ttys = found.split_off(others.len());
-        for (tty, events) in ttys.iter_mut().zip(on_ttys) {
-            tty.noticed(events);
-        }
-        Ok(found)
+        sleep::sleep(at_most, self.ttys(), others)
     }
 }

@@ -1,29 +1,17 @@
 //! Where the drone is, line by line from a FIFO: the autopilot's side writes `x_m y_m altitude_m` as often as it knows better, and behind
 //! that the interference that was heard there, W, if it was measured. `receiver power_w` is what the ground receiver hears.
 
-use std::fmt;
-use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::fd::BorrowedFd;
 use std::path::Path;
 
-use rustix::fs::{FileType, Mode, OFlags, fstat, open};
-use rustix::io::{Errno, read};
 use uav_relay::{Instant, Placement, Sample};
+use uav_relay_linux::lines::{Fifo, LONGEST};
+use uav_relay_linux::log::Log;
 
-use crate::log::Log;
-
-/// No line is longer.
-const LONGEST: usize = 200;
-
-/// Buffers that are read at once, at most.
-const READS: usize = 16;
-
-/// An open FIFO.
+/// The FIFO, and what its lines may say.
 #[derive(Debug)]
 pub(crate) struct Positions {
-    fd: OwnedFd,
-    name: String,
-    /// What has come of a line so far; one byte more than the longest for one that is too long.
-    begun: Vec<u8>,
+    fifo: Fifo,
     /// Whether a line may have a power, too.
     listens: bool,
     /// Lines that were none.
@@ -36,29 +24,19 @@ impl Positions {
     /// # Errors
     /// One line that says what does not work.
     pub(crate) fn open(path: &Path, listens: bool) -> Result<Self, String> {
-        let name = format!("--positions {}", path.display());
-        // With an end of its own to write to it is never at its end, whoever comes and goes.
-        let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
-        let fd = open(path, flags, Mode::empty()).map_err(|error| format!("{name}: {error}"))?;
-        let kind = fstat(&fd).map(|stat| FileType::from_raw_mode(stat.st_mode));
-        if kind != Ok(FileType::Fifo) {
-            return Err(format!("{name}: is no FIFO, make one with mkfifo"));
-        }
         Ok(Self {
-            fd,
-            name,
-            begun: Vec::new(),
+            fifo: Fifo::open("--positions", path)?,
             listens,
             bad: 0,
         })
     }
 
     pub(crate) fn fd(&self) -> BorrowedFd<'_> {
-        self.fd.as_fd()
+        self.fifo.fd()
     }
 
     /// The newest of the positions that have come since, and every measurement is handed to `heard`; the first line that is neither is said.
-    /// Work: [`READS`] buffers at most, whoever writes how much.
+    /// Work: that of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,
@@ -66,52 +44,15 @@ impl Positions {
         heard: &mut impl FnMut(Sample),
     ) -> Option<Placement> {
         let mut newest = None;
-        let mut buffer = [0; 4096];
-        for _ in 0..READS {
-            let count = match read(&self.fd, &mut buffer) {
-                Ok(count @ 1..) => count,
-                Err(Errno::INTR) => continue,
-                // This end holds the other one open as well, so there is no end, and no other error that a FIFO has.
-                _ => break,
-            };
-            for &byte in buffer.get(..count).unwrap_or_default() {
-                if byte != b'\n' {
-                    if self.begun.len() <= LONGEST {
-                        self.begun.push(byte);
-                    }
-                    continue;
-                }
-                match news(&self.begun) {
-                    Some((place, sample)) if self.listens || sample.is_none() => {
-                        newest = place.or(newest);
-                        sample.into_iter().for_each(&mut *heard);
-                    }
-                    _ => self.refuse(now, log),
-                }
-                self.begun.clear();
+        let Self { fifo, listens, bad } = self;
+        fifo.read(|line| match news(line) {
+            Some((place, sample)) if *listens || sample.is_none() => {
+                newest = place.or(newest);
+                sample.into_iter().for_each(&mut *heard);
             }
-        }
+            _ => refuse(now, log, *listens, bad, line),
+        });
         newest
-    }
-
-    fn refuse(&mut self, now: Instant, log: &Log) {
-        self.bad += 1;
-        if self.bad > 1 {
-            return;
-        }
-        let text = String::from_utf8_lossy(&self.begun);
-        log.tell(
-            now,
-            "position",
-            format_args!(
-                "{text:?} is not x_m y_m altitude_m{}; more of these are only counted",
-                if self.listens {
-                    " [power_w] or receiver power_w, a power within 1e-30 to 1e6"
-                } else {
-                    ""
-                }
-            ),
-        );
     }
 
     /// Lines that were none.
@@ -131,10 +72,25 @@ impl Positions {
     }
 }
 
-impl fmt::Display for Positions {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.name)
+/// The first line that is none is said.
+fn refuse(now: Instant, log: &Log, listens: bool, bad: &mut u64, line: &[u8]) {
+    *bad += 1;
+    if *bad > 1 {
+        return;
     }
+    let text = String::from_utf8_lossy(line);
+    log.tell(
+        now,
+        "position",
+        format_args!(
+            "{text:?} is not x_m y_m altitude_m{}; more of these are only counted",
+            if listens {
+                " [power_w] or receiver power_w, a power within 1e-30 to 1e6"
+            } else {
+                ""
+            }
+        ),
+    );
 }
 
 /// Says whether drones are kept apart.
@@ -143,7 +99,10 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
         Some(positions) => log.tell(
             Instant::ZERO,
             "guarded",
-            format_args!("setpoints keep drones apart on their way, by {positions}"),
+            format_args!(
+                "setpoints keep drones apart on their way, by {}",
+                positions.fifo
+            ),
         ),
         None => log.tell(
             Instant::ZERO,

@@ -1,39 +1,28 @@
 //! The loop: move bytes, say what happened, sleep. Once it flies nothing ends it but a signal.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::os::fd::{AsFd, BorrowedFd};
-use std::os::unix::net::UnixStream;
-use std::time::{Duration, Instant as Clock};
+use std::os::fd::BorrowedFd;
 
 use rustix::event::PollFlags;
-use serde_json::{Value, json};
+use serde_json::json;
 use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, Upload};
 
 use crate::autopilot::Companion;
-use crate::log::Log;
-use crate::notify::Notify;
 use crate::options::Plan;
 use crate::ports::Ports;
 use crate::positions::Positions;
-use crate::refusals::Refusals;
 use crate::report::Report;
-use crate::requests::Requests;
-use crate::socket::StatusSocket;
-use crate::system::{now, on_stop};
 use crate::uploads::Uploads;
 use crate::views::Views;
-use crate::{epoch, positions, socket, status, uploads, views};
-
-/// How long the last lines may take.
-const LAST_LINES: Duration = Duration::from_millis(500);
-
-/// Where it is not possible to sleep as it should be.
-const NAP: Duration = Duration::from_millis(10);
+use crate::{positions, status, uploads, views};
+use uav_relay_linux::epoch;
+use uav_relay_linux::log::Log;
+use uav_relay_linux::refusals::Refusals;
+use uav_relay_linux::service::Service;
 
 /// A relay, and all that it is connected to.
 struct Flight {
-    clock: Clock,
-    log: Log,
+    service: Service,
     report: Report,
     relay: Relay,
     ports: Ports,
@@ -43,10 +32,6 @@ struct Flight {
     uploads: Option<Uploads>,
     refusals: Refusals,
     signs: bool,
-    socket: Option<StatusSocket>,
-    requests: Requests,
-    notify: Option<Notify>,
-    stop: UnixStream,
 }
 
 /// Runs the relay until it is told to stop.
@@ -55,7 +40,7 @@ struct Flight {
 /// One line that says why it could not begin.
 pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
     let mut flight = Flight::begin(plan)?;
-    flight.notify.iter().for_each(Notify::ready);
+    flight.service.ready();
     while flight.turn() {}
     flight.end();
     Ok(())
@@ -63,7 +48,8 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
 
 impl Flight {
     fn begin(plan: &Plan) -> Result<Self, String> {
-        let (stop, requests) = (on_stop()?, Requests::new()?);
+        let service = Service::begin(&plan.log, plan.status_socket.as_deref())?;
+        let log = service.log.clone();
         let mut ports = Ports::open(&plan.ttys, plan.baud, plan.capture.as_deref())?;
         let listens = plan.settings.listen.is_some();
         let positions = plan
@@ -71,16 +57,10 @@ impl Flight {
             .as_deref()
             .map(|path| Positions::open(path, listens))
             .transpose()?;
-        let socket = plan
-            .status_socket
-            .as_deref()
-            .map(StatusSocket::open)
-            .transpose()?;
-        let clock = Clock::now();
         let autopilot = plan
             .autopilot
             .as_ref()
-            .map(|plan| Companion::open(plan, now(clock)))
+            .map(|plan| Companion::open(plan, service.now()))
             .transpose()?;
         let auth = auth(plan)?;
         let settings = Settings {
@@ -88,13 +68,12 @@ impl Flight {
             ..plan.settings
         };
         let views = Views::load(plan.view_file.as_deref())?;
-        let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), now(clock))
+        let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), service.now())
             .map_err(|error| error.to_string())?;
-        let log = Log::open(&plan.log)?;
         let resumed = resume(plan, &mut relay, &log);
         if let Some(record) = views.stored() {
             relay
-                .resume_view(now(clock), record)
+                .resume_view(service.now(), record)
                 .map_err(|error| views::refused(plan.view_file.as_deref(), &error.to_string()))?;
         }
         let report = Report::new(log.clone(), plan.identity, &plan.mission);
@@ -112,8 +91,7 @@ impl Flight {
         }
         let file = plan.secret.as_ref().and_then(|it| it.upload_file.as_ref());
         Ok(Self {
-            clock,
-            log,
+            service,
             report,
             relay,
             ports,
@@ -123,17 +101,14 @@ impl Flight {
             uploads: file.map(|file| Uploads::new(file)),
             refusals: Refusals::default(),
             signs: auth.is_some(),
-            socket,
-            requests,
-            notify: Notify::open(),
-            stop,
         })
     }
 
     /// One turn of the loop; whether there is to be another.
     fn turn(&mut self) -> bool {
-        let time = now(self.clock);
-        let Self { log, relay, .. } = self;
+        let time = self.service.now();
+        let Self { service, relay, .. } = self;
+        let log = &service.log;
         if let Some(positions) = &mut self.positions {
             let mut heard = |sample| relay.handle_sample(time, sample);
             if let Some(place) = positions.newest(time, log, &mut heard) {
@@ -164,72 +139,53 @@ impl Flight {
         if let Some(why) = self.refusals.look(time, relay.stats(), self.signs) {
             log.tell(time, "not taken", format_args!("{why}"));
         }
-        self.asked(time);
-        let again = self.autopilot.as_ref().map(|it| it.wake(now(self.clock)));
-        let alive = self.notify.as_mut().and_then(|it| it.tend(time));
+        let again = self.autopilot.as_ref().map(|it| it.wake(service.now()));
+        let alive = self.tell(time);
         let others = [again, reopen, alive].into_iter().flatten();
         let wake = wake.into_iter().chain(others).min();
         self.sleep(wake)
     }
 
-    /// Does what signals and the socket ask for.
-    fn asked(&mut self, time: Instant) {
-        if self.requests.take_hangup() {
-            self.log.reopen();
-            self.log.tell(
-                time,
-                "hang-up",
-                format_args!("the log was opened again, the relay goes on"),
-            );
-        }
-        if self.requests.take_status() {
-            let status = self.status(time);
-            let text = status.to_string();
-            self.log.say(time, "status", status, format_args!("{text}"));
-        }
-        let clients = self.socket.as_ref().map(StatusSocket::clients);
-        for client in clients.into_iter().flatten() {
-            socket::answer(client, &self.status(time));
-        }
-    }
-
-    fn status(&mut self, time: Instant) -> Value {
+    /// Does what signals and the socket ask for, and says when to come back at the latest.
+    fn tell(&mut self, time: Instant) -> Option<Instant> {
+        let Self {
+            service,
+            relay,
+            report,
+            ports,
+            ..
+        } = self;
         let upload_failures = self.uploads.as_ref().map_or(0, Uploads::failures);
-        json!({
-            "program": env!("CARGO_BIN_NAME"),
-            "program_version": env!("CARGO_PKG_VERSION"),
-            "uptime_s": time.as_micros() / 1_000_000,
-            "relay": status::of_relay(&self.relay, |node| self.report.name(node)),
-            "links": self.ports.status(),
-            "autopilot": self.autopilot.as_ref().map(Companion::status),
-            "positions_refused": self.positions.as_ref().map(Positions::bad),
-            "view_file_failures": self.views.failures(),
-            "upload_file_failures": upload_failures,
-            "lines_dropped": self.log.dropped(),
+        service.tend(time, "relay", |log| {
+            json!({
+                "program": env!("CARGO_BIN_NAME"),
+                "program_version": env!("CARGO_PKG_VERSION"),
+                "uptime_s": time.as_micros() / 1_000_000,
+                "relay": status::of_relay(relay, |node| report.name(node)),
+                "links": ports.status(),
+                "autopilot": self.autopilot.as_ref().map(Companion::status),
+                "positions_refused": self.positions.as_ref().map(Positions::bad),
+                "view_file_failures": self.views.failures(),
+                "upload_file_failures": upload_failures,
+                "lines_dropped": log.dropped(),
+            })
         })
     }
 
     /// Sleeps until there may be something to do; whether nobody said that it is enough.
     fn sleep(&mut self, wake: Option<Instant>) -> bool {
-        let time = now(self.clock);
-        let span = wake.map(|at| Duration::from_micros(at.since(time).as_micros()));
-        let [hangup, status] = self.requests.fds();
-        let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = vec![
-            (self.stop.as_fd(), PollFlags::IN),
-            (hangup, PollFlags::IN),
-            (status, PollFlags::IN),
-        ];
-        let socket = self.socket.as_ref().map(StatusSocket::fd);
+        let span = self.service.until(wake);
+        let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
         let fifo = self.positions.as_ref().map(Positions::fd);
-        others.extend(socket.into_iter().chain(fifo).map(|fd| (fd, PollFlags::IN)));
+        others.extend(fifo.map(|fd| (fd, PollFlags::IN)));
         // The last one, if any.
         let autopilot = self.autopilot.as_ref().and_then(Companion::interest);
         others.extend(autopilot);
         let found = self.ports.sleep(span, &others);
         let has_autopilot = autopilot.is_some();
         let Ok(found) = found else {
-            // For want of memory, say. A relay in the air goes on.
-            std::thread::sleep(span.map_or(NAP, |span| span.min(NAP)));
+            // A relay in the air goes on.
+            Service::nap(span);
             return true;
         };
         if let (true, Some(autopilot), Some(events)) =
@@ -237,20 +193,20 @@ impl Flight {
         {
             autopilot.noticed(*events);
         }
-        found.first().is_none_or(PollFlags::is_empty)
+        !Service::is_over(&found)
     }
 
     fn end(&mut self) {
-        self.notify.iter().for_each(Notify::stopping);
-        let time = now(self.clock);
+        self.service.stopping();
+        let (time, log) = (self.service.now(), &self.service.log);
         if let Some(positions) = &self.positions {
-            positions.stopped(time, &self.log);
+            positions.stopped(time, log);
         }
         if let Some(autopilot) = &self.autopilot {
-            autopilot.stopped(time, &self.log);
+            autopilot.stopped(time, log);
         }
         self.report.stopped(time, self.relay.stats());
-        self.log.flush(LAST_LINES);
+        self.service.end();
     }
 }
 

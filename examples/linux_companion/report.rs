@@ -8,9 +8,10 @@ use uav_relay::sensing::belief::{Belief, Told};
 use uav_relay::wire::digest::digest;
 use uav_relay::{Event, Identity, Instant, Mission, Placement, Relay, Side, Stats, Upload};
 
-use crate::log::Log;
-use crate::site::Between;
-use crate::status::{at, counted};
+use crate::status::at;
+use uav_relay_linux::counters::counted;
+use uav_relay_linux::log::Log;
+use uav_relay_linux::site::Between;
 
 /// An f32 for people and, exactly, for programs.
 struct Exact(f32);

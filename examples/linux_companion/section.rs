@@ -1,10 +1,8 @@
 //! The companion's own part of the file, as options.
 
-use std::path::PathBuf;
-
 use uav_relay_scenario::deployment::Deployment;
 
-use crate::config::{Given, network};
+use uav_relay_linux::config::{Given, network};
 
 /// What a file says to a companion.
 pub(crate) fn companion(deployment: &Deployment, given: &mut Given) {
@@ -17,12 +15,7 @@ pub(crate) fn companion(deployment: &Deployment, given: &mut Given) {
     given.path("--epoch-file", own.epoch_file.as_ref());
     given.path("--upload-file", own.upload_file.as_ref());
     given.path("--view-file", own.view_file.as_ref());
-    match own.autopilot.as_ref() {
-        Some(tty) if !tty.starts_with("udp:") => {
-            given.path("--autopilot", Some(&PathBuf::from(tty)));
-        }
-        other => given.value("--autopilot", other),
-    }
+    given.path_or_udp("--autopilot", own.autopilot.as_ref());
     given.value("--autopilot-baud", own.autopilot_baud);
     given.path("--autopilot-key-file", own.autopilot_key_file.as_ref());
     given.value("--speed", own.speed_m_s);

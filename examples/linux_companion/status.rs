@@ -1,7 +1,8 @@
 //! What a relay has counted and how it is, as one JSON object.
 
 use serde_json::{Value, json};
-use uav_relay::{Placement, Relay, Stats};
+use uav_relay::{Placement, Relay};
+use uav_relay_linux::counters::counted;
 
 /// A place, m.
 pub(crate) fn at(place: Placement) -> Value {
@@ -25,35 +26,5 @@ pub(crate) fn of_relay(relay: &Relay, name: impl Fn(u16) -> String) -> Value {
         "upstream": upstream,
         "downstream": downstream,
         "counters": counted(relay.stats()),
-    })
-}
-
-/// Every counter of `stats`.
-pub(crate) fn counted(stats: &Stats) -> Value {
-    json!({
-        "sent": stats.sent,
-        "repeats": stats.repeats,
-        "sweeps": stats.sweeps,
-        "received": stats.received,
-        "repeated": stats.repeated,
-        "overheard": stats.overheard,
-        "refused": stats.rejected(),
-        "oversized": stats.oversized,
-        "truncated": stats.truncated,
-        "crc": stats.crc,
-        "version": stats.version,
-        "handshakes": stats.handshakes,
-        "unsigned": stats.unsigned,
-        "forged": stats.forged,
-        "replayed": stats.replayed,
-        "malformed": stats.malformed,
-        "foreign": stats.foreign,
-        "misaddressed": stats.misaddressed,
-        "misdirected": stats.misdirected,
-        "mission": stats.mission,
-        "view": stats.view,
-        "views": stats.views,
-        "stale": stats.stale,
-        "samples_refused": stats.samples_refused,
     })
 }

@@ -11,7 +11,7 @@ use uav_relay::wire::upload::LENGTH;
 use uav_relay::{Instant, Mission, Upload};
 
 use crate::kept::Kept;
-use crate::log::Log;
+use uav_relay_linux::log::Log;
 
 /// Bytes of the file.
 const STORED: usize = LENGTH + 4;

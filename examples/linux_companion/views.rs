@@ -10,7 +10,7 @@ use uav_relay::wire::crc::CRC_32C;
 use uav_relay::{Instant, Relay, ViewRecord};
 
 use crate::kept::Kept;
-use crate::log::Log;
+use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--view-file";
 

@@ -19,46 +19,13 @@
 //! | `options.rs` | the command line, checked |
 //! | `station.rs` | the loop |
 //!
-//! The other files are those of `examples/linux_companion`.
+//! What it has in common with the relay is a library, `examples/linux`.
 #![cfg_attr(unix, forbid(unsafe_code))]
 
 #[cfg(unix)]
-#[path = "../linux_companion/command.rs"]
-mod command;
-#[cfg(unix)]
-#[path = "../linux_companion/config.rs"]
-#[expect(dead_code, reason = "what single relays have of their own")]
-mod config;
-#[cfg(unix)]
-#[path = "../linux_companion/epoch.rs"]
-mod epoch;
-#[cfg(unix)]
-#[path = "../linux_companion/keep.rs"]
-mod keep;
-#[cfg(unix)]
-#[path = "../linux_companion/key.rs"]
-#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
-mod key;
-#[cfg(unix)]
-#[path = "../linux_companion/log.rs"]
-#[expect(dead_code, reason = "a relay goes on where this one ends")]
-mod log;
-#[cfg(unix)]
-#[path = "../linux_companion/mission.rs"]
-mod mission;
-#[cfg(unix)]
 mod options;
 #[cfg(unix)]
-#[path = "../linux_companion/site.rs"]
-mod site;
-#[cfg(unix)]
 mod station;
-#[cfg(unix)]
-#[path = "../linux_companion/system.rs"]
-mod system;
-#[cfg(unix)]
-#[path = "../linux_companion/tty.rs"]
-mod tty;
 
 #[cfg(unix)]
 fn main() -> std::process::ExitCode {
@@ -71,7 +38,7 @@ fn main() -> std::process::ExitCode {
     match station::upload(&plan) {
         Ok(()) => ExitCode::SUCCESS,
         Err(line) => {
-            command::complain(&line);
+            uav_relay_linux::command::complain(&line);
             ExitCode::FAILURE
         }
     }

@@ -12,15 +12,15 @@ use uav_relay::{
 };
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 
-use crate::command;
-use crate::config::{self, Beyond, Given};
-use crate::key;
-use crate::log::LogOptions;
-use crate::mission::{
+use uav_relay_linux::command;
+use uav_relay_linux::config::{self, Beyond, Given};
+use uav_relay_linux::log::LogOptions;
+use uav_relay_linux::mission::{
     MissionOptions, altitude, band, distance, interferer, left, mission, noise, power, right,
     separation,
 };
-use crate::site::{SiteOptions, site};
+use uav_relay_linux::site::{SiteOptions, site};
+use uav_relay_scenario::key;
 
 /// Uploads a new mission to a chain of relays in flight. The options up to --min-separation say what the relays were loaded with; those
 /// that begin with --new- what is different from now on, and without any of them it is what they were loaded with. The number of

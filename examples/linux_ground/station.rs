@@ -10,12 +10,12 @@ use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Ground, Instant, Key, Progress, Side, Stats};
 
-use crate::epoch;
-use crate::log::Log;
 use crate::options::Plan;
-use crate::site::Between;
-use crate::system::{now, on_stop};
-use crate::tty::Tty;
+use uav_relay_linux::epoch;
+use uav_relay_linux::log::Log;
+use uav_relay_linux::site::Between;
+use uav_relay_linux::system::{now, on_stop};
+use uav_relay_linux::tty::Tty;
 
 /// How long the last lines may take.
 const LAST_LINES: std::time::Duration = std::time::Duration::from_millis(500);

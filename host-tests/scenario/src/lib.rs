@@ -6,6 +6,7 @@
 //! | [`mission`] | from a scenario to the mission that relays fly |
 //! | [`scene`], [`hypothetical`] | several interferers whose powers add up, and the one that stands for them |
 //! | [`deployment`] | what the programs of a chain need beside the scenario, in sections of the same file |
+//! | [`key`] | the network's key, or an autopilot's, from a file |
 //! | [`number`] | from the f64 of files to the f32 of relays |
 //!
 //! A file is read in three passes, each with one job: `check` compares its shape, its keys and every range with
@@ -20,6 +21,7 @@ mod error;
 mod file;
 pub mod hypothetical;
 mod interferer;
+pub mod key;
 mod keys;
 pub mod mission;
 pub mod number;

@@ -4,7 +4,6 @@
 //! | --- | --- |
 //! | [`config`] | the block, byte by byte; a crate of its own, as the firmware has it |
 //! | [`course`] | the line on earth that its sites make; the firmware's own file |
-//! | [`key`] | the network's key, from a file; the Linux companion's own file |
 //! | [`block`] | from a scenario to the block of one drone |
 //! | [`folder`] | the blocks of a whole flight: all of them, or none |
 //! | [`summary`] | what is in that folder, and what to type |
@@ -13,8 +12,6 @@ pub mod block;
 #[path = "../../../../examples/stm32f405/course.rs"]
 pub mod course;
 pub mod folder;
-#[path = "../../../../examples/linux_companion/key.rs"]
-pub mod key;
 pub mod summary;
 
 pub use uav_relay_block as config;

@@ -9,7 +9,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use clap::Parser as _;
 use uav_relay::{Adjust, ChannelLoad, Local, Measure, Settings};
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
-use uav_relay_scenario::{Interference, PlannedMethod, Scenario, mission};
+use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
 use uav_relay_sim::command::{self, Failure};
 use uav_relay_sim::simulator::medium::access::OVERHEAD;
 use uav_relay_tools::plan::carried::is_current;
@@ -17,7 +17,7 @@ use uav_relay_tools::plan::flown::{Flown, flown};
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::{ADDRESS, LEN, Secret};
 use uav_relay_tools::provision::summary::{Heading, summary};
-use uav_relay_tools::provision::{folder, key};
+use uav_relay_tools::provision::folder;
 
 use options::{Method, Options};
 

@@ -13,7 +13,7 @@ const DAMAGED: u32 = 10;
 
 /// What was seen, and what was said.
 #[derive(Debug, Default)]
-pub(crate) struct Refusals {
+pub struct Refusals {
     last: Stats,
     look_at: Instant,
     told: [bool; 5],
@@ -21,7 +21,7 @@ pub(crate) struct Refusals {
 
 impl Refusals {
     /// A reason that was not said before, if there is one now.
-    pub(crate) fn look(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
+    pub fn look(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
         if now < self.look_at {
             return None;
         }

@@ -13,7 +13,7 @@ use uav_relay::serial::{Fault, SerialPort};
 
 /// An open tty.
 #[derive(Debug)]
-pub(crate) struct Tty {
+pub struct Tty {
     fd: OwnedFd,
     /// Option and path, as messages have it.
     name: String,
@@ -27,7 +27,7 @@ impl Tty {
     ///
     /// # Errors
     /// One line that says what does not work.
-    pub(crate) fn open(option: &str, path: &Path, baud: u32) -> Result<Self, String> {
+    pub fn open(option: &str, path: &Path, baud: u32) -> Result<Self, String> {
         let name = format!("{option} {}", path.display());
         let fd = configured(path, baud).map_err(|error| match error {
             Errno::WOULDBLOCK => format!("{name}: is in use already"),
@@ -49,7 +49,7 @@ impl Tty {
     }
 
     /// What to sleep on: bytes that come in, and room if there was none.
-    pub(crate) fn interest(&self) -> PollFlags {
+    pub fn interest(&self) -> PollFlags {
         if self.full {
             PollFlags::IN | PollFlags::OUT
         } else {
@@ -58,14 +58,14 @@ impl Tty {
     }
 
     /// Takes note of what poll(2) has found. An adapter that is pulled out stays ready for ever: without this, a busy loop.
-    pub(crate) fn noticed(&mut self, events: PollFlags) {
+    pub fn noticed(&mut self, events: PollFlags) {
         if events.intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL) {
             self.fail("is gone");
         }
     }
 
     /// The line that says why this tty is of no use any more.
-    pub(crate) fn failure(&self) -> Option<&str> {
+    pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
     }
 

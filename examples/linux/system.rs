@@ -8,7 +8,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use uav_relay::Instant;
 
 /// Time since the start, by a clock that nobody sets.
-pub(crate) fn now(clock: Clock) -> Instant {
+pub fn now(clock: Clock) -> Instant {
     Instant::from_micros(u64::try_from(clock.elapsed().as_micros()).unwrap_or(u64::MAX))
 }
 
@@ -16,7 +16,7 @@ pub(crate) fn now(clock: Clock) -> Instant {
 ///
 /// # Errors
 /// One line that says what does not work.
-pub(crate) fn on_stop() -> Result<UnixStream, String> {
+pub fn on_stop() -> Result<UnixStream, String> {
     on(&[SIGINT, SIGTERM])
 }
 
@@ -24,7 +24,7 @@ pub(crate) fn on_stop() -> Result<UnixStream, String> {
 ///
 /// # Errors
 /// One line that says what does not work.
-pub(crate) fn on(signals: &[i32]) -> Result<UnixStream, String> {
+pub fn on(signals: &[i32]) -> Result<UnixStream, String> {
     let pipe = || -> io::Result<UnixStream> {
         let (ours, theirs) = UnixStream::pair()?;
         ours.set_nonblocking(true)?;

@@ -18,37 +18,45 @@ const TOLERANCE: f64 = 1e-4;
 
 /// What only a file can say.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Beyond {
+pub struct Beyond {
     /// The channel; without it that of the paper.
-    pub(crate) channel: Option<Channel>,
+    pub channel: Option<Channel>,
     /// The field, where the file has one.
-    pub(crate) field: Option<Interference>,
+    pub field: Option<Interference>,
     /// What single relays have of their own.
-    pub(crate) profiles: Vec<(u16, Profile)>,
+    pub profiles: Vec<(u16, Profile)>,
 }
 
 /// Options that a file gives: their names, and their values; none for those without one.
 #[derive(Debug, Default)]
-pub(crate) struct Given {
+pub struct Given {
     options: Vec<(&'static str, Option<OsString>)>,
     folder: PathBuf,
 }
 
 impl Given {
     /// An option with a value, if there is one.
-    pub(crate) fn value(&mut self, name: &'static str, value: Option<impl ToString>) {
+    pub fn value(&mut self, name: &'static str, value: Option<impl ToString>) {
         let value = value.map(|value| value.to_string().into());
         self.options.extend(value.map(|value| (name, Some(value))));
     }
 
     /// An option with a path, which is relative to the folder of the file.
-    pub(crate) fn path(&mut self, name: &'static str, path: Option<&PathBuf>) {
+    pub fn path(&mut self, name: &'static str, path: Option<&PathBuf>) {
         let path = path.map(|path| self.folder.join(path).into_os_string());
         self.options.extend(path.map(|path| (name, Some(path))));
     }
 
+    /// An option with a path, as [`path`](Self::path), or with an address that begins with `udp:`.
+    pub fn path_or_udp(&mut self, name: &'static str, place: Option<&String>) {
+        match place {
+            Some(path) if !path.starts_with("udp:") => self.path(name, Some(&PathBuf::from(path))),
+            other => self.value(name, other),
+        }
+    }
+
     /// An option without a value.
-    pub(crate) fn flag(&mut self, name: &'static str, is: Option<bool>) {
+    pub fn flag(&mut self, name: &'static str, is: Option<bool>) {
         if is == Some(true) {
             self.options.push((name, None));
         }
@@ -96,7 +104,7 @@ const OTHERWISE: [(&str, &[&str]); 6] = [
 ///
 /// # Errors
 /// One line that says what is wrong with the file.
-pub(crate) fn read<T: Parser>(
+pub fn read<T: Parser>(
     section: fn(&Deployment, &mut Given),
 ) -> Result<(Vec<OsString>, Beyond), String> {
     let mut words = std::env::args_os();
@@ -204,7 +212,7 @@ fn unspaced(scenario: &Scenario) -> Scenario {
 }
 
 /// The sections that every program reads.
-pub(crate) fn network(deployment: &Deployment, given: &mut Given) {
+pub fn network(deployment: &Deployment, given: &mut Given) {
     let network = &deployment.network;
     given.value("--network", network.id);
     given.value("--of", network.relays);

@@ -12,7 +12,7 @@ use crate::system::on;
 
 /// A stream for each of the two.
 #[derive(Debug)]
-pub(crate) struct Requests {
+pub struct Requests {
     hangup: UnixStream,
     status: UnixStream,
 }
@@ -22,7 +22,7 @@ impl Requests {
     ///
     /// # Errors
     /// One line that says what does not work.
-    pub(crate) fn new() -> Result<Self, String> {
+    pub fn new() -> Result<Self, String> {
         signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))
             .map_err(|error| format!("cannot wait for signals: {error}"))?;
         Ok(Self {
@@ -32,17 +32,17 @@ impl Requests {
     }
 
     /// What to sleep on.
-    pub(crate) fn fds(&self) -> [BorrowedFd<'_>; 2] {
+    pub fn fds(&self) -> [BorrowedFd<'_>; 2] {
         [self.hangup.as_fd(), self.status.as_fd()]
     }
 
     /// Whether there was a SIGHUP since.
-    pub(crate) fn take_hangup(&mut self) -> bool {
+    pub fn take_hangup(&mut self) -> bool {
         drained(&mut self.hangup)
     }
 
     /// Whether there was a SIGUSR1 since.
-    pub(crate) fn take_status(&mut self) -> bool {
+    pub fn take_status(&mut self) -> bool {
         drained(&mut self.status)
     }
 }

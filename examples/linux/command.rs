@@ -10,9 +10,10 @@ use crate::config::{self, Beyond, Given};
 
 /// Reads the command line, and the file that `--config` names in it; where there is nothing to run, help or the mistake has been printed.
 /// `section` is the program's own part of the file.
-pub(crate) fn read<T: Parser>(
-    section: fn(&Deployment, &mut Given),
-) -> Result<(T, Beyond), ExitCode> {
+///
+/// # Errors
+/// The status to end with.
+pub fn read<T: Parser>(section: fn(&Deployment, &mut Given)) -> Result<(T, Beyond), ExitCode> {
     let (words, beyond) = config::read::<T>(section).map_err(|line| refuse(&line))?;
     let options = T::try_parse_from(words).map_err(|error| {
         if !error.use_stderr() {
@@ -43,13 +44,13 @@ fn first(text: &str) -> String {
 }
 
 /// Says what is wrong.
-pub(crate) fn refuse(line: &str) -> ExitCode {
+pub fn refuse(line: &str) -> ExitCode {
     complain(line);
     ExitCode::from(2)
 }
 
 /// One line on standard error. Not `eprintln!`: that panics where nobody reads any more.
-pub(crate) fn complain(line: &str) {
+pub fn complain(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
@@ -57,7 +58,7 @@ pub(crate) fn complain(line: &str) {
 ///
 /// # Errors
 /// The range, where it is not one of them.
-pub(crate) fn whole<T: TryFrom<u64>>(text: &str, least: u64, most: u64) -> Result<T, String> {
+pub fn whole<T: TryFrom<u64>>(text: &str, least: u64, most: u64) -> Result<T, String> {
     let value: Option<u64> = text.trim().parse().ok();
     value
         .filter(|value| (least..=most).contains(value))
@@ -69,7 +70,7 @@ pub(crate) fn whole<T: TryFrom<u64>>(text: &str, least: u64, most: u64) -> Resul
 ///
 /// # Errors
 /// The range, where it is not one of them.
-pub(crate) fn number(text: &str, least: f32, most: f32) -> Result<f32, String> {
+pub fn number(text: &str, least: f32, most: f32) -> Result<f32, String> {
     let value = text.trim().parse().ok();
     value
         .filter(|value| (least..=most).contains(value))
@@ -80,6 +81,6 @@ pub(crate) fn number(text: &str, least: f32, most: f32) -> Result<f32, String> {
 ///
 /// # Errors
 /// As [`number`], with its name.
-pub(crate) fn named(name: &str, text: &str, least: f32, most: f32) -> Result<f32, String> {
+pub fn named(name: &str, text: &str, least: f32, most: f32) -> Result<f32, String> {
     number(text, least, most).map_err(|error| format!("{name} {error}"))
 }

@@ -8,7 +8,7 @@ use uav_relay::{Geodetic, Sites};
 
 /// The two ends of the line.
 #[derive(Args, Debug)]
-pub(crate) struct SiteOptions {
+pub struct SiteOptions {
     /// Where the transmitter is: latitude and longitude, degrees (WGS84), and the ground's height above the mean sea level, m
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_rx", allow_hyphen_values = true, value_parser = site)]
     site_tx: Option<Geodetic>,
@@ -19,7 +19,7 @@ pub(crate) struct SiteOptions {
 
 impl SiteOptions {
     /// Both, if they were given.
-    pub(crate) fn sites(&self) -> Option<Sites> {
+    pub fn sites(&self) -> Option<Sites> {
         let (Some(tx), Some(rx)) = (self.site_tx, self.site_rx) else {
             return None;
         };
@@ -30,7 +30,7 @@ impl SiteOptions {
     ///
     /// # Errors
     /// One line that says what is wrong.
-    pub(crate) fn of(&self, distance_m: f32) -> Result<Option<Sites>, String> {
+    pub fn of(&self, distance_m: f32) -> Result<Option<Sites>, String> {
         let Some(sites) = self.sites() else {
             return Ok(None);
         };
@@ -46,7 +46,8 @@ impl SiteOptions {
 }
 
 /// Two sites for people, and for other programs: as options give them.
-pub(crate) struct Between(pub(crate) Sites);
+#[derive(Clone, Copy, Debug)]
+pub struct Between(pub Sites);
 
 impl fmt::Display for Between {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -56,14 +57,17 @@ impl fmt::Display for Between {
 }
 
 /// A site as options give it.
-pub(crate) fn degrees(at: Geodetic) -> String {
+pub fn degrees(at: Geodetic) -> String {
     let part = |number: i32, unit: f64| f64::from(number) / unit;
     let (lat, lon) = (part(at.lat_e7, 1e7), part(at.lon_e7, 1e7));
     format!("{lat:.7},{lon:.7},{:.3}", part(at.amsl_mm, 1e3))
 }
 
 /// Latitude, longitude, height.
-pub(crate) fn site(text: &str) -> Result<Geodetic, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn site(text: &str) -> Result<Geodetic, String> {
     let form = "must be LAT,LON,AMSL: degrees within -90 to 90 and -180 to 180, and metres within -1000 to 10000";
     let numbers: Option<Vec<f64>> = text
         .split(',')

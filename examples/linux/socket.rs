@@ -14,7 +14,7 @@ const ANSWERS: usize = 4;
 
 /// The socket; its name is removed in the end.
 #[derive(Debug)]
-pub(crate) struct StatusSocket {
+pub struct StatusSocket {
     listener: UnixListener,
     path: PathBuf,
 }
@@ -24,7 +24,7 @@ impl StatusSocket {
     ///
     /// # Errors
     /// One line that names it and what is wrong.
-    pub(crate) fn open(path: &Path) -> Result<Self, String> {
+    pub fn open(path: &Path) -> Result<Self, String> {
         let named =
             |error: &dyn std::fmt::Display| format!("--status-socket {}: {error}", path.display());
         if let Ok(there) = path.symlink_metadata() {
@@ -47,19 +47,19 @@ impl StatusSocket {
     }
 
     /// What to sleep on.
-    pub(crate) fn fd(&self) -> BorrowedFd<'_> {
+    pub fn fd(&self) -> BorrowedFd<'_> {
         self.listener.as_fd()
     }
 
     /// Whoever has connected since.
-    pub(crate) fn clients(&self) -> Vec<UnixStream> {
+    pub fn clients(&self) -> Vec<UnixStream> {
         let accepted = (0..ANSWERS).map_while(|_| self.listener.accept().ok());
         accepted.map(|(client, _)| client).collect()
     }
 }
 
 /// Answers with `status`. It fits into what the kernel holds for a connection; who leaves no room gets less.
-pub(crate) fn answer(mut client: UnixStream, status: &Value) {
+pub fn answer(mut client: UnixStream, status: &Value) {
     if client.set_nonblocking(true).is_ok() {
         let _ = client.write_all(format!("{status}\n").as_bytes());
     }

@@ -22,7 +22,7 @@ const LONGEST: Duration = Duration::from_millis(4_000);
 ///
 /// All that comes and goes over a port passes through its `read` and `write`.
 #[derive(Debug)]
-pub(crate) struct Replug {
+pub struct Replug {
     option: &'static str,
     path: PathBuf,
     baud: u32,
@@ -49,7 +49,7 @@ impl Replug {
     ///
     /// # Errors
     /// One line that names the option and what is wrong.
-    pub(crate) fn open(option: &'static str, path: &Path, baud: u32) -> Result<Self, String> {
+    pub fn open(option: &'static str, path: &Path, baud: u32) -> Result<Self, String> {
         Ok(Self {
             option,
             path: path.to_owned(),
@@ -63,12 +63,12 @@ impl Replug {
     }
 
     /// What it carries from now on is written down there.
-    pub(crate) fn tapped(&mut self, tap: Tap) {
+    pub fn tapped(&mut self, tap: Tap) {
         self.tap = Some(tap);
     }
 
     /// Gives a tty up that is of no use any more, and opens it again when it is time to. Each is said once.
-    pub(crate) fn tend(&mut self, now: Instant, log: &Log) {
+    pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {
             let fields = json!({ "option": self.option, "port": self.path.display().to_string() });
@@ -105,29 +105,29 @@ impl Replug {
     }
 
     /// When it is to be tried again.
-    pub(crate) fn wake(&self) -> Option<Instant> {
+    pub fn wake(&self) -> Option<Instant> {
         self.tty.is_none().then_some(self.again_at)
     }
 
     /// What to sleep on.
-    pub(crate) fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
+    pub fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
         self.tty.as_ref().map(|tty| (tty.as_fd(), tty.interest()))
     }
 
     /// Takes note of what poll(2) has found.
-    pub(crate) fn noticed(&mut self, events: PollFlags) {
+    pub fn noticed(&mut self, events: PollFlags) {
         if let Some(tty) = &mut self.tty {
             tty.noticed(events);
         }
     }
 
     /// Whether it is there.
-    pub(crate) const fn is_open(&self) -> bool {
+    pub const fn is_open(&self) -> bool {
         self.tty.is_some()
     }
 
     /// What it has counted.
-    pub(crate) fn status(&self) -> Value {
+    pub fn status(&self) -> Value {
         json!({
             "option": self.option,
             "port": self.path.display().to_string(),

@@ -22,7 +22,7 @@ struct Piece {
 
 /// The tap of one port.
 #[derive(Debug)]
-pub(crate) struct Tap {
+pub struct Tap {
     port: usize,
     sender: SyncSender<Piece>,
     left_out: u64,
@@ -31,7 +31,7 @@ pub(crate) struct Tap {
 
 impl Tap {
     /// Bytes have come or gone.
-    pub(crate) fn take(&mut self, direction: Direction, bytes: &[u8]) {
+    pub fn take(&mut self, direction: Direction, bytes: &[u8]) {
         if bytes.is_empty() || self.is_over {
             return;
         }
@@ -52,24 +52,24 @@ impl Tap {
     }
 
     /// Whether the file could not be written any more.
-    pub(crate) const fn is_over(&self) -> bool {
+    pub const fn is_over(&self) -> bool {
         self.is_over
     }
 
     /// Pieces that are missing in it.
-    pub(crate) const fn left_out(&self) -> u64 {
+    pub const fn left_out(&self) -> u64 {
         self.left_out
     }
 }
 
-/// Begins the capture at `path`, in place of what was there, and gives a tap for each of the ports of these names.
+/// Begins the capture of `program` at `path`, in place of what was there, and gives a tap for each of the ports of these names.
 ///
 /// # Errors
 /// One line that names the file.
-pub(crate) fn taps(path: &Path, ports: &[String]) -> Result<Vec<Tap>, String> {
+pub fn taps(program: &str, path: &Path, ports: &[String]) -> Result<Vec<Tap>, String> {
     let wrong = |error: io::Error| format!("--capture {}: {error}", path.display());
     let out = BufWriter::new(File::create(path).map_err(wrong)?);
-    let mut capture = Capture::new(out, "linux_companion", "").map_err(wrong)?;
+    let mut capture = Capture::new(out, program, "").map_err(wrong)?;
     let interfaces: Vec<Interface> = ports
         .iter()
         .map(|name| capture.interface(name, "").map_err(wrong))

@@ -16,43 +16,43 @@ const PAPERS: Interference = Interference::Source(Interferer {
 
 /// The options of a mission but for the number of relays.
 #[derive(Args, Debug)]
-pub(crate) struct MissionOptions {
+pub struct MissionOptions {
     /// Distance from transmitter to receiver, m, 1 to 1e6
     #[arg(long, value_name = "M", default_value_t = 1000.0, allow_negative_numbers = true, value_parser = distance)]
-    pub(crate) distance: f32,
+    pub distance: f32,
     /// Altitude of every relay, m, 0.1 to 1e5
     #[arg(long, value_name = "M", default_value_t = 20.0, allow_negative_numbers = true, value_parser = altitude)]
-    pub(crate) altitude: f32,
+    pub altitude: f32,
     /// Altitudes to choose from, m, 0.1 to 1e5, --altitude among them; without it that alone
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
-    pub(crate) band: Option<Band>,
+    pub band: Option<Band>,
     /// Room to the left of the line to the receiver, as y in m, -1e5 to 0, for places that `joint` chooses
     #[arg(long = "lateral-min-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = left)]
-    pub(crate) lateral_min: f32,
+    pub lateral_min: f32,
     /// Room to its right, as y in m, 0 to 1e5
     #[arg(long = "lateral-max-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = right)]
-    pub(crate) lateral_max: f32,
+    pub lateral_max: f32,
     /// Power of the transmitter, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", default_value_t = 80.0, allow_negative_numbers = true, value_parser = power)]
-    pub(crate) tx_power: f32,
+    pub tx_power: f32,
     /// Power of every relay, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = power)]
-    pub(crate) uav_power: f32,
+    pub uav_power: f32,
     /// Interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7); or `unknown`, to relays
     /// that listen; without it 80,500,400
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = guess)]
-    pub(crate) interferer: Option<Interference>,
+    pub interferer: Option<Interference>,
     /// Noise power at every receiver, W, 0 to 1
     #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = noise)]
-    pub(crate) noise: f32,
+    pub noise: f32,
     /// Least distance between two relays, m, 0 to 1e5
     #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = separation)]
-    pub(crate) min_separation: f32,
+    pub min_separation: f32,
 }
 
 impl MissionOptions {
     /// What disturbs the hops: what was given, else the `field` of a file, else the paper's interferer.
-    pub(crate) fn interference(&self, field: Option<Interference>) -> Interference {
+    pub fn interference(&self, field: Option<Interference>) -> Interference {
         self.interferer.or(field).unwrap_or(PAPERS)
     }
 
@@ -60,7 +60,7 @@ impl MissionOptions {
     ///
     /// # Errors
     /// One line that says what is wrong.
-    pub(crate) fn config(
+    pub fn config(
         &self,
         relays: u16,
         interference: Interference,
@@ -98,7 +98,7 @@ impl MissionOptions {
 ///
 /// # Errors
 /// One line that names the option and what is wrong.
-pub(crate) fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
+pub fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
     let MissionConfig {
         relays,
         distance_m,
@@ -120,42 +120,66 @@ pub(crate) fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, St
 }
 
 /// m, 1 to 1e6.
-pub(crate) fn distance(text: &str) -> Result<f32, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn distance(text: &str) -> Result<f32, String> {
     number(text, 1.0, 1e6)
 }
 
 /// m, 0.1 to 1e5.
-pub(crate) fn altitude(text: &str) -> Result<f32, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn altitude(text: &str) -> Result<f32, String> {
     number(text, 0.1, 1e5)
 }
 
 /// y, m, -1e5 to 0.
-pub(crate) fn left(text: &str) -> Result<f32, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn left(text: &str) -> Result<f32, String> {
     number(text, -1e5, 0.0)
 }
 
 /// y, m, 0 to 1e5.
-pub(crate) fn right(text: &str) -> Result<f32, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn right(text: &str) -> Result<f32, String> {
     number(text, 0.0, 1e5)
 }
 
 /// W, 1e-6 to 1e6.
-pub(crate) fn power(text: &str) -> Result<f32, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn power(text: &str) -> Result<f32, String> {
     number(text, 1e-6, 1e6)
 }
 
 /// W, 0 to 1.
-pub(crate) fn noise(text: &str) -> Result<f32, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn noise(text: &str) -> Result<f32, String> {
     number(text, 0.0, 1.0)
 }
 
 /// m, 0 to 1e5.
-pub(crate) fn separation(text: &str) -> Result<f32, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn separation(text: &str) -> Result<f32, String> {
     number(text, 0.0, 1e5)
 }
 
 /// `unknown`, or power, W, and place, m.
-pub(crate) fn guess(text: &str) -> Result<Interference, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn guess(text: &str) -> Result<Interference, String> {
     if text == "unknown" {
         return Ok(Interference::Unknown);
     }
@@ -163,7 +187,10 @@ pub(crate) fn guess(text: &str) -> Result<Interference, String> {
 }
 
 /// Power, W, and place, m.
-pub(crate) fn interferer(text: &str) -> Result<Interferer, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn interferer(text: &str) -> Result<Interferer, String> {
     let [power, x, y] = text.split(',').collect::<Vec<_>>()[..] else {
         return Err("must be three numbers: P,X,Y".to_owned());
     };
@@ -175,7 +202,10 @@ pub(crate) fn interferer(text: &str) -> Result<Interferer, String> {
 }
 
 /// Two altitudes, m.
-pub(crate) fn band(text: &str) -> Result<Band, String> {
+///
+/// # Errors
+/// What it must be, where it is not.
+pub fn band(text: &str) -> Result<Band, String> {
     let (least, most) = text
         .split_once(',')
         .ok_or("must be two numbers: LEAST,MOST")?;

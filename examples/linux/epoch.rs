@@ -14,7 +14,7 @@ use crate::keep::keep;
 ///
 /// # Errors
 /// One line that names the file and what is wrong.
-pub(crate) fn next(file: &Path) -> Result<u32, String> {
+pub fn next(file: &Path) -> Result<u32, String> {
     let named = |error: &str| format!("--epoch-file {}: {error}", file.display());
     let last = match std::fs::read_to_string(file) {
         Ok(text) => text.trim().parse().ok(),

@@ -21,7 +21,7 @@ const QUEUE: usize = 1_024;
 /// How the lines are written, and where.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Log")]
-pub(crate) struct LogOptions {
+pub struct LogOptions {
     /// Every line is one JSON object
     #[arg(long)]
     json: bool,
@@ -45,7 +45,7 @@ struct Shared {
 
 /// Takes lines. No call waits, and none fails.
 #[derive(Clone, Debug)]
-pub(crate) struct Log {
+pub struct Log {
     orders: SyncSender<Order>,
     shared: Arc<Shared>,
     json: bool,
@@ -56,7 +56,7 @@ impl Log {
     ///
     /// # Errors
     /// One line that names the file that cannot be opened.
-    pub(crate) fn open(options: &LogOptions) -> Result<Self, String> {
+    pub fn open(options: &LogOptions) -> Result<Self, String> {
         let out = Out::open(options.log_file.as_deref())?;
         let (orders, taken) = sync_channel(QUEUE);
         let shared = Arc::new(Shared::default());
@@ -79,7 +79,7 @@ impl Log {
     }
 
     /// One line: what happened at `now`, in one word or two and for people; `fields` are for programs alone.
-    pub(crate) fn say(&self, now: Instant, event: &str, fields: Value, text: fmt::Arguments<'_>) {
+    pub fn say(&self, now: Instant, event: &str, fields: Value, text: fmt::Arguments<'_>) {
         let line = rendered(self.json, now, event, fields, &text.to_string());
         if self.orders.try_send(Order::Line(now, line)).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
@@ -87,22 +87,22 @@ impl Log {
     }
 
     /// The same without fields.
-    pub(crate) fn tell(&self, now: Instant, event: &str, text: fmt::Arguments<'_>) {
+    pub fn tell(&self, now: Instant, event: &str, text: fmt::Arguments<'_>) {
         self.say(now, event, Value::Null, text);
     }
 
     /// Opens the file again before the next line, as after it was moved away.
-    pub(crate) fn reopen(&self) {
+    pub fn reopen(&self) {
         self.shared.reopen.store(true, Ordering::Relaxed);
     }
 
     /// Lines that nobody took.
-    pub(crate) fn dropped(&self) -> u64 {
+    pub fn dropped(&self) -> u64 {
         self.shared.dropped.load(Ordering::Relaxed)
     }
 
     /// Waits until all lines are written, but no longer than `at_most`.
-    pub(crate) fn flush(&self, at_most: Duration) {
+    pub fn flush(&self, at_most: Duration) {
         let end = Clock::now() + at_most;
         let (done, heard) = sync_channel(1);
         while let Err(TrySendError::Full(_)) = self.orders.try_send(Order::Flush(done.clone())) {

@@ -7,7 +7,7 @@ use uav_relay::{Duration, Instant};
 
 /// Where it is told.
 #[derive(Debug)]
-pub(crate) struct Notify {
+pub struct Notify {
     socket: UnixDatagram,
     to: SocketAddr,
     /// Between two signs of life, where they are asked for.
@@ -17,7 +17,7 @@ pub(crate) struct Notify {
 
 impl Notify {
     /// As the environment asks for it; `None` where it does not, or where that cannot be reached: no reason not to fly.
-    pub(crate) fn open() -> Option<Self> {
+    pub fn open() -> Option<Self> {
         let to = address(&std::env::var_os("NOTIFY_SOCKET")?)?;
         let socket = UnixDatagram::unbound().ok()?;
         socket.set_nonblocking(true).ok()?;
@@ -30,12 +30,12 @@ impl Notify {
     }
 
     /// Says that the relay has begun.
-    pub(crate) fn ready(&self) {
+    pub fn ready(&self) {
         self.send("READY=1");
     }
 
     /// Says that it is alive, when it is time to, and when to come back for that.
-    pub(crate) fn tend(&mut self, now: Instant) -> Option<Instant> {
+    pub fn tend(&mut self, now: Instant) -> Option<Instant> {
         let every = self.every?;
         if self.due <= now {
             self.due = now + every;
@@ -45,7 +45,7 @@ impl Notify {
     }
 
     /// Says that it ends as it was told to.
-    pub(crate) fn stopping(&self) {
+    pub fn stopping(&self) {
         self.send("STOPPING=1");
     }
 
