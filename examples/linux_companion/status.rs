@@ -1,7 +1,7 @@
 //! What a relay has counted and how it is, as one JSON object.
 
 use serde_json::{Value, json};
-use uav_relay::{Placement, Relay};
+use uav_relay::{Placement, Relay, Side};
 use uav_relay_linux::counters::counted;
 
 /// A place, m.
@@ -21,6 +21,8 @@ pub(crate) fn of_relay(relay: &Relay, name: impl Fn(u16) -> String) -> Value {
         "version": relay.version(),
         "setpoint": relay.setpoint().map(at),
         "target_sir": relay.target(),
+        "transmitter_w": relay.level_w(Side::Upstream),
+        "receiver_w": relay.level_w(Side::Downstream),
         "stands_down": relay.stands_down(),
         "has_lease": relay.lease().is_some(),
         "upstream": upstream,

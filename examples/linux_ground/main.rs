@@ -1,8 +1,10 @@
-//! The ground's end of an upload, over a real tty: hands the chain a new mission, and ends once that is flown.
+//! The ground's end of a chain, over a real tty: hands it a new mission, or stays at its post.
 //!
 //! ```text
 //! cargo ground --tty /dev/ttyUSB0 --end tx --of 3 \
 //!   --key-file network7.key --epoch-file ground.epoch --version 1 --new-interferer 80,700,-300
+//! cargo ground --tty /dev/ttyUSB0 --end rx --of 3 \
+//!   --key-file network7.key --epoch-file rx.epoch --stand --measurements udp:9000
 //! cargo ground --help
 //! ```
 //! It is the transmitter or the receiver of the chain: connect it where the relay next to that listens, or to the channel that
@@ -11,19 +13,35 @@
 //! The options that begin with `--new-` say what is different from now on. Every upload has a larger `--version` than the
 //! one before, and the epoch file is this program's own.
 //!
-//! Its lines on standard output are as those of `linux_companion`. It ends with status 0 once the chain flies the new mission, 1 if
-//! that does not come about, 2 when the options are wrong.
+//! With `--stand` it does not end: it answers the relays and tells them how strong the interference is where it stands
+//! (`--measurements`). Neither a port that vanishes nor a full disk nor a reader that stops ends it or holds it up. It takes no upload
+//! while it stands: it is started again with `--version`, knows nothing that it would lose, and the relays know it again by its first frames.
+//!
+//! Its lines on standard output are as those of `linux_companion`. It ends with status 0 once the chain flies the new mission, or where it
+//! stood at Ctrl-C or SIGTERM; 1 if that does not come about or it cannot begin, 2 when the options are wrong.
 //!
 //! | file | one idea |
 //! | --- | --- |
 //! | `options.rs` | the command line, checked |
+//! | `new.rs` | what is different in a new mission |
 //! | `station.rs` | the loop |
+//! | `measurements.rs` | how strong the interference is, from a FIFO, a file or datagrams |
+//! | `heard.rs` | which relays are heard |
+//! | `report.rs` | the lines it says |
 //!
 //! What it has in common with the relay is a library, `examples/linux`.
 #![cfg_attr(unix, forbid(unsafe_code))]
 
 #[cfg(unix)]
+mod heard;
+#[cfg(unix)]
+mod measurements;
+#[cfg(unix)]
+mod new;
+#[cfg(unix)]
 mod options;
+#[cfg(unix)]
+mod report;
 #[cfg(unix)]
 mod station;
 
@@ -35,7 +53,7 @@ fn main() -> std::process::ExitCode {
         Ok(plan) => plan,
         Err(code) => return code,
     };
-    match station::upload(&plan) {
+    match station::stand(&plan) {
         Ok(()) => ExitCode::SUCCESS,
         Err(line) => {
             uav_relay_linux::command::complain(&line);

@@ -1,32 +1,26 @@
 //! The command line, checked.
 
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, ValueEnum};
-use uav_relay::flight::axis::Axis;
-use uav_relay::wire::upload::UploadError;
-use uav_relay::{
-    Band, Duration, Geodetic, Interference, Interferer, Mission, MissionConfig, Profile, Side,
-    Sites, Upload, Wiring,
-};
-use uav_relay_scenario::deployment::{Deployment, NETWORK};
-
+use clap::{ArgAction, CommandFactory as _, Parser, ValueEnum};
+use uav_relay::{Duration, Mission, Side, Upload, Wiring};
 use uav_relay_linux::command;
 use uav_relay_linux::config::{self, Beyond, Given};
 use uav_relay_linux::log::LogOptions;
-use uav_relay_linux::mission::{
-    MissionOptions, altitude, band, distance, interferer, left, mission, noise, power, right,
-    separation,
-};
-use uav_relay_linux::site::{SiteOptions, site};
+use uav_relay_linux::mission::{MissionOptions, mission};
+use uav_relay_linux::site::SiteOptions;
+use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::key;
 
-/// Uploads a new mission to a chain of relays in flight. The options up to --min-separation say what the relays were loaded with; those
+use crate::new::NewOptions;
+
+/// The transmitter or the receiver of a chain of relays in flight: uploads a new mission to it, or stays at its post (--stand). The options up to --min-separation say what the relays were loaded with; those
 /// that begin with --new- what is different from now on, and without any of them it is what they were loaded with. The number of
 /// relays stays.
 #[derive(Parser, Debug)]
-#[command(name = "linux_ground", disable_version_flag = true)]
+#[command(name = "linux_ground", version, disable_version_flag = true)]
 struct Options {
     /// TOML file with the scenario that the relays were loaded with, and sections `network` and `ground`: what it says, options of the
     /// command line say otherwise
@@ -53,10 +47,13 @@ struct Options {
     /// File that keeps the number of this start, made if it is missing; it must never go back, and is no relay's
     #[arg(long, value_name = "FILE")]
     epoch_file: PathBuf,
-    /// Version of the new mission, 1 to 65535: larger than that of every upload before
-    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 65_535))]
-    version: u16,
-    /// Seconds after which it gives up, 1 to 86400
+    /// Version of the new mission, 1 to 65535: larger than that of every upload before. Without V, as the last word, that of the program
+    #[arg(long, value_name = "V", required_unless_present = "stand", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 65_535))]
+    version: Option<u16>,
+    /// Prints the version of the program
+    #[arg(short = 'V', action = ArgAction::Version)]
+    own_version: Option<bool>,
+    /// Seconds after which it gives an upload up, 1 to 86400; with --stand it says so and goes on
     #[arg(long, value_name = "S", default_value_t = 300, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 86_400))]
     timeout: u64,
     /// Number of relays, 1 to 1000
@@ -66,43 +63,28 @@ struct Options {
     loaded: MissionOptions,
     #[command(flatten)]
     sites: SiteOptions,
-    /// Where the transmitter is from now on; then the distance follows. Without it and --new-site-rx, relays fly between the sites that they
-    /// were loaded with
-    #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
-    new_site_tx: Option<Geodetic>,
-    /// Where the receiver is from now on
-    #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
-    new_site_rx: Option<Geodetic>,
-    /// New distance from transmitter to receiver, m, 1 to 1e6
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = distance)]
-    new_distance: Option<f32>,
-    /// New altitude of every relay, m, 0.1 to 1e5
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = altitude)]
-    new_altitude: Option<f32>,
-    /// New altitudes to choose from, m, 0.1 to 1e5; without it those of --band, or the new altitude alone
-    #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
-    new_band: Option<Band>,
-    /// New room to the left of the line to the receiver, as y in m, -1e5 to 0
-    #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = left)]
-    new_lateral_min: Option<f32>,
-    /// New room to its right, as y in m, 0 to 1e5
-    #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = right)]
-    new_lateral_max: Option<f32>,
-    /// New power of the transmitter, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
-    new_tx_power: Option<f32>,
-    /// New power of every relay, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
-    new_uav_power: Option<f32>,
-    /// New interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7)
-    #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = interferer)]
-    new_interferer: Option<Interferer>,
-    /// New noise power at every receiver, W, 0 to 1
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = noise)]
-    new_noise: Option<f32>,
-    /// New least distance between two relays, m, 0 to 1e5
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = separation)]
-    new_min_separation: Option<f32>,
+    #[command(flatten)]
+    new: NewOptions,
+    /// How strong the interference is here, line by line: a FIFO, a file whose last line counts, or `udp:PORT` or `udp:HOST:PORT` to be
+    /// told there. A line is the mean power that is received here, W, 1e-30 to 1e6. The relays near by are told of it, those that --listen
+    #[arg(
+        long,
+        value_name = "FIFO|FILE|udp:[HOST:]PORT",
+        requires = "stand",
+        help_heading = "Standing"
+    )]
+    measurements: Option<String>,
+    /// Stays at its post until a signal ends it: it answers the relays, tells them what is measured here, and says what it hears. With --version
+    /// it uploads that mission first
+    #[arg(long, help_heading = "Standing")]
+    stand: bool,
+    /// Unix socket that answers each connection with one JSON object of all counters, and closes it
+    #[arg(long, value_name = "SOCKET", help_heading = "Log")]
+    status_socket: Option<PathBuf>,
+    /// Write every frame that comes or goes at the tty to a pcapng capture, for `cargo decode` and Wireshark. It takes the place of what was
+    /// there, and grows as long as the program runs
+    #[arg(long, value_name = "FILE", help_heading = "Log")]
+    capture: Option<PathBuf>,
     #[command(flatten)]
     log: LogOptions,
 }
@@ -120,18 +102,30 @@ pub(crate) struct Plan {
     pub(crate) tty: PathBuf,
     pub(crate) baud: u32,
     pub(crate) loaded: Mission,
-    pub(crate) upload: Upload,
+    pub(crate) upload: Option<Upload>,
+    pub(crate) stands: bool,
+    pub(crate) measurements: Option<String>,
     pub(crate) end: Side,
     pub(crate) wiring: Wiring,
     pub(crate) network: u16,
     pub(crate) key: [u8; 32],
     pub(crate) epoch_file: PathBuf,
     pub(crate) timeout: Duration,
+    pub(crate) status_socket: Option<PathBuf>,
+    pub(crate) capture: Option<PathBuf>,
     pub(crate) log: LogOptions,
 }
 
 /// Reads the command line; where there is nothing to run, help or the mistake has been printed.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
+    if std::env::args_os()
+        .next_back()
+        .is_some_and(|word| word == "--version")
+    {
+        // Nobody may be left to read it.
+        let _ = write!(std::io::stdout(), "{}", Options::command().render_version());
+        return Err(ExitCode::SUCCESS);
+    }
     let (options, beyond) = command::read(section)?;
     plan(options, &beyond).map_err(|line| command::refuse(&line))
 }
@@ -145,8 +139,12 @@ fn section(deployment: &Deployment, given: &mut Given) {
     given.value("--end", own.end.as_ref());
     given.path("--epoch-file", own.epoch_file.as_ref());
     given.value("--timeout", own.timeout_s);
+    given.flag("--stand", own.stand);
+    given.path_or_udp("--measurements", own.measurements.as_ref());
     given.flag("--json", own.json);
     given.path("--log-file", own.log_file.as_ref());
+    given.path("--status-socket", own.status_socket.as_ref());
+    given.path("--capture", own.capture.as_ref());
 }
 
 fn plan(options: Options, beyond: &Beyond) -> Result<Plan, String> {
@@ -156,27 +154,19 @@ fn plan(options: Options, beyond: &Beyond) -> Result<Plan, String> {
         .config(options.of, interference, beyond.channel)?;
     let loaded = mission(base, "--")?;
     let sited = options.sites.of(options.loaded.distance)?;
-    let (sites, along_m) = match moved(&options, sited)? {
-        Some((sites, along_m)) => (Some(sites), Some(along_m)),
-        None => (None, None),
-    };
-    let config = changed(&options, loaded.config(), along_m);
-    let keeps = sited.is_some() && sites.is_none();
-    if keeps && config.distance_m.to_bits() != loaded.config().distance_m.to_bits() {
-        return Err(format!(
-            "--new-distance {}: must be that of --distance where the relays keep their sites; else give --new-site-tx or --new-site-rx",
-            config.distance_m
-        ));
-    }
-    mission(config, "--new-")?;
-    let refused = |error: UploadError| error.to_string();
-    let mut upload = Upload::new(&loaded, options.version, config).map_err(refused)?;
-    if let Some(sites) = sites {
-        upload = upload.with_sites(sites).map_err(refused)?;
-    }
+    let upload = options
+        .version
+        .map(|version| {
+            options
+                .new
+                .upload(version, &loaded, sited, options.loaded.band)
+        })
+        .transpose()?;
     Ok(Plan {
         loaded,
         upload,
+        stands: options.stand,
+        measurements: options.measurements,
         end: match options.end {
             End::Tx => Side::Upstream,
             End::Rx => Side::Downstream,
@@ -192,57 +182,8 @@ fn plan(options: Options, beyond: &Beyond) -> Result<Plan, String> {
         baud: options.baud,
         tty: options.tty,
         epoch_file: options.epoch_file,
+        status_socket: options.status_socket,
+        capture: options.capture,
         log: options.log,
     })
-}
-
-/// Between which sites the mission is flown from now on, and how far apart they are, m, where one has moved.
-fn moved(options: &Options, loaded: Option<Sites>) -> Result<Option<(Sites, f32)>, String> {
-    let (tx, rx) = (options.new_site_tx, options.new_site_rx);
-    let Some(loaded) = loaded.filter(|_| tx.is_some() || rx.is_some()) else {
-        return Ok(None);
-    };
-    let sites = Sites {
-        tx: tx.unwrap_or(loaded.tx),
-        rx: rx.unwrap_or(loaded.rx),
-    };
-    let name = if rx.is_some() { "rx" } else { "tx" };
-    let axis = Axis::between(sites).map_err(|error| format!("--new-site-{name}: {error}"))?;
-    #[expect(clippy::cast_possible_truncation, reason = "as a mission has it")]
-    let along_m = axis.distance_m() as f32;
-    match options.new_distance {
-        Some(given) if !axis.is_of(given) => Err(format!(
-            "--new-distance {given}: must be {along_m:.3} m, as the new sites have it, or be left out"
-        )),
-        _ => Ok(Some((sites, along_m))),
-    }
-}
-
-fn changed(options: &Options, loaded: &MissionConfig, along_m: Option<f32>) -> MissionConfig {
-    let altitude_m = options.new_altitude.unwrap_or(loaded.common.altitude_m);
-    let alone = Band::at(altitude_m);
-    MissionConfig {
-        distance_m: options
-            .new_distance
-            .or(along_m)
-            .unwrap_or(loaded.distance_m),
-        min_separation_m: options
-            .new_min_separation
-            .unwrap_or(loaded.min_separation_m),
-        tx_power_w: options.new_tx_power.unwrap_or(loaded.tx_power_w),
-        common: Profile {
-            altitude_m,
-            power_w: options.new_uav_power.unwrap_or(loaded.common.power_w),
-        },
-        band: options.new_band.or(options.loaded.band).unwrap_or(alone),
-        lateral: Band {
-            least_m: options.new_lateral_min.unwrap_or(loaded.lateral.least_m),
-            most_m: options.new_lateral_max.unwrap_or(loaded.lateral.most_m),
-        },
-        interference: options
-            .new_interferer
-            .map_or(loaded.interference, Interference::Source),
-        noise_w: options.new_noise.unwrap_or(loaded.noise_w),
-        ..*loaded
-    }
 }

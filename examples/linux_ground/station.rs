@@ -1,264 +1,258 @@
-//! The loop: move bytes, say how far the upload is, sleep.
+//! The loop: move bytes, hand on what is measured, say how far the upload is, sleep.
 
-use std::os::fd::{AsFd, BorrowedFd};
-use std::time::Instant as Clock;
+use std::os::fd::BorrowedFd;
 
-use rustix::event::{PollFd, Timespec, poll};
-use rustix::io::Errno;
+use rustix::event::PollFlags;
+use serde_json::{Value, json};
 use uav_relay::serial::SerialPort as _;
-use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Auth, Ground, Instant, Key, Progress, Side, Stats};
-
-use crate::options::Plan;
-use uav_relay_linux::epoch;
+use uav_relay::{Auth, Ground, Instant, Key, Progress};
+use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::Log;
-use uav_relay_linux::site::Between;
-use uav_relay_linux::system::{now, on_stop};
-use uav_relay_linux::tty::Tty;
+use uav_relay_linux::refusals::Refusals;
+use uav_relay_linux::replug::Replug;
+use uav_relay_linux::service::Service;
+use uav_relay_linux::sleep::sleep;
+use uav_relay_linux::{epoch, tap};
 
-/// How long the last lines may take.
-const LAST_LINES: std::time::Duration = std::time::Duration::from_millis(500);
+use crate::heard::Hearing;
+use crate::measurements::{Measurements, name};
+use crate::options::Plan;
+use crate::report;
 
-/// A tty, and what it has not taken yet.
-struct Wire {
-    tty: Tty,
+/// Buffers that are read at once, at most.
+const READS: usize = 64;
+
+/// How it went on, if it is over.
+type Over = Option<Result<(), String>>;
+
+/// An end of the chain, and all that it is connected to.
+struct Station<'a> {
+    plan: &'a Plan,
+    service: Service,
+    ground: Ground,
+    tty: Replug,
+    /// What that has not taken yet.
     outgoing: Vec<u8>,
+    measurements: Option<Measurements>,
+    hearing: Hearing,
+    refusals: Refusals,
+    progress: Progress,
+    /// Until when the upload is to be flown; `None` once that is told, or where there is none.
+    late_at: Option<Instant>,
 }
 
-/// Uploads until the chain flies the new mission.
+/// Stays at its post until it is told to stop, or only until the chain flies the new mission.
 ///
 /// # Errors
-/// One line that says why it does not.
-pub(crate) fn upload(plan: &Plan) -> Result<(), String> {
-    let stop = on_stop()?;
-    let mut wire = Wire {
-        tty: Tty::open("--tty", &plan.tty, plan.baud)?,
-        outgoing: Vec::new(),
+/// One line that says why it could not begin, or why the chain does not fly it.
+pub(crate) fn stand(plan: &Plan) -> Result<(), String> {
+    let mut station = Station::begin(plan)?;
+    station.service.ready();
+    let over = loop {
+        if let Some(over) = station.turn() {
+            break over;
+        }
     };
-    let clock = Clock::now();
-    let auth = Auth {
-        key: Key::new(plan.key),
-        epoch: epoch::next(&plan.epoch_file)?,
-    };
-    let log = Log::open(&plan.log)?;
-    started(&log, plan, auth.epoch);
-    let mut ground = Ground::new(&plan.loaded, plan.end, plan.network, plan.wiring, auth);
-    let begun = now(clock);
-    ground
-        .upload(begun, plan.upload)
-        .map_err(|error| error.to_string())?;
-    let end = begun + plan.timeout;
-    let mut last = Progress::Idle;
-    loop {
-        wire.turn(&mut ground, now(clock));
-        if ground.progress() != last {
-            last = ground.progress();
-            say(&log, now(clock), plan, last);
-        }
-        match last {
-            Progress::Flown { .. } => {
-                log.flush(LAST_LINES);
-                return Ok(());
-            }
-            Progress::Outdated { version } => return Err(outdated(plan, version)),
-            _ => {}
-        }
-        if let Some(failure) = wire.tty.failure() {
-            return Err(failure.to_owned());
-        }
-        let time = now(clock);
-        if time >= end {
-            return Err(late(plan, last, &ground));
-        }
-        let wake = ground.poll_timeout().map_or(end, |again| again.min(end));
-        if wire.sleep(time, wake, stop.as_fd())? {
-            return Err("stopped before the chain was known to fly it".to_owned());
-        }
-    }
+    station.service.end();
+    over
 }
 
-impl Wire {
-    /// Moves what can be moved.
-    fn turn(&mut self, ground: &mut Ground, now: Instant) {
+impl<'a> Station<'a> {
+    fn begin(plan: &'a Plan) -> Result<Self, String> {
+        let service = Service::begin(&plan.log, plan.status_socket.as_deref())?;
+        let mut tty = Replug::open("--tty", &plan.tty, plan.baud)?;
+        if let Some(capture) = &plan.capture {
+            let ports = [tty.to_string()];
+            for tap in tap::taps(env!("CARGO_BIN_NAME"), capture, &ports)? {
+                tty.tapped(tap);
+            }
+        }
+        let measurements = plan.measurements.as_deref();
+        let measurements = measurements
+            .map(|from| Measurements::open(from, plan.end))
+            .transpose()?;
+        let auth = Auth {
+            key: Key::new(plan.key),
+            epoch: epoch::next(&plan.epoch_file)?,
+        };
+        report::started(&service.log, plan, auth.epoch);
+        let mut ground = Ground::new(&plan.loaded, plan.end, plan.network, plan.wiring, auth);
+        let begun = service.now();
+        if let Some(upload) = plan.upload {
+            ground
+                .upload(begun, upload)
+                .map_err(|error| error.to_string())?;
+        }
+        Ok(Self {
+            plan,
+            service,
+            ground,
+            tty,
+            outgoing: Vec::new(),
+            measurements,
+            hearing: Hearing::default(),
+            refusals: Refusals::default(),
+            progress: Progress::Idle,
+            late_at: plan.upload.map(|_| begun + plan.timeout),
+        })
+    }
+
+    /// One turn of the loop.
+    fn turn(&mut self) -> Over {
+        let time = self.service.now();
+        let log = &self.service.log;
+        self.tty.tend(time, log);
+        self.exchange(time);
+        let log = &self.service.log;
+        let silent = self.hearing.look(time, &self.ground, log);
+        if let Some(why) = self.refusals.look(time, self.ground.stats(), true) {
+            log.tell(time, "not taken", format_args!("{why}"));
+        }
+        let over = self.uploading(time);
+        if over.is_some() {
+            return over;
+        }
+        let alive = self.tell(time);
+        let measured = self.measurements.as_ref().and_then(Measurements::wake);
+        let others = [silent, alive, measured, self.late_at, self.tty.wake()];
+        let wake = others
+            .into_iter()
+            .flatten()
+            .chain(self.ground.poll_timeout());
+        self.sleep(wake.min())
+    }
+
+    /// Moves what can be moved, and hands on what was measured.
+    fn exchange(&mut self, time: Instant) {
+        let Self { ground, tty, .. } = self;
         let mut bytes = [0; 256];
-        // What is wrong with the tty is in its failure.
-        while let Ok(count @ 1..) = self.tty.read(&mut bytes) {
+        for _ in 0..READS {
+            // What is wrong with the tty is said when it is tended.
+            let Ok(count @ 1..) = tty.read(&mut bytes) else {
+                break;
+            };
             ground.handle_bytes(bytes.get(..count).unwrap_or_default());
         }
-        ground.handle_timeout(now);
-        let mut frame = [0; MAX_FRAME];
-        while let Some(len) = ground.poll_transmit(&mut frame) {
+        if let Some(measurements) = &mut self.measurements
+            && let Some(power_w) = measurements.newest(time, &self.service.log)
+        {
+            ground.measured(power_w);
+        }
+        ground.handle_timeout(time);
+        loop {
+            if !self.outgoing.is_empty() {
+                let sent = tty.write(&self.outgoing).unwrap_or(0);
+                self.outgoing.drain(..sent);
+            }
+            // A frame is made when it can go: a slow tty is told the newest.
+            let mut frame = [0; MAX_FRAME];
+            if !self.outgoing.is_empty() {
+                return;
+            }
+            let Some(len) = ground.poll_transmit(&mut frame) else {
+                return;
+            };
             self.outgoing.extend(frame.get(..len).unwrap_or_default());
         }
-        if !self.outgoing.is_empty() {
-            let sent = self.tty.write(&self.outgoing).unwrap_or(0);
-            self.outgoing.drain(..sent);
+    }
+
+    /// Says how far the upload is; that it is over where that ends the program.
+    fn uploading(&mut self, time: Instant) -> Over {
+        let (Some(upload), stands) = (&self.plan.upload, self.plan.stands) else {
+            return None;
+        };
+        let log = &self.service.log;
+        let progress = self.ground.progress();
+        let is_new = std::mem::replace(&mut self.progress, progress) != progress;
+        if is_new {
+            report::progress(log, time, upload, progress);
         }
-    }
-
-    /// Sleeps until the tty needs it, or until `wake`; whether the program was told to end.
-    fn sleep(&mut self, now: Instant, wake: Instant, stop: BorrowedFd<'_>) -> Result<bool, String> {
-        let span = std::time::Duration::from_micros(wake.since(now).as_micros());
-        let timeout = Timespec::try_from(span).ok();
-        let mut fds = [
-            PollFd::from_borrowed_fd(stop, rustix::event::PollFlags::IN),
-            PollFd::from_borrowed_fd(self.tty.as_fd(), self.tty.interest()),
-        ];
-        match poll(&mut fds, timeout.as_ref()) {
-            Ok(_) => {}
-            Err(Errno::INTR) => return Ok(false),
-            Err(error) => return Err(format!("cannot sleep: {error}")),
-        }
-        let [stopped, events] = fds.map(|fd| fd.revents());
-        self.tty.noticed(events);
-        Ok(!stopped.is_empty())
-    }
-}
-
-const fn name(plan: &Plan) -> &'static str {
-    match plan.end {
-        Side::Upstream => "transmitter",
-        Side::Downstream => "receiver",
-    }
-}
-
-fn started(log: &Log, plan: &Plan, epoch: u32) {
-    let (end, relays, network) = (name(plan), plan.loaded.relays(), plan.network);
-    let (base, baud) = (digest(&plan.loaded), plan.baud);
-    let tty = plan.tty.display();
-    log.tell(
-        Instant::ZERO,
-        "started",
-        format_args!(
-            "{end} of {relays} relays, network {network}, loaded mission 0x{base:04x}, --tty {tty}, {baud} baud"
-        ),
-    );
-    log.tell(
-        Instant::ZERO,
-        "signed",
-        format_args!("frames carry a tag, epoch {epoch}"),
-    );
-}
-
-fn say(log: &Log, now: Instant, plan: &Plan, progress: Progress) {
-    let version = plan.upload.version();
-    match progress {
-        Progress::Offering => {
-            let digest = plan.upload.id().digest;
-            let what = format!("version {version}, mission 0x{digest:04x}");
-            match plan.upload.sites() {
-                Some(sites) => {
-                    log.tell(now, "offering", format_args!("{what}, {}", Between(sites)));
-                }
-                None => log.tell(now, "offering", format_args!("{what}")),
+        let fault = match progress {
+            Progress::Flown { .. } => {
+                self.late_at = None;
+                return (!stands).then_some(Ok(()));
             }
+            Progress::Outdated { version } => {
+                self.late_at = None;
+                is_new.then(|| report::outdated(upload, version))
+            }
+            _ => {
+                let is_late = self.late_at.take_if(|at| *at <= time).is_some();
+                is_late.then(|| report::late(self.plan, upload, progress, &self.ground))
+            }
+        }?;
+        if stands {
+            log.tell(time, "not flown", format_args!("{fault}"));
+            return None;
         }
-        Progress::Held { by } => log.tell(
-            now,
-            "held",
-            format_args!("relay {by} holds version {version}, and the others are asked"),
-        ),
-        Progress::Flown { by, view } => log.tell(
-            now,
-            "flown",
-            format_args!(
-                "relay {by} flies version {version}, view {} of the chain",
-                view.number()
-            ),
-        ),
-        // The others are the program's end.
-        _ => {}
+        Some(Err(fault))
+    }
+
+    /// Does what signals and the socket ask for, and says when to come back at the latest.
+    fn tell(&mut self, time: Instant) -> Option<Instant> {
+        let Self {
+            service,
+            plan,
+            ground,
+            tty,
+            measurements,
+            hearing,
+            ..
+        } = self;
+        service.tend(time, "station", |log| {
+            json!({
+                "program": env!("CARGO_BIN_NAME"),
+                "program_version": env!("CARGO_PKG_VERSION"),
+                "uptime_s": time.as_micros() / 1_000_000,
+                "station": {
+                    "end": name(plan.end),
+                    "relays": plan.loaded.relays(),
+                    "hears": hearing.nodes(),
+                    "upload": upload(plan, ground),
+                    "counters": counted(ground.stats()),
+                },
+                "measurements": measurements.as_ref().map(Measurements::status),
+                "links": { "ports": [tty.status()] },
+                "lines_dropped": log.dropped(),
+            })
+        })
+    }
+
+    /// Sleeps until there may be something to do.
+    fn sleep(&mut self, wake: Option<Instant>) -> Over {
+        let span = self.service.until(wake);
+        let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
+        let measured = self.measurements.as_ref().and_then(Measurements::fd);
+        others.extend(measured.map(|fd| (fd, PollFlags::IN)));
+        let Ok(found) = sleep(span, std::iter::once(&mut self.tty), &others) else {
+            Service::nap(span);
+            return None;
+        };
+        Service::is_over(&found).then(|| self.stop())
+    }
+
+    fn stop(&self) -> Result<(), String> {
+        if !self.plan.stands {
+            return Err("stopped before the chain was known to fly it".to_owned());
+        }
+        self.service.stopping();
+        let log: &Log = &self.service.log;
+        report::stopped(log, self.service.now(), self.plan.end, &self.ground);
+        Ok(())
     }
 }
 
-fn outdated(plan: &Plan, held: u16) -> String {
-    let version = plan.upload.version();
-    match held.checked_add(1) {
-        Some(next) => {
-            format!(
-                "--version {version}: must be within {next} to 65535, the relays hold version {held}"
-            )
-        }
-        None => {
-            format!("--version {version}: the relays hold version {held}, the last one there is")
-        }
-    }
-}
-
-fn late(plan: &Plan, progress: Progress, ground: &Ground) -> String {
-    let seconds = plan.timeout.as_micros() / 1_000_000;
-    let version = plan.upload.version();
-    let state = match progress {
-        Progress::Held { by } => {
-            format!("relay {by} holds version {version}, and the chain does not fly it yet")
-        }
-        _ => format!(
-            "no relay is known to hold version {version}: {}",
-            why(plan, ground.stats())
-        ),
+/// What is uploaded, and how far that is.
+fn upload(plan: &Plan, ground: &Ground) -> Value {
+    let Some(upload) = &plan.upload else {
+        return Value::Null;
     };
-    let refused = ground.refused();
-    format!("--timeout {seconds}: {state}; {refused} frames refused")
-}
-
-/// What most likely is wrong, by what was heard.
-fn why(plan: &Plan, stats: &Stats) -> String {
-    let faults = [
-        (
-            stats.mission,
-            format!(
-                "hellos are of relays that were loaded with another mission than 0x{:04x}; say what they were loaded with",
-                digest(&plan.loaded)
-            ),
-        ),
-        (
-            stats.forged,
-            "frames have a wrong tag: is the key in --key-file that of the relays?".to_owned(),
-        ),
-        (
-            stats.unsigned,
-            "frames are not signed: relays without --key-file take no uploads".to_owned(),
-        ),
-        (
-            stats.foreign,
-            format!(
-                "frames are of another network number than --network {}",
-                plan.network
-            ),
-        ),
-        (
-            stats.version,
-            "frames are of another version of the format".to_owned(),
-        ),
-        (
-            stats.misaddressed.saturating_add(stats.overheard),
-            format!(
-                "frames are heard and none is for the {}: are --key-file, --end and --of those of the relays? The log of the nearest one says more",
-                name(plan)
-            ),
-        ),
-        (
-            stats.crc,
-            format!(
-                "frames are damaged: is --baud {} that of the relays?",
-                plan.baud
-            ),
-        ),
-    ];
-    match faults.into_iter().find(|(count, _)| *count > 0) {
-        Some((count, fault)) => format!("{count} {fault}"),
-        None if stats.received > 0 => "one answers, and does not take it yet".to_owned(),
-        // A relay that flies another mission says no more than that it is there.
-        None if stats.handshakes > 0 => format!(
-            "one is there and says nothing: it was loaded with another mission than 0x{:04x}, most likely",
-            digest(&plan.loaded)
-        ),
-        None => format!(
-            "nothing was heard; is --tty {} the one toward the chain, and are --network {}, --baud {}, --end and --key-file right? The log of a relay that hears this says more",
-            plan.tty.display(),
-            plan.network,
-            plan.baud
-        ),
-    }
+    let progress = match ground.progress() {
+        Progress::Held { .. } => "held",
+        Progress::Flown { .. } => "flown",
+        Progress::Outdated { .. } => "outdated",
+        _ => "offering",
+    };
+    json!({ "version": upload.version(), "progress": progress })
 }

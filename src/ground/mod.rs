@@ -8,9 +8,12 @@
 //! | `Flown` | it flies it: so does every relay of its view, or it takes part in nothing until it does | done |
 //! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
 
+mod levels;
 mod progress;
 
 pub use progress::Progress;
+
+use levels::Levels;
 
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
@@ -34,9 +37,6 @@ const PATIENCE: Duration = Duration::from_millis(1_000);
 
 /// So many questions without an answer are put to one relay before the next one is asked.
 const QUESTIONS: u8 = 3;
-
-/// So many levels are said until the relays are greeted anew: one that was switched on since can read them again from then on.
-const LEVELS_A_GREETING: u8 = 16;
 
 /// The transmitter or the receiver, where it uploads missions or measures the interference; sans-IO, as [`Relay`](crate::Relay) is.
 ///
@@ -103,10 +103,7 @@ pub struct Ground {
     answer: Option<u16>,
     due: bool,
     again: Option<Instant>,
-    /// The interference here, W, as last measured, and the distances of the relays that are to be told: bit d - 1 for d.
-    level_w: f32,
-    untold: u8,
-    levels: u8,
+    levels: Levels,
     deframer: Deframer,
     session: Session,
     counter: u32,
@@ -140,9 +137,7 @@ impl Ground {
             answer: None,
             due: false,
             again: None,
-            level_w: 0.0,
-            untold: 0,
-            levels: 0,
+            levels: Levels::NONE,
             deframer: Deframer::new(),
             session: Session::new(auth),
             counter: 0,
@@ -179,10 +174,7 @@ impl Ground {
         if !is_level(power_w) {
             return false;
         }
-        self.level_w = power_w;
-        self.untold = (1..=self.within).fold(0, |all, distance| all | bit(distance));
-        self.levels = (self.levels + 1) % LEVELS_A_GREETING;
-        if self.levels == 0 {
+        if self.levels.measured(power_w, self.within) {
             for distance in 1..=self.within {
                 self.session.greet(self.at(distance));
             }
@@ -204,10 +196,19 @@ impl Ground {
         unknown.saturating_add(untrue).saturating_add(other)
     }
 
-    /// What it has counted of the frames that came in, as a relay does. `mission` are relays that were loaded with another one, `foreign`
+    /// What it has counted of the frames that it sent and that came in, as a relay does. `mission` are relays that were loaded with another one, `foreign`
     /// frames of another network, `overheard` those to another node, and `crc` all that are damaged.
     pub const fn stats(&self) -> &Stats {
         &self.stats
+    }
+
+    /// The relays that may hear it by their node numbers, the nearest first, and whether each has shown with the key that it is there and can
+    /// read what it is told. One that was switched on again, or has been greeted anew, has not until it answers. Work: four relays at most.
+    pub fn near(&self) -> impl Iterator<Item = (u16, bool)> {
+        (1..=self.within).map(|distance| {
+            let node = self.at(distance);
+            (node, self.session.knows(node))
+        })
     }
 
     /// Takes in bytes, however they are cut; at most one tag for each 19 of them.
@@ -257,8 +258,8 @@ impl Ground {
                     Checked::Handshake { first } => {
                         bump(&mut self.stats.handshakes);
                         self.due |= first && self.is_under_way();
-                        if first && self.level_w > 0.0 {
-                            self.untold |= bit(distance);
+                        if first {
+                            self.levels.owe(distance);
                         }
                     }
                     Checked::Unproven => bump(&mut self.stats.handshakes),
@@ -360,6 +361,7 @@ impl Ground {
         };
         let len = self.next(&mut header, frame)?;
         self.counter += 1;
+        bump(&mut self.stats.sent);
         Some(len)
     }
 
@@ -399,21 +401,12 @@ impl Ground {
 
     /// Tells the next relay of the level; a handshake goes to one that could not read it.
     fn next_level(&mut self, header: &mut Header, frame: &mut FrameBuf) -> Option<usize> {
-        let distance = (1..=self.within).find(|distance| self.untold & bit(*distance) != 0)?;
-        self.untold &= !bit(distance);
+        let (distance, power_w) = self.levels.take(self.within)?;
         let message = Message::Level {
             mission: self.base,
-            power_w: self.level_w,
+            power_w,
         };
         let to = self.at(distance);
         say(&mut self.session, to, &message, header, frame)
-    }
-}
-
-/// The bit of a relay that far away, 1 to 8.
-const fn bit(distance: u16) -> u8 {
-    match 1_u8.checked_shl(distance.saturating_sub(1) as u32) {
-        Some(bit) => bit,
-        None => 0,
     }
 }

@@ -131,12 +131,19 @@ impl Relay {
 
     /// What it believes of the interference, and the number of that: of the mission before the chain has found anything else.
     pub fn belief(&self) -> Told {
-        self.node.round().told()
+        self.node.round().sensing().told()
+    }
+
+    /// What the transmitter (upstream) or the receiver (downstream) has told this relay of the interference there: the mean of its
+    /// measurements, W, the receiver's noise taken off; `None` before it has, and in a relay that does not listen
+    /// ([`Settings::listen`](crate::Settings::listen)).
+    pub fn level_w(&self, side: Side) -> Option<f32> {
+        self.node.round().sensing().level_w(side)
     }
 
     /// At the leader: why nothing was made of what was heard last.
     pub fn unfit(&self) -> Option<Unfit> {
-        self.node.round().unfit()
+        self.node.round().sensing().unfit()
     }
 
     /// While Algorithm 2 goes on, at the leader: rounds that are over, and the SIR (linear) of the chain after the last.

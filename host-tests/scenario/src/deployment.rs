@@ -99,10 +99,18 @@ pub struct Ground {
     pub epoch_file: Option<PathBuf>,
     /// Seconds after which it gives up, 1 to 86400.
     pub timeout_s: Option<u32>,
+    /// Whether it stays at its post.
+    pub stand: Option<bool>,
+    /// Where it is told how strong the interference is: a FIFO, a file, or `udp:[HOST:]PORT`.
+    pub measurements: Option<String>,
     /// Whether its lines are JSON.
     pub json: Option<bool>,
     /// Where its lines go, in place of standard output.
     pub log_file: Option<PathBuf>,
+    /// The socket that tells its counters.
+    pub status_socket: Option<PathBuf>,
+    /// Where what goes over its port is written down.
+    pub capture: Option<PathBuf>,
 }
 
 /// A file's table without the sections, and they.

@@ -49,6 +49,10 @@ const GROUND: Keys = &[
     optional("end", Choice(&["tx", "rx"])),
     optional("epoch_file", Text),
     optional("timeout_s", Whole(range(1.0, 86_400.0, "s"))),
+    optional("stand", Rule::Flag),
+    optional("measurements", Text),
     optional("json", Rule::Flag),
     optional("log_file", Text),
+    optional("status_socket", Text),
+    optional("capture", Text),
 ];

@@ -20,6 +20,7 @@ mod process;
 mod pty;
 mod signed;
 mod soak;
+mod stand;
 mod stays;
 mod systemd;
 mod unplugged;

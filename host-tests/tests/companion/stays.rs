@@ -9,10 +9,11 @@ use serde_json::Value;
 use std::io::{Read, Write};
 use std::path::Path;
 
-use crate::binary::companion;
+use crate::binary::{companion, ground};
 use crate::hub::Hub;
 use crate::process::{Ended, LIMIT, Relay};
 use crate::pty::Pty;
+use crate::signed::Files;
 
 /// What a relay says by its socket.
 pub(crate) fn asked(socket: &Path) -> Value {
@@ -83,8 +84,8 @@ fn a_port_that_vanishes_comes_back_and_the_other_one_goes_on() {
 struct Bare(Child);
 
 impl Bare {
-    fn start(options: &[&str], stdout: Stdio, stderr: Stdio) -> Self {
-        let child = Command::new(companion())
+    fn start(program: &Path, options: &[&str], stdout: Stdio, stderr: Stdio) -> Self {
+        let child = Command::new(program)
             .args(options)
             .stdin(Stdio::null())
             .stdout(stdout)
@@ -118,8 +119,7 @@ impl Drop for Bare {
 }
 
 /// A reader that stops fills the pipe, then the queue; one that goes closes it; `/dev/full` takes nothing.
-#[test]
-fn nobody_who_reads_is_no_reason_to_leave_the_air() {
+fn goes_on_where_nobody_reads(program: &Path, options: &[&str]) {
     let (kept, stopped) = std::io::pipe().unwrap();
     let (gone, closed) = std::io::pipe().unwrap();
     drop(gone);
@@ -134,9 +134,8 @@ fn nobody_who_reads_is_no_reason_to_leave_the_air() {
     ] {
         let folder = tempfile::tempdir().unwrap();
         let socket = folder.path().join("status");
-        let socket_name = socket.to_str().unwrap();
-        let options = ["--index", "1", "--of", "1", "--status-socket", socket_name];
-        let relay = Bare::start(&options, stdout, Stdio::null());
+        let options = [options, &["--status-socket", socket.to_str().unwrap()]].concat();
+        let relay = Bare::start(program, &options, stdout, Stdio::null());
         asked(&socket);
         // Every one is a line of some 1 500 bytes: 64 KiB in the pipe, 1 024 lines in the queue.
         let end = Instant::now() + LIMIT;
@@ -153,11 +152,26 @@ fn nobody_who_reads_is_no_reason_to_leave_the_air() {
     drop(kept);
 }
 
+#[test]
+fn nobody_who_reads_is_no_reason_to_leave_the_air() {
+    goes_on_where_nobody_reads(companion(), &["--index", "1", "--of", "1"]);
+}
+
+#[test]
+fn nobody_who_reads_is_no_reason_to_leave_the_post() {
+    let (files, tty) = (Files::new(), Pty::new());
+    let tty = tty.path().to_str().unwrap();
+    let signed = files.options("key", "ground");
+    let mut options = vec!["--stand", "--end", "rx", "--of", "1", "--tty", tty];
+    options.extend(signed.iter().map(String::as_str));
+    goes_on_where_nobody_reads(ground(), &options);
+}
+
 /// Nobody reads what it says of a mistake, either.
 #[test]
 fn a_closed_standard_error_is_no_panic() {
     for options in [&["--index", "0"][..], &["--help"], &["--version"]] {
-        for program in [companion(), crate::binary::ground()] {
+        for program in [companion(), ground()] {
             let (gone, closed) = std::io::pipe().unwrap();
             drop(gone);
             let status = Command::new(program)

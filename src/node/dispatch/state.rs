@@ -159,7 +159,7 @@ impl Node {
 
     /// Flies by what is believed from now on.
     fn believe(&mut self) {
-        let told = self.layers.round.told();
+        let told = self.layers.round.sensing().told();
         let believing = self
             .member
             .mission

@@ -11,6 +11,7 @@ use crate::sensing::listener::Listener;
 use crate::sensing::sums::Sums;
 use crate::sensing::terms::unit_w;
 use crate::settings::Listen;
+use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Heard;
 
@@ -115,18 +116,30 @@ impl Sensing {
             .is_some_and(|ear| ear.at.take_if(|at| *at <= now).is_some())
     }
 
-    pub(super) const fn told(&self) -> Told {
+    /// What it believes.
+    pub(crate) const fn told(&self) -> Told {
         match self.ear() {
             Some(ear) => ear.told,
             None => AS_LOADED,
         }
     }
 
-    pub(super) const fn unfit(&self) -> Option<Unfit> {
+    /// At the leader: why nothing was made of what was heard last.
+    pub(crate) const fn unfit(&self) -> Option<Unfit> {
         match self.ear() {
             Some(ear) => ear.unfit,
             None => None,
         }
+    }
+
+    /// What the end at `side` has told this relay, W; `None` before it has.
+    pub(crate) fn level_w(&self, side: Side) -> Option<f32> {
+        let ear = self.ear()?;
+        let level_w = match side {
+            Side::Upstream => ear.transmitter.mean,
+            Side::Downstream => ear.receiver.mean,
+        };
+        (level_w > 0.0).then_some(level_w)
     }
 
     /// What has come of it so far.

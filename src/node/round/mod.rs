@@ -37,14 +37,12 @@ use super::sample::{Meter, Sample};
 use super::timing::{PAUSE, earliest};
 use crate::mission::Profile;
 use crate::place::Placement;
-use crate::sensing::belief::Told;
-use crate::sensing::fit::Unfit;
 use crate::settings::Settings;
 use crate::time::Instant;
 use crate::wire::message::Message;
 
 use computation::{ADJUST, ALTITUDE, Computation};
-use ear::{Findings, SENSING};
+use ear::{Findings, SENSING, Sensing};
 use state::{Action, Phase};
 
 /// What is to be sent.
@@ -374,12 +372,9 @@ impl Round {
         &self.computation.meter
     }
 
-    pub(crate) const fn told(&self) -> Told {
-        self.computation.sensing.told()
-    }
-
-    pub(crate) const fn unfit(&self) -> Option<Unfit> {
-        self.computation.sensing.unfit()
+    /// What it hears and believes of the interference.
+    pub(crate) const fn sensing(&self) -> &Sensing {
+        &self.computation.sensing
     }
 
     pub(crate) const fn target(&self) -> Option<f32> {

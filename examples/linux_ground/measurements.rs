@@ -1,0 +1,284 @@
+//! How strong the interference is where the station stands, line by line from whatever measures it: a FIFO, a file, or datagrams.
+
+use std::fs::File;
+use std::io::{ErrorKind, Read as _, Seek as _, SeekFrom};
+use std::net::UdpSocket;
+use std::os::fd::{AsFd as _, BorrowedFd};
+use std::os::unix::fs::MetadataExt as _;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use uav_relay::{Duration, Instant, Side};
+use uav_relay_linux::lines::{Begun, Fifo, LONGEST};
+use uav_relay_linux::log::Log;
+
+const OPTION: &str = "--measurements";
+
+/// Between two looks at a file: no poll(2) tells of one that has changed.
+const LOOK: Duration = Duration::from_millis(500);
+
+/// Datagrams that are read at once, at most.
+const READS: usize = 16;
+
+/// So much of the end of a file is read, bytes: a line and the one before.
+const TAIL: u64 = 1_024;
+
+/// Between two measurements that are handed on: whoever measures more often does not fill the channel.
+const EVERY: Duration = Duration::from_millis(500);
+
+/// After so long without a measurement that is said.
+const SILENCE: Duration = Duration::from_millis(60_000);
+
+/// Where lines come from.
+#[derive(Debug)]
+enum Source {
+    Fifo(Fifo),
+    Udp(UdpSocket),
+    File(Watched),
+}
+
+/// A file, and how it was when it was read last: its inode, its length, and when it was written, s and ns.
+#[derive(Debug)]
+struct Watched {
+    path: PathBuf,
+    seen: Option<[i128; 4]>,
+    look_at: Instant,
+}
+
+/// The measurements of one end.
+#[derive(Debug)]
+pub(crate) struct Measurements {
+    source: Source,
+    name: String,
+    end: Side,
+    /// The newest that was not handed on yet, W.
+    newest_w: Option<f32>,
+    next_at: Instant,
+    /// When the last line was a measurement, once one was.
+    last_at: Option<Instant>,
+    is_silent: bool,
+    last_w: Option<f32>,
+    taken: u64,
+    bad: u64,
+}
+
+impl Measurements {
+    /// Opens the FIFO, the file or the socket of that name.
+    ///
+    /// # Errors
+    /// One line that names it and what is wrong.
+    pub(crate) fn open(name: &str, end: Side) -> Result<Self, String> {
+        let named = |error: &str| format!("{OPTION} {name}: {error}");
+        let path = Path::new(name);
+        let source = if let Some(address) = name.strip_prefix("udp:") {
+            Source::Udp(socket(address).map_err(|error| named(&error.to_string()))?)
+        } else if path.is_file() {
+            File::open(path).map_err(|error| named(&error.to_string()))?;
+            Source::File(Watched {
+                path: path.to_owned(),
+                seen: None,
+                look_at: Instant::ZERO,
+            })
+        } else {
+            Source::Fifo(Fifo::open(OPTION, path)?)
+        };
+        Ok(Self {
+            source,
+            name: name.to_owned(),
+            end,
+            newest_w: None,
+            next_at: Instant::ZERO,
+            last_at: None,
+            is_silent: false,
+            last_w: None,
+            taken: 0,
+            bad: 0,
+        })
+    }
+
+    /// The newest that has come since, W, if it is time to hand one on. Work: 64 KiB of lines at most, whoever writes how much.
+    pub(crate) fn newest(&mut self, now: Instant, log: &Log) -> Option<f32> {
+        self.read(now, log);
+        let silent_at = self.last_at.map(|at| at + SILENCE);
+        if !self.is_silent && silent_at.is_some_and(|at| at <= now) {
+            self.is_silent = true;
+            let (name, seconds) = (&self.name, SILENCE.as_micros() / 1_000_000);
+            log.tell(
+                now,
+                "measurement",
+                format_args!("none from {name} for {seconds} s"),
+            );
+        }
+        let newest_w = self.newest_w.take_if(|_| self.next_at <= now)?;
+        self.next_at = now + EVERY;
+        self.taken += 1;
+        self.last_w = Some(newest_w);
+        Some(newest_w)
+    }
+
+    fn read(&mut self, now: Instant, log: &Log) {
+        let Self { source, .. } = self;
+        let mut lines: Vec<Vec<u8>> = Vec::new();
+        let mut line = |text: &[u8]| lines.push(text.to_owned());
+        match source {
+            Source::Fifo(fifo) => fifo.read(&mut line),
+            Source::Udp(socket) => {
+                let mut buffer = [0; 4_096];
+                for _ in 0..READS {
+                    let count = match socket.recv(&mut buffer) {
+                        Ok(count) => count,
+                        Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                        Err(_) => break,
+                    };
+                    // Its last line may go without an end.
+                    let text = buffer.get(..count).unwrap_or_default();
+                    let mut begun = Begun::default();
+                    begun.take(text, &mut line);
+                    if !text.ends_with(b"\n") {
+                        begun.take(b"\n", &mut line);
+                    }
+                }
+            }
+            Source::File(file) => file.last(now).iter().for_each(|text| line(text)),
+        }
+        for text in lines {
+            self.take(now, log, &text);
+        }
+    }
+
+    fn take(&mut self, now: Instant, log: &Log, text: &[u8]) {
+        let Some(power_w) = level(text, self.end) else {
+            self.refuse(now, log, text);
+            return;
+        };
+        self.newest_w = Some(power_w);
+        let is_first = self.last_at.replace(now).is_none();
+        if is_first || std::mem::take(&mut self.is_silent) {
+            let fields = json!({ "power_w": power_w });
+            let name = &self.name;
+            log.say(
+                now,
+                "measurement",
+                fields,
+                format_args!(
+                    "{power_w:.3e} W by {name}; the next ones are handed on without a line"
+                ),
+            );
+        }
+    }
+
+    fn refuse(&mut self, now: Instant, log: &Log, text: &[u8]) {
+        self.bad += 1;
+        if self.bad > 1 {
+            return;
+        }
+        let (text, own) = (String::from_utf8_lossy(text), name(self.end));
+        log.tell(
+            now,
+            "measurement",
+            format_args!(
+                "{text:?} is not power_w or {own} power_w, a power within 1e-30 to 1e6; more of these are only counted"
+            ),
+        );
+    }
+
+    /// When to come back at the latest.
+    pub(crate) fn wake(&self) -> Option<Instant> {
+        let look = match &self.source {
+            Source::File(file) => Some(file.look_at),
+            _ => None,
+        };
+        let next = self.newest_w.map(|_| self.next_at);
+        let silent = self.last_at.filter(|_| !self.is_silent);
+        let silent = silent.map(|at| at + SILENCE);
+        [look, next, silent].into_iter().flatten().min()
+    }
+
+    /// What to sleep on.
+    pub(crate) fn fd(&self) -> Option<BorrowedFd<'_>> {
+        match &self.source {
+            Source::Fifo(fifo) => Some(fifo.fd()),
+            Source::Udp(socket) => Some(socket.as_fd()),
+            Source::File(_) => None,
+        }
+    }
+
+    /// What it has counted.
+    pub(crate) fn status(&self) -> Value {
+        json!({
+            "from": self.name,
+            "handed_on": self.taken,
+            "last_w": self.last_w,
+            "refused": self.bad,
+            "silent": self.is_silent,
+        })
+    }
+}
+
+impl Watched {
+    /// Its last whole line, where it was written since.
+    fn last(&mut self, now: Instant) -> Option<Vec<u8>> {
+        if now < self.look_at {
+            return None;
+        }
+        self.look_at = now + LOOK;
+        // One that is away is on its way to another name, or will be made again.
+        let mut file = File::open(&self.path).ok()?;
+        let about = file.metadata().ok()?;
+        let seen = [
+            i128::from(about.ino()),
+            i128::from(about.len()),
+            i128::from(about.mtime()),
+            i128::from(about.mtime_nsec()),
+        ];
+        if self.seen.replace(seen) == Some(seen) {
+            return None;
+        }
+        let from = about.len().saturating_sub(TAIL);
+        file.seek(SeekFrom::Start(from)).ok()?;
+        let mut tail = Vec::new();
+        file.take(TAIL).read_to_end(&mut tail).ok()?;
+        let mut last = None;
+        // A line without its end is still being written.
+        Begun::default().take(&tail, |line| last = Some(line.to_owned()));
+        last
+    }
+}
+
+/// A socket at a port, of this computer alone where there is no host.
+fn socket(address: &str) -> std::io::Result<UdpSocket> {
+    let wrong =
+        || std::io::Error::other("must be udp:PORT or udp:HOST:PORT, PORT within 1 to 65535");
+    let (host, port) = address.rsplit_once(':').unwrap_or(("127.0.0.1", address));
+    let port: u16 = port.parse().map_err(|_| wrong())?;
+    if port == 0 || host.is_empty() {
+        return Err(wrong());
+    }
+    let host = host.trim_start_matches('[').trim_end_matches(']');
+    let socket = UdpSocket::bind((host, port))?;
+    socket.set_nonblocking(true)?;
+    Ok(socket)
+}
+
+/// What an end is called.
+pub(crate) const fn name(end: Side) -> &'static str {
+    match end {
+        Side::Upstream => "transmitter",
+        Side::Downstream => "receiver",
+    }
+}
+
+/// A power, W, alone or behind the name of this end.
+fn level(text: &[u8], end: Side) -> Option<f32> {
+    let text = std::str::from_utf8(text)
+        .ok()
+        .filter(|_| text.len() <= LONGEST)?;
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let power = match words[..] {
+        [power] => power,
+        [whose, power] if whose == name(end) => power,
+        _ => return None,
+    };
+    let power_w: f32 = power.parse().ok()?;
+    (1e-30..=1e6).contains(&power_w).then_some(power_w)
+}

@@ -1,0 +1,142 @@
+//! What is different in a new mission, as the options that begin with `--new-` give it.
+
+use clap::Args;
+use uav_relay::flight::axis::Axis;
+use uav_relay::wire::upload::UploadError;
+use uav_relay::{
+    Band, Geodetic, Interference, Interferer, Mission, MissionConfig, Profile, Sites, Upload,
+};
+use uav_relay_linux::mission::{
+    altitude, band, distance, interferer, left, mission, noise, power, right, separation,
+};
+use uav_relay_linux::site::site;
+
+/// The options of a new mission; what is not among them is as it was loaded.
+#[derive(Args, Debug)]
+#[group(id = "new", multiple = true, requires = "version")]
+#[expect(clippy::struct_field_names, reason = "as the options are called")]
+pub(crate) struct NewOptions {
+    /// Where the transmitter is from now on; then the distance follows. Without it and --new-site-rx, relays fly between the sites that they
+    /// were loaded with
+    #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
+    new_site_tx: Option<Geodetic>,
+    /// Where the receiver is from now on
+    #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
+    new_site_rx: Option<Geodetic>,
+    /// New distance from transmitter to receiver, m, 1 to 1e6
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = distance)]
+    new_distance: Option<f32>,
+    /// New altitude of every relay, m, 0.1 to 1e5
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = altitude)]
+    new_altitude: Option<f32>,
+    /// New altitudes to choose from, m, 0.1 to 1e5; without it those of --band, or the new altitude alone
+    #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
+    new_band: Option<Band>,
+    /// New room to the left of the line to the receiver, as y in m, -1e5 to 0
+    #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = left)]
+    new_lateral_min: Option<f32>,
+    /// New room to its right, as y in m, 0 to 1e5
+    #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = right)]
+    new_lateral_max: Option<f32>,
+    /// New power of the transmitter, W, 1e-6 to 1e6
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
+    new_tx_power: Option<f32>,
+    /// New power of every relay, W, 1e-6 to 1e6
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
+    new_uav_power: Option<f32>,
+    /// New interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7)
+    #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = interferer)]
+    new_interferer: Option<Interferer>,
+    /// New noise power at every receiver, W, 0 to 1
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = noise)]
+    new_noise: Option<f32>,
+    /// New least distance between two relays, m, 0 to 1e5
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = separation)]
+    new_min_separation: Option<f32>,
+}
+
+impl NewOptions {
+    /// The upload of a mission in place of `loaded`, which was flown between the sites `sited` if any were given, over the band `loaded_band` if
+    /// one was.
+    ///
+    /// # Errors
+    /// One line that names the option and what is wrong.
+    pub(crate) fn upload(
+        &self,
+        version: u16,
+        loaded: &Mission,
+        sited: Option<Sites>,
+        loaded_band: Option<Band>,
+    ) -> Result<Upload, String> {
+        let (sites, along_m) = match self.moved(sited)? {
+            Some((sites, along_m)) => (Some(sites), Some(along_m)),
+            None => (None, None),
+        };
+        let config = self.changed(loaded.config(), loaded_band, along_m);
+        let keeps = sited.is_some() && sites.is_none();
+        if keeps && config.distance_m.to_bits() != loaded.config().distance_m.to_bits() {
+            return Err(format!(
+                "--new-distance {}: must be that of --distance where the relays keep their sites; else give --new-site-tx or --new-site-rx",
+                config.distance_m
+            ));
+        }
+        mission(config, "--new-")?;
+        let refused = |error: UploadError| error.to_string();
+        let upload = Upload::new(loaded, version, config).map_err(refused)?;
+        match sites {
+            Some(sites) => upload.with_sites(sites).map_err(refused),
+            None => Ok(upload),
+        }
+    }
+
+    /// Between which sites the mission is flown from now on, and how far apart they are, m, where one has moved.
+    fn moved(&self, loaded: Option<Sites>) -> Result<Option<(Sites, f32)>, String> {
+        let (tx, rx) = (self.new_site_tx, self.new_site_rx);
+        let Some(loaded) = loaded.filter(|_| tx.is_some() || rx.is_some()) else {
+            return Ok(None);
+        };
+        let sites = Sites {
+            tx: tx.unwrap_or(loaded.tx),
+            rx: rx.unwrap_or(loaded.rx),
+        };
+        let name = if rx.is_some() { "rx" } else { "tx" };
+        let axis = Axis::between(sites).map_err(|error| format!("--new-site-{name}: {error}"))?;
+        #[expect(clippy::cast_possible_truncation, reason = "as a mission has it")]
+        let along_m = axis.distance_m() as f32;
+        match self.new_distance {
+            Some(given) if !axis.is_of(given) => Err(format!(
+                "--new-distance {given}: must be {along_m:.3} m, as the new sites have it, or be left out"
+            )),
+            _ => Ok(Some((sites, along_m))),
+        }
+    }
+
+    fn changed(
+        &self,
+        loaded: &MissionConfig,
+        loaded_band: Option<Band>,
+        along_m: Option<f32>,
+    ) -> MissionConfig {
+        let altitude_m = self.new_altitude.unwrap_or(loaded.common.altitude_m);
+        let alone = Band::at(altitude_m);
+        MissionConfig {
+            distance_m: self.new_distance.or(along_m).unwrap_or(loaded.distance_m),
+            min_separation_m: self.new_min_separation.unwrap_or(loaded.min_separation_m),
+            tx_power_w: self.new_tx_power.unwrap_or(loaded.tx_power_w),
+            common: Profile {
+                altitude_m,
+                power_w: self.new_uav_power.unwrap_or(loaded.common.power_w),
+            },
+            band: self.new_band.or(loaded_band).unwrap_or(alone),
+            lateral: Band {
+                least_m: self.new_lateral_min.unwrap_or(loaded.lateral.least_m),
+                most_m: self.new_lateral_max.unwrap_or(loaded.lateral.most_m),
+            },
+            interference: self
+                .new_interferer
+                .map_or(loaded.interference, Interference::Source),
+            noise_w: self.new_noise.unwrap_or(loaded.noise_w),
+            ..*loaded
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! What the station says, one line each.
+
+use serde_json::json;
+use uav_relay::wire::digest::digest;
+use uav_relay::{Ground, Instant, Progress, Side, Stats, Upload};
+use uav_relay_linux::counters::counted;
+use uav_relay_linux::log::Log;
+use uav_relay_linux::site::Between;
+
+use crate::measurements::name;
+use crate::options::Plan;
+
+/// Who listens where.
+pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
+    let (end, relays, network) = (name(plan.end), plan.loaded.relays(), plan.network);
+    let (base, baud) = (digest(&plan.loaded), plan.baud);
+    let tty = plan.tty.display();
+    log.say(
+        Instant::ZERO,
+        "started",
+        json!({
+            "end": end, "relays": relays, "network": network, "mission": base, "ports": [format!("--tty {tty}")], "baud": baud,
+            "version": env!("CARGO_PKG_VERSION"),
+        }),
+        format_args!(
+            "{end} of {relays} relays, network {network}, loaded mission 0x{base:04x}, --tty {tty}, {baud} baud"
+        ),
+    );
+    log.say(
+        Instant::ZERO,
+        "signed",
+        json!({ "epoch": epoch }),
+        format_args!("frames carry a tag, epoch {epoch}"),
+    );
+}
+
+/// How far the upload is.
+pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progress) {
+    let version = upload.version();
+    match progress {
+        Progress::Offering => {
+            let digest = upload.id().digest;
+            let what = format!("version {version}, mission 0x{digest:04x}");
+            match upload.sites() {
+                Some(sites) => {
+                    log.tell(now, "offering", format_args!("{what}, {}", Between(sites)));
+                }
+                None => log.tell(now, "offering", format_args!("{what}")),
+            }
+        }
+        Progress::Held { by } => log.tell(
+            now,
+            "held",
+            format_args!("relay {by} holds version {version}, and the others are asked"),
+        ),
+        Progress::Flown { by, view } => log.tell(
+            now,
+            "flown",
+            format_args!(
+                "relay {by} flies version {version}, view {} of the chain",
+                view.number()
+            ),
+        ),
+        // The others are said elsewhere.
+        _ => {}
+    }
+}
+
+/// That the relays hold a newer mission.
+pub(crate) fn outdated(upload: &Upload, held: u16) -> String {
+    let version = upload.version();
+    match held.checked_add(1) {
+        Some(next) => {
+            format!(
+                "--version {version}: must be within {next} to 65535, the relays hold version {held}"
+            )
+        }
+        None => {
+            format!("--version {version}: the relays hold version {held}, the last one there is")
+        }
+    }
+}
+
+/// That the chain does not fly it in time, and why most likely.
+pub(crate) fn late(plan: &Plan, upload: &Upload, progress: Progress, ground: &Ground) -> String {
+    let seconds = plan.timeout.as_micros() / 1_000_000;
+    let version = upload.version();
+    let state = match progress {
+        Progress::Held { by } => {
+            format!("relay {by} holds version {version}, and the chain does not fly it yet")
+        }
+        _ => format!(
+            "no relay is known to hold version {version}: {}",
+            why(plan, ground.stats())
+        ),
+    };
+    let refused = ground.refused();
+    format!("--timeout {seconds}: {state}; {refused} frames refused")
+}
+
+/// What most likely is wrong, by what was heard.
+fn why(plan: &Plan, stats: &Stats) -> String {
+    let faults = [
+        (
+            stats.mission,
+            format!(
+                "hellos are of relays that were loaded with another mission than 0x{:04x}; say what they were loaded with",
+                digest(&plan.loaded)
+            ),
+        ),
+        (
+            stats.forged,
+            "frames have a wrong tag: is the key in --key-file that of the relays?".to_owned(),
+        ),
+        (
+            stats.unsigned,
+            "frames are not signed: relays without --key-file take no uploads".to_owned(),
+        ),
+        (
+            stats.foreign,
+            format!(
+                "frames are of another network number than --network {}",
+                plan.network
+            ),
+        ),
+        (
+            stats.version,
+            "frames are of another version of the format".to_owned(),
+        ),
+        (
+            stats.misaddressed.saturating_add(stats.overheard),
+            format!(
+                "frames are heard and none is for the {}: are --key-file, --end and --of those of the relays? The log of the nearest one says more",
+                name(plan.end)
+            ),
+        ),
+        (
+            stats.crc,
+            format!(
+                "frames are damaged: is --baud {} that of the relays?",
+                plan.baud
+            ),
+        ),
+    ];
+    match faults.into_iter().find(|(count, _)| *count > 0) {
+        Some((count, fault)) => format!("{count} {fault}"),
+        None if stats.received > 0 => "one answers, and does not take it yet".to_owned(),
+        // A relay that flies another mission says no more than that it is there.
+        None if stats.handshakes > 0 => format!(
+            "one is there and says nothing: it was loaded with another mission than 0x{:04x}, most likely",
+            digest(&plan.loaded)
+        ),
+        None => format!(
+            "nothing was heard; is --tty {} the one toward the chain, and are --network {}, --baud {}, --end and --key-file right? The log of a relay that hears this says more",
+            plan.tty.display(),
+            plan.network,
+            plan.baud
+        ),
+    }
+}
+
+/// That a relay is heard, or not any more.
+pub(crate) fn heard(log: &Log, now: Instant, node: u16, is_heard: bool) {
+    let fields = json!({ "node": node });
+    if is_heard {
+        let what = format_args!("relay {node} is heard, and hears this station");
+        log.say(now, "back", fields, what);
+    } else {
+        let what = format_args!("relay {node} does not answer");
+        log.say(now, "lost", fields, what);
+    }
+}
+
+/// The last line of a station that stood.
+pub(crate) fn stopped(log: &Log, now: Instant, end: Side, ground: &Ground) {
+    let stats = ground.stats();
+    log.say(
+        now,
+        "stopped",
+        counted(stats),
+        format_args!(
+            "{}, {} frames sent, {} received, {} refused",
+            name(end),
+            stats.sent,
+            stats.received.saturating_add(stats.handshakes),
+            ground.refused()
+        ),
+    );
+}
