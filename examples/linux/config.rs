@@ -6,11 +6,13 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use uav_relay::{Channel, Interference, Profile};
+use serde_json::json;
+use uav_relay::{Channel, Instant, Interference, Profile};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::deployment::Deployment;
 use uav_relay_scenario::mission;
 
+use crate::log::Log;
 use crate::site::degrees;
 
 /// The tolerance on the SIR that every relay of a chain is given.
@@ -25,6 +27,43 @@ pub struct Beyond {
     pub field: Option<Interference>,
     /// What single relays have of their own.
     pub profiles: Vec<(u16, Profile)>,
+    /// What the command line says otherwise than the file.
+    pub overrides: Vec<Override>,
+}
+
+/// An option of the command line that counts, where the file says something else.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Override {
+    /// The option and its value.
+    pub option: String,
+    /// What the file has in its place.
+    pub instead: String,
+    file: String,
+}
+
+impl Override {
+    /// Whether it is that option.
+    #[must_use]
+    pub fn is(&self, name: &str) -> bool {
+        self.option.split(' ').next() == Some(name)
+    }
+}
+
+/// Says what the command line says otherwise than the file, a line each: nobody is to fly by a file that does not count unawares.
+pub fn tell(overrides: &[Override], log: &Log) {
+    for one in overrides {
+        let Override {
+            option,
+            instead,
+            file,
+        } = one;
+        log.say(
+            Instant::ZERO,
+            "override",
+            json!({ "option": option, "instead_of": instead, "file": file }),
+            format_args!("{option} counts, and not {instead} of {file}"),
+        );
+    }
 }
 
 /// Options that a file gives: their names, and their values; none for those without one.
@@ -62,23 +101,62 @@ impl Given {
         }
     }
 
-    /// The same less what the command line says, and less what it says otherwise.
-    fn less(mut self, line: &[OsString]) -> Self {
-        let says = |name: &str| {
-            let with_value = format!("{name}=");
-            line.iter().any(|word| {
-                let word = word.to_string_lossy();
-                word == name || word.starts_with(&with_value)
-            })
-        };
-        self.options.retain(|(name, _)| !says(name));
-        for (one, others) in OTHERWISE {
-            if says(one) {
-                self.options.retain(|(name, _)| !others.contains(name));
+    /// The same less what the command line says, and less what it says otherwise; what of that is something else.
+    fn less(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
+        let mut overrides = Vec::new();
+        self.options.retain(|(name, value)| {
+            let others = OTHERWISE
+                .iter()
+                .filter(|(_, others)| others.contains(name))
+                .map(|(one, _)| *one);
+            let Some(said) = std::iter::once(*name)
+                .chain(others)
+                .find_map(|one| Some((one, said(line, one)?)))
+            else {
+                return true;
+            };
+            let value = value.as_ref().map(|value| value.to_string_lossy());
+            let (option, given) = said;
+            let same = option == *name && is_same(&given, value.as_deref().unwrap_or_default());
+            let instead = match value {
+                Some(value) if option == *name => value.into_owned(),
+                Some(value) => format!("{name} {value}"),
+                None => (*name).to_owned(),
+            };
+            if !same {
+                overrides.push(Override {
+                    option: format!("{option} {given}"),
+                    instead,
+                    file: file.to_owned(),
+                });
             }
-        }
-        self
+            false
+        });
+        (self, overrides)
     }
+}
+
+/// What the command line gives for the option of that name, nothing for one without a value.
+fn said(line: &[OsString], name: &str) -> Option<String> {
+    let with_value = format!("{name}=");
+    line.iter().enumerate().find_map(|(at, word)| {
+        let word = word.to_string_lossy();
+        if word == name {
+            let next = line.get(at + 1).map(|word| word.to_string_lossy());
+            return Some(next.unwrap_or_default().into_owned());
+        }
+        word.strip_prefix(&with_value).map(ToOwned::to_owned)
+    })
+}
+
+/// Whether two values are the same text, or the same numbers.
+fn is_same(one: &str, other: &str) -> bool {
+    let numbers = |text: &str| -> Option<Vec<u64>> {
+        let numbers = text.split(',').map(|part| part.trim().parse::<f64>().ok());
+        numbers.map(|number| Some(number?.to_bits())).collect()
+    };
+    // An option without a value is followed by any other word.
+    one == other || other.is_empty() || numbers(one).is_some_and(|one| Some(one) == numbers(other))
 }
 
 /// Options of the command line, and those of a file whose place they take.
@@ -130,7 +208,21 @@ pub fn read<T: Parser>(
         has.get_arguments()
             .any(|arg| arg.get_long() == name.strip_prefix("--"))
     });
-    let given = given.less(&line);
+    let name = file.display().to_string();
+    let (given, mut overrides) = given.less(&line, &name);
+    if beyond.field.is_some() {
+        for option in ["--interferer", "--field"] {
+            overrides.extend(said(&line, option).map(|value| Override {
+                option: format!("{option} {value}"),
+                instead: "[field]".to_owned(),
+                file: name.clone(),
+            }));
+        }
+    }
+    let beyond = Beyond {
+        overrides,
+        ..beyond
+    };
     let words = given
         .options
         .into_iter()
@@ -166,7 +258,10 @@ fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
     given.value("--distance", Some(config.distance_m));
     given.value("--altitude", Some(config.common.altitude_m));
     let (band, lateral) = (config.band, config.lateral);
-    given.value("--band", Some(format!("{},{}", band.least_m, band.most_m)));
+    // One altitude alone follows from that.
+    let is_band = band.least_m < band.most_m;
+    let ends = format!("{},{}", band.least_m, band.most_m);
+    given.value("--band", is_band.then_some(ends));
     given.value("--lateral-min-m", Some(lateral.least_m));
     given.value("--lateral-max-m", Some(lateral.most_m));
     given.value("--tx-power", Some(config.tx_power_w));
@@ -200,6 +295,7 @@ fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
         channel: Some(config.channel),
         field,
         profiles,
+        overrides: Vec::new(),
     })
 }
 

@@ -18,7 +18,7 @@ use crate::autopilot::{AutopilotPlan, SigningKey, Where};
 use crate::listen::ListenOptions;
 use crate::section;
 use uav_relay_linux::command::{self, named};
-use uav_relay_linux::config::Beyond;
+use uav_relay_linux::config::{Beyond, Override};
 use uav_relay_linux::log::LogOptions;
 use uav_relay_linux::mission::{self, MissionOptions};
 use uav_relay_linux::site::SiteOptions;
@@ -166,6 +166,7 @@ pub(crate) struct Plan {
     pub(crate) status_socket: Option<PathBuf>,
     pub(crate) capture: Option<PathBuf>,
     pub(crate) log: LogOptions,
+    pub(crate) overrides: Vec<Override>,
 }
 
 /// What frames are signed with.
@@ -215,6 +216,15 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
     let mut profiles = beyond.profiles.iter();
     let own = profiles.find(|(of, _)| *of == index);
     let profile = own.map_or(mission.config().common, |(_, profile)| *profile);
+    let mut overrides = beyond.overrides.iter();
+    if own.is_some()
+        && let Some(one) = overrides.find(|one| one.is("--altitude") || one.is("--uav-power"))
+    {
+        return Err(format!(
+            "{}: relay {index} has what is its own by a [[relay]] of --config; say it there",
+            one.option
+        ));
+    }
     let guard = GuardConfig {
         hover_m: options.position_error,
         ..GuardConfig::of(&mission, profile)
@@ -251,6 +261,7 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
         status_socket: options.status_socket.clone(),
         capture: options.capture.clone(),
         log: options.log.clone(),
+        overrides: beyond.overrides.clone(),
     })
 }
 

@@ -15,10 +15,10 @@ use crate::report::Report;
 use crate::uploads::Uploads;
 use crate::views::Views;
 use crate::{positions, status, uploads, views};
-use uav_relay_linux::epoch;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::refusals::Refusals;
 use uav_relay_linux::service::Service;
+use uav_relay_linux::{config, epoch};
 
 /// A relay, and all that it is connected to.
 struct Flight {
@@ -78,6 +78,7 @@ impl Flight {
         }
         let report = Report::new(log.clone(), plan.identity, &plan.mission);
         report.started(&ports.names(), plan.baud);
+        config::tell(&plan.overrides, &log);
         report.signs(auth.map(|auth| auth.epoch));
         match &autopilot {
             Some(autopilot) => autopilot.started(&log),

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{ArgAction, CommandFactory as _, Parser, ValueEnum};
 use uav_relay::{Duration, Mission, Side, Upload, Wiring};
 use uav_relay_linux::command;
-use uav_relay_linux::config::{self, Beyond, Given};
+use uav_relay_linux::config::{self, Beyond, Given, Override};
 use uav_relay_linux::log::LogOptions;
 use uav_relay_linux::mission::{MissionOptions, mission};
 use uav_relay_linux::site::SiteOptions;
@@ -114,6 +114,7 @@ pub(crate) struct Plan {
     pub(crate) status_socket: Option<PathBuf>,
     pub(crate) capture: Option<PathBuf>,
     pub(crate) log: LogOptions,
+    pub(crate) overrides: Vec<Override>,
 }
 
 /// Reads the command line; where there is nothing to run, help or the mistake has been printed.
@@ -185,5 +186,6 @@ fn plan(options: Options, beyond: &Beyond) -> Result<Plan, String> {
         status_socket: options.status_socket,
         capture: options.capture,
         log: options.log,
+        overrides: beyond.overrides.clone(),
     })
 }

@@ -13,7 +13,7 @@ use uav_relay_linux::refusals::Refusals;
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::service::Service;
 use uav_relay_linux::sleep::sleep;
-use uav_relay_linux::{epoch, tap};
+use uav_relay_linux::{config, epoch, tap};
 
 use crate::heard::Hearing;
 use crate::measurements::{Measurements, name};
@@ -77,6 +77,7 @@ impl<'a> Station<'a> {
             epoch: epoch::next(&plan.epoch_file)?,
         };
         report::started(&service.log, plan, auth.epoch);
+        config::tell(&plan.overrides, &service.log);
         let mut ground = Ground::new(&plan.loaded, plan.end, plan.network, plan.wiring, auth);
         let begun = service.now();
         if let Some(upload) = plan.upload {

@@ -173,3 +173,107 @@ fn what_is_wrong_with_the_file_is_named() {
         );
     }
 }
+
+/// The command line counts, and says where it counts against the file: nobody flies by a file that does not count unawares.
+#[test]
+fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
+    let folder = Folder::new();
+    let sections =
+        "[network]\nid = 4711\nrelays = 1\nbaud = 57600\n[companion]\nupstream = \"away\"\n";
+    let file = folder.write("drone.toml", &format!("{SCENARIO}\n{sections}"));
+    let name = file.display();
+    let channel = Medium::new(1, QUIET);
+    let said = |file: &Path, more: &[&str]| -> Vec<String> {
+        let all = [&["--index", "1", "--shared", channel.tty(0)], more].concat();
+        let relay = start(file, &all);
+        let mut said = overrides(relay);
+        let shared = format!("--shared {} counts, and not --upstream ", channel.tty(0));
+        let last = said.pop().unwrap();
+        assert!(last.starts_with(&shared), "{last}");
+        said
+    };
+    let mut others = said(
+        &file,
+        &["--altitude", "23", "--network=12", "--interferer", "80,1,2"],
+    );
+    others.sort();
+    assert_eq!(
+        others,
+        [
+            format!("--altitude 23 counts, and not 33.3 of {name}"),
+            format!("--interferer 80,1,2 counts, and not 55.5,987.6,-321 of {name}"),
+            format!("--network 12 counts, and not 4711 of {name}"),
+        ]
+    );
+    // The same number in other words is no contradiction, and what the file does not say neither.
+    let same = ["--altitude", "33.30", "--network", "4711", "--baud=57600"];
+    let same = [
+        &same[..],
+        &[
+            "--interferer",
+            "55.50,987.6,-321.0",
+            "--dead-after-ms",
+            "20000",
+        ],
+    ];
+    assert_eq!(said(&file, &same.concat()), [""; 0]);
+
+    let field = "[geometry]\ndistance_m = 1000.0\naltitude_m = 20.0\n[power]\ntx_w = 80.0\nuav_w = 1.0\n\
+        [field]\ni_max_w = 2e-10\n[[field.beta]]\nx_m = 0.0\nalpha = 2.0\nbeta = 1.5\n\
+        [network]\nrelays = 1\n";
+    let field = folder.write("field.toml", field);
+    let alone = [
+        "--index",
+        "1",
+        "--interferer",
+        "80,500,400",
+        "--altitude",
+        "25",
+    ];
+    let mut said = overrides(start(&field, &alone));
+    said.sort();
+    let name = field.display();
+    assert_eq!(
+        said,
+        [
+            format!("--altitude 25 counts, and not 20 of {name}"),
+            format!("--interferer 80,500,400 counts, and not [field] of {name}"),
+        ]
+    );
+
+    // What is one relay's own by the file, an option for all cannot say.
+    let own = format!("{SCENARIO}\n[[relay]]\nindex = 1\npower_w = 0.5\n");
+    let own = folder.write("own.toml", &own);
+    for (index, status) in [("1", 2), ("2", 1)] {
+        let more = [
+            "--index",
+            index,
+            "--of",
+            "2",
+            "--shared",
+            "/nowhere",
+            "--altitude",
+            "23",
+        ];
+        let Ended {
+            status: ended,
+            stderr,
+            ..
+        } = start(&own, &more).end();
+        assert_eq!((ended, stderr.len()), (Some(status), 1), "{stderr:?}");
+        let line = "--altitude 23: relay 1 has what is its own by a [[relay]] of --config";
+        assert_eq!(stderr[0].starts_with(line), status == 2, "{stderr:?}");
+    }
+}
+
+/// What a relay has said it was told otherwise by its command line, once it has begun.
+fn overrides(mut relay: Relay) -> Vec<String> {
+    relay.line("unguarded: ");
+    relay.signal(rustix::process::Signal::TERM);
+    let ended = relay.end();
+    assert_eq!(ended.status, Some(0), "{ended:?}");
+    let lines = ended.stdout.iter();
+    lines
+        .filter_map(|line| Some(line.split_once("  override: ")?.1.to_owned()))
+        .collect()
+}
