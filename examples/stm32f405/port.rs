@@ -13,7 +13,7 @@ use uav_relay::serial::{ByteQueues, Fault, InterruptEnd, Pend, QueuedPort};
 use super::{board, clock};
 
 /// Bits a second on every port, 8N1.
-pub(crate) const BAUD: u32 = 115_200;
+pub(crate) use uav_relay_block::BAUD;
 
 /// Received bytes that can wait for the main loop: 11 ms of them at full speed.
 pub(crate) const RECEIVED: usize = 128;

@@ -83,6 +83,9 @@ pub use write::write;
 /// Where the block begins: the last sector of the flash of an STM32F405.
 pub const ADDRESS: u32 = 0x080E_0000;
 
+/// Bit/s on every port of the firmware, which no block changes.
+pub const BAUD: u32 = 115_200;
+
 /// The first bytes of a block.
 pub const MAGIC: [u8; 4] = *b"UAVR";
 

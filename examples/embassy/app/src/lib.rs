@@ -20,7 +20,7 @@ use uav_relay::{Event, Instant, Relay, Settings, Wiring};
 use uav_relay_block as config;
 
 /// Bits a second on every port, 8N1.
-pub const BAUD: u32 = 115_200;
+pub use uav_relay_block::BAUD;
 
 /// Bytes that the driver of a UART holds each way: 22 ms of them, where a call of the relay takes 3.
 pub const BUFFER: usize = 256;

@@ -231,3 +231,71 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
     let both = [&plain[..], &["9", "--wires", "--baud", "9600"]].concat();
     assert!(refusal(&both).contains("--wires"));
 }
+
+/// What section `network` says reaches the block, or is refused: nothing of it is passed over.
+#[test]
+fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("relay.bin");
+    let file = folder.path().join("chain.toml");
+    let scenario = std::fs::read_to_string(super::example()).unwrap();
+    let run = |sections: &str, more: &[&str]| {
+        std::fs::write(&file, format!("{scenario}\n{sections}\n")).unwrap();
+        let file = file.to_str().unwrap();
+        let all = ["--scenario", file, "--uavs", "5", "--index", "3", "--out"];
+        provision(&[&all[..], &[out.to_str().unwrap()], more].concat())
+    };
+    let written = |sections: &str, more: &[&str]| {
+        let output = run(sections, more);
+        assert!(output.status.success(), "{output:?}");
+        let block: Block = std::fs::read(&out).unwrap().try_into().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        (reads(&block).unwrap().method, said)
+    };
+    let network = |keys: &str| format!("[network]\n{keys}");
+    let joint = network("method = \"joint\"");
+    assert_eq!(written("", &[]).0, Method::Align);
+    assert_eq!(written(&network("baud = 115200"), &[]).0, Method::Align);
+    let adjust = network("method = \"adjust\"");
+    assert_eq!(written(&adjust, &[]).0, Method::Adjust(Adjust::default()));
+    let rounds = Adjust {
+        rounds: 7,
+        ..Adjust::default()
+    };
+    assert_eq!(
+        written(&adjust, &["--rounds", "7"]).0,
+        Method::Adjust(rounds)
+    );
+    let (method, said) = written(&joint, &[]);
+    assert_eq!(method, Method::Joint);
+    assert!(!said.contains("--method"), "{said}");
+    let (method, said) = written(&joint, &["--method", "align"]);
+    assert_eq!(method, Method::Align);
+    let line = "--method align counts, and not network.method = \"joint\" of ";
+    assert!(said.starts_with(line), "{said}");
+    let mut planned =
+        "\n[plan]\nuavs = 5\ntolerance = 1e-4\nmethod = \"align\"\nsir_db = 3.0\n".to_owned();
+    for k in 1..=5 {
+        writeln!(
+            planned,
+            "[[plan.places]]\nx_m = {k}00.0\ny_m = 0.0\naltitude_m = 40.0"
+        )
+        .unwrap();
+    }
+    for (sections, words) in [
+        (
+            network("baud = 57600"),
+            "network.baud = 57600: must be 115200, or left out: the firmware's ports run at that",
+        ),
+        (
+            joint + &planned,
+            "network.method = \"joint\": must be \"align\", as its [plan] has it",
+        ),
+    ] {
+        let output = run(&sections, &[]);
+        assert_eq!(output.status.code(), Some(2), "{sections}: {output:?}");
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(line.trim_end().lines().count(), 1, "{line}");
+        assert!(line.contains(words), "{words} not in {line}");
+    }
+}

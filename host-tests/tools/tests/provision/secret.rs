@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use uav_relay_scenario::Scenario;
+use uav_relay_scenario::key;
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Block, ConfigError, Secret, secret};
-use uav_relay_scenario::key;
 
 use super::{of_paper, paper, provision, reads, refusal, with};
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use clap::Parser as _;
+use clap::{Parser as _, ValueEnum as _};
 use uav_relay::{Adjust, ChannelLoad, Local, Measure, Settings};
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
@@ -15,9 +15,9 @@ use uav_relay_sim::simulator::medium::access::OVERHEAD;
 use uav_relay_tools::plan::carried::is_current;
 use uav_relay_tools::plan::flown::{Flown, flown};
 use uav_relay_tools::provision::block::Flight;
-use uav_relay_tools::provision::config::{ADDRESS, LEN, Secret};
-use uav_relay_tools::provision::summary::{Heading, summary};
+use uav_relay_tools::provision::config::{ADDRESS, BAUD, LEN, Secret};
 use uav_relay_tools::provision::folder;
+use uav_relay_tools::provision::summary::{Heading, summary};
 
 use options::{Method, Options};
 
@@ -127,6 +127,7 @@ impl<'a> Asked<'a> {
             PlannedMethod::Align => Method::Align,
             PlannedMethod::Joint => Method::Joint,
         });
+        let of_section = network.method.as_deref();
         let method = match (options.method, planned) {
             (Some(method), Some(planned)) if method != planned => {
                 return Err(other(
@@ -134,8 +135,16 @@ impl<'a> Asked<'a> {
                     &format!("another method, {planned:?}").to_lowercase(),
                 ));
             }
-            (method, planned) => method.or(planned).unwrap_or(Method::Align),
+            (method, planned) => method.or(planned),
         };
+        let method = of_network(method, of_section, &name, planned.is_some())?;
+        if let Some(baud) = network.baud
+            && baud != BAUD
+        {
+            return Err(format!(
+                "{name}: network.baud = {baud}: must be {BAUD}, or left out: the firmware's ports run at that, and no block changes it; a radio's own data rate is --baud"
+            ));
+        }
         let tolerance = match (options.tolerance, plan) {
             (Some(tolerance), Some(plan)) if tolerance.total_cmp(&plan.tolerance).is_ne() => {
                 return Err(other(
@@ -293,6 +302,36 @@ impl<'a> Asked<'a> {
             self.uavs,
             text.trim_end()
         ))
+    }
+}
+
+/// The method: that of the command line or of a plan, else that of section `network`, else `align`. A plan that was made by another one than
+/// the section's is refused; what the command line says otherwise is said.
+fn of_network(
+    method: Option<Method>,
+    of_file: Option<&str>,
+    name: &str,
+    is_planned: bool,
+) -> Result<Method, String> {
+    let Some(text) = of_file else {
+        return Ok(method.unwrap_or(Method::Align));
+    };
+    // The scenario has checked it.
+    let own = Method::from_str(text, false).unwrap_or(Method::Align);
+    match method {
+        Some(method) if method != own => {
+            let said = format!("{method:?}").to_lowercase();
+            if is_planned {
+                return Err(format!(
+                    "{name}: network.method = \"{text}\": must be \"{said}\", as its [plan] has it, or plan anew"
+                ));
+            }
+            command::complain(&format!(
+                "--method {said} counts, and not network.method = \"{text}\" of {name}"
+            ));
+            Ok(method)
+        }
+        _ => Ok(own),
     }
 }
 

@@ -28,7 +28,7 @@ pub(crate) struct Options {
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1; without it that of the scenario's plan, or 1e-4
     #[arg(long, value_name = "T", value_parser = |text: &str| number(text, 1e-6, 0.1))]
     pub(crate) tolerance: Option<f64>,
-    /// How the places are found; in a field, only by `align`. Without it that of the scenario's plan, or `align`
+    /// How the places are found; in a field, only by `align`. Without it that of the scenario's plan or section `network`, or `align`
     #[arg(long, value_name = "M", value_enum)]
     pub(crate) method: Option<Method>,
     /// Rounds of `adjust` at most, 1 to 65535; 500 without it
