@@ -123,9 +123,6 @@ pub struct Noise {
 /// Boltzmann's constant, J/K.
 const BOLTZMANN: f64 = 1.380_649e-23;
 
-/// The temperature that noise figures are for, K.
-const STANDARD_K: f64 = 290.0;
-
 impl Default for Noise {
     fn default() -> Self {
         Self {
@@ -138,10 +135,13 @@ impl Default for Noise {
 }
 
 impl Noise {
+    /// The temperature T0 that noise figures are for, K.
+    pub const STANDARD_K: f64 = 290.0;
+
     /// Noise power at the input of a receiver, in watts: k T0 B F, or what is given.
     pub fn receiver_w(&self) -> f64 {
         self.power_dbm.map_or_else(
-            || BOLTZMANN * STANDARD_K * self.bandwidth_hz * factor(self.figure_db),
+            || BOLTZMANN * Self::STANDARD_K * self.bandwidth_hz * factor(self.figure_db),
             watts,
         )
     }

@@ -18,6 +18,7 @@ mod field;
 pub mod flown;
 mod found;
 pub mod map;
+pub mod noise;
 mod one;
 pub mod report;
 mod several;

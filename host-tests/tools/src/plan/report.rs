@@ -4,10 +4,12 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use uav_relay_scenario::Noise;
 use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
 
 use super::ask::Number;
 use super::found::{Plan, Why};
+use super::noise::NoiseReport;
 use super::unit::Unit;
 
 /// The one interferer that stands for several.
@@ -97,6 +99,9 @@ pub struct PlanReport {
     /// The same in dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir_db: Option<f64>,
+    /// The noise that a bandwidth and a noise figure make.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseReport>,
     /// For several interferers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hypothetical: Option<HypotheticalReport>,
@@ -164,6 +169,7 @@ impl PlanReport {
             relays: relays(&plan.places, &plan.sirs),
             rx_sir,
             rx_sir_db: rx_sir.map(db),
+            noise: None,
             hypothetical,
             room: !plan.mission.config().lateral.is_single(),
             unit,
@@ -185,6 +191,15 @@ impl PlanReport {
             target_sir_db: target_sir.map(db),
             unit,
             ..Self::default()
+        }
+    }
+
+    /// The same, of a scenario with that noise.
+    #[must_use]
+    pub fn in_noise(self, noise: &Noise) -> Self {
+        Self {
+            noise: NoiseReport::of(noise),
+            ..self
         }
     }
 
@@ -218,6 +233,9 @@ impl PlanReport {
             );
         }
         _ = writeln!(text, "{}", self.certainty());
+        if let Some(noise) = &self.noise {
+            _ = writeln!(text, "{noise}");
+        }
         if let Some(one) = &self.hypothetical {
             one.describe(&mut text, unit);
         }

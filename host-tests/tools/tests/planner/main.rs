@@ -7,6 +7,7 @@
 )]
 
 mod closed;
+mod noise;
 mod refusals;
 mod units;
 

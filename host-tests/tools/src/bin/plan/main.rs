@@ -53,7 +53,8 @@ fn run(options: &Options) -> Result<(), Failure> {
             let next = out::write(options, &scenario, &plan, number)?;
             show(
                 options,
-                &PlanReport::new(&plan, number, options.unit(), options.bandwidth_hz),
+                &PlanReport::new(&plan, number, options.unit(), options.bandwidth_hz)
+                    .in_noise(&scenario.noise),
             )?;
             if !options.json {
                 command::print(&next);
@@ -71,7 +72,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         }
         Err(NoPlan::Unmet(why, best_sir)) => show(
             options,
-            &PlanReport::unmet(&why, best_sir, number, options.unit()),
+            &PlanReport::unmet(&why, best_sir, number, options.unit()).in_noise(&scenario.noise),
         ),
     }
 }
