@@ -82,15 +82,13 @@ impl Replug {
             self.counts.times_gone = self.counts.times_gone.saturating_add(1);
             self.again_at = now + self.pause;
         }
-        if let Some(tap) = self.tap.take_if(|tap| tap.is_over()) {
-            let fields =
-                json!({ "port": self.path.display().to_string(), "left_out": tap.left_out() });
-            log.say(
-                now,
-                "capture over",
-                fields,
-                format_args!("the capture cannot be written any more, and has no more of {self}"),
-            );
+        if let Some(tap) = self.tap.take_if(|tap| tap.is_over())
+            && let Some(fault) = tap.fault()
+        {
+            let fields = json!({ "fault": fault, "left_out": tap.left_out() });
+            let what =
+                format_args!("--capture cannot be written any more: {fault}; all else goes on");
+            log.say(now, "capture over", fields, what);
         }
         if self.tty.is_none() && self.again_at <= now {
             self.pause = self.pause.times(2).min(LONGEST);

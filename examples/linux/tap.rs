@@ -4,7 +4,9 @@
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use uav_relay_capture::{Capture, Cut, Direction, Frame, Interface};
@@ -20,10 +22,19 @@ struct Piece {
     bytes: Vec<u8>,
 }
 
+/// What became of a capture, as all its taps see it.
+#[derive(Debug, Default)]
+struct Fate {
+    /// Why it ended before the program did.
+    fault: OnceLock<String>,
+    is_told: AtomicBool,
+}
+
 /// The tap of one port.
 #[derive(Debug)]
 pub struct Tap {
     port: usize,
+    fate: Arc<Fate>,
     sender: SyncSender<Piece>,
     left_out: u64,
     is_over: bool,
@@ -56,6 +67,14 @@ impl Tap {
         self.is_over
     }
 
+    /// Why the file could not be written any more; said by the first of its taps that is asked.
+    #[must_use]
+    pub fn fault(&self) -> Option<&str> {
+        let is_told = self.fate.is_told.swap(true, Ordering::Relaxed);
+        let fault = self.fate.fault.get().map_or("its writer is gone", |it| it);
+        (!is_told).then_some(fault)
+    }
+
     /// Pieces that are missing in it.
     pub const fn left_out(&self) -> u64 {
         self.left_out
@@ -76,13 +95,18 @@ pub fn taps(program: &str, path: &Path, ports: &[String]) -> Result<Vec<Tap>, St
         .collect::<Result<_, _>>()?;
     capture.flush().map_err(wrong)?;
     let (sender, receiver) = sync_channel(WAITING);
+    let fate = Arc::new(Fate::default());
+    let ended = Arc::clone(&fate);
     std::thread::spawn(move || {
         // Whoever taps is told by the channel that is gone.
-        _ = write(&mut capture, &interfaces, &receiver);
+        if let Err(error) = write(&mut capture, &interfaces, &receiver) {
+            _ = ended.fault.set(error.to_string());
+        }
     });
     Ok((0..ports.len())
         .map(|port| Tap {
             port,
+            fate: Arc::clone(&fate),
             sender: sender.clone(),
             left_out: 0,
             is_over: false,

@@ -3,12 +3,15 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
+use std::time::Duration;
 
 use rustix::process::Signal;
 use serde_json::Value;
 
-use super::medium::QUIET;
+use super::medium::{Medium, QUIET};
 use super::process::Relay;
+use super::signed::Files;
+use super::stays::fill_disk;
 use super::{Chain, simulated};
 use uav_relay_scenario::Scenario;
 
@@ -86,4 +89,81 @@ fn a_capture_that_cannot_begin_is_refused() {
         ended.stderr.join(" ").contains("--capture /dev/full: "),
         "{ended:?}"
     );
+}
+
+/// The one in the middle has two ports, and says it once for both.
+#[test]
+fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("relay.pcapng");
+    let capture = ["--capture", file.to_str().unwrap()].map(str::to_owned);
+    let quick = ["--probe-after-ms", "300", "--dead-after-ms", "900"].map(str::to_owned);
+    let mut chain = Chain::of_wires(3, QUIET);
+    for index in 1..=3 {
+        chain.options = quick.to_vec();
+        if index == 2 {
+            chain.options.extend(capture.clone());
+        }
+        let relay = chain.relay(index);
+        chain.relays.push(relay);
+    }
+    assert_eq!(chain.settled(), simulated(&Scenario::default(), 3));
+    fill_disk(chain.relays[1].pid(), true);
+    let full = std::fs::metadata(&file).unwrap().len();
+    let line = chain.relays[1].line("capture over: ");
+    let why = "--capture cannot be written any more: File too large";
+    assert!(line.contains(why), "{line}");
+    // Its neighbours ask for signs of life all the while, and get them.
+    std::thread::sleep(Duration::from_secs(4));
+    let again = chain.relays[1].lines_with("capture over");
+    assert!(again.is_empty(), "once: {again:?}");
+    for relay in &mut chain.relays {
+        assert!(!relay.has_said("lost: ") && !relay.has_said("lapsed: "));
+    }
+    // Space that comes back begins no other capture.
+    fill_disk(chain.relays[1].pid(), false);
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(std::fs::metadata(&file).unwrap().len() <= full + 64);
+    for relay in chain.relays {
+        relay.signal(Signal::TERM);
+        assert_eq!(relay.end().status, Some(0));
+    }
+}
+
+/// The same at a station, which is asked for by a relay that was switched on: it says so and answers all the same.
+#[test]
+fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
+    let files = Files::new();
+    let wire = Medium::new(2, QUIET);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("ground.pcapng").display().to_string();
+    let level = folder.path().join("level");
+    std::fs::write(&level, "1e-9\n").unwrap();
+    let signed = files.options("key", "ground");
+    let mut options = vec!["--stand", "--end", "tx", "--of", "1", "--tty", wire.tty(0)];
+    options.extend([
+        "--capture",
+        &file,
+        "--measurements",
+        level.to_str().unwrap(),
+    ]);
+    options.extend(signed.iter().map(String::as_str));
+    let mut station = Relay::ground(&options);
+    station.line("measurement: 1.000e-9 W");
+    fill_disk(station.pid(), true);
+    let signed = files.options("key", "relay");
+    let mut options = vec!["--index", "1", "--of", "1", "--upstream", wire.tty(1)];
+    options.extend(signed.iter().map(String::as_str));
+    let _relay = Relay::start(&options);
+    for power in ["2e-9\n", "3e-9\n", "4e-9\n"] {
+        std::thread::sleep(Duration::from_millis(1_200));
+        std::fs::write(&level, power).unwrap();
+    }
+    station.line("capture over: --capture cannot be written any more: File too large");
+    if !station.has_said("back: relay 1") {
+        station.line("back: relay 1 is heard");
+    }
+    assert!(station.lines_with("capture over").is_empty(), "once");
+    station.signal(Signal::TERM);
+    assert_eq!(station.end().status, Some(0));
 }
