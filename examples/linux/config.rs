@@ -31,6 +31,22 @@ pub struct Beyond {
     pub overrides: Vec<Override>,
 }
 
+impl Beyond {
+    /// Refuses an option for all relays where relay `index`, which has something of its own by the file, would not fly by it.
+    ///
+    /// # Errors
+    /// One line that names the option and the file's table.
+    pub fn is_one_for_all(&self, index: u16) -> Result<(), String> {
+        let is_passed_over = |one: &&Override| one.is("--altitude") || one.is("--uav-power");
+        self.overrides.iter().find(is_passed_over).map_or(Ok(()), |one| {
+            Err(format!(
+                "{}: relay {index} has what is its own by a [[relay]] of --config; say it there",
+                one.option
+            ))
+        })
+    }
+}
+
 /// An option of the command line that counts, where the file says something else.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Override {

@@ -1,36 +1,89 @@
-//! A file that is written in flight. Where the disk does not take it the relay stays in the air: it is said once, counted, and tried
-//! again every second.
+//! A file that is written in flight, by a thread of its own: neither a slow disk nor a full one holds up the relay. Where the disk does not
+//! take it the relay stays in the air: it is said once, counted, and tried again every second.
 
+use std::io::{Read as _, Write as _};
+use std::os::fd::{AsFd as _, BorrowedFd};
+use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::time::{Duration as Span, Instant as Clock};
 
 use serde_json::json;
 use uav_relay::{Duration, Instant};
-
 use uav_relay_linux::keep::keep;
 use uav_relay_linux::log::Log;
 
 /// Between two tries.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
+/// How long the end of the program waits for the disk.
+const LAST: Span = Span::from_millis(500);
+
+/// How a write ended, and how long it took.
+type Done = (std::io::Result<()>, Span);
+
 /// A file, and how it went.
 #[derive(Debug)]
 pub(crate) struct Kept {
     option: &'static str,
     file: PathBuf,
+    orders: SyncSender<Vec<u8>>,
+    done: Receiver<Done>,
+    /// Has a byte for every write that has ended, so that poll(2) notices.
+    ended: UnixStream,
+    is_writing: bool,
+    writes: u64,
+    slowest: Span,
     failures: u64,
     failing: bool,
     again_at: Instant,
 }
 
 impl Kept {
-    pub(crate) fn new(option: &'static str, file: &Path) -> Self {
-        Self {
+    /// The file that was given for `option`; nothing is written yet.
+    ///
+    /// # Errors
+    /// One line that says what does not work.
+    pub(crate) fn new(option: &'static str, file: &Path) -> Result<Self, String> {
+        let named = |error: std::io::Error| format!("{option} {}: {error}", file.display());
+        let (ended, mut end) = UnixStream::pair().map_err(named)?;
+        ended.set_nonblocking(true).map_err(named)?;
+        let (orders, taken) = sync_channel::<Vec<u8>>(1);
+        let (told, done) = sync_channel(1);
+        let path = file.to_owned();
+        let serve = move || {
+            for bytes in taken {
+                let begun = Clock::now();
+                let result = keep(&path, &bytes);
+                if told.send((result, begun.elapsed())).is_err() {
+                    return;
+                }
+                // It has room for a byte: the one before was taken with what it told of.
+                let _ = end.write(&[0]);
+            }
+        };
+        std::thread::Builder::new()
+            .name("file".to_owned())
+            .spawn(serve)
+            .map_err(named)?;
+        Ok(Self {
             option,
             file: file.to_owned(),
+            orders,
+            done,
+            ended,
+            is_writing: false,
+            writes: 0,
+            slowest: Span::ZERO,
             failures: 0,
             failing: false,
             again_at: Instant::ZERO,
-        }
+        })
+    }
+
+    /// Whether a write has not ended yet.
+    pub(crate) const fn is_writing(&self) -> bool {
+        self.is_writing
     }
 
     /// Whether it is of use to try: not so soon after a try that failed.
@@ -38,24 +91,58 @@ impl Kept {
         !self.failing || self.again_at <= now
     }
 
-    /// Makes `bytes` all that is in the file; whether they are.
-    pub(crate) fn put(&mut self, now: Instant, log: &Log, bytes: &[u8]) -> bool {
-        let Self { option, file, .. } = self;
-        let name = format!("{option} {}", file.display());
-        let result = keep(file, bytes);
-        let was = core::mem::replace(&mut self.failing, result.is_err());
+    /// When to come back to try again.
+    pub(crate) fn wake(&self) -> Option<Instant> {
+        (self.failing && !self.is_writing).then_some(self.again_at)
+    }
+
+    /// What to sleep on while it writes.
+    pub(crate) fn fd(&self) -> BorrowedFd<'_> {
+        self.ended.as_fd()
+    }
+
+    /// Begins to make `bytes` all that is in the file. Nothing where it writes already.
+    pub(crate) fn put(&mut self, bytes: Vec<u8>) {
+        self.is_writing |= self.orders.try_send(bytes).is_ok();
+    }
+
+    /// Whether what was put last is in the file, once that is known.
+    pub(crate) fn tend(&mut self, now: Instant, log: &Log) -> Option<bool> {
+        let mut bytes = [0; 8];
+        let _ = (&self.ended).read(&mut bytes);
+        let (result, took) = self.done.try_recv().ok()?;
+        Some(self.took(now, log, result, took))
+    }
+
+    /// Waits for a write that goes on, but not for long: the program ends.
+    pub(crate) fn finish(&mut self, now: Instant, log: &Log) {
+        if self.is_writing
+            && let Ok((result, took)) = self.done.recv_timeout(LAST)
+        {
+            self.took(now, log, result, took);
+        }
+    }
+
+    fn took(&mut self, now: Instant, log: &Log, result: std::io::Result<()>, took: Span) -> bool {
+        self.is_writing = false;
+        self.slowest = self.slowest.max(took);
+        let is_kept = result.is_ok();
+        let was = core::mem::replace(&mut self.failing, !is_kept);
+        let (option, name) = (self.option, self.file.display().to_string());
         match result {
             Ok(()) => {
+                self.writes += 1;
                 if was {
                     let failures = self.failures;
                     log.say(
                         now,
                         "file",
-                        json!({ "file": self.file.display().to_string(), "failures": failures }),
-                        format_args!("{name}: is written again, after {failures} failures"),
+                        json!({ "file": name, "failures": failures }),
+                        format_args!(
+                            "{option} {name}: is written again, after {failures} failures"
+                        ),
                     );
                 }
-                true
             }
             Err(error) => {
                 self.failures += 1;
@@ -64,15 +151,25 @@ impl Kept {
                     log.say(
                         now,
                         "file",
-                        json!({ "file": self.file.display().to_string(), "failures": self.failures }),
+                        json!({ "file": name, "failures": self.failures }),
                         format_args!(
-                            "{name}: cannot be written: {error}; the relay flies on, and tries again every second"
+                            "{option} {name}: cannot be written: {error}; the relay flies on, and tries again every second"
                         ),
                     );
                 }
-                false
             }
         }
+        is_kept
+    }
+
+    /// How often it was written.
+    pub(crate) const fn writes(&self) -> u64 {
+        self.writes
+    }
+
+    /// How long a write took at most, ms.
+    pub(crate) fn slowest_ms(&self) -> f64 {
+        1e3 * self.slowest.as_secs_f64()
     }
 
     /// How often it could not be written.

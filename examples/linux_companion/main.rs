@@ -35,7 +35,8 @@
 //! | `status.rs` | how the relay is, as JSON |
 //! | `uploads.rs` | the newest mission that was uploaded, in a file |
 //! | `views.rs` | what it has said in the votes on views, in a file |
-//! | `kept.rs` | a file that is written in flight |
+//! | `kept.rs` | a file that is written in flight, by a thread of its own |
+//! | `gate.rs` | nothing is sent before it is in such a file |
 //!
 //! What it has in common with the ground station is a library, `examples/linux`.
 //!
@@ -44,6 +45,8 @@
 
 #[cfg(unix)]
 mod autopilot;
+#[cfg(unix)]
+mod gate;
 #[cfg(unix)]
 mod kept;
 #[cfg(unix)]

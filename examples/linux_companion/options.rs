@@ -216,14 +216,8 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
     let mut profiles = beyond.profiles.iter();
     let own = profiles.find(|(of, _)| *of == index);
     let profile = own.map_or(mission.config().common, |(_, profile)| *profile);
-    let mut overrides = beyond.overrides.iter();
-    if own.is_some()
-        && let Some(one) = overrides.find(|one| one.is("--altitude") || one.is("--uav-power"))
-    {
-        return Err(format!(
-            "{}: relay {index} has what is its own by a [[relay]] of --config; say it there",
-            one.option
-        ));
+    if own.is_some() {
+        beyond.is_one_for_all(index)?;
     }
     let guard = GuardConfig {
         hover_m: options.position_error,

@@ -10,14 +10,15 @@ use serde_json::{Value, json};
 use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, SerialStats, Shared, byte_time};
 use uav_relay::{Instant, Relay};
 
+use crate::gate::Gate;
 use crate::options::Ttys;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::{sleep, tap};
 
-/// A tty, or the end of the chain: nobody is there.
+/// A tty, or the end of the chain: nobody is there; behind a gate.
 #[derive(Debug)]
-pub(crate) struct End(Option<Replug>);
+pub(crate) struct End(Option<Replug>, Gate);
 
 impl SerialPort for End {
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
@@ -25,6 +26,10 @@ impl SerialPort for End {
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
+        if !self.1.is_open() {
+            // It waits, as for a port that takes nothing.
+            return Ok(0);
+        }
         let all = Ok(bytes.len());
         self.0.as_mut().map_or(all, |tty| tty.write(bytes))
     }
@@ -42,16 +47,21 @@ pub(crate) enum Ports {
 }
 
 impl Ports {
-    /// Opens them, and writes down what goes over them in `capture`, if there is one.
+    /// Opens them, and writes down what goes over them in `capture`, if there is one. Nothing is sent while `gate` is shut.
     ///
     /// # Errors
     /// One line that names the tty or the file.
-    pub(crate) fn open(ttys: &Ttys, baud: u32, capture: Option<&Path>) -> Result<Self, String> {
+    pub(crate) fn open(
+        ttys: &Ttys,
+        baud: u32,
+        capture: Option<&Path>,
+        gate: &Gate,
+    ) -> Result<Self, String> {
         let link = |option, path: Option<&_>| {
             let tty = path
                 .map(|path| Replug::open(option, path, baud))
                 .transpose()?;
-            Ok::<_, String>(SerialLink::new(End(tty), byte_time(baud)))
+            Ok::<_, String>(SerialLink::new(End(tty, gate.clone()), byte_time(baud)))
         };
         let mut ports = match ttys {
             Ttys::Pair {

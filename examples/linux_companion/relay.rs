@@ -8,6 +8,8 @@ use serde_json::json;
 use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, Upload};
 
 use crate::autopilot::Companion;
+use crate::gate::Gate;
+use crate::kept::Kept;
 use crate::options::Plan;
 use crate::ports::Ports;
 use crate::positions::Positions;
@@ -50,7 +52,8 @@ impl Flight {
     fn begin(plan: &Plan) -> Result<Self, String> {
         let service = Service::begin(&plan.log, plan.status_socket.as_deref())?;
         let log = service.log.clone();
-        let mut ports = Ports::open(&plan.ttys, plan.baud, plan.capture.as_deref())?;
+        let gate = Gate::new();
+        let mut ports = Ports::open(&plan.ttys, plan.baud, plan.capture.as_deref(), &gate)?;
         let listens = plan.settings.listen.is_some();
         let positions = plan
             .positions
@@ -67,7 +70,7 @@ impl Flight {
             auth,
             ..plan.settings
         };
-        let views = Views::load(plan.view_file.as_deref())?;
+        let views = Views::load(plan.view_file.as_deref(), gate)?;
         let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), service.now())
             .map_err(|error| error.to_string())?;
         let resumed = resume(plan, &mut relay, &log);
@@ -99,7 +102,7 @@ impl Flight {
             positions,
             autopilot,
             views,
-            uploads: file.map(|file| Uploads::new(file)),
+            uploads: file.map(|file| Uploads::new(file)).transpose()?,
             refusals: Refusals::default(),
             signs: auth.is_some(),
         })
@@ -134,15 +137,16 @@ impl Flight {
             }
             self.report.event(time, event, relay);
         }
-        if let Some(uploads) = &mut self.uploads {
-            uploads.tend(time, log);
-        }
+        let files = [
+            self.uploads.as_mut().and_then(|it| it.tend(time, log)),
+            self.views.kept().and_then(Kept::wake),
+        ];
         if let Some(why) = self.refusals.look(time, relay.stats(), self.signs) {
             log.tell(time, "not taken", format_args!("{why}"));
         }
         let again = self.autopilot.as_ref().map(|it| it.wake(service.now()));
         let alive = self.tell(time);
-        let others = [again, reopen, alive].into_iter().flatten();
+        let others = [again, reopen, alive].into_iter().chain(files).flatten();
         let wake = wake.into_iter().chain(others).min();
         self.sleep(wake)
     }
@@ -156,7 +160,8 @@ impl Flight {
             ports,
             ..
         } = self;
-        let upload_failures = self.uploads.as_ref().map_or(0, Uploads::failures);
+        let uploads = self.uploads.as_ref().map(Uploads::kept);
+        let views = self.views.kept();
         service.tend(time, "relay", |log| {
             json!({
                 "program": env!("CARGO_BIN_NAME"),
@@ -166,8 +171,10 @@ impl Flight {
                 "links": ports.status(),
                 "autopilot": self.autopilot.as_ref().map(Companion::status),
                 "positions_refused": self.positions.as_ref().map(Positions::bad),
-                "view_file_failures": self.views.failures(),
-                "upload_file_failures": upload_failures,
+                "view_file_writes": views.map_or(0, Kept::writes),
+                "view_file_slowest_ms": views.map_or(0.0, Kept::slowest_ms),
+                "view_file_failures": views.map_or(0, Kept::failures),
+                "upload_file_failures": uploads.map_or(0, Kept::failures),
                 "lines_dropped": log.dropped(),
             })
         })
@@ -178,7 +185,9 @@ impl Flight {
         let span = self.service.until(wake);
         let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
         let fifo = self.positions.as_ref().map(Positions::fd);
-        others.extend(fifo.map(|fd| (fd, PollFlags::IN)));
+        let files = [self.views.kept(), self.uploads.as_ref().map(Uploads::kept)];
+        let files = files.into_iter().flatten().map(Kept::fd);
+        others.extend(fifo.into_iter().chain(files).map(|fd| (fd, PollFlags::IN)));
         // The last one, if any.
         let autopilot = self.autopilot.as_ref().and_then(Companion::interest);
         others.extend(autopilot);
@@ -200,6 +209,10 @@ impl Flight {
     fn end(&mut self) {
         self.service.stopping();
         let (time, log) = (self.service.now(), &self.service.log);
+        self.views.finish(time, log);
+        if let Some(uploads) = &mut self.uploads {
+            uploads.finish(time, log);
+        }
         if let Some(positions) = &self.positions {
             positions.stopped(time, log);
         }

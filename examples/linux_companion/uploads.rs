@@ -48,14 +48,21 @@ fn parse(bytes: &[u8]) -> Option<Upload> {
 pub(crate) struct Uploads {
     kept: Kept,
     unstored: Option<[u8; STORED]>,
+    /// What is being written.
+    writing: Option<[u8; STORED]>,
 }
 
 impl Uploads {
-    pub(crate) fn new(file: &Path) -> Self {
-        Self {
-            kept: Kept::new("--upload-file", file),
+    /// Nothing is written yet.
+    ///
+    /// # Errors
+    /// One line that says what does not work.
+    pub(crate) fn new(file: &Path) -> Result<Self, String> {
+        Ok(Self {
+            kept: Kept::new("--upload-file", file)?,
             unstored: None,
-        }
+            writing: None,
+        })
     }
 
     /// Has it written down by the next [`tend`](Self::tend).
@@ -68,19 +75,30 @@ impl Uploads {
         self.unstored = Some(bytes);
     }
 
-    /// Writes down what is not yet. What cannot be kept is flown all the same.
-    pub(crate) fn tend(&mut self, now: Instant, log: &Log) {
-        if let Some(bytes) = &self.unstored
-            && self.kept.is_due(now)
-            && self.kept.put(now, log, bytes)
-        {
-            self.unstored = None;
+    /// Has what is not written down yet written, and says when to come back for that. What cannot be kept is flown all the same.
+    pub(crate) fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
+        if let Some(is_kept) = self.kept.tend(now, log) {
+            let written = self.writing.take();
+            self.unstored.take_if(|it| is_kept && Some(*it) == written);
         }
+        if let Some(bytes) = &self.unstored
+            && !self.kept.is_writing()
+            && self.kept.is_due(now)
+        {
+            self.writing = Some(*bytes);
+            self.kept.put(bytes.to_vec());
+        }
+        self.kept.wake()
     }
 
-    /// How often it could not be written.
-    pub(crate) const fn failures(&self) -> u64 {
-        self.kept.failures()
+    /// The file.
+    pub(crate) const fn kept(&self) -> &Kept {
+        &self.kept
+    }
+
+    /// Waits for the disk at the end, but not for long.
+    pub(crate) fn finish(&mut self, now: Instant, log: &Log) {
+        self.kept.finish(now, log);
     }
 }
 

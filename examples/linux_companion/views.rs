@@ -1,6 +1,7 @@
 //! What the relay has said in the votes on views, in a file: [`ViewRecord::to_bytes`], and a CRC-32C behind it.
 //!
-//! It is on the disk before the others are told: a promise that is forgotten is none, and two parts of a chain could fly one view each.
+//! It is on the disk before the others are told: a promise that is forgotten is none, and two parts of a chain could fly one view each. So while
+//! it is being written, by a thread of its own, nothing is sent; all else goes on.
 //! It is of one flight. Before another one the file is removed.
 
 use std::io::ErrorKind;
@@ -9,6 +10,7 @@ use std::path::Path;
 use uav_relay::wire::crc::CRC_32C;
 use uav_relay::{Instant, Relay, ViewRecord};
 
+use crate::gate::Gate;
 use crate::kept::Kept;
 use uav_relay_linux::log::Log;
 
@@ -18,8 +20,12 @@ const OPTION: &str = "--view-file";
 pub(crate) struct Views {
     kept: Option<Kept>,
     stored: Option<ViewRecord>,
-    /// What was to be written last.
+    /// What is being written.
+    writing: Option<ViewRecord>,
+    /// What was written last, or could not be.
     tried: Option<ViewRecord>,
+    /// Open where all that was said is stored.
+    gate: Gate,
 }
 
 impl Views {
@@ -27,7 +33,7 @@ impl Views {
     ///
     /// # Errors
     /// One line that names the file and what is wrong: who has said something and forgotten it had better not vote.
-    pub(crate) fn load(file: Option<&Path>) -> Result<Self, String> {
+    pub(crate) fn load(file: Option<&Path>, gate: Gate) -> Result<Self, String> {
         let stored = match file {
             None => None,
             Some(file) => match std::fs::read(file) {
@@ -42,9 +48,11 @@ impl Views {
             },
         };
         Ok(Self {
-            kept: file.map(|file| Kept::new(OPTION, file)),
+            kept: file.map(|file| Kept::new(OPTION, file)).transpose()?,
             stored,
+            writing: None,
             tried: None,
+            gate,
         })
     }
 
@@ -53,25 +61,36 @@ impl Views {
         self.stored.as_ref()
     }
 
-    /// Writes down what `relay` has said, if that has changed. Where it cannot be written it is tried again, and the relay flies on: a drone
-    /// in the air is not to be switched off for it.
+    /// Has what `relay` has said written down, if that has changed; until it is, the gate is shut. Where it cannot be written it is tried again,
+    /// and the relay flies on, and speaks: a drone in the air is not to be switched off for it.
     pub(crate) fn keep(&mut self, now: Instant, log: &Log, relay: &Relay) {
         let Some(kept) = &mut self.kept else { return };
+        if let Some(is_kept) = kept.tend(now, log) {
+            self.tried = self.writing.take();
+            if is_kept {
+                self.stored = self.tried;
+            }
+        }
         let record = relay.view_record();
-        let tried = self.tried.replace(record) == Some(record);
-        if self.stored == Some(record) || tried && !kept.is_due(now) {
-            return;
+        let (is_stored, is_tried) = (self.stored == Some(record), self.tried == Some(record));
+        if !is_stored && !kept.is_writing() && (!is_tried || kept.is_due(now)) {
+            let body = record.to_bytes();
+            kept.put([&body[..], &sum(&body)].concat());
+            self.writing = Some(record);
         }
-        let body = record.to_bytes();
-        let bytes = [&body[..], &sum(&body)].concat();
-        if kept.put(now, log, &bytes) {
-            self.stored = Some(record);
-        }
+        self.gate.set(is_stored || is_tried);
     }
 
-    /// How often it could not be written.
-    pub(crate) fn failures(&self) -> u64 {
-        self.kept.as_ref().map_or(0, Kept::failures)
+    /// The file, if there is one.
+    pub(crate) const fn kept(&self) -> Option<&Kept> {
+        self.kept.as_ref()
+    }
+
+    /// Waits for the disk at the end, but not for long.
+    pub(crate) fn finish(&mut self, now: Instant, log: &Log) {
+        if let Some(kept) = &mut self.kept {
+            kept.finish(now, log);
+        }
     }
 }
 

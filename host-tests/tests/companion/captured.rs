@@ -56,7 +56,7 @@ fn every_frame_is_in_the_captures_of_both_ends() {
     let places: Vec<_> = chain.relays.iter_mut().map(Relay::settled).collect();
     assert_eq!(places, simulated(&Scenario::default(), 3));
     // What was on its way is there by then, and nothing new is said for seconds.
-    std::thread::sleep(std::time::Duration::from_millis(500));
+    std::thread::sleep(Duration::from_millis(500));
     for relay in chain.relays {
         relay.signal(Signal::TERM);
         assert_eq!(relay.end().status, Some(0));

@@ -311,6 +311,11 @@ fn a_full_disk_is_said_once_and_the_relay_stays_in_the_air() {
             "1500",
             "--view-file",
             hub.folder().join(format!("view{index}")).to_str().unwrap(),
+            "--status-socket",
+            hub.folder()
+                .join(format!("status{index}"))
+                .to_str()
+                .unwrap(),
         ])
     };
     let (mut first, mut second) = (start(1), start(2));
@@ -329,8 +334,68 @@ fn a_full_disk_is_said_once_and_the_relay_stays_in_the_air() {
     assert!(more.is_empty(), "once: {more:?}");
     fill_disk(first.pid(), false);
     first.line("is written again, after ");
+    let said = asked(&hub.folder().join("status1"));
+    let (writes, slowest) = (&said["view_file_writes"], &said["view_file_slowest_ms"]);
+    println!("{writes} writes of the views, the slowest of {slowest} ms");
+    assert!(writes.as_u64().unwrap() >= 2 && slowest.as_f64().unwrap() > 0.0);
+    assert!(said["view_file_failures"].as_u64().unwrap() >= 3);
     first.signal(Signal::TERM);
     assert_eq!(first.end().status, Some(0));
+}
+
+/// A disk that takes for ever: what is to become the file of the views is a FIFO that nobody reads.
+#[test]
+fn a_slow_disk_holds_up_what_is_sent_and_nothing_else() {
+    let hub = Hub::new(2);
+    let views = hub.folder().join("views1");
+    let slow = crate::positions::fifo(hub.folder(), "views1.new");
+    let start = |index: usize, more: &[&str]| {
+        let (number, socket) = (
+            index.to_string(),
+            hub.folder().join(format!("status{index}")),
+        );
+        let tty = hub.name(index - 1);
+        let options = [
+            "--index",
+            &number,
+            "--of",
+            "2",
+            "--shared",
+            tty.to_str().unwrap(),
+        ];
+        let quick = ["--probe-after-ms", "500", "--dead-after-ms", "1500"];
+        let socket = ["--status-socket", socket.to_str().unwrap()];
+        Relay::start(&[&options[..], &quick, &socket, more].concat())
+    };
+    let mut first = start(1, &["--view-file", views.to_str().unwrap()]);
+    let mut second = start(2, &[]);
+    let socket = hub.folder().join("status1");
+    let end = Instant::now() + Duration::from_secs(3);
+    let mut slowest = Duration::ZERO;
+    while Instant::now() < end {
+        let begun = Instant::now();
+        let said = asked(&socket);
+        slowest = slowest.max(begun.elapsed());
+        let port = &said["links"]["ports"][0];
+        assert_eq!(port["bytes_out"], 0, "before it is stored: {said:#}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    assert!(slowest < Duration::from_secs(1), "{slowest:?}");
+    assert!(asked(&socket)["links"]["ports"][0]["bytes_in"].as_u64() > Some(0));
+    assert!(!second.has_said("converged: "));
+    // Somebody takes it, but a FIFO keeps nothing: it is tried again, with a file this time.
+    drop(std::fs::File::open(&slow).unwrap());
+    let line = first.line("cannot be written: ");
+    assert!(line.contains("file: --view-file /"), "{line}");
+    first.line("is written again, after ");
+    for relay in [&mut first, &mut second] {
+        if !relay.has_said("converged: ") {
+            relay.line("converged: ");
+        }
+    }
+    first.signal(Signal::TERM);
+    assert_eq!(first.end().status, Some(0));
+    assert!(views.exists() && !slow.exists());
 }
 
 /// What a start cannot keep is no start: a number of an epoch must not be used twice.
