@@ -67,7 +67,7 @@ impl Fifo {
         self.fd.as_fd()
     }
 
-    /// Hands every line that has come since to `line`. Work: [`READS`] buffers of 4 KiB at most, whoever writes how much.
+    /// Hands every line that has come since to `line`. Work: 64 KiB at most, whoever writes how much.
     pub fn read(&mut self, mut line: impl FnMut(&[u8])) {
         let mut buffer = [0; 4096];
         for _ in 0..READS {

@@ -11,7 +11,7 @@ fn with(sections: &str) -> tempfile::NamedTempFile {
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     let text = std::fs::read_to_string(super::example("scenario.toml")).unwrap();
     let text = text.replace("[power]", &format!("[power]\n{sections}"));
-    write!(file, "{text}\n").unwrap();
+    writeln!(file, "{text}").unwrap();
     file
 }
 
