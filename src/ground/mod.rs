@@ -44,10 +44,9 @@ const QUESTIONS: u8 = 3;
 /// [`poll_timeout`](Self::poll_timeout). It takes in anything, and what is not for it has no effect.
 ///
 /// ```
+/// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
 /// use uav_relay::wire::frame::MAX_FRAME;
-/// use uav_relay::{
-///     Auth, Ground, Instant, Interference, Interferer, Key, Mission, MissionConfig, Progress, Side, Upload, Wiring,
-/// };
+/// use uav_relay::{Auth, Ground, Instant, Interference, Interferer, Key, Mission, MissionConfig, Progress, Side, Upload, Wiring};
 ///
 /// # fn example(loaded: &Mission, mut send: impl FnMut(&[u8]), received: &[u8]) -> Result<Progress, Box<dyn core::error::Error>> {
 /// // The jammer has moved.
@@ -68,17 +67,8 @@ const QUESTIONS: u8 = 3;
 /// }
 /// # Ok(ground.progress())
 /// # }
-/// # use uav_relay::{Band, Channel, Profile, channel::AirGround};
-/// # let loaded = Mission::try_new(MissionConfig {
-/// #     relays: 1, distance_m: 1000.0, min_separation_m: 4.0, tx_power_w: 80.0,
-/// #     common: Profile { altitude_m: 20.0, power_w: 1.0 },
-/// #     channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?, band: Band::at(20.0), lateral: Band::NONE,
-/// #     interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
-/// #     noise_w: 0.0,
-/// #     tolerance: 1e-4,
-/// # })?;
 /// # let mut sent = 0;
-/// # assert_eq!(example(&loaded, |_| sent += 1, &[])?, Progress::Offering);
+/// # assert_eq!(example(&paper::MISSION, |_| sent += 1, &[])?, Progress::Offering);
 /// # assert_eq!(sent, 1, "a handshake, before anything else");
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
@@ -196,8 +186,8 @@ impl Ground {
         unknown.saturating_add(untrue).saturating_add(other)
     }
 
-    /// What it has counted of the frames that it sent and that came in, as a relay does. `mission` are relays that were loaded with another one, `foreign`
-    /// frames of another network, `overheard` those to another node, and `crc` all that are damaged.
+    /// What it has counted of the frames that it sent and that came in, as a relay does. `mission` are relays that were loaded with another
+    /// one, `foreign` frames of another network, `overheard` those to another node, and `crc` all that are damaged.
     pub const fn stats(&self) -> &Stats {
         &self.stats
     }
@@ -205,10 +195,8 @@ impl Ground {
     /// The relays that may hear it by their node numbers, the nearest first, and whether each has shown with the key that it is there and can
     /// read what it is told. One that was switched on again, or has been greeted anew, has not until it answers. Work: four relays at most.
     pub fn near(&self) -> impl Iterator<Item = (u16, bool)> {
-        (1..=self.within).map(|distance| {
-            let node = self.at(distance);
-            (node, self.session.knows(node))
-        })
+        let nodes = (1..=self.within).map(|distance| self.at(distance));
+        nodes.map(|node| (node, self.session.knows(node)))
     }
 
     /// Takes in bytes, however they are cut; at most one tag for each 19 of them.
@@ -323,8 +311,7 @@ impl Ground {
                 1
             };
             // It may have been switched on again, and know nothing of this node.
-            let to = self.to();
-            self.session.greet(to);
+            self.session.greet(self.to());
         }
         self.due = true;
         self.again = Some(now + PATIENCE);
