@@ -14,7 +14,7 @@ use uav_relay_tools::provision::config::LEN;
 #[derive(Parser, Debug)]
 #[command(name = "image", bin_name = "cargo image", disable_version_flag = true)]
 struct Options {
-    /// Which board: stm32f405, stm32f405-embassy or pico2
+    /// Which board: stm32f405, stm32f405-embassy, nucleo-f446re or pico2
     #[arg(long, value_name = "B", value_parser = board)]
     board: Board,
     /// The image with one UART to a radio that all relays share; otherwise one to each neighbour

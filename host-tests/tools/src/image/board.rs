@@ -27,7 +27,7 @@ pub struct Board {
 }
 
 /// All boards.
-pub const BOARDS: [Board; 3] = [
+pub const BOARDS: [Board; 4] = [
     Board {
         name: "stm32f405",
         target: "thumbv7em-none-eabihf",
@@ -46,6 +46,16 @@ pub const BOARDS: [Board; 3] = [
         examples: false,
         images: ["wires", "radio"],
         block: ADDRESS,
+        uf2: None,
+    },
+    Board {
+        name: "nucleo-f446re",
+        target: "thumbv7em-none-eabihf",
+        manifest: "examples/embassy/Cargo.toml",
+        package: "relay-nucleo-f446re",
+        examples: false,
+        images: ["wires", "radio"],
+        block: 0x0806_0000,
         uf2: None,
     },
     Board {

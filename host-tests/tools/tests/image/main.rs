@@ -4,6 +4,7 @@
 use std::process::{Command, Output};
 
 use ihex::{Reader, Record};
+use uav_relay_tools::image::board::Board;
 use uav_relay_tools::image::elf::{Piece, flat, pieces};
 use uav_relay_tools::image::uf2::{Family, PAGE};
 use uav_relay_tools::image::{hex, uf2};
@@ -163,5 +164,25 @@ fn a_block_becomes_files_for_its_place_and_what_is_none_is_refused() {
         let line = String::from_utf8_lossy(&refused.stderr).into_owned();
         assert_eq!(refused.status.code(), Some(2), "{line}");
         assert!(line.contains(says) && line.lines().count() == 1, "{line}");
+    }
+}
+
+/// A block that lies in the image would be gone with the next one.
+#[test]
+fn a_board_has_its_block_where_its_memory_says_that_no_image_reaches() {
+    let embassy = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/embassy");
+    for (board, folder) in [
+        ("stm32f405-embassy", "stm32f405"),
+        ("nucleo-f446re", "nucleo-f446re"),
+        ("pico2", "pico2"),
+    ] {
+        let memory = std::fs::read_to_string(embassy.join(folder).join("memory.x")).unwrap();
+        let (_, length) = memory.split_once("LENGTH =").unwrap();
+        let length = length.lines().next().unwrap();
+        let kib = |part: &str| -> u32 { part.trim().trim_end_matches('K').parse().unwrap() };
+        let kib = length.split('-').map(kib).reduce(|all, less| all - less);
+        let board = Board::named(board).unwrap();
+        let start = board.block & 0xFF00_0000;
+        assert!(board.block >= start + 1024 * kib.unwrap(), "{}", board.name);
     }
 }

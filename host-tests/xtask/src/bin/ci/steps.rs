@@ -149,14 +149,18 @@ fn clippy() -> Vec<Step> {
     ]
 }
 
-/// The Embassy examples, a workspace of their own: as the rest is checked, for both chips.
+/// The Embassy examples, a workspace of their own: as the rest is checked, for each chip.
 fn embassy() -> Vec<Step> {
     const MANIFEST: &str = "--manifest-path examples/embassy/Cargo.toml";
     let mut steps = vec![step(
         "Embassy, formatting",
         format!("cargo fmt {MANIFEST} --all --check"),
     )];
-    for (package, target) in [("relay-stm32f405", TARGET), ("relay-pico2", TARGET_V8M)] {
+    for (package, target) in [
+        ("relay-stm32f405", TARGET),
+        ("relay-nucleo-f446re", TARGET),
+        ("relay-pico2", TARGET_V8M),
+    ] {
         let what = format!(
             "{MANIFEST} -p relay-app -p {package} --locked --target {target} --target-dir target/embassy"
         );

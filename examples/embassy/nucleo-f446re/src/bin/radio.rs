@@ -1,0 +1,17 @@
+//! A relay on a NUCLEO-F446RE with one UART to a radio that all relays share.
+#![no_std]
+#![no_main]
+
+use embassy_executor::Spawner;
+use embassy_stm32::gpio::{Level, Output, Speed};
+use relay_nucleo_f446re::{block, seed, usart1};
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    let chip = embassy_stm32::init(embassy_stm32::Config::default());
+    let block = block(chip.FLASH);
+    let enable = Output::new(chip.PA8, Level::Low, Speed::Low);
+    if let Ok(radio) = usart1(chip.USART1, chip.PA9, chip.PA10) {
+        match relay_app::fly_shared(&block, seed(), radio, enable).await {}
+    }
+}

@@ -1,0 +1,102 @@
+//! The NUCLEO-F446RE: its configuration block, its seed, and its UARTs.
+//!
+//! | what | where |
+//! | --- | --- |
+//! | toward the transmitter, or the radio | USART1: TX PA9 (D8, CN10 pin 21), RX PA10 (D2, CN10 pin 33) |
+//! | toward the receiver | USART3: TX PC10 (CN7 pin 1), RX PC11 (CN7 pin 2) |
+//! | the radio's driver enable | PA8 (D7, CN10 pin 23): high while this relay sends |
+//! | log | the ST-LINK on the board (RTT) |
+//! | clock | HSI, 16 MHz, no PLL |
+//!
+//! USART2 on PA2 and PA3 is left alone: solder bridges SB13 and SB14 lead both to the ST-LINK, whose virtual serial port it is, and none leads
+//! to D0 and D1.
+#![no_std]
+#![forbid(unsafe_code)]
+
+use defmt_rtt as _;
+use embassy_stm32::flash::Flash;
+use embassy_stm32::interrupt::typelevel::Binding;
+use embassy_stm32::peripherals::{FLASH, PA9, PA10, PC10, PC11, USART1, USART3};
+use embassy_stm32::usart::{
+    BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config, ConfigError,
+    Instance, RxPin, TxPin,
+};
+use embassy_stm32::{Peri, bind_interrupts};
+use panic_probe as _;
+use relay_app::{BAUD, BUFFER};
+use static_cell::StaticCell;
+use uav_relay_block::{Block, LEN};
+
+bind_interrupts!(
+    /// Who handles which interrupt.
+    pub struct Irqs {
+        USART1 => BufferedInterruptHandler<USART1>;
+        USART3 => BufferedInterruptHandler<USART3>;
+    }
+);
+
+/// Where the configuration block begins, in the flash: its last sector.
+const BLOCK: u32 = 0x6_0000;
+
+/// The configuration block; blank where it cannot be read.
+pub fn block(flash: Peri<'_, FLASH>) -> Block {
+    let mut block = [0xFF; LEN];
+    let mut flash = Flash::new_blocking(flash);
+    if flash.blocking_read(BLOCK, &mut block).is_err() {
+        block.fill(0xFF);
+    }
+    block
+}
+
+type Halves = (BufferedUartRx<'static>, BufferedUartTx<'static>);
+type Buffers = StaticCell<[[u8; BUFFER]; 2]>;
+
+/// Reader and writer of USART1.
+///
+/// # Errors
+/// Where its clock does not give the baud rate.
+pub fn usart1(
+    uart: Peri<'static, USART1>,
+    tx: Peri<'static, PA9>,
+    rx: Peri<'static, PA10>,
+) -> Result<Halves, ConfigError> {
+    static BUFFERS: Buffers = StaticCell::new();
+    halves(uart, tx, rx, &BUFFERS)
+}
+
+/// Reader and writer of USART3.
+///
+/// # Errors
+/// Where its clock does not give the baud rate.
+pub fn usart3(
+    uart: Peri<'static, USART3>,
+    tx: Peri<'static, PC10>,
+    rx: Peri<'static, PC11>,
+) -> Result<Halves, ConfigError> {
+    static BUFFERS: Buffers = StaticCell::new();
+    halves(uart, tx, rx, &BUFFERS)
+}
+
+fn halves<T: Instance>(
+    uart: Peri<'static, T>,
+    tx: Peri<'static, impl TxPin<T>>,
+    rx: Peri<'static, impl RxPin<T>>,
+    buffers: &'static Buffers,
+) -> Result<Halves, ConfigError>
+where
+    Irqs: Binding<T::Interrupt, BufferedInterruptHandler<T>>,
+{
+    let mut config = Config::default();
+    config.baudrate = BAUD;
+    let [sent, received] = buffers.init([[0; BUFFER]; 2]);
+    let (tx, rx) = BufferedUart::new(uart, rx, tx, sent, received, Irqs, config)?.split();
+    Ok((rx, tx))
+}
+
+/// Differs from one chip to the next: it has no random number generator.
+pub fn seed() -> u32 {
+    let words = embassy_stm32::uid::uid().map(u32::from);
+    // FNV-1a.
+    let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);
+    words.into_iter().fold(0x811C_9DC5, step)
+}
