@@ -5,13 +5,13 @@ use uav_relay::wire::auth::Auth;
 #[cfg(feature = "auth")]
 use uav_relay::wire::auth::Key;
 use uav_relay::{Instant, Relay, Settings, Wiring};
+#[cfg(feature = "auth")]
+use uav_relay_kept::{epoch, journal::Journal};
 
 use super::autopilot::{Autopilot, Uart};
 #[cfg(feature = "auth")]
-use super::journal::Journal;
+use super::flash;
 use super::{board, config, kept, log};
-#[cfg(feature = "auth")]
-use super::{epoch, flash};
 
 /// The relay, what it has said, and the autopilot, if it is told where to fly; in places of their own in RAM, since the stack would
 /// have to hold them.

@@ -3,13 +3,13 @@
 use core::ptr::{read_volatile, write_volatile};
 
 use stm32f4xx_hal::pac::FLASH;
-
 #[cfg(feature = "auth")]
-use super::epoch;
-use super::journal::Flash;
+use uav_relay_kept::epoch;
+use uav_relay_kept::journal::{BLANK, Flash};
+use uav_relay_kept::views;
+
 #[cfg(feature = "upload")]
 use super::uploads;
-use super::views;
 
 /// Where a sector begins that no image reaches (`memory.x`).
 #[derive(Clone, Copy)]
@@ -44,11 +44,27 @@ impl Sectors {
     fn get(&self, sector: usize) -> Option<Sector> {
         self.0.get(sector).copied()
     }
+
+    /// What stands in a sector.
+    #[inline(never)] // it is small, and often wanted
+    fn all(&self, sector: usize) -> &[u32] {
+        self.get(sector).map_or(&[], Sector::words)
+    }
 }
 
 impl Flash for Sectors {
-    fn words(&self, sector: usize) -> &[u32] {
-        self.get(sector).map_or(&[], Sector::words)
+    fn words(&self, sector: usize) -> usize {
+        self.all(sector).len()
+    }
+
+    fn used(&mut self, sector: usize) -> usize {
+        let words = self.all(sector);
+        let last = words.iter().rposition(|word| *word != BLANK);
+        last.map_or(0, |last| last + 1)
+    }
+
+    fn read(&mut self, sector: usize, word: usize) -> u32 {
+        self.all(sector).get(word).copied().unwrap_or(BLANK)
     }
 
     fn erase(&mut self, sector: usize) {

@@ -1,13 +1,16 @@
 //! What is in the flash before it is needed again: with the feature `upload` what was uploaded, and what the relay has said in the votes
 //! on views.
 
-use uav_relay::{Instant, Relay, ViewRecord};
+use uav_relay::{Instant, Relay};
+#[cfg(feature = "upload")]
+use uav_relay_kept::journal::{Journal, WhenFull};
+use uav_relay_kept::views;
 
+#[cfg(feature = "upload")]
 use super::flash::Sectors;
-use super::journal::{Journal, WhenFull};
 #[cfg(feature = "upload")]
 use super::uploads;
-use super::{board, flash, log, views};
+use super::{board, flash, log};
 
 /// Has `relay`, which was just made, fly what it held when this drone was switched off.
 #[cfg(feature = "upload")]
@@ -15,7 +18,8 @@ use super::{board, flash, log, views};
 pub(crate) fn resume_upload(relay: &mut Relay) {
     let mut log = uploads();
     log.tidy();
-    if let Some(upload) = log.newest().and_then(uploads::upload)
+    let newest = log.newest::<{ uploads::WORDS }>();
+    if let Some(upload) = newest.and_then(|kept| uploads::upload(&kept))
         && relay.resume(&upload).is_ok()
     {
         log::resumes(upload.version());
@@ -36,53 +40,24 @@ fn uploads() -> Journal<Sectors> {
     Journal::new(flash::UPLOADS, uploads::WORDS, block())
 }
 
-/// What the relay has said, as it was when that was looked at last.
-pub(crate) struct Views {
-    said: ViewRecord,
-    /// Whether it stands in the flash.
-    kept: bool,
-}
+/// What the relay has said.
+pub(crate) struct Views(views::Views);
 
 impl Views {
     /// Has `relay`, which was handed nothing but an upload yet, stand by what it said before this drone was switched off.
     #[inline(never)]
     pub(crate) fn resume(relay: &mut Relay, now: Instant) -> Self {
-        let mut log = views();
-        log.tidy();
-        let mut kept = true;
-        if let Some(words) = log.newest() {
-            let record = views::record(words);
-            kept = record.is_some_and(|record| relay.resume_view(now, &record).is_ok());
-            log::stands_by(kept);
-        }
-        Self {
-            said: relay.view_record(),
-            kept,
-        }
+        let log = views::log(flash::VIEWS, block());
+        Self(views::Views::resume(relay, now, log, log::stands_by))
     }
 
-    /// Writes down what `relay` has said, if that has changed. Called before anything is sent. Where it cannot be written, the relay
-    /// flies on: a drone in the air is not to be switched off for it.
+    /// Writes down what `relay` has said, if that has changed. Called before anything is sent.
     pub(crate) fn keep(&mut self, relay: &Relay) {
-        let said = relay.view_record();
-        if said != self.said {
-            self.said = said;
-            self.write();
-        }
-    }
-
-    #[inline(never)]
-    fn write(&mut self) {
-        let kept = views().keep(&views::kept(&self.said), WhenFull::Erase);
-        if kept != self.kept {
+        let log = || views::log(flash::VIEWS, block());
+        if let Some(kept) = self.0.keep(relay, log) {
             log::votes(kept);
         }
-        self.kept = kept;
     }
-}
-
-fn views() -> Journal<Sectors> {
-    Journal::new(flash::VIEWS, views::WORDS, block())
 }
 
 /// The check sequence of the configuration block: its last four bytes.

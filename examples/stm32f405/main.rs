@@ -20,12 +20,9 @@
 //! | `turns.rs` | its main loop |
 //! | `autopilot.rs`, `grounded.rs` | the autopilot with the feature `flight`, and without |
 //! | `course.rs` | the line on earth that it flies along |
-//! | `epoch.rs` | with the feature `auth`, the number that rises at every start |
 //! | `uploads.rs` | with the feature `upload`, the missions that were uploaded in flight |
-//! | `views.rs` | what the relay has said in the votes on views |
-//! | `kept.rs` | when these two are written and read |
-//! | `journal.rs` | the log in two sectors of flash that each of these three is in |
-//! | `flash.rs` | those sectors, and everything unsafe about them |
+//! | `kept.rs` | when they, and what the relay has said in votes, are written and read |
+//! | `flash.rs` | the sectors of the logs of the crate `uav-relay-kept`, and everything unsafe about them |
 //! | `port.rs` | a serial port that an interrupt serves |
 //! | `clock.rs` | time and sleep |
 //! | `log.rs`, `silent.rs` | the log with `--features defmt`, and without |
@@ -45,14 +42,8 @@ mod clock;
 mod course;
 #[cfg(target_os = "none")]
 mod drone;
-#[cfg(all(target_os = "none", feature = "auth"))]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod epoch;
 #[cfg(target_os = "none")]
 mod flash;
-#[cfg(target_os = "none")]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod journal;
 #[cfg(target_os = "none")]
 mod kept;
 #[cfg(target_os = "none")]
@@ -65,9 +56,6 @@ mod turns;
 #[cfg(all(target_os = "none", feature = "upload"))]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
-#[cfg(target_os = "none")]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod views;
 #[cfg(target_os = "none")]
 mod wires;
 

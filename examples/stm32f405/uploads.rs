@@ -1,6 +1,6 @@
 //! Uploaded missions, kept across a reboot.
 //!
-//! They are in a [`Journal`](super::journal::Journal) of their own, whose key is the check sequence of the configuration block: with
+//! They are in a [`Journal`](uav_relay_kept::journal::Journal) of their own, whose key is the check sequence of the configuration block: with
 //! another block a drone has forgotten what was uploaded before, and flies what the block says.
 //!
 //! Nothing is erased for an upload in flight, since an erase of these sectors stops the CPU for a second or two. A sector of 128 KiB has
@@ -8,8 +8,7 @@
 
 use uav_relay::Upload;
 use uav_relay::wire::upload::LENGTH;
-
-use super::journal::{pack, unpack};
+use uav_relay_kept::journal::{pack, unpack};
 
 /// Where the two sectors begin: sectors 7 and 8 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x0806_0000, 0x0808_0000];

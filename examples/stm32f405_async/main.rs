@@ -28,19 +28,11 @@ mod course;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/drone.rs"]
 mod drone;
-#[cfg(all(target_os = "none", feature = "auth"))]
-#[path = "../stm32f405/epoch.rs"]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod epoch;
 #[cfg(target_os = "none")]
 mod executor;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/flash.rs"]
 mod flash;
-#[cfg(target_os = "none")]
-#[path = "../stm32f405/journal.rs"]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod journal;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/kept.rs"]
 mod kept;
@@ -58,10 +50,6 @@ mod ports;
 #[path = "../stm32f405/uploads.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
-#[cfg(target_os = "none")]
-#[path = "../stm32f405/views.rs"]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod views;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/wires.rs"]
 mod wires;

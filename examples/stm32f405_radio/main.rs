@@ -23,17 +23,9 @@ mod course;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/drone.rs"]
 mod drone;
-#[cfg(all(target_os = "none", feature = "auth"))]
-#[path = "../stm32f405/epoch.rs"]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod epoch;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/flash.rs"]
 mod flash;
-#[cfg(target_os = "none")]
-#[path = "../stm32f405/journal.rs"]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod journal;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/kept.rs"]
 mod kept;
@@ -53,10 +45,6 @@ mod turns;
 #[path = "../stm32f405/uploads.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
-#[cfg(target_os = "none")]
-#[path = "../stm32f405/views.rs"]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod views;
 
 #[cfg(target_os = "none")]
 use uav_relay_block as config;

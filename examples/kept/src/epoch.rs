@@ -9,7 +9,7 @@
 //! the start after: it may come to the same epoch, and be refused until the neighbours are switched off and on. So that is logged as
 //! an error, and the drone is not to fly again before its block has a larger epoch and its flash is sound.
 
-use super::journal::{Flash, Journal, WhenFull};
+use crate::journal::{Flash, Journal, WhenFull};
 
 /// Where the two sectors begin: sectors 9 and 10 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x080A_0000, 0x080C_0000];
@@ -23,10 +23,7 @@ pub const KEY: u32 = 0;
 /// The epoch of this start, at least `floor`, and whether it stands in the flash; `None` after the last one there is, 4294967294.
 pub fn begin<F: Flash>(log: &mut Journal<F>, floor: u32) -> Option<(u32, bool)> {
     log.tidy();
-    let newest = match log.newest() {
-        Some([newest]) => *newest,
-        _ => 0,
-    };
+    let [newest] = log.newest::<WORDS>().unwrap_or([0]);
     let epoch = newest.checked_add(1)?.max(floor).max(1);
     if epoch == u32::MAX {
         return None;

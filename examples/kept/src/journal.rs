@@ -23,10 +23,16 @@ pub const AROUND: usize = 2;
 /// Places that are tried for one record: some may be worn.
 const TRIES: usize = 4;
 
-/// Two sectors of flash, 0 and 1.
+/// Two sectors of flash, 0 and 1. They need not be of one length.
 pub trait Flash {
-    /// What stands in a sector.
-    fn words(&self, sector: usize) -> &[u32];
+    /// Words in a sector; 0 where there is none.
+    fn words(&self, sector: usize) -> usize;
+
+    /// Words of a sector up to the last that is not [`BLANK`]: a flash knows best how to look through all of it.
+    fn used(&mut self, sector: usize) -> usize;
+
+    /// What stands in that word of a sector; [`BLANK`] behind its end.
+    fn read(&mut self, sector: usize, word: usize) -> u32;
 
     /// Makes a sector blank.
     fn erase(&mut self, sector: usize);
@@ -35,14 +41,32 @@ pub trait Flash {
     fn write(&mut self, sector: usize, first: usize, words: &[u32]) -> bool;
 }
 
+impl<F: Flash> Flash for &mut F {
+    fn words(&self, sector: usize) -> usize {
+        F::words(self, sector)
+    }
+
+    fn used(&mut self, sector: usize) -> usize {
+        F::used(self, sector)
+    }
+
+    fn read(&mut self, sector: usize, word: usize) -> u32 {
+        F::read(self, sector, word)
+    }
+
+    fn erase(&mut self, sector: usize) {
+        F::erase(self, sector);
+    }
+
+    fn write(&mut self, sector: usize, first: usize, words: &[u32]) -> bool {
+        F::write(self, sector, first, words)
+    }
+}
+
 /// What [`Journal::keep`] does when both sectors are full.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum WhenFull {
     /// Keeps nothing.
-    #[allow(
-        dead_code,
-        reason = "for uploads alone, which an image may be built without"
-    )]
     Refuse,
     /// Erases the sector that does not have the newest record, and goes on there.
     Erase,
@@ -83,15 +107,23 @@ impl<F: Flash> Journal<F> {
         }
     }
 
-    /// What was kept last. Linear in the words of the sectors; a CRC for each record behind the newest, and for that one.
-    pub fn newest(&self) -> Option<&[u32]> {
+    /// What was kept last, `KEPT` being as many words as this log keeps. Linear in the words of the sectors; a CRC for each record behind
+    /// the newest, and for that one.
+    pub fn newest<const KEPT: usize>(&mut self) -> Option<[u32; KEPT]> {
+        let mut kept = [BLANK; KEPT];
+        self.read_newest(&mut kept)?;
+        Some(kept)
+    }
+
+    #[inline(never)] // one for all lengths
+    fn read_newest(&mut self, kept: &mut [u32]) -> Option<()> {
         let found = self.found();
         let sector = current(found);
-        let newest = found.get(sector)?.newest?;
-        match self.record(sector, newest.record)? {
-            [_, kept @ .., _] => Some(kept),
-            _ => None,
+        let first = found.get(sector)?.newest?.record * self.words + 1;
+        for (at, word) in (first..).zip(kept) {
+            *word = self.flash.read(sector, at);
         }
+        Some(())
     }
 
     /// At a start: makes each sector blank that is not, and does not have the newest record. Then the log has room for all records of
@@ -124,40 +156,55 @@ impl<F: Flash> Journal<F> {
                 self.flash.erase(sector);
                 used = 0;
             }
-            let sum = check(number, kept, self.key);
             let mut places = used..room.min(used + TRIES);
             return places.any(|record| {
                 let first = record * self.words;
                 let behind = first + 1 + kept.len();
                 // The CRC is last: what has one is whole.
-                self.flash.write(sector, first, &[number])
-                    && self.flash.write(sector, first + 1, kept)
-                    && self.flash.write(sector, behind, &[sum])
+                let stands = self.flash.write(sector, first, &[number])
+                    && self.flash.write(sector, first + 1, kept);
+                let sum = self.sum(sector, first);
+                stands && self.flash.write(sector, behind, &[sum])
             });
         }
         false
     }
 
-    fn record(&self, sector: usize, record: usize) -> Option<&[u32]> {
-        let from = self.flash.words(sector).get(record * self.words..)?;
-        from.get(..self.words)
-    }
-
-    fn found(&self) -> [Found; 2] {
+    fn found(&mut self) -> [Found; 2] {
         [0, 1].map(|sector| {
-            let room = self.flash.words(sector).len().checked_div(self.words);
-            let room = room.unwrap_or(0);
-            let is_used = |at: &usize| {
-                let record = self.record(sector, *at).unwrap_or_default();
-                record.iter().any(|word| *word != BLANK)
-            };
-            let used = (0..room).rev().find(is_used).map_or(0, |last| last + 1);
+            let records = |words: usize| words.checked_div(self.words).unwrap_or(0);
+            let room = records(self.flash.words(sector));
+            let used = records(self.flash.used(sector) + self.words - 1).min(room);
             let newest = (0..used).rev().find_map(|record| {
-                let number = number(self.record(sector, record)?, self.key)?;
+                let number = self.number(sector, record)?;
                 Some(Newest { number, record })
             });
             Found { newest, used, room }
         })
+    }
+
+    /// The number of a record that is whole and has this log's key.
+    fn number(&mut self, sector: usize, record: usize) -> Option<u32> {
+        let first = record * self.words;
+        let sum = self.sum(sector, first);
+        let is_whole = self.flash.read(sector, first + self.words - 1) == sum;
+        is_whole.then(|| self.flash.read(sector, first))
+    }
+
+    /// The CRC of the record that begins at that word, but for its last word, and of this log's key.
+    #[inline(never)] // there are two who want it
+    fn sum(&mut self, sector: usize, first: usize) -> u32 {
+        let mut crc = CRC_32C.digest();
+        let last = first + self.words - 1;
+        for at in first..=last {
+            let word = if at == last {
+                self.key
+            } else {
+                self.flash.read(sector, at)
+            };
+            crc.update(&word.to_le_bytes());
+        }
+        crc.finalize()
     }
 }
 
@@ -165,22 +212,6 @@ impl<F: Flash> Journal<F> {
 fn current(found: [Found; 2]) -> usize {
     let [first, second] = found.map(|found| found.newest);
     usize::from(second > first)
-}
-
-/// The number of a record that is whole and has that key.
-fn number(record: &[u32], key: u32) -> Option<u32> {
-    let [number, kept @ .., sum] = record else {
-        return None;
-    };
-    (check(*number, kept, key) == *sum).then_some(*number)
-}
-
-fn check(number: u32, kept: &[u32], key: u32) -> u32 {
-    let mut crc = CRC_32C.digest();
-    for word in [&number].into_iter().chain(kept).chain([&key]) {
-        crc.update(&word.to_le_bytes());
-    }
-    crc.finalize()
 }
 
 /// Bytes as words, with zeros behind them.

@@ -2,10 +2,8 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`journal`] | a log in two sectors of flash; the firmware's own file, as are the next three |
-//! | [`epoch`] | the number that rises at every start, and where it is kept |
-//! | [`uploads`] | the missions that were uploaded in flight, and where they are kept |
-//! | [`views`] | what the relay has said in the votes on views, and where it is kept |
+//! | [`journal`], [`epoch`], [`views`] | what is kept in flash, by the crate that the firmware has it from |
+//! | [`uploads`] | the missions that were uploaded in flight, and where they are kept; the firmware's own file |
 //! | [`ram`] | two sectors of flash in RAM, to fill them and to spoil them |
 //! | [`image`] | the image, built by cargo |
 //! | [`emulator`] | one emulated drone: a process, and a socket for each serial port |
@@ -15,11 +13,7 @@
 
 #[cfg(unix)]
 pub mod emulator;
-#[path = "../../../examples/stm32f405/epoch.rs"]
-pub mod epoch;
 pub mod image;
-#[path = "../../../examples/stm32f405/journal.rs"]
-pub mod journal;
 #[cfg(unix)]
 pub mod medium;
 #[cfg(unix)]
@@ -29,8 +23,8 @@ pub mod ram;
 pub mod slow;
 #[path = "../../../examples/stm32f405/uploads.rs"]
 pub mod uploads;
-#[path = "../../../examples/stm32f405/views.rs"]
-pub mod views;
+
+pub use uav_relay_kept::{epoch, journal, views};
 
 /// The emulator.
 pub const QEMU: &str = "qemu-system-arm";

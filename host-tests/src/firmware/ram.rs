@@ -62,9 +62,18 @@ impl Ram {
     }
 }
 
-impl Flash for &mut Ram {
-    fn words(&self, sector: usize) -> &[u32] {
-        &self.sectors[sector]
+impl Flash for Ram {
+    fn words(&self, sector: usize) -> usize {
+        self.sectors[sector].len()
+    }
+
+    fn used(&mut self, sector: usize) -> usize {
+        let last = self.sectors[sector].iter().rposition(|word| *word != BLANK);
+        last.map_or(0, |last| last + 1)
+    }
+
+    fn read(&mut self, sector: usize, word: usize) -> u32 {
+        self.sectors[sector].get(word).copied().unwrap_or(BLANK)
     }
 
     fn erase(&mut self, sector: usize) {

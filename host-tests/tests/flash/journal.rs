@@ -15,7 +15,7 @@ fn log(flash: &mut Ram) -> Journal<&mut Ram> {
 }
 
 fn newest(flash: &mut Ram) -> Option<Vec<u32>> {
-    log(flash).newest().map(<[u32]>::to_vec)
+    log(flash).newest::<KEPT>().map(Vec::from)
 }
 
 fn entry(number: u32) -> Vec<u32> {
@@ -31,8 +31,8 @@ fn records_fill_both_sectors_and_the_newest_counts() {
     for number in 1..=8 {
         assert!(log(&mut flash).keep(&entry(number), WhenFull::Refuse));
         assert_eq!(newest(&mut flash), Some(entry(number)));
-        let other = Journal::new(&mut flash, KEPT, KEY + 1);
-        assert_eq!(other.newest(), None, "another key");
+        let mut other = Journal::new(&mut flash, KEPT, KEY + 1);
+        assert_eq!(other.newest::<KEPT>(), None, "another key");
     }
     let full = flash.sectors.clone();
     assert!(!log(&mut flash).keep(&entry(9), WhenFull::Refuse));
@@ -83,7 +83,7 @@ fn another_key_forgets_and_a_start_makes_room() {
     }
     let mut other = Journal::new(&mut flash, KEPT, KEY + 1);
     other.tidy();
-    assert_eq!(other.newest(), None);
+    assert_eq!(other.newest::<KEPT>(), None);
     assert_eq!(flash.erased, [0, 1]);
     assert!(flash.sectors.iter().flatten().all(|word| *word == BLANK));
 }

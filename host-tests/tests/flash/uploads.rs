@@ -22,7 +22,8 @@ fn as_many_are_kept_in_a_flight_as_the_firmware_says() {
     assert_eq!(SECTOR / (WORDS + AROUND), 1_092);
     assert!(log.keep(&kept(&version(1)), WhenFull::Refuse));
     assert!(log.keep(&kept(&version(2)), WhenFull::Refuse));
-    assert_eq!(log.newest().and_then(upload), Some(version(2)));
+    let newest = log.newest::<WORDS>().unwrap();
+    assert_eq!(upload(&newest), Some(version(2)));
 }
 
 #[test]

@@ -4,9 +4,14 @@ use host_tests::firmware::journal::{AROUND, Journal, WhenFull};
 use host_tests::firmware::ram::Ram;
 use host_tests::firmware::views::{SECTORS, WORDS, kept, record};
 use host_tests::fixtures::voted;
+use uav_relay::ViewRecord;
 
 /// Words of a sector of 16 KiB.
 const SECTOR: usize = 4 * 1024;
+
+fn found(log: &mut Journal<&mut Ram>) -> Option<ViewRecord> {
+    log.newest::<WORDS>().and_then(|kept| record(&kept))
+}
 
 #[test]
 fn as_many_are_kept_before_an_erase_as_the_firmware_says() {
@@ -16,16 +21,13 @@ fn as_many_are_kept_before_an_erase_as_the_firmware_says() {
         let said = voted(7, 5, number, true);
         let mut log = Journal::new(&mut flash, WORDS, 7);
         assert!(log.keep(&kept(&said), WhenFull::Erase));
-        assert_eq!(log.newest().and_then(record), Some(said));
+        assert_eq!(found(&mut log), Some(said));
     }
     assert_eq!(SECTOR / (WORDS + AROUND), 240);
     assert_eq!(flash.erased, [0, 1, 0], "behind 480, 720 and 960");
     let mut start = Journal::new(&mut flash, WORDS, 7);
     start.tidy();
-    assert_eq!(
-        start.newest().and_then(record),
-        Some(voted(7, 5, 1_000, true))
-    );
+    assert_eq!(found(&mut start), Some(voted(7, 5, 1_000, true)));
 }
 
 /// A loss of power in the middle of a record: what was said before holds, and nobody has been told more.
@@ -40,9 +42,9 @@ fn of_a_record_that_is_torn_the_one_before_holds() {
         assert!(!log.keep(&kept(&voted(7, 5, 2, false)), WhenFull::Erase));
         assert!(flash.switch_on());
         let mut log = Journal::new(&mut flash, WORDS, 7);
-        assert_eq!(log.newest().and_then(record), Some(voted(7, 5, 1, true)));
+        assert_eq!(found(&mut log), Some(voted(7, 5, 1, true)));
         assert!(log.keep(&kept(&voted(7, 5, 3, true)), WhenFull::Erase));
-        assert_eq!(log.newest().and_then(record), Some(voted(7, 5, 3, true)));
+        assert_eq!(found(&mut log), Some(voted(7, 5, 3, true)));
     }
 }
 

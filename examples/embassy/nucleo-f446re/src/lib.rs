@@ -1,4 +1,4 @@
-//! The NUCLEO-F446RE: its configuration block, its seed, and its UARTs.
+//! The NUCLEO-F446RE: its flash, its seed, and its UARTs.
 //!
 //! | what | where |
 //! | --- | --- |
@@ -7,6 +7,9 @@
 //! | the radio's driver enable | PA8 (D7, CN10 pin 23): high while this relay sends |
 //! | log | the ST-LINK on the board (RTT) |
 //! | clock | HSI, 16 MHz, no PLL |
+//! | epochs | sectors 3 and 4 of the flash, of 16 and 64 KiB |
+//! | image | sector 0, the vectors alone; sectors 5 and 6 |
+//! | configuration block | sector 7 |
 //!
 //! USART2 on PA2 and PA3 is left alone: solder bridges SB13 and SB14 lead both to the ST-LINK, whose virtual serial port it is, and none leads
 //! to D0 and D1.
@@ -14,7 +17,7 @@
 #![forbid(unsafe_code)]
 
 use defmt_rtt as _;
-use embassy_stm32::flash::Flash;
+use embassy_stm32::flash::{Blocking, Flash};
 use embassy_stm32::interrupt::typelevel::Binding;
 use embassy_stm32::peripherals::{FLASH, PA9, PA10, PC10, PC11, USART1, USART3};
 use embassy_stm32::usart::{
@@ -23,9 +26,9 @@ use embassy_stm32::usart::{
 };
 use embassy_stm32::{Peri, bind_interrupts};
 use panic_probe as _;
+use relay_app::board::{Board, Storage};
 use relay_app::{BAUD, BUFFER};
 use static_cell::StaticCell;
-use uav_relay_block::{Block, LEN};
 
 bind_interrupts!(
     /// Who handles which interrupt.
@@ -35,17 +38,16 @@ bind_interrupts!(
     }
 );
 
-/// Where the configuration block begins, in the flash: its last sector.
-const BLOCK: u32 = 0x6_0000;
-
-/// The configuration block; blank where it cannot be read.
-pub fn block(flash: Peri<'_, FLASH>) -> Block {
-    let mut block = [0xFF; LEN];
-    let mut flash = Flash::new_blocking(flash);
-    if flash.blocking_read(BLOCK, &mut block).is_err() {
-        block.fill(0xFF);
-    }
-    block
+/// The board. An erase stops its CPU: 0.25 s for 16 KiB, 0.55 s for 64 KiB, twice that at most.
+pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
+    Board::new(
+        seed(),
+        Storage {
+            flash: Flash::new_blocking(flash),
+            block: 0x6_0000,
+            epochs: [0xC000..0x1_0000, 0x1_0000..0x2_0000],
+        },
+    )
 }
 
 type Halves = (BufferedUartRx<'static>, BufferedUartTx<'static>);
@@ -94,7 +96,7 @@ where
 }
 
 /// Differs from one chip to the next: it has no random number generator.
-pub fn seed() -> u32 {
+fn seed() -> u32 {
     let words = embassy_stm32::uid::uid().map(u32::from);
     // FNV-1a.
     let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);

@@ -1,4 +1,4 @@
-//! The Raspberry Pi Pico 2: its configuration block, its seed, and its UARTs.
+//! The Raspberry Pi Pico 2: its flash, its seed, and its UARTs.
 //!
 //! | what | where |
 //! | --- | --- |
@@ -6,6 +6,8 @@
 //! | toward the receiver | UART1: TX GP4, RX GP5 |
 //! | the radio's driver enable | GP2: high while this relay sends |
 //! | log | the debug probe (RTT) |
+//! | configuration block | the last 4 KiB of the flash |
+//! | epochs | 4 KiB twice before them |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -18,9 +20,9 @@ use embassy_rp::uart::{
 };
 use embassy_rp::{Peri, bind_interrupts};
 use panic_probe as _;
+use relay_app::board::{Board, Storage};
 use relay_app::{BAUD, BUFFER};
 use static_cell::StaticCell;
-use uav_relay_block::{Block, LEN};
 
 bind_interrupts!(
     /// Who handles which interrupt.
@@ -34,21 +36,23 @@ bind_interrupts!(
 /// Bytes of the flash.
 const FLASH_SIZE: usize = 4 * 1024 * 1024;
 
-/// Where the configuration block begins, in the flash: its last sector.
-const BLOCK: u32 = 0x3F_F000;
+/// Its flash.
+pub type BoardFlash = Flash<'static, FLASH, Blocking, FLASH_SIZE>;
 
-/// The configuration block; blank where it cannot be read.
-pub fn block(flash: Peri<'_, FLASH>) -> Block {
-    let mut block = [0xFF; LEN];
-    let mut flash = Flash::<_, Blocking, FLASH_SIZE>::new_blocking(flash);
-    if flash.blocking_read(BLOCK, &mut block).is_err() {
-        block.fill(0xFF);
-    }
-    block
+/// The board, with a seed from its random number generator.
+pub fn board(flash: Peri<'static, FLASH>, trng: Peri<'static, TRNG>) -> Board<BoardFlash> {
+    Board::new(
+        seed(trng),
+        Storage {
+            flash: Flash::new_blocking(flash),
+            block: 0x3F_F000,
+            epochs: [0x3F_D000..0x3F_E000, 0x3F_E000..0x3F_F000],
+        },
+    )
 }
 
 /// Differs from one start to the next.
-pub fn seed(trng: Peri<'_, TRNG>) -> u32 {
+fn seed(trng: Peri<'_, TRNG>) -> u32 {
     Trng::new(trng, Irqs, embassy_rp::trng::Config::default()).blocking_next_u32()
 }
 

@@ -1,4 +1,4 @@
-//! The STM32F405, on the pins of the other firmware: its configuration block, its seed, and its UARTs.
+//! The STM32F405, on the pins of the other firmware: its flash, its seed, and its UARTs.
 //!
 //! | what | where |
 //! | --- | --- |
@@ -7,20 +7,25 @@
 //! | the radio's driver enable | PA1: high while this relay sends |
 //! | log | the debug probe (RTT) |
 //! | clock | HSI, 16 MHz, no PLL |
+//! | epochs, configuration block | the sectors of the other firmware |
 #![no_std]
 #![forbid(unsafe_code)]
 
+use core::ops::Range;
+
 use defmt_rtt as _;
-use embassy_stm32::flash::Flash;
+use embassy_stm32::flash::{Blocking, Flash};
 use embassy_stm32::peripherals::{FLASH, PA2, PA3, PB10, PB11, USART2, USART3};
 use embassy_stm32::usart::{
     BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config, ConfigError,
 };
 use embassy_stm32::{Peri, bind_interrupts};
 use panic_probe as _;
+use relay_app::board::{Board, Storage};
 use relay_app::{BAUD, BUFFER};
 use static_cell::StaticCell;
-use uav_relay_block::{ADDRESS, Block, LEN};
+use uav_relay_block::ADDRESS;
+use uav_relay_kept::epoch;
 
 bind_interrupts!(
     /// Who handles which interrupt.
@@ -33,17 +38,24 @@ bind_interrupts!(
 /// Where the flash begins.
 const FLASH_START: u32 = 0x0800_0000;
 
-/// The configuration block; blank where it cannot be read.
-pub fn block(flash: Peri<'_, FLASH>) -> Block {
-    let mut block = [0xFF; LEN];
-    let mut flash = Flash::new_blocking(flash);
-    if flash
-        .blocking_read(ADDRESS - FLASH_START, &mut block)
-        .is_err()
-    {
-        block.fill(0xFF);
-    }
-    block
+const KIB: u32 = 1024;
+
+/// The board. An erase of a sector of the epoch stops its CPU for 1 s, for 2 s at most.
+pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
+    Board::new(
+        seed(),
+        Storage {
+            flash: Flash::new_blocking(flash),
+            block: ADDRESS - FLASH_START,
+            epochs: epoch::SECTORS.map(|at| sector(at, 128 * KIB)),
+        },
+    )
+}
+
+/// The offsets of a sector at that address.
+const fn sector(address: u32, bytes: u32) -> Range<u32> {
+    let start = address - FLASH_START;
+    start..start + bytes
 }
 
 type Halves = (BufferedUartRx<'static>, BufferedUartTx<'static>);
@@ -85,7 +97,7 @@ fn config() -> Config {
 }
 
 /// Differs from one chip to the next: its random number generator wants the PLL, which this board leaves alone.
-pub fn seed() -> u32 {
+fn seed() -> u32 {
     let words = embassy_stm32::uid::uid().map(u32::from);
     // FNV-1a.
     let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);

@@ -3,15 +3,20 @@
 #![no_main]
 
 use embassy_executor::Spawner;
-use relay_nucleo_f446re::{block, seed, usart1, usart3};
+use relay_app::drone::Room;
+use relay_nucleo_f446re::{board, usart1, usart3};
+use static_cell::StaticCell;
+
+static ROOM: StaticCell<Room> = StaticCell::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let chip = embassy_stm32::init(embassy_stm32::Config::default());
-    let block = block(chip.FLASH);
+    let board = board(chip.FLASH);
     let upstream = usart1(chip.USART1, chip.PA9, chip.PA10);
     let downstream = usart3(chip.USART3, chip.PC10, chip.PC11);
     if let (Ok(upstream), Ok(downstream)) = (upstream, downstream) {
-        match relay_app::fly(&block, seed(), upstream, downstream).await {}
+        let room = ROOM.init_with(Room::new);
+        let _ = relay_app::fly(room, board, upstream, downstream).await;
     }
 }

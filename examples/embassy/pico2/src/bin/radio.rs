@@ -4,13 +4,18 @@
 
 use embassy_executor::Spawner;
 use embassy_rp::gpio::{Level, Output};
-use relay_pico2::{block, seed, uart0};
+use relay_app::drone::Room;
+use relay_pico2::{board, uart0};
+use static_cell::StaticCell;
+
+static ROOM: StaticCell<Room> = StaticCell::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let chip = embassy_rp::init(embassy_rp::config::Config::default());
-    let (block, seed) = (block(chip.FLASH), seed(chip.TRNG));
+    let board = board(chip.FLASH, chip.TRNG);
     let radio = uart0(chip.UART0, chip.PIN_0, chip.PIN_1);
     let enable = Output::new(chip.PIN_2, Level::Low);
-    match relay_app::fly_shared(&block, seed, radio, enable).await {}
+    let room = ROOM.init_with(Room::new);
+    let _ = relay_app::fly_shared(room, board, radio, enable).await;
 }

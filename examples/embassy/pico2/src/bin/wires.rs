@@ -3,13 +3,18 @@
 #![no_main]
 
 use embassy_executor::Spawner;
-use relay_pico2::{block, seed, uart0, uart1};
+use relay_app::drone::Room;
+use relay_pico2::{board, uart0, uart1};
+use static_cell::StaticCell;
+
+static ROOM: StaticCell<Room> = StaticCell::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let chip = embassy_rp::init(embassy_rp::config::Config::default());
-    let (block, seed) = (block(chip.FLASH), seed(chip.TRNG));
+    let board = board(chip.FLASH, chip.TRNG);
     let upstream = uart0(chip.UART0, chip.PIN_0, chip.PIN_1);
     let downstream = uart1(chip.UART1, chip.PIN_4, chip.PIN_5);
-    match relay_app::fly(&block, seed, upstream, downstream).await {}
+    let room = ROOM.init_with(Room::new);
+    let _ = relay_app::fly(room, board, upstream, downstream).await;
 }

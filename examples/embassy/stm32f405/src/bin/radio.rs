@@ -4,14 +4,19 @@
 
 use embassy_executor::Spawner;
 use embassy_stm32::gpio::{Level, Output, Speed};
-use relay_stm32f405::{block, seed, usart2};
+use relay_app::drone::Room;
+use relay_stm32f405::{board, usart2};
+use static_cell::StaticCell;
+
+static ROOM: StaticCell<Room> = StaticCell::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let chip = embassy_stm32::init(embassy_stm32::Config::default());
-    let block = block(chip.FLASH);
+    let board = board(chip.FLASH);
     let enable = Output::new(chip.PA1, Level::Low, Speed::Low);
     if let Ok(radio) = usart2(chip.USART2, chip.PA2, chip.PA3) {
-        match relay_app::fly_shared(&block, seed(), radio, enable).await {}
+        let room = ROOM.init_with(Room::new);
+        let _ = relay_app::fly_shared(room, board, radio, enable).await;
     }
 }

@@ -3,15 +3,20 @@
 #![no_main]
 
 use embassy_executor::Spawner;
-use relay_stm32f405::{block, seed, usart2, usart3};
+use relay_app::drone::Room;
+use relay_stm32f405::{board, usart2, usart3};
+use static_cell::StaticCell;
+
+static ROOM: StaticCell<Room> = StaticCell::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let chip = embassy_stm32::init(embassy_stm32::Config::default());
-    let block = block(chip.FLASH);
+    let board = board(chip.FLASH);
     let upstream = usart2(chip.USART2, chip.PA2, chip.PA3);
     let downstream = usart3(chip.USART3, chip.PB10, chip.PB11);
     if let (Ok(upstream), Ok(downstream)) = (upstream, downstream) {
-        match relay_app::fly(&block, seed(), upstream, downstream).await {}
+        let room = ROOM.init_with(Room::new);
+        let _ = relay_app::fly(room, board, upstream, downstream).await;
     }
 }

@@ -149,13 +149,24 @@ fn clippy() -> Vec<Step> {
     ]
 }
 
-/// The Embassy examples, a workspace of their own: as the rest is checked, for each chip.
+/// The Embassy examples, a workspace of their own: as the rest is checked, for each chip; the application on a PC too.
 fn embassy() -> Vec<Step> {
     const MANIFEST: &str = "--manifest-path examples/embassy/Cargo.toml";
-    let mut steps = vec![step(
-        "Embassy, formatting",
-        format!("cargo fmt {MANIFEST} --all --check"),
-    )];
+    const HOST: &str = "-p relay-app --locked --target-dir target/embassy";
+    let mut steps = vec![
+        step(
+            "Embassy, formatting",
+            format!("cargo fmt {MANIFEST} --all --check"),
+        ),
+        step(
+            "Embassy, clippy, its tests",
+            format!("cargo clippy {MANIFEST} {HOST} --all-targets -- -D warnings"),
+        ),
+        step(
+            "Embassy, the application on a PC",
+            format!("cargo test {MANIFEST} {HOST}"),
+        ),
+    ];
     for (package, target) in [
         ("relay-stm32f405", TARGET),
         ("relay-nucleo-f446re", TARGET),

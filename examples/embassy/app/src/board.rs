@@ -1,0 +1,43 @@
+//! What a board brings beside its ports.
+
+use core::ops::Range;
+
+use embedded_storage::nor_flash::NorFlash;
+use uav_relay_block::{Block, LEN};
+
+/// The block, a seed, and a flash to keep the epoch in.
+#[derive(Debug)]
+pub struct Board<F> {
+    /// The configuration block.
+    pub block: Block,
+    /// Differs from one board to the next, and better from one start to the next.
+    pub seed: u32,
+    /// Where it keeps what has to survive a reboot. Without it a block with a key is refused.
+    pub storage: Option<Storage<F>>,
+}
+
+/// A flash, and what is where in it: offsets of whole erase units that no image reaches.
+#[derive(Debug)]
+pub struct Storage<F> {
+    /// Its driver.
+    pub flash: F,
+    /// Where the configuration block begins.
+    pub block: u32,
+    /// The two sectors of the epoch.
+    pub epochs: [Range<u32>; 2],
+}
+
+impl<F: NorFlash> Board<F> {
+    /// A board whose block is in the flash that it keeps things in; blank where it cannot be read.
+    pub fn new(seed: u32, mut storage: Storage<F>) -> Self {
+        let mut block = [0xFF; LEN];
+        if storage.flash.read(storage.block, &mut block).is_err() {
+            block.fill(0xFF);
+        }
+        Self {
+            block,
+            seed,
+            storage: Some(storage),
+        }
+    }
+}

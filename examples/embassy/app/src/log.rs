@@ -1,0 +1,78 @@
+//! What is logged.
+
+use core::convert::Infallible;
+
+use defmt::{Debug2Format, error, info, warn};
+use uav_relay::asynch::AsyncRelay;
+use uav_relay::{Event, Relay};
+use uav_relay_block::Config;
+
+use crate::drone::Refused;
+
+pub(crate) fn begins(config: &Config) {
+    info!(
+        "relay {} of {}, network {}",
+        config.identity.index,
+        config.mission.relays(),
+        config.identity.network
+    );
+}
+
+pub(crate) fn unsigned() {
+    warn!("no key: frames are not signed, and anybody can send some");
+}
+
+/// `kept` tells whether the epoch stands in the flash.
+pub(crate) fn signs(epoch: u32, kept: bool) {
+    if kept {
+        info!("frames are signed, epoch {}", epoch);
+    } else {
+        error!(
+            "frames are signed, epoch {}; it cannot be kept: raise the epoch of the block before the next start",
+            epoch
+        );
+    }
+}
+
+pub(crate) fn unguarded() {
+    warn!(
+        "no sites: no autopilot is told where to fly, and nothing keeps drones apart on their way"
+    );
+}
+
+pub(crate) fn refused(why: Refused) {
+    match why {
+        Refused::Block(why) => error!("configuration refused: {}", Debug2Format(&why)),
+        Refused::NoFlash => {
+            error!(
+                "configuration refused: it has a key, and this board keeps no epoch to sign with"
+            );
+        }
+        Refused::NoEpoch => error!("no epoch is left to sign with"),
+        Refused::NoAutopilot => {
+            error!(
+                "configuration refused: it has sites, and this image has no port to an autopilot"
+            );
+        }
+        Refused::Setup(why) => {
+            error!("configuration refused: this image cannot do it, {}", why);
+        }
+    }
+}
+
+/// Logs what happens, and where to fly.
+pub(crate) async fn events(relay: &AsyncRelay<'_>) -> Infallible {
+    loop {
+        let event = relay.next_event().await;
+        info!("event {}", event);
+        if event == Event::SetpointChanged
+            && let Some(place) = relay.look(Relay::setpoint).flatten()
+        {
+            let bits = [place.x_m, place.y_m, place.altitude_m].map(f32::to_bits);
+            info!(
+                "setpoint x {} m ({:#010x}) y {} m ({:#010x}) altitude {} m ({:#010x})",
+                place.x_m, bits[0], place.y_m, bits[1], place.altitude_m, bits[2]
+            );
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! A drone that runs the application, wired to a neighbour that does not: relays 1 and 2 of 2.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::future::poll_fn;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
+
+use embassy_time::MockDriver;
+use embedded_io_async::{ErrorType, Read, Write};
+use relay_app::EmbassyClock;
+use relay_app::board::Board;
+use relay_app::drone::{Refused, Room};
+use uav_relay::asynch::Clock as _;
+use uav_relay::channel::AirGround;
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{
+    Auth, Band, Event, Identity, Interference, Interferer, Key, Method, Mission, MissionConfig,
+    Port, Profile, Relay, Settings,
+};
+use uav_relay_block::{Block, ChannelNumbers, Config, Secret, Sites, write};
+
+use crate::ram::Ram;
+
+pub(crate) const KEY: [u8; 32] = [7; 32];
+
+/// The clock is one for all tests.
+static CLOCK: Mutex<()> = Mutex::new(());
+
+/// One direction of a wire.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Pipe(Rc<RefCell<VecDeque<u8>>>);
+
+impl ErrorType for Pipe {
+    type Error = Infallible;
+}
+
+impl Read for Pipe {
+    /// Whoever waits is polled again in the next millisecond anyway.
+    async fn read(&mut self, into: &mut [u8]) -> Result<usize, Infallible> {
+        poll_fn(|_| match self.take(into) {
+            0 => Poll::Pending,
+            count => Poll::Ready(Ok(count)),
+        })
+        .await
+    }
+}
+
+impl Write for Pipe {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        self.0.borrow_mut().extend(bytes);
+        Ok(bytes.len())
+    }
+
+    async fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+impl Pipe {
+    /// As many bytes as there are, and room for.
+    pub(crate) fn take(&self, into: &mut [u8]) -> usize {
+        let mut bytes = self.0.borrow_mut();
+        let count = bytes.len().min(into.len());
+        for (place, byte) in into.iter_mut().zip(bytes.drain(..count)) {
+            *place = byte;
+        }
+        count
+    }
+}
+
+/// What an application is polled to.
+type Running = Pin<Box<dyn Future<Output = Result<Infallible, Refused>>>>;
+
+pub(crate) struct Bench {
+    neighbour: Relay,
+    pub(crate) events: Vec<Event>,
+    /// To the neighbour, and from it.
+    wire: [Pipe; 2],
+    drone: Option<Running>,
+    _clock: MutexGuard<'static, ()>,
+}
+
+fn numbers() -> ChannelNumbers {
+    ChannelNumbers {
+        carrier_hz: 2e9,
+        excess_los: 1.023_293,
+        excess_nlos: 125.892_54,
+        los_weight: 1.0,
+    }
+}
+
+/// What relay `index` of 2 flies.
+fn config(index: u16, sites: Option<Sites>) -> Config {
+    let common = Profile {
+        altitude_m: 20.0,
+        power_w: 1.0,
+    };
+    let channel = uav_relay::Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los);
+    let mission = Mission::try_new(MissionConfig {
+        relays: 2,
+        distance_m: 1343.795,
+        min_separation_m: 4.0,
+        tx_power_w: 80.0,
+        common,
+        channel: channel.unwrap(),
+        band: Band::at(20.0),
+        lateral: Band::NONE,
+        interference: Interference::Source(Interferer {
+            power_w: 80.0,
+            x_m: 500.0,
+            y_m: 400.0,
+        }),
+        noise_w: 0.0,
+        tolerance: 1e-4,
+    });
+    Config {
+        identity: Identity { network: 7, index },
+        mission: mission.unwrap(),
+        profile: common,
+        hold_altitude: false,
+        method: Method::Align,
+        measure: None,
+        listen: None,
+        sites,
+    }
+}
+
+/// The block of relay 1; with an epoch it has a key.
+pub(crate) fn block(epoch: Option<u32>, sites: Option<Sites>) -> Block {
+    let secret = epoch.map(|epoch| Secret { key: KEY, epoch });
+    write(&config(1, sites), &numbers(), secret, None)
+}
+
+/// Sites that are as far apart as the mission says.
+pub(crate) const SITES: Sites = Sites {
+    ends: [
+        [474_000_000, 85_400_000, 420_000],
+        [474_100_000, 85_500_000, 431_000],
+    ],
+    speed_m_s: 0.0,
+};
+
+/// What becomes of a board that has to be refused.
+pub(crate) fn refused(board: Board<Ram>) -> Refused {
+    let _clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
+    let [up, down] = [Pipe::default(), Pipe::default()];
+    let mut running = running(board, up, down);
+    match running
+        .as_mut()
+        .poll(&mut Context::from_waker(Waker::noop()))
+    {
+        Poll::Ready(Err(why)) => why,
+        _ => panic!("it takes part"),
+    }
+}
+
+fn running(board: Board<Ram>, rx: Pipe, tx: Pipe) -> Running {
+    let room = Box::leak(Box::new(Room::new()));
+    let nobody = (Pipe::default(), Pipe::default());
+    Box::pin(relay_app::fly(room, board, nobody, (rx, tx)))
+}
+
+impl Bench {
+    /// The neighbour alone, on its first epoch.
+    pub(crate) fn new() -> Self {
+        let clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
+        let said = config(2, None);
+        let settings = Settings {
+            auth: Some(Auth {
+                key: Key::new(KEY),
+                epoch: 1,
+            }),
+            ..Settings::default()
+        };
+        let now = EmbassyClock.now();
+        Self {
+            neighbour: Relay::new(said.mission, said.identity, settings, 2, now).unwrap(),
+            events: Vec::new(),
+            wire: [Pipe::default(), Pipe::default()],
+            drone: None,
+            _clock: clock,
+        }
+    }
+
+    /// Switches the drone on, or off and on. What was on the wires then is gone.
+    pub(crate) fn boot(&mut self, board: Board<Ram>) {
+        for wire in &self.wire {
+            wire.0.borrow_mut().clear();
+        }
+        let [there, back] = self.wire.clone();
+        self.drone = Some(running(board, back, there));
+    }
+
+    /// Switches it off.
+    pub(crate) fn switch_off(&mut self) {
+        self.drone = None;
+    }
+
+    /// So many milliseconds pass; what the neighbour was told meanwhile.
+    pub(crate) fn run(&mut self, millis: u32) -> Vec<Event> {
+        self.events.clear();
+        let mut cx = Context::from_waker(Waker::noop());
+        for _ in 0..millis {
+            MockDriver::get().advance(embassy_time::Duration::from_millis(1));
+            if let Some(drone) = &mut self.drone {
+                assert!(drone.as_mut().poll(&mut cx).is_pending(), "it takes part");
+            }
+            self.listen();
+        }
+        self.events.clone()
+    }
+
+    fn listen(&mut self) {
+        let (now, relay) = (EmbassyClock.now(), &mut self.neighbour);
+        let mut bytes = [0; 256];
+        let count = self.wire[0].take(&mut bytes);
+        relay.handle_bytes(now, Port::Upstream, &bytes[..count]);
+        relay.handle_timeout(now);
+        let mut frame = [0; MAX_FRAME];
+        while let Some(sent) = relay.poll_transmit(now, &mut frame) {
+            if sent.port == Port::Upstream {
+                self.wire[1].0.borrow_mut().extend(&frame[..sent.len]);
+            }
+        }
+        while let Some(event) = relay.poll_event() {
+            self.events.push(event);
+        }
+    }
+
+    /// Frames that the neighbour did not believe.
+    pub(crate) fn disbelieved(&self) -> u32 {
+        let stats = self.neighbour.stats();
+        stats.unsigned + stats.forged + stats.replayed
+    }
+}

@@ -1,0 +1,104 @@
+//! A block with a key: frames are signed, by an epoch that rises at every start.
+
+use relay_app::board::Board;
+use relay_app::drone::Refused;
+use uav_relay::Event;
+use uav_relay_block::ConfigError;
+use uav_relay_kept::epoch;
+use uav_relay_kept::journal::Journal;
+use uav_relay_kept::nor::Nor;
+
+use crate::bench::{Bench, SITES, block, refused};
+use crate::ram::Ram;
+
+/// So long a neighbour is missed before it is lost, ms.
+const LOST: u32 = 25_000;
+
+/// The epoch that stands in the flash.
+fn epoch(flash: &Ram) -> Option<u32> {
+    let storage = flash.storage();
+    let flash = Nor::new(storage.flash, storage.epochs);
+    let newest = Journal::new(flash, epoch::WORDS, epoch::KEY).newest::<{ epoch::WORDS }>();
+    newest.map(|[epoch]| epoch)
+}
+
+#[test]
+fn its_epoch_rises_at_every_start_and_its_neighbour_believes_it_each_time() {
+    let flash = Ram::blank();
+    let mut bench = Bench::new();
+    for start in 1..=4 {
+        bench.boot(flash.board(&block(Some(1), None), start));
+        // Who comes back often is heard for longer before he is taken in again.
+        let told = bench.run(60_000);
+        assert!(told.contains(&Event::Converged), "start {start}: {told:?}");
+        assert_eq!(epoch(&flash), Some(start));
+        bench.switch_off();
+        let told = bench.run(LOST);
+        let lost = |event: &Event| matches!(event, Event::NeighbourLost { .. });
+        assert!(told.iter().any(lost), "start {start}: {told:?}");
+    }
+    assert_eq!(bench.disbelieved(), 0);
+}
+
+/// What the epoch is for: the same start again is one that somebody may have recorded.
+#[test]
+fn one_that_forgets_its_epoch_is_not_believed() {
+    let mut bench = Bench::new();
+    for start in 1..=2 {
+        bench.boot(Ram::blank().board(&block(Some(1), None), start));
+        let told = bench.run(10_000);
+        assert_eq!(told.contains(&Event::Converged), start == 1, "{told:?}");
+        let went_back = Event::EpochWentBack { node: 1 };
+        assert_eq!(told.contains(&went_back), start == 2, "{told:?}");
+        bench.switch_off();
+        bench.run(LOST);
+    }
+}
+
+#[test]
+fn a_block_may_raise_the_epoch_and_never_lowers_it() {
+    let flash = Ram::blank();
+    let mut bench = Bench::new();
+    for (least, expected) in [(40, 40), (1, 41), (900, 900), (41, 901)] {
+        bench.boot(flash.board(&block(Some(least), None), 1));
+        bench.run(1);
+        assert_eq!(epoch(&flash), Some(expected));
+    }
+}
+
+/// More starts than a sector has room for, with sectors of two lengths.
+#[test]
+fn the_epoch_rises_through_full_sectors() {
+    let flash = Ram::blank();
+    let mut bench = Bench::new();
+    for start in 1..=1_100 {
+        bench.boot(flash.board(&block(Some(1), None), start));
+        bench.run(1);
+        assert_eq!(epoch(&flash), Some(start));
+    }
+}
+
+#[test]
+fn a_board_that_cannot_do_it_says_why() {
+    let board = |epoch, sites| Ram::blank().board(&block(epoch, sites), 1);
+    let no_flash = Board {
+        storage: None,
+        ..board(Some(1), None)
+    };
+    assert_eq!(refused(no_flash), Refused::NoFlash);
+    assert_eq!(
+        refused(board(Some(u32::MAX), None)),
+        Refused::Block(ConfigError::Secret)
+    );
+    assert_eq!(refused(board(None, Some(SITES))), Refused::NoAutopilot);
+    let blank = Ram::blank().board(&[0xFF; uav_relay_block::LEN], 1);
+    assert_eq!(refused(blank), Refused::Block(ConfigError::Blank));
+    let flash = Ram::blank();
+    let last = block(Some(u32::MAX - 1), None);
+    Bench::new().boot(flash.board(&last, 1));
+    let mut bench = Bench::new();
+    bench.boot(flash.board(&last, 1));
+    bench.run(1);
+    drop(bench);
+    assert_eq!(refused(flash.board(&last, 1)), Refused::NoEpoch);
+}

@@ -1,0 +1,108 @@
+//! Two sectors of a flash that has the traits of `embedded-storage`, as the drivers of Embassy and of many HALs do.
+
+use core::ops::Range;
+
+use embedded_storage::nor_flash::NorFlash;
+
+use crate::journal::{BLANK, Flash};
+
+/// Bytes of a word.
+const WORD: usize = 4;
+
+/// Words that are read or written at once: a call of a driver costs more than a word, and some flashes write a page each time.
+const PIECE: usize = 16;
+
+/// Two sectors of a flash, each of one erase unit or several, as offsets into it. Whole words have to be what it reads and writes.
+#[derive(Debug)]
+pub struct Nor<F> {
+    flash: F,
+    sectors: [Range<u32>; 2],
+    /// What was read last: the sector, the number of the first word, and the words.
+    last: Option<(usize, usize, [[u8; WORD]; PIECE])>,
+}
+
+impl<F: NorFlash> Nor<F> {
+    /// These sectors of `flash`, which may be a `&mut` of it.
+    pub const fn new(flash: F, sectors: [Range<u32>; 2]) -> Self {
+        const {
+            assert!(WORD.is_multiple_of(F::READ_SIZE) && WORD.is_multiple_of(F::WRITE_SIZE));
+        }
+        Self {
+            flash,
+            sectors,
+            last: None,
+        }
+    }
+
+    /// Where so many words from that one of a sector on begin; `None` where they are not all in it.
+    fn place(&self, sector: usize, first: usize, words: usize) -> Option<u32> {
+        let start = self.sectors.get(sector)?.start;
+        let end = first.checked_add(words)?;
+        let is_in = end <= self.words(sector);
+        let bytes = u32::try_from(first.checked_mul(WORD)?).ok()?;
+        start.checked_add(bytes).filter(|_| is_in)
+    }
+
+    /// The word, out of the piece that it is in.
+    fn word(&mut self, sector: usize, word: usize) -> Option<u32> {
+        let (first, at) = (word - word % PIECE, word % PIECE);
+        if self
+            .last
+            .is_none_or(|last| (last.0, last.1) != (sector, first))
+        {
+            let count = self.words(sector).checked_sub(first)?.min(PIECE);
+            let place = self.place(sector, first, count)?;
+            let mut piece = [[0xFF; WORD]; PIECE];
+            let bytes = piece.get_mut(..count)?.as_flattened_mut();
+            self.flash.read(place, bytes).ok()?;
+            self.last = Some((sector, first, piece));
+        }
+        let (_, _, piece) = self.last.as_ref()?;
+        piece.get(at).map(|bytes| u32::from_le_bytes(*bytes))
+    }
+
+    fn write_all(&mut self, sector: usize, first: usize, words: &[u32]) -> Option<()> {
+        self.place(sector, first, words.len())?;
+        self.last = None;
+        let mut bytes = [[0; WORD]; PIECE];
+        for (at, words) in (first..).step_by(PIECE).zip(words.chunks(PIECE)) {
+            let place = self.place(sector, at, words.len())?;
+            let bytes = bytes.get_mut(..words.len())?;
+            for (bytes, word) in bytes.iter_mut().zip(words) {
+                *bytes = word.to_le_bytes();
+            }
+            self.flash.write(place, bytes.as_flattened()).ok()?;
+        }
+        let mut words = (first..).zip(words);
+        let stand = words.all(|(at, word)| self.word(sector, at) == Some(*word));
+        stand.then_some(())
+    }
+}
+
+impl<F: NorFlash> Flash for Nor<F> {
+    fn words(&self, sector: usize) -> usize {
+        self.sectors.get(sector).map_or(0, Range::len) / WORD
+    }
+
+    fn used(&mut self, sector: usize) -> usize {
+        let mut words = (0..self.words(sector)).rev();
+        let last = words.find(|at| self.read(sector, *at) != BLANK);
+        last.map_or(0, |last| last + 1)
+    }
+
+    fn read(&mut self, sector: usize, word: usize) -> u32 {
+        self.word(sector, word).unwrap_or(BLANK)
+    }
+
+    fn erase(&mut self, sector: usize) {
+        self.last = None;
+        if let Some(range) = self.sectors.get(sector) {
+            // What does not stand there afterwards is noticed where it is read back.
+            let _ = self.flash.erase(range.start, range.end);
+        }
+    }
+
+    fn write(&mut self, sector: usize, first: usize, words: &[u32]) -> bool {
+        self.write_all(sector, first, words).is_some()
+    }
+}
