@@ -13,6 +13,7 @@ use stm32f4xx_hal::serial::Serial;
 use uav_relay::flight::autopilot::Autopilot as Link;
 #[cfg(feature = "upload")]
 use uav_relay::flight::axis::Axis;
+use uav_relay::flight::course::Course;
 use uav_relay::flight::mavlink::outgoing::FrameBytes;
 #[cfg(feature = "mavlink-signing")]
 use uav_relay::flight::mavlink::signing::{Signing, Stamp};
@@ -20,9 +21,6 @@ use uav_relay::serial::SerialPort as _;
 use uav_relay::{Duration, Event, Instant, Mission, Relay};
 
 use super::config::{self, Sites};
-#[cfg(feature = "upload")]
-use super::course::ends;
-use super::course::{Course, course};
 use super::port::{self, OUTGOING, Port, Queues, Slot};
 use super::{board, log};
 
@@ -75,7 +73,8 @@ impl Autopilot {
         mission: &Mission,
         now: Instant,
     ) -> Option<&'static mut Self> {
-        let course = course(sites, mission).map_err(log::off_course).ok()?;
+        let course = Course::try_new(sites.on_earth(), sites.speed_m_s, mission);
+        let course = course.map_err(log::off_course).ok()?;
         log::flies(&course);
         Self::along(&course, uart, sites, now)
     }
@@ -94,7 +93,7 @@ impl Autopilot {
     ) -> Option<&'static mut Self> {
         let port = open(uart)?;
         #[cfg(feature = "upload")]
-        let loaded = ends(sites);
+        let loaded = sites.on_earth();
         let autopilot = singleton!(LINK: Autopilot = Autopilot {
             link: Link::new(course.axis, course.pace, now),
             #[cfg(feature = "upload")]

@@ -8,14 +8,14 @@ use uav_relay::flight::autopilot::AutopilotEvent;
 use uav_relay::flight::autopilot::state::State;
 #[cfg(feature = "flight")]
 use uav_relay::flight::autopilot::trust::Mistrust;
+#[cfg(feature = "flight")]
+use uav_relay::flight::course::{Course, CourseError};
 use uav_relay::sensing::belief::Belief;
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
 
 use super::clock;
 use super::config::{Config, ConfigError};
-#[cfg(feature = "flight")]
-use super::course::{Course, CourseError};
 
 #[cfg_attr(feature = "rtt", path = "sink_rtt.rs")]
 #[cfg_attr(not(feature = "rtt"), path = "sink_uart.rs")]
@@ -58,6 +58,7 @@ pub(crate) fn off_course(error: CourseError) {
             "configuration refused: the sites are {=f64} m apart, the mission's distance is another",
             along
         ),
+        other => defmt::error!("configuration refused: sites, {}", other),
     }
 }
 

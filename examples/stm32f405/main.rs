@@ -19,7 +19,6 @@
 //! | `drone.rs` | what a drone is by its configuration, whatever its links are |
 //! | `turns.rs` | its main loop |
 //! | `autopilot.rs`, `grounded.rs` | the autopilot with the feature `flight`, and without |
-//! | `course.rs` | the line on earth that it flies along |
 //! | `uploads.rs` | with the feature `upload`, the missions that were uploaded in flight |
 //! | `kept.rs` | when they, and what the relay has said in votes, are written and read |
 //! | `flash.rs` | the sectors of the logs of the crate `uav-relay-kept`, and everything unsafe about them |
@@ -37,9 +36,6 @@ mod autopilot;
 mod board;
 #[cfg(target_os = "none")]
 mod clock;
-#[cfg(all(target_os = "none", feature = "flight"))]
-#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
-mod course;
 #[cfg(target_os = "none")]
 mod drone;
 #[cfg(target_os = "none")]

@@ -3,12 +3,12 @@
 use uav_relay::SetupError;
 #[cfg(feature = "flight")]
 use uav_relay::flight::autopilot::AutopilotEvent;
+#[cfg(feature = "flight")]
+use uav_relay::flight::course::{Course, CourseError};
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
 
 use super::config::{Config, ConfigError};
-#[cfg(feature = "flight")]
-use super::course::{Course, CourseError};
 
 pub(crate) const fn asked() -> bool {
     false

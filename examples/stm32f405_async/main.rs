@@ -2,7 +2,7 @@
 //!
 //! It is here to be compared with the polled one (`cargo cost`), and to be flown in the emulator (`cargo test --test qemu`), where
 //! Embassy's start-up waits for good for a clock that QEMU does not have. For a board of your own begin with `examples/embassy`. It has
-//! no autopilot: a drone whose block has sites takes no part.
+//! no autopilot, as those there have: a drone whose block has sites takes no part.
 //!
 //! | file | one idea |
 //! | --- | --- |
@@ -21,10 +21,6 @@ mod board;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/clock.rs"]
 mod clock;
-#[cfg(all(target_os = "none", feature = "flight"))]
-#[path = "../stm32f405/course.rs"]
-#[allow(dead_code, unreachable_pub, reason = "what the log names")]
-mod course;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/drone.rs"]
 mod drone;

@@ -16,10 +16,6 @@ mod board;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/clock.rs"]
 mod clock;
-#[cfg(all(target_os = "none", feature = "flight"))]
-#[path = "../stm32f405/course.rs"]
-#[expect(unreachable_pub, reason = "the tools on the ground have it public")]
-mod course;
 #[cfg(target_os = "none")]
 #[path = "../stm32f405/drone.rs"]
 mod drone;

@@ -6,6 +6,7 @@
 //! | [`relay`] | a relay that tasks share |
 //! | [`link`] | one port: reader, writer, frames that wait, driver-enable pin |
 //! | `frames` | the frames that wait |
+//! | `autopilot` | with the feature `flight`, the link to an autopilot on a port of its own |
 //! | this one | all of them together: [`AsyncPair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`AsyncShared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
 //!
 //! # One future
@@ -106,6 +107,8 @@
 //! # Ok::<(), Box<dyn core::error::Error>>(())
 //! ```
 
+#[cfg(feature = "flight")]
+pub mod autopilot;
 pub mod clock;
 mod frames;
 pub mod link;
@@ -119,6 +122,8 @@ use embassy_futures::yield_now;
 use embedded_hal::digital::OutputPin;
 use embedded_io_async::{Read, Write};
 
+#[cfg(feature = "flight")]
+pub use autopilot::AsyncAutopilot;
 pub use clock::Clock;
 pub use link::AsyncLink;
 pub use relay::AsyncRelay;

@@ -143,12 +143,12 @@ const ZERO: SerialStats = SerialStats {
 };
 
 /// Keeps whom to wake, who may be there already.
-fn keep(place: &Cell<Option<Waker>>, cx: &Context<'_>) {
+pub(super) fn keep(place: &Cell<Option<Waker>>, cx: &Context<'_>) {
     let kept = place.take().filter(|waker| waker.will_wake(cx.waker()));
     place.set(Some(kept.unwrap_or_else(|| cx.waker().clone())));
 }
 
-fn wake(place: &Cell<Option<Waker>>) {
+pub(super) fn wake(place: &Cell<Option<Waker>>) {
     if let Some(waker) = place.take() {
         waker.wake_by_ref();
         place.set(Some(waker));

@@ -3,6 +3,7 @@
 //! | module | one idea |
 //! | --- | --- |
 //! | [`axis`] | the line from transmitter to receiver on earth, and places along it |
+//! | [`course`] | that line for a mission, and how fast it is flown |
 //! | [`mavlink`] | the bytes that autopilots speak |
 //! | [`autopilot`] | where to fly, who flies, and where the drone is |
 //!
@@ -26,4 +27,5 @@
 
 pub mod autopilot;
 pub mod axis;
+pub mod course;
 pub mod mavlink;

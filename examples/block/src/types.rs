@@ -3,7 +3,7 @@
 use uav_relay::channel::{AirGround, Channel, ChannelError};
 use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
-use uav_relay::{Identity, Listen, Measure, Method, Mission, Profile};
+use uav_relay::{Geodetic, Identity, Listen, Measure, Method, Mission, Profile};
 
 /// What the block says, checked.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -22,7 +22,7 @@ pub struct Config {
     pub measure: Option<Measure>,
     /// Whether and how the chain finds its interferer.
     pub listen: Option<Listen>,
-    /// Where the ends of the line are on earth. `course.rs` checks whether they make one.
+    /// Where the ends of the line are on earth. `uav_relay::flight::course` checks whether they make one.
     pub sites: Option<Sites>,
 }
 
@@ -33,6 +33,18 @@ pub struct Sites {
     pub ends: [[i32; 3]; 2],
     /// The drone's greatest speed, m/s: 0.1 to 20, or 0 for that of an autopilot that is told none.
     pub speed_m_s: f32,
+}
+
+impl Sites {
+    /// Where they are.
+    pub fn on_earth(&self) -> uav_relay::Sites {
+        let [tx, rx] = self.ends.map(|[lat_e7, lon_e7, amsl_mm]| Geodetic {
+            lat_e7,
+            lon_e7,
+            amsl_mm,
+        });
+        uav_relay::Sites { tx, rx }
+    }
 }
 
 /// What frames are signed with.

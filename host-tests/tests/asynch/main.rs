@@ -1,5 +1,6 @@
 //! Relays on asynchronous ports: a chain on an executor with virtual time, ports that are stuck, fail, or never have enough.
 
+mod autopilot;
 mod chain;
 mod polled;
 mod ports;

@@ -1,6 +1,11 @@
 //! What a drone is by its configuration, whatever its ports are.
 
 use embedded_storage::nor_flash::NorFlash;
+use uav_relay::asynch::AsyncAutopilot;
+use uav_relay::flight::autopilot::Autopilot;
+use uav_relay::flight::course::{Course, CourseError};
+use uav_relay::flight::mavlink::signing::{Signing, Stamp};
+use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Auth, Instant, Key, Relay, Settings, SetupError, Wiring};
 use uav_relay_block as config;
 use uav_relay_block::ConfigError;
@@ -10,6 +15,9 @@ use uav_relay_kept::nor::Nor;
 
 use crate::board::{Board, Storage};
 use crate::log;
+
+/// How far off its place a hovering drone may be reported, m.
+const POSITION_ERROR_M: f32 = 1.5;
 
 /// Room for the relay and its field, which the stack would have to hold.
 #[derive(Debug)]
@@ -45,11 +53,20 @@ pub enum Refused {
     NoEpoch,
     /// There are sites, and no port to an autopilot.
     NoAutopilot,
+    /// The sites make no line, or not the mission's.
+    Course(CourseError),
     /// The library was built without what the block asks for.
     Setup(SetupError),
 }
 
-/// The relay of a board, in `room`.
+/// The relay, and the autopilot, if it is told where to fly.
+#[derive(Debug)]
+pub(crate) struct Drone {
+    pub(crate) relay: &'static mut Relay,
+    pub(crate) autopilot: Option<AsyncAutopilot>,
+}
+
+/// The drone of a board, its relay in `room`; `flies` tells whether there is a port to an autopilot.
 ///
 /// # Errors
 /// Why it takes no part.
@@ -57,15 +74,32 @@ pub(crate) fn begin<F: NorFlash>(
     room: &'static mut Room,
     board: &mut Board<F>,
     wiring: Wiring,
+    flies: bool,
     now: Instant,
-) -> Result<&'static mut Relay, Refused> {
+) -> Result<Drone, Refused> {
     let said = config::read(&board.block, &mut room.field).map_err(Refused::Block)?;
     log::begins(&said);
     let auth = sign(board)?;
-    if said.sites.is_some() {
-        return Err(Refused::NoAutopilot);
-    }
-    log::unguarded();
+    let autopilot = match &said.sites {
+        Some(_) if !flies => return Err(Refused::NoAutopilot),
+        Some(sites) => {
+            let ends = sites.on_earth();
+            let course = Course::try_new(ends, sites.speed_m_s, &said.mission);
+            let Course { axis, pace } = course.map_err(Refused::Course)?;
+            log::flies(axis.distance_m(), pace.speed_m_s);
+            let mut link = Autopilot::new(axis, pace, now);
+            if let Some(key) = config::autopilot_key(&board.block) {
+                // Without a clock it takes the time from what it hears.
+                link.sign(Signing::new(key, 0, Stamp::UNKNOWN, now));
+                log::signs_to_autopilot();
+            }
+            Some(AsyncAutopilot::new(link, ends))
+        }
+        None => {
+            log::unguarded();
+            None
+        }
+    };
     let common = said.mission.config().common;
     let settings = Settings {
         auth,
@@ -76,10 +110,17 @@ pub(crate) fn begin<F: NorFlash>(
         measure: said.measure,
         listen: said.listen,
         wiring,
+        guard: said.sites.map(|_| GuardConfig {
+            hover_m: POSITION_ERROR_M,
+            ..GuardConfig::of(&said.mission, said.profile)
+        }),
+        sited: said.sites.is_some(),
         ..Settings::default()
     };
     let (slot, identity) = (&mut room.relay, said.identity);
-    Relay::new_in(slot, &said.mission, identity, &settings, board.seed, now).map_err(Refused::Setup)
+    let relay = Relay::new_in(slot, &said.mission, identity, &settings, board.seed, now);
+    let relay = relay.map_err(Refused::Setup)?;
+    Ok(Drone { relay, autopilot })
 }
 
 /// What frames are signed with in this start, if they are.

@@ -7,8 +7,9 @@
 //! | `log` | what is logged |
 //! | this one | all of it together, for wires and for a radio |
 //!
-//! With a key in the block the relay signs, by an epoch in the board's flash that rises at every start. What it does not have: an autopilot,
-//! votes that survive a reboot in flight, and uploads that do. `examples/stm32f405` has all three.
+//! With a key in the block the relay signs, by an epoch in the board's flash that rises at every start. With sites in it an autopilot, a PX4 or
+//! ArduCopter on a port of its own, is told where to fly, and the guard keeps drones apart. What it does not have: votes that survive a reboot
+//! in flight, and uploads that do. `examples/stm32f405` has both.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -19,17 +20,17 @@ mod log;
 use core::convert::Infallible;
 use core::future::Future;
 
-use embassy_futures::join::join;
+use embassy_futures::join::{join, join3};
 use embassy_time::Timer;
 use embedded_hal::digital::OutputPin;
 use embedded_io_async::{Read, Write};
 use embedded_storage::nor_flash::NorFlash;
-use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
+use uav_relay::asynch::{AsyncAutopilot, AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
 use uav_relay::serial::byte_time;
 use uav_relay::{Instant, Wiring};
 
 use board::Board;
-use drone::{Refused, Room};
+use drone::{Drone, Refused, Room};
 
 /// Bits a second on every port, 8N1.
 pub use uav_relay_block::BAUD;
@@ -51,41 +52,77 @@ impl Clock for EmbassyClock {
     }
 }
 
-/// Flies the relay of `board` with a UART to each neighbour, given as reader and writer. It never completes where it takes part.
+/// Bytes that the driver of an autopilot's UART holds of what comes in: it sends bursts.
+pub const BURST: usize = 512;
+
+/// Flies the relay of `board` with a UART to each neighbour, given as reader and writer, and one to the autopilot if the board has one to
+/// spare. It never completes where it takes part.
 ///
 /// # Errors
 /// Why it takes no part, which is logged.
-pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write>(
+pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read, AW: Write>(
     room: &'static mut Room,
-    mut board: Board<F>,
+    board: Board<F>,
     (up_rx, up_tx): (UR, UW),
     (down_rx, down_tx): (DR, DW),
+    autopilot: Option<(AR, AW)>,
 ) -> Result<Infallible, Refused> {
-    let relay = drone::begin(room, &mut board, Wiring::Pair, EmbassyClock.now());
-    let relay = AsyncRelay::new(relay.inspect_err(|why| log::refused(*why))?);
+    let Drone {
+        relay,
+        autopilot: link,
+    } = begin(room, board, Wiring::Pair, autopilot.is_some())?;
+    let relay = AsyncRelay::new(relay);
     let mut ports = AsyncPair::new(
         AsyncLink::new(up_rx, up_tx, byte_time(BAUD)),
         AsyncLink::new(down_rx, down_tx, byte_time(BAUD)),
     );
-    Ok(join(ports.run(&relay, &EmbassyClock), log::events(&relay))
-        .await
-        .0)
+    let beside = beside(&relay, link.as_ref(), autopilot);
+    Ok(join(ports.run(&relay, &EmbassyClock), beside).await.0)
 }
 
 /// The same with one UART to a radio that all relays share; `pin` is high while this one sends.
 ///
 /// # Errors
 /// As [`fly`].
-pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin>(
+pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, AW: Write>(
     room: &'static mut Room,
-    mut board: Board<F>,
+    board: Board<F>,
     (rx, tx): (R, W),
     pin: D,
+    autopilot: Option<(AR, AW)>,
 ) -> Result<Infallible, Refused> {
-    let relay = drone::begin(room, &mut board, Wiring::Shared, EmbassyClock.now());
-    let relay = AsyncRelay::new(relay.inspect_err(|why| log::refused(*why))?);
+    let Drone {
+        relay,
+        autopilot: link,
+    } = begin(room, board, Wiring::Shared, autopilot.is_some())?;
+    let relay = AsyncRelay::new(relay);
     let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, byte_time(BAUD), pin));
-    Ok(join(ports.run(&relay, &EmbassyClock), log::events(&relay))
-        .await
-        .0)
+    let beside = beside(&relay, link.as_ref(), autopilot);
+    Ok(join(ports.run(&relay, &EmbassyClock), beside).await.0)
+}
+
+fn begin<F: NorFlash>(
+    room: &'static mut Room,
+    mut board: Board<F>,
+    wiring: Wiring,
+    flies: bool,
+) -> Result<Drone, Refused> {
+    let now = EmbassyClock.now();
+    drone::begin(room, &mut board, wiring, flies, now).inspect_err(|why| log::refused(*why))
+}
+
+/// What runs beside the ports of the relay: the autopilot's, of a drone with sites, and the log.
+async fn beside<R: Read, W: Write>(
+    relay: &AsyncRelay<'_>,
+    link: Option<&AsyncAutopilot>,
+    port: Option<(R, W)>,
+) -> Infallible {
+    match (link, port) {
+        (Some(link), Some((mut rx, mut tx))) => {
+            let flies = link.run(relay, &EmbassyClock, &mut rx, &mut tx);
+            let logs = log::events(relay, Some(link));
+            join3(flies, logs, log::autopilot(link)).await.0
+        }
+        _ => log::events(relay, None).await,
+    }
 }

@@ -3,7 +3,9 @@
 use core::convert::Infallible;
 
 use defmt::{Debug2Format, error, info, warn};
-use uav_relay::asynch::AsyncRelay;
+use uav_relay::asynch::{AsyncAutopilot, AsyncRelay};
+use uav_relay::flight::autopilot::AutopilotEvent;
+use uav_relay::flight::autopilot::state::State;
 use uav_relay::{Event, Relay};
 use uav_relay_block::Config;
 
@@ -40,6 +42,18 @@ pub(crate) fn unguarded() {
     );
 }
 
+/// Where the autopilot is told to fly.
+pub(crate) fn flies(along_m: f64, speed_m_s: f32) {
+    info!(
+        "the autopilot flies along {} m at {} m/s or less",
+        along_m, speed_m_s
+    );
+}
+
+pub(crate) fn signs_to_autopilot() {
+    info!("frames to the autopilot are signed, and only what is signed with its key counts");
+}
+
 pub(crate) fn refused(why: Refused) {
     match why {
         Refused::Block(why) => error!("configuration refused: {}", Debug2Format(&why)),
@@ -54,16 +68,23 @@ pub(crate) fn refused(why: Refused) {
                 "configuration refused: it has sites, and this image has no port to an autopilot"
             );
         }
+        Refused::Course(why) => error!("configuration refused: sites, {}", why),
         Refused::Setup(why) => {
             error!("configuration refused: this image cannot do it, {}", why);
         }
     }
 }
 
-/// Logs what happens, and where to fly.
-pub(crate) async fn events(relay: &AsyncRelay<'_>) -> Infallible {
+/// Logs what happens, and where to fly; has the operator's ground station show it, if there is an autopilot.
+pub(crate) async fn events(
+    relay: &AsyncRelay<'_>,
+    autopilot: Option<&AsyncAutopilot>,
+) -> Infallible {
     loop {
         let event = relay.next_event().await;
+        if let Some(autopilot) = autopilot {
+            autopilot.handle_event(event);
+        }
         info!("event {}", event);
         if event == Event::SetpointChanged
             && let Some(place) = relay.look(Relay::setpoint).flatten()
@@ -73,6 +94,28 @@ pub(crate) async fn events(relay: &AsyncRelay<'_>) -> Infallible {
                 "setpoint x {} m ({:#010x}) y {} m ({:#010x}) altitude {} m ({:#010x})",
                 place.x_m, bits[0], place.y_m, bits[1], place.altitude_m, bits[2]
             );
+        }
+    }
+}
+
+/// Logs what the link to the autopilot says.
+pub(crate) async fn autopilot(link: &AsyncAutopilot) -> Infallible {
+    loop {
+        match link.next_event().await {
+            AutopilotEvent::State(State::Silent) => {
+                warn!("autopilot: silent; look at the cable, the baud rate and MAVLink 2");
+            }
+            AutopilotEvent::State(State::Engaged) => {
+                info!("autopilot: flies to the relay's setpoints");
+            }
+            AutopilotEvent::State(State::Blind) => {
+                warn!("autopilot: no position; keeps its last target");
+            }
+            AutopilotEvent::Refused => warn!(
+                "autopilot: does not fly where it is told to; is the place outside its fence?"
+            ),
+            AutopilotEvent::Mistrusted(why) => error!("autopilot: signatures, {}", why),
+            other => info!("autopilot: {}", other),
         }
     }
 }

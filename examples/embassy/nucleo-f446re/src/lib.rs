@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | toward the transmitter, or the radio | USART1: TX PA9 (D8, CN10 pin 21), RX PA10 (D2, CN10 pin 33) |
 //! | toward the receiver | USART3: TX PC10 (CN7 pin 1), RX PC11 (CN7 pin 2) |
+//! | the autopilot, of a drone with sites | USART6: TX PC6 (CN10 pin 4), RX PC7 (D9, CN10 pin 19) |
 //! | the radio's driver enable | PA8 (D7, CN10 pin 23): high while this relay sends |
 //! | log | the ST-LINK on the board (RTT) |
 //! | clock | HSI, 16 MHz, no PLL |
@@ -19,7 +20,7 @@
 use defmt_rtt as _;
 use embassy_stm32::flash::{Blocking, Flash};
 use embassy_stm32::interrupt::typelevel::Binding;
-use embassy_stm32::peripherals::{FLASH, PA9, PA10, PC10, PC11, USART1, USART3};
+use embassy_stm32::peripherals::{FLASH, PA9, PA10, PC6, PC7, PC10, PC11, USART1, USART3, USART6};
 use embassy_stm32::usart::{
     BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config, ConfigError,
     Instance, RxPin, TxPin,
@@ -27,7 +28,7 @@ use embassy_stm32::usart::{
 use embassy_stm32::{Peri, bind_interrupts};
 use panic_probe as _;
 use relay_app::board::{Board, Storage};
-use relay_app::{BAUD, BUFFER};
+use relay_app::{BAUD, BUFFER, BURST};
 use static_cell::StaticCell;
 
 bind_interrupts!(
@@ -35,6 +36,7 @@ bind_interrupts!(
     pub struct Irqs {
         USART1 => BufferedInterruptHandler<USART1>;
         USART3 => BufferedInterruptHandler<USART3>;
+        USART6 => BufferedInterruptHandler<USART6>;
     }
 );
 
@@ -51,7 +53,7 @@ pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
 }
 
 type Halves = (BufferedUartRx<'static>, BufferedUartTx<'static>);
-type Buffers = StaticCell<[[u8; BUFFER]; 2]>;
+type Buffer = StaticCell<[u8; BUFFER]>;
 
 /// Reader and writer of USART1.
 ///
@@ -62,8 +64,10 @@ pub fn usart1(
     tx: Peri<'static, PA9>,
     rx: Peri<'static, PA10>,
 ) -> Result<Halves, ConfigError> {
-    static BUFFERS: Buffers = StaticCell::new();
-    halves(uart, tx, rx, &BUFFERS)
+    static SENT: Buffer = StaticCell::new();
+    static RECEIVED: Buffer = StaticCell::new();
+    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BUFFER]));
+    halves(uart, tx, rx, sent, received)
 }
 
 /// Reader and writer of USART3.
@@ -75,22 +79,39 @@ pub fn usart3(
     tx: Peri<'static, PC10>,
     rx: Peri<'static, PC11>,
 ) -> Result<Halves, ConfigError> {
-    static BUFFERS: Buffers = StaticCell::new();
-    halves(uart, tx, rx, &BUFFERS)
+    static SENT: Buffer = StaticCell::new();
+    static RECEIVED: Buffer = StaticCell::new();
+    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BUFFER]));
+    halves(uart, tx, rx, sent, received)
+}
+
+/// Reader and writer of USART6, to the autopilot.
+///
+/// # Errors
+/// Where its clock does not give the baud rate.
+pub fn usart6(
+    uart: Peri<'static, USART6>,
+    tx: Peri<'static, PC6>,
+    rx: Peri<'static, PC7>,
+) -> Result<Halves, ConfigError> {
+    static SENT: Buffer = StaticCell::new();
+    static RECEIVED: StaticCell<[u8; BURST]> = StaticCell::new();
+    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BURST]));
+    halves(uart, tx, rx, sent, received)
 }
 
 fn halves<T: Instance>(
     uart: Peri<'static, T>,
     tx: Peri<'static, impl TxPin<T>>,
     rx: Peri<'static, impl RxPin<T>>,
-    buffers: &'static Buffers,
+    sent: &'static mut [u8],
+    received: &'static mut [u8],
 ) -> Result<Halves, ConfigError>
 where
     Irqs: Binding<T::Interrupt, BufferedInterruptHandler<T>>,
 {
     let mut config = Config::default();
     config.baudrate = BAUD;
-    let [sent, received] = buffers.init([[0; BUFFER]; 2]);
     let (tx, rx) = BufferedUart::new(uart, rx, tx, sent, received, Irqs, config)?.split();
     Ok((rx, tx))
 }

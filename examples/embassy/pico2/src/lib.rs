@@ -3,7 +3,7 @@
 //! | what | where |
 //! | --- | --- |
 //! | toward the transmitter, or the radio | UART0: TX GP0, RX GP1 |
-//! | toward the receiver | UART1: TX GP4, RX GP5 |
+//! | toward the receiver; beside a radio the autopilot, of a drone with sites | UART1: TX GP4, RX GP5 |
 //! | the radio's driver enable | GP2: high while this relay sends |
 //! | log | the debug probe (RTT) |
 //! | configuration block | the last 4 KiB of the flash |
@@ -21,7 +21,7 @@ use embassy_rp::uart::{
 use embassy_rp::{Peri, bind_interrupts};
 use panic_probe as _;
 use relay_app::board::{Board, Storage};
-use relay_app::{BAUD, BUFFER};
+use relay_app::{BAUD, BUFFER, BURST};
 use static_cell::StaticCell;
 
 bind_interrupts!(
@@ -56,12 +56,18 @@ fn seed(trng: Peri<'_, TRNG>) -> u32 {
     Trng::new(trng, Irqs, embassy_rp::trng::Config::default()).blocking_next_u32()
 }
 
+/// Reader and writer.
+pub type Port = (BufferedUartRx, BufferedUartTx);
+
+/// With a UART to each neighbour there is none left.
+pub const NO_AUTOPILOT: Option<Port> = None;
+
 /// Reader and writer of UART0.
 pub fn uart0(
     uart: Peri<'static, UART0>,
     tx: Peri<'static, embassy_rp::peripherals::PIN_0>,
     rx: Peri<'static, embassy_rp::peripherals::PIN_1>,
-) -> (BufferedUartRx, BufferedUartTx) {
+) -> Port {
     static BUFFERS: StaticCell<[[u8; BUFFER]; 2]> = StaticCell::new();
     let [sent, received] = BUFFERS.init([[0; BUFFER]; 2]);
     let (tx, rx) = BufferedUart::new(uart, tx, rx, Irqs, sent, received, config()).split();
@@ -73,9 +79,10 @@ pub fn uart1(
     uart: Peri<'static, UART1>,
     tx: Peri<'static, embassy_rp::peripherals::PIN_4>,
     rx: Peri<'static, embassy_rp::peripherals::PIN_5>,
-) -> (BufferedUartRx, BufferedUartTx) {
-    static BUFFERS: StaticCell<[[u8; BUFFER]; 2]> = StaticCell::new();
-    let [sent, received] = BUFFERS.init([[0; BUFFER]; 2]);
+) -> Port {
+    static SENT: StaticCell<[u8; BUFFER]> = StaticCell::new();
+    static RECEIVED: StaticCell<[u8; BURST]> = StaticCell::new();
+    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BURST]));
     let (tx, rx) = BufferedUart::new(uart, tx, rx, Irqs, sent, received, config()).split();
     (rx, tx)
 }

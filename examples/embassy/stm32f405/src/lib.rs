@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | toward the transmitter, or the radio | USART2: TX PA2, RX PA3 |
 //! | toward the receiver | USART3: TX PB10, RX PB11 |
+//! | the autopilot, of a drone with sites | USART1: TX PA9, RX PA10 |
 //! | the radio's driver enable | PA1: high while this relay sends |
 //! | log | the debug probe (RTT) |
 //! | clock | HSI, 16 MHz, no PLL |
@@ -15,14 +16,16 @@ use core::ops::Range;
 
 use defmt_rtt as _;
 use embassy_stm32::flash::{Blocking, Flash};
-use embassy_stm32::peripherals::{FLASH, PA2, PA3, PB10, PB11, USART2, USART3};
+use embassy_stm32::interrupt::typelevel::Binding;
+use embassy_stm32::peripherals::{FLASH, PA2, PA3, PA9, PA10, PB10, PB11, USART1, USART2, USART3};
 use embassy_stm32::usart::{
     BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config, ConfigError,
+    Instance, RxPin, TxPin,
 };
 use embassy_stm32::{Peri, bind_interrupts};
 use panic_probe as _;
 use relay_app::board::{Board, Storage};
-use relay_app::{BAUD, BUFFER};
+use relay_app::{BAUD, BUFFER, BURST};
 use static_cell::StaticCell;
 use uav_relay_block::ADDRESS;
 use uav_relay_kept::epoch;
@@ -32,6 +35,7 @@ bind_interrupts!(
     pub struct Irqs {
         USART2 => BufferedInterruptHandler<USART2>;
         USART3 => BufferedInterruptHandler<USART3>;
+        USART1 => BufferedInterruptHandler<USART1>;
     }
 );
 
@@ -59,6 +63,7 @@ const fn sector(address: u32, bytes: u32) -> Range<u32> {
 }
 
 type Halves = (BufferedUartRx<'static>, BufferedUartTx<'static>);
+type Buffer = StaticCell<[u8; BUFFER]>;
 
 /// Reader and writer of USART2.
 ///
@@ -69,10 +74,10 @@ pub fn usart2(
     tx: Peri<'static, PA2>,
     rx: Peri<'static, PA3>,
 ) -> Result<Halves, ConfigError> {
-    static BUFFERS: StaticCell<[[u8; BUFFER]; 2]> = StaticCell::new();
-    let [sent, received] = BUFFERS.init([[0; BUFFER]; 2]);
-    let (tx, rx) = BufferedUart::new(uart, rx, tx, sent, received, Irqs, config())?.split();
-    Ok((rx, tx))
+    static SENT: Buffer = StaticCell::new();
+    static RECEIVED: Buffer = StaticCell::new();
+    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BUFFER]));
+    halves(uart, tx, rx, sent, received)
 }
 
 /// Reader and writer of USART3.
@@ -84,16 +89,41 @@ pub fn usart3(
     tx: Peri<'static, PB10>,
     rx: Peri<'static, PB11>,
 ) -> Result<Halves, ConfigError> {
-    static BUFFERS: StaticCell<[[u8; BUFFER]; 2]> = StaticCell::new();
-    let [sent, received] = BUFFERS.init([[0; BUFFER]; 2]);
-    let (tx, rx) = BufferedUart::new(uart, rx, tx, sent, received, Irqs, config())?.split();
-    Ok((rx, tx))
+    static SENT: Buffer = StaticCell::new();
+    static RECEIVED: Buffer = StaticCell::new();
+    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BUFFER]));
+    halves(uart, tx, rx, sent, received)
 }
 
-fn config() -> Config {
+/// Reader and writer of USART1, to the autopilot.
+///
+/// # Errors
+/// Where its clock does not give the baud rate.
+pub fn usart1(
+    uart: Peri<'static, USART1>,
+    tx: Peri<'static, PA9>,
+    rx: Peri<'static, PA10>,
+) -> Result<Halves, ConfigError> {
+    static SENT: Buffer = StaticCell::new();
+    static RECEIVED: StaticCell<[u8; BURST]> = StaticCell::new();
+    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BURST]));
+    halves(uart, tx, rx, sent, received)
+}
+
+fn halves<T: Instance>(
+    uart: Peri<'static, T>,
+    tx: Peri<'static, impl TxPin<T>>,
+    rx: Peri<'static, impl RxPin<T>>,
+    sent: &'static mut [u8],
+    received: &'static mut [u8],
+) -> Result<Halves, ConfigError>
+where
+    Irqs: Binding<T::Interrupt, BufferedInterruptHandler<T>>,
+{
     let mut config = Config::default();
     config.baudrate = BAUD;
-    config
+    let (tx, rx) = BufferedUart::new(uart, rx, tx, sent, received, Irqs, config)?.split();
+    Ok((rx, tx))
 }
 
 /// Differs from one chip to the next: its random number generator wants the PLL, which this board leaves alone.

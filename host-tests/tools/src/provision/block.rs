@@ -2,13 +2,13 @@
 
 use std::fmt;
 
+use uav_relay::flight::course::{Course, CourseError};
 use uav_relay::{Identity, Interference, Listen, Measure, Method, Mission, Profile};
 
 use super::config::{
     Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, Secret, Sites, autopilot_key,
     read, secret, write,
 };
-use super::course::{CourseError, course};
 use uav_relay_scenario::mission::{self, Refusal};
 use uav_relay_scenario::{AirGround, ChannelSpec, Scenario};
 
@@ -68,6 +68,7 @@ impl fmt::Display for BlockError {
                     "the sites are {along:.3} m apart, and the mission's distance is another"
                 )
             }
+            Self::Course(error) => error.fmt(f),
             Self::Config(ConfigError::Mission(error)) => error.fmt(f),
             Self::Config(ConfigError::Channel(error)) => error.fmt(f),
             Self::Config(_) | Self::Changed => f.write_str("the block does not say the mission"),
@@ -212,7 +213,8 @@ impl Flight {
         let block = write(&config, &self.numbers, self.secret, self.autopilot_key);
         let read = read(&block, Box::leak(Box::new(EMPTY))).map_err(BlockError::Config)?;
         if let Some(sites) = &read.sites {
-            course(sites, &read.mission).map_err(BlockError::Course)?;
+            let (ends, speed_m_s) = (sites.on_earth(), sites.speed_m_s);
+            Course::try_new(ends, speed_m_s, &read.mission).map_err(BlockError::Course)?;
         }
         let secret = secret(&block).map_err(BlockError::Config)?;
         let same = (read, secret) == (config, self.secret);

@@ -3,14 +3,11 @@
 //! | file | one idea |
 //! | --- | --- |
 //! | [`config`] | the block, byte by byte; a crate of its own, as the firmware has it |
-//! | [`course`] | the line on earth that its sites make; the firmware's own file |
 //! | [`block`] | from a scenario to the block of one drone |
 //! | [`folder`] | the blocks of a whole flight: all of them, or none |
 //! | [`summary`] | what is in that folder, and what to type |
 
 pub mod block;
-#[path = "../../../../examples/stm32f405/course.rs"]
-pub mod course;
 pub mod folder;
 pub mod summary;
 

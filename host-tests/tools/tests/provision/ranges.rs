@@ -4,12 +4,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::channel::ChannelError;
 use uav_relay::field::FieldError;
+use uav_relay::flight::course::Course;
 use uav_relay::mission::MissionError;
 use uav_relay::{Adjust, Instant, Local, Measure, Method, Relay, Settings};
 use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::{Config, ConfigError, LEN};
-use uav_relay_tools::provision::course::course;
 
 use super::{changed, field, in_a_field, reads, with};
 
@@ -192,7 +192,10 @@ fn flies(config: &Config) {
         ..Settings::default()
     };
     Relay::new(config.mission, config.identity, settings, 1, Instant::ZERO).unwrap();
-    if let Some(Ok(course)) = config.sites.map(|sites| course(&sites, &config.mission)) {
+    if let Some(Ok(course)) = config
+        .sites
+        .map(|sites| Course::try_new(sites.on_earth(), sites.speed_m_s, &config.mission))
+    {
         assert!(course.pace.is_valid());
     }
 }

@@ -1,11 +1,11 @@
 //! The sites in a block, the line that a drone makes of them, and where `cargo provision` has them from.
 
-use uav_relay::Geodetic;
 use uav_relay::flight::axis::AxisError;
+use uav_relay::flight::course::{Course, CourseError};
+use uav_relay::{Geodetic, Mission};
 use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Block, ConfigError, Sites, autopilot_key};
-use uav_relay_tools::provision::course::{CourseError, course};
 
 use super::{changed, of_paper, provision, reads, refusal};
 
@@ -13,6 +13,10 @@ const TOML: &str = "[geometry]\naltitude_m = 20.0\n[power]\ntx_w = 80.0\nuav_w =
     [[interferer]]\npower_w = 80\nx_m = 500\ny_m = 400\n\
     [site]\ntx = { lat_deg = 47.40, lon_deg = 8.54, amsl_m = 420.0 }\n\
     rx = { lat_deg = -47.41, lon_deg = 8.55, amsl_m = 431.0 }\n";
+
+fn course(sites: &Sites, mission: &Mission) -> Result<Course, CourseError> {
+    Course::try_new(sites.on_earth(), sites.speed_m_s, mission)
+}
 
 fn scenario() -> Scenario {
     Scenario::parse("flight.toml", &TOML.replace("-47", "47")).unwrap()

@@ -18,12 +18,13 @@ use uav_relay::asynch::Clock as _;
 use uav_relay::channel::AirGround;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
-    Auth, Band, Event, Identity, Interference, Interferer, Key, Method, Mission, MissionConfig,
-    Port, Profile, Relay, Settings,
+    Auth, Band, Event, Identity, Instant, Interference, Interferer, Key, Method, Mission,
+    MissionConfig, Placement, Port, Profile, Relay, Settings,
 };
 use uav_relay_block::{Block, ChannelNumbers, Config, Secret, Sites, write};
 
 use crate::ram::Ram;
+use crate::vehicle::Vehicle;
 
 pub(crate) const KEY: [u8; 32] = [7; 32];
 
@@ -81,6 +82,7 @@ pub(crate) struct Bench {
     /// To the neighbour, and from it.
     wire: [Pipe; 2],
     drone: Option<Running>,
+    vehicle: Option<Vehicle>,
     _clock: MutexGuard<'static, ()>,
 }
 
@@ -93,15 +95,15 @@ fn numbers() -> ChannelNumbers {
     }
 }
 
-/// What relay `index` of 2 flies.
-fn config(index: u16, sites: Option<Sites>) -> Config {
+/// What relay `index` of `relays` flies.
+fn config(relays: u16, index: u16, sites: Option<Sites>) -> Config {
     let common = Profile {
         altitude_m: 20.0,
         power_w: 1.0,
     };
     let channel = uav_relay::Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los);
     let mission = Mission::try_new(MissionConfig {
-        relays: 2,
+        relays,
         distance_m: 1343.795,
         min_separation_m: 4.0,
         tx_power_w: 80.0,
@@ -132,7 +134,23 @@ fn config(index: u16, sites: Option<Sites>) -> Config {
 /// The block of relay 1; with an epoch it has a key.
 pub(crate) fn block(epoch: Option<u32>, sites: Option<Sites>) -> Block {
     let secret = epoch.map(|epoch| Secret { key: KEY, epoch });
-    write(&config(1, sites), &numbers(), secret, None)
+    write(&config(2, 1, sites), &numbers(), secret, None)
+}
+
+/// The block of the only relay between these sites.
+pub(crate) fn block_alone(sites: Sites) -> Block {
+    write(&config(1, 1, Some(sites)), &numbers(), None, None)
+}
+
+/// Where the only relay between these sites belongs.
+pub(crate) fn alone(sites: Sites) -> Placement {
+    let said = config(1, 1, Some(sites));
+    let now = Instant::ZERO;
+    let mut relay = Relay::new(said.mission, said.identity, Settings::default(), 1, now).unwrap();
+    for millis in (0..30_000).step_by(10) {
+        relay.handle_timeout(Instant::from_millis(millis));
+    }
+    relay.setpoint().unwrap()
 }
 
 /// Sites that are as far apart as the mission says.
@@ -144,11 +162,20 @@ pub(crate) const SITES: Sites = Sites {
     speed_m_s: 0.0,
 };
 
-/// What becomes of a board that has to be refused.
+/// What becomes of a board that has to be refused, and has no port to an autopilot.
 pub(crate) fn refused(board: Board<Ram>) -> Refused {
+    why(board, None)
+}
+
+/// The same with such a port.
+pub(crate) fn refused_with_autopilot(board: Board<Ram>) -> Refused {
+    why(board, Some((Pipe::default(), Pipe::default())))
+}
+
+fn why(board: Board<Ram>, autopilot: Option<(Pipe, Pipe)>) -> Refused {
     let _clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
     let [up, down] = [Pipe::default(), Pipe::default()];
-    let mut running = running(board, up, down);
+    let mut running = running(board, up, down, autopilot);
     match running
         .as_mut()
         .poll(&mut Context::from_waker(Waker::noop()))
@@ -158,17 +185,17 @@ pub(crate) fn refused(board: Board<Ram>) -> Refused {
     }
 }
 
-fn running(board: Board<Ram>, rx: Pipe, tx: Pipe) -> Running {
+fn running(board: Board<Ram>, rx: Pipe, tx: Pipe, autopilot: Option<(Pipe, Pipe)>) -> Running {
     let room = Box::leak(Box::new(Room::new()));
     let nobody = (Pipe::default(), Pipe::default());
-    Box::pin(relay_app::fly(room, board, nobody, (rx, tx)))
+    Box::pin(relay_app::fly(room, board, nobody, (rx, tx), autopilot))
 }
 
 impl Bench {
     /// The neighbour alone, on its first epoch.
     pub(crate) fn new() -> Self {
         let clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
-        let said = config(2, None);
+        let said = config(2, 2, None);
         let settings = Settings {
             auth: Some(Auth {
                 key: Key::new(KEY),
@@ -182,6 +209,7 @@ impl Bench {
             events: Vec::new(),
             wire: [Pipe::default(), Pipe::default()],
             drone: None,
+            vehicle: None,
             _clock: clock,
         }
     }
@@ -192,7 +220,20 @@ impl Bench {
             wire.0.borrow_mut().clear();
         }
         let [there, back] = self.wire.clone();
-        self.drone = Some(running(board, back, there));
+        let autopilot = self.vehicle.as_ref().map(Vehicle::port);
+        self.drone = Some(running(board, back, there, autopilot));
+    }
+
+    /// The same with a vehicle at the application's third port.
+    pub(crate) fn with(vehicle: Vehicle) -> Self {
+        Self {
+            vehicle: Some(vehicle),
+            ..Self::new()
+        }
+    }
+
+    pub(crate) fn vehicle(&mut self) -> &mut Vehicle {
+        self.vehicle.as_mut().unwrap()
     }
 
     /// Switches it off.
@@ -210,6 +251,9 @@ impl Bench {
                 assert!(drone.as_mut().poll(&mut cx).is_pending(), "it takes part");
             }
             self.listen();
+            if let Some(vehicle) = &mut self.vehicle {
+                vehicle.step();
+            }
         }
         self.events.clone()
     }

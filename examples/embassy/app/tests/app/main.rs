@@ -6,7 +6,9 @@
     reason = "tests"
 )]
 
+mod autopilot;
 mod bench;
 mod key;
 mod logger;
 mod ram;
+mod vehicle;

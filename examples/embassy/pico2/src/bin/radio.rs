@@ -1,11 +1,11 @@
-//! A relay on a Pico 2 with one UART to a radio that all relays share.
+//! A relay on a Pico 2 with one UART to a radio that all relays share, and the other one to an autopilot.
 #![no_std]
 #![no_main]
 
 use embassy_executor::Spawner;
 use embassy_rp::gpio::{Level, Output};
 use relay_app::drone::Room;
-use relay_pico2::{board, uart0};
+use relay_pico2::{board, uart0, uart1};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
@@ -15,7 +15,8 @@ async fn main(_spawner: Spawner) {
     let chip = embassy_rp::init(embassy_rp::config::Config::default());
     let board = board(chip.FLASH, chip.TRNG);
     let radio = uart0(chip.UART0, chip.PIN_0, chip.PIN_1);
+    let autopilot = uart1(chip.UART1, chip.PIN_4, chip.PIN_5);
     let enable = Output::new(chip.PIN_2, Level::Low);
     let room = ROOM.init_with(Room::new);
-    let _ = relay_app::fly_shared(room, board, radio, enable).await;
+    let _ = relay_app::fly_shared(room, board, radio, enable, Some(autopilot)).await;
 }

@@ -5,7 +5,7 @@
 use embassy_executor::Spawner;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use relay_app::drone::Room;
-use relay_stm32f405::{board, usart2};
+use relay_stm32f405::{board, usart1, usart2};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
@@ -15,8 +15,9 @@ async fn main(_spawner: Spawner) {
     let chip = embassy_stm32::init(embassy_stm32::Config::default());
     let board = board(chip.FLASH);
     let enable = Output::new(chip.PA1, Level::Low, Speed::Low);
+    let autopilot = usart1(chip.USART1, chip.PA9, chip.PA10).ok();
     if let Ok(radio) = usart2(chip.USART2, chip.PA2, chip.PA3) {
         let room = ROOM.init_with(Room::new);
-        let _ = relay_app::fly_shared(room, board, radio, enable).await;
+        let _ = relay_app::fly_shared(room, board, radio, enable, autopilot).await;
     }
 }

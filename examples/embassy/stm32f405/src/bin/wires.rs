@@ -4,7 +4,7 @@
 
 use embassy_executor::Spawner;
 use relay_app::drone::Room;
-use relay_stm32f405::{board, usart2, usart3};
+use relay_stm32f405::{board, usart1, usart2, usart3};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
@@ -15,8 +15,9 @@ async fn main(_spawner: Spawner) {
     let board = board(chip.FLASH);
     let upstream = usart2(chip.USART2, chip.PA2, chip.PA3);
     let downstream = usart3(chip.USART3, chip.PB10, chip.PB11);
+    let autopilot = usart1(chip.USART1, chip.PA9, chip.PA10).ok();
     if let (Ok(upstream), Ok(downstream)) = (upstream, downstream) {
         let room = ROOM.init_with(Room::new);
-        let _ = relay_app::fly(room, board, upstream, downstream).await;
+        let _ = relay_app::fly(room, board, upstream, downstream, autopilot).await;
     }
 }

@@ -1,0 +1,335 @@
+//! The link to an autopilot beside a relay, each a future of one task that is polled when it is woken and never else.
+
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::future::{pending, poll_fn};
+use std::rc::Rc;
+use std::task::{Poll, Waker};
+
+use embassy_futures::join::join4;
+use embedded_io_async::{ErrorType, Read, Write};
+use futures_executor::LocalPool;
+use futures_util::task::LocalSpawnExt as _;
+use host_tests::fixtures;
+use mavlink::dialects::common::{
+    EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot,
+    MavLandedState, MavMessage, MavModeFlag, MavType, SET_POSITION_TARGET_GLOBAL_INT_DATA,
+};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader};
+use uav_relay::asynch::{AsyncAutopilot, AsyncLink, AsyncPair, AsyncRelay, Clock};
+use uav_relay::flight::autopilot::carrot::Pace;
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
+use uav_relay::flight::axis::Axis;
+use uav_relay::guard::config::GuardConfig;
+use uav_relay::{Duration, Geodetic, Instant, Mission, Placement, Relay, Settings, Sites};
+
+use crate::time::Time;
+use crate::wire::BYTE_TIME;
+
+const START: Placement = Placement::on_line(100.0, 20.0);
+
+/// Bytes on their way, and who waits for them.
+#[derive(Clone, Default)]
+struct Uart(Rc<Queue>);
+
+#[derive(Default)]
+struct Queue {
+    bytes: RefCell<VecDeque<u8>>,
+    waits: RefCell<Option<Waker>>,
+    /// Writes never complete.
+    stuck: Cell<bool>,
+}
+
+impl ErrorType for Uart {
+    type Error = Infallible;
+}
+
+impl Read for Uart {
+    async fn read(&mut self, into: &mut [u8]) -> Result<usize, Infallible> {
+        poll_fn(|cx| {
+            let mut bytes = self.0.bytes.borrow_mut();
+            let count = bytes.len().min(into.len());
+            if count == 0 {
+                *self.0.waits.borrow_mut() = Some(cx.waker().clone());
+                return Poll::Pending;
+            }
+            into.iter_mut()
+                .zip(bytes.drain(..count))
+                .for_each(|(place, byte)| *place = byte);
+            Poll::Ready(Ok(count))
+        })
+        .await
+    }
+}
+
+impl Write for Uart {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        if self.0.stuck.get() {
+            pending::<()>().await;
+        }
+        self.0.bytes.borrow_mut().extend(bytes);
+        if let Some(waits) = self.0.waits.borrow_mut().take() {
+            waits.wake();
+        }
+        Ok(bytes.len())
+    }
+
+    async fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+/// A PX4 in its companion's mode that flies where it is told, at once.
+struct Vehicle {
+    mute: Cell<bool>,
+    place: Cell<Placement>,
+    told: RefCell<Vec<(Instant, Placement)>>,
+}
+
+fn sites() -> Sites {
+    let site = |lat, lon, amsl| Geodetic::from_degrees(lat, lon, amsl).unwrap();
+    Sites {
+        tx: site(47.40, 8.54, 420.0),
+        rx: site(47.41, 8.55, 431.0),
+    }
+}
+
+fn axis() -> Axis {
+    Axis::between(sites()).unwrap()
+}
+
+fn raw(number: u8, message: &MavMessage) -> Vec<u8> {
+    let header = MavHeader {
+        system_id: 1,
+        component_id: 1,
+        sequence: number,
+    };
+    let mut raw = MAVLinkV2MessageRaw::new();
+    raw.serialize_message(header, message);
+    raw.raw_bytes().to_vec()
+}
+
+/// Says every 200 ms how it is, and flies.
+async fn fly(vehicle: &Vehicle, time: &Time, mut to: Uart, from: Uart) -> Infallible {
+    let mut number = 0;
+    let mut waiting: Vec<u8> = Vec::new();
+    loop {
+        time.sleep_until(time.now() + Duration::from_millis(200))
+            .await;
+        waiting.extend(from.0.bytes.borrow_mut().drain(..));
+        while let Some(end) = waiting.get(1).map(|len| 12 + usize::from(*len))
+            && waiting.len() >= end
+        {
+            let frame: Vec<u8> = waiting.drain(..end).collect();
+            let mut reader = mavlink::MavlinkReader::new(&frame[..]);
+            let read = reader.read_message::<MavMessage>(mavlink::MavlinkVersion::V2);
+            if let MavMessage::SET_POSITION_TARGET_GLOBAL_INT(target) = read.unwrap().1 {
+                let place = axis().place(point(&target)).unwrap();
+                vehicle.told.borrow_mut().push((time.now(), place));
+                vehicle.place.set(place);
+            }
+        }
+        if vehicle.mute.get() {
+            continue;
+        }
+        let at = axis().point(vehicle.place.get()).unwrap();
+        for message in [
+            MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+                mavtype: MavType::MAV_TYPE_QUADROTOR,
+                autopilot: MavAutopilot::MAV_AUTOPILOT_PX4,
+                base_mode: MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+                    | MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED,
+                custom_mode: 6 << 16,
+                ..HEARTBEAT_DATA::DEFAULT
+            }),
+            MavMessage::EXTENDED_SYS_STATE(EXTENDED_SYS_STATE_DATA {
+                landed_state: MavLandedState::MAV_LANDED_STATE_IN_AIR,
+                ..EXTENDED_SYS_STATE_DATA::DEFAULT
+            }),
+            MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+                time_boot_ms: (time.now().as_micros() / 1_000) as u32,
+                lat: at.lat_e7,
+                lon: at.lon_e7,
+                alt: at.amsl_mm,
+                ..GLOBAL_POSITION_INT_DATA::DEFAULT
+            }),
+        ] {
+            let Ok(_) = to.write(&raw(number, &message)).await;
+            number = number.wrapping_add(1);
+        }
+    }
+}
+
+fn point(target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Geodetic {
+    Geodetic {
+        lat_e7: target.lat_int,
+        lon_e7: target.lon_int,
+        amsl_mm: (target.alt * 1e3) as i32,
+    }
+}
+
+/// One relay between the sites, with a guard.
+fn relay() -> Relay {
+    let mut config = fixtures::paper(1);
+    config.distance_m = 1343.795;
+    let mission = Mission::try_new(config).unwrap();
+    let guard = GuardConfig {
+        hover_m: 1.5,
+        ..GuardConfig::of(&mission, config.common)
+    };
+    let settings = Settings {
+        guard: Some(guard),
+        sited: true,
+        ..Settings::default()
+    };
+    fixtures::relay(mission, 1, settings)
+}
+
+/// What the firmware has seen of it.
+#[derive(Default)]
+struct Seen {
+    events: Vec<AutopilotEvent>,
+    setpoint: Option<Placement>,
+    flown: bool,
+}
+
+struct Scene {
+    time: Time,
+    pool: LocalPool,
+    vehicle: Rc<Vehicle>,
+    from_link: Uart,
+    seen: Rc<RefCell<Seen>>,
+}
+
+impl Scene {
+    /// With `tells` the firmware hands the link the relay's events.
+    fn new(tells: bool) -> Self {
+        let time = Time::default();
+        let pool = LocalPool::new();
+        let [to_link, from_link] = [Uart::default(), Uart::default()];
+        let vehicle = Rc::new(Vehicle {
+            mute: Cell::new(false),
+            place: Cell::new(START),
+            told: RefCell::default(),
+        });
+        let seen = Rc::<RefCell<Seen>>::default();
+        let task = {
+            let (time, vehicle, seen) = (time.clone(), Rc::clone(&vehicle), Rc::clone(&seen));
+            let (mut rx, mut tx) = (to_link.clone(), from_link.clone());
+            let (to, from) = (to_link, from_link.clone());
+            async move {
+                let mut relay = relay();
+                let relay = AsyncRelay::new(&mut relay);
+                let link = || AsyncLink::new(Uart::default(), Uart::default(), BYTE_TIME);
+                let mut ports = AsyncPair::new(link(), link());
+                let link = Autopilot::new(axis(), Pace::default(), time.now());
+                let autopilot = AsyncAutopilot::new(link, sites());
+                let relays = async {
+                    loop {
+                        let event = relay.next_event().await;
+                        if tells {
+                            autopilot.handle_event(event);
+                        }
+                        seen.borrow_mut().setpoint = relay.look(Relay::setpoint).flatten();
+                    }
+                };
+                let autopilots = async {
+                    loop {
+                        let event = autopilot.next_event().await;
+                        let mut seen = seen.borrow_mut();
+                        seen.events.push(event);
+                        seen.flown = autopilot.is_flown();
+                    }
+                };
+                let flies = fly(&vehicle, &time, to, from);
+                let runs = autopilot.run(&relay, &time, &mut rx, &mut tx);
+                let both = embassy_futures::join::join(ports.run(&relay, &time), runs);
+                join4::<_, _, _, _>(both, relays, autopilots, flies).await
+            }
+        };
+        let task = async move {
+            let _: ((Infallible, Infallible), (), (), Infallible) = task.await;
+        };
+        pool.spawner().spawn_local(task).unwrap();
+        Self {
+            time,
+            pool,
+            vehicle,
+            from_link,
+            seen,
+        }
+    }
+
+    fn run(&mut self, millis: u64) {
+        let until = self.time.now() + Duration::from_millis(millis);
+        self.time.run(&mut self.pool, until);
+    }
+}
+
+/// To the place that the relay alone would take; with and without the relay's events.
+#[test]
+fn it_is_engaged_and_led_to_its_place() {
+    for tells in [true, false] {
+        let mut scene = Scene::new(tells);
+        scene.run(120_000);
+        let seen = scene.seen.borrow();
+        // In between it was on the ground and in its pilot's hands: of several states the last is told.
+        let expected = [
+            AutopilotEvent::Found(Kind::Px4),
+            AutopilotEvent::State(State::Engaged),
+        ];
+        assert_eq!(seen.events, expected);
+        assert!(seen.flown);
+        let (place, setpoint) = (scene.vehicle.place.get(), seen.setpoint.unwrap());
+        println!("at {place:?}, to {setpoint:?}");
+        assert!(
+            (place.x_m - setpoint.x_m).abs() < 0.05,
+            "{place:?}, {setpoint:?}"
+        );
+        assert!(place.x_m > START.x_m + 200.0, "{place:?}");
+        let told = scene.vehicle.told.borrow();
+        let gaps = told.windows(2).map(|pair| pair[1].0.since(pair[0].0));
+        let longest = gaps.max().unwrap().as_micros() / 1_000;
+        assert!(
+            longest <= 400,
+            "a PX4 leaves its mode behind a second: {longest} ms"
+        );
+    }
+}
+
+/// An autopilot that falls silent is one that flies nowhere; the relay is told so, and so is the firmware. It may come back.
+#[test]
+fn it_falls_silent_and_comes_back() {
+    let mut scene = Scene::new(true);
+    scene.run(30_000);
+    assert!(scene.seen.borrow().flown);
+    scene.vehicle.mute.set(true);
+    scene.run(5_000);
+    let last = scene.seen.borrow().events.last().copied();
+    assert_eq!(last, Some(AutopilotEvent::State(State::Silent)));
+    assert!(!scene.seen.borrow().flown);
+    let before = scene.vehicle.told.borrow().len();
+    scene.run(5_000);
+    assert_eq!(scene.vehicle.told.borrow().len(), before, "nobody is told");
+    scene.vehicle.mute.set(false);
+    scene.run(10_000);
+    assert!(scene.seen.borrow().flown);
+    assert!(scene.vehicle.told.borrow().len() > before + 20);
+}
+
+/// A writer that never completes: what the autopilot says is heard all the same, and the relay goes on.
+#[test]
+fn a_stuck_writer_keeps_nobody_from_hearing() {
+    let mut scene = Scene::new(true);
+    scene.run(10_000);
+    scene.from_link.0.stuck.set(true);
+    scene.run(10_000);
+    let before = scene.seen.borrow().events.len();
+    scene.vehicle.mute.set(true);
+    scene.run(10_000);
+    let seen = scene.seen.borrow();
+    let expected = [State::Blind, State::Silent].map(AutopilotEvent::State);
+    assert_eq!(seen.events[before..], expected);
+}
