@@ -5,14 +5,14 @@ use core::ops::Range;
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay_block::{Block, LEN};
 
-/// The block, a seed, and a flash to keep the epoch in.
+/// The block, a seed, and a flash to keep things in.
 #[derive(Debug)]
 pub struct Board<F> {
     /// The configuration block.
     pub block: Block,
     /// Differs from one board to the next, and better from one start to the next.
     pub seed: u32,
-    /// Where it keeps what has to survive a reboot. Without it a block with a key is refused.
+    /// Where it keeps what has to survive a reboot. Without it a block with a key is refused, and what was said in votes forgotten.
     pub storage: Option<Storage<F>>,
 }
 
@@ -25,6 +25,8 @@ pub struct Storage<F> {
     pub block: u32,
     /// The two sectors of the epoch.
     pub epochs: [Range<u32>; 2],
+    /// The two of what was said in votes. One is erased in flight when both are full: the smaller, the sooner that is done.
+    pub views: [Range<u32>; 2],
 }
 
 impl<F: NorFlash> Board<F> {

@@ -15,6 +15,7 @@ use uav_relay_kept::nor::Nor;
 
 use crate::board::{Board, Storage};
 use crate::log;
+use crate::votes::Votes;
 
 /// How far off its place a hovering drone may be reported, m.
 const POSITION_ERROR_M: f32 = 1.5;
@@ -59,10 +60,12 @@ pub enum Refused {
     Setup(SetupError),
 }
 
-/// The relay, and the autopilot, if it is told where to fly.
+/// The relay, what it has said, and the autopilot, if it is told where to fly.
 #[derive(Debug)]
-pub(crate) struct Drone {
+pub(crate) struct Drone<F> {
     pub(crate) relay: &'static mut Relay,
+    /// Where the board can keep them.
+    pub(crate) votes: Option<Votes<F>>,
     pub(crate) autopilot: Option<AsyncAutopilot>,
 }
 
@@ -72,14 +75,14 @@ pub(crate) struct Drone {
 /// Why it takes no part.
 pub(crate) fn begin<F: NorFlash>(
     room: &'static mut Room,
-    board: &mut Board<F>,
+    mut board: Board<F>,
     wiring: Wiring,
     flies: bool,
     now: Instant,
-) -> Result<Drone, Refused> {
+) -> Result<Drone<F>, Refused> {
     let said = config::read(&board.block, &mut room.field).map_err(Refused::Block)?;
     log::begins(&said);
-    let auth = sign(board)?;
+    let auth = sign(&mut board)?;
     let autopilot = match &said.sites {
         Some(_) if !flies => return Err(Refused::NoAutopilot),
         Some(sites) => {
@@ -120,7 +123,12 @@ pub(crate) fn begin<F: NorFlash>(
     let (slot, identity) = (&mut room.relay, said.identity);
     let relay = Relay::new_in(slot, &said.mission, identity, &settings, board.seed, now);
     let relay = relay.map_err(Refused::Setup)?;
-    Ok(Drone { relay, autopilot })
+    let votes = (board.storage).map(|storage| Votes::resume(storage, &board.block, relay, now));
+    Ok(Drone {
+        relay,
+        votes,
+        autopilot,
+    })
 }
 
 /// What frames are signed with in this start, if they are.

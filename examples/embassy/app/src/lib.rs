@@ -4,18 +4,20 @@
 //! | --- | --- |
 //! | [`board`] | what a board brings beside its ports: its block, a seed, a flash |
 //! | [`drone`] | what a drone is by its block; why it takes no part |
+//! | `votes` | what the relay has said in votes, kept across a reboot |
 //! | `log` | what is logged |
 //! | this one | all of it together, for wires and for a radio |
 //!
 //! With a key in the block the relay signs, by an epoch in the board's flash that rises at every start. With sites in it an autopilot, a PX4 or
-//! ArduCopter on a port of its own, is told where to fly, and the guard keeps drones apart. What it does not have: votes that survive a reboot
-//! in flight, and uploads that do. `examples/stm32f405` has both.
+//! ArduCopter on a port of its own, is told where to fly, and the guard keeps drones apart. What it has said in votes survives a reboot in
+//! flight. What it does not have: uploads that do, which `examples/stm32f405` has.
 #![no_std]
 #![forbid(unsafe_code)]
 
 pub mod board;
 pub mod drone;
 mod log;
+mod votes;
 
 use core::convert::Infallible;
 use core::future::Future;
@@ -27,7 +29,7 @@ use embedded_io_async::{Read, Write};
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay::asynch::{AsyncAutopilot, AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
 use uav_relay::serial::byte_time;
-use uav_relay::{Instant, Wiring};
+use uav_relay::{Instant, Relay, Wiring};
 
 use board::Board;
 use drone::{Drone, Refused, Room};
@@ -69,6 +71,7 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
 ) -> Result<Infallible, Refused> {
     let Drone {
         relay,
+        mut votes,
         autopilot: link,
     } = begin(room, board, Wiring::Pair, autopilot.is_some())?;
     let relay = AsyncRelay::new(relay);
@@ -77,7 +80,9 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
         AsyncLink::new(down_rx, down_tx, byte_time(BAUD)),
     );
     let beside = beside(&relay, link.as_ref(), autopilot);
-    Ok(join(ports.run(&relay, &EmbassyClock), beside).await.0)
+    let mut keep = |relay: &Relay| votes.iter_mut().for_each(|votes| votes.keep(relay));
+    let runs = ports.run_keeping(&relay, &EmbassyClock, &mut keep);
+    Ok(join(runs, beside).await.0)
 }
 
 /// The same with one UART to a radio that all relays share; `pin` is high while this one sends.
@@ -93,22 +98,25 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
 ) -> Result<Infallible, Refused> {
     let Drone {
         relay,
+        mut votes,
         autopilot: link,
     } = begin(room, board, Wiring::Shared, autopilot.is_some())?;
     let relay = AsyncRelay::new(relay);
     let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, byte_time(BAUD), pin));
     let beside = beside(&relay, link.as_ref(), autopilot);
-    Ok(join(ports.run(&relay, &EmbassyClock), beside).await.0)
+    let mut keep = |relay: &Relay| votes.iter_mut().for_each(|votes| votes.keep(relay));
+    let runs = ports.run_keeping(&relay, &EmbassyClock, &mut keep);
+    Ok(join(runs, beside).await.0)
 }
 
 fn begin<F: NorFlash>(
     room: &'static mut Room,
-    mut board: Board<F>,
+    board: Board<F>,
     wiring: Wiring,
     flies: bool,
-) -> Result<Drone, Refused> {
+) -> Result<Drone<F>, Refused> {
     let now = EmbassyClock.now();
-    drone::begin(room, &mut board, wiring, flies, now).inspect_err(|why| log::refused(*why))
+    drone::begin(room, board, wiring, flies, now).inspect_err(|why| log::refused(*why))
 }
 
 /// What runs beside the ports of the relay: the autopilot's, of a drone with sites, and the log.

@@ -54,6 +54,24 @@ pub(crate) fn signs_to_autopilot() {
     info!("frames to the autopilot are signed, and only what is signed with its key counts");
 }
 
+/// What was said in the votes on views was kept before this start; `taken` tells whether the relay stands by it.
+pub(crate) fn stands_by(taken: bool) {
+    if taken {
+        info!("what was said in the votes on views before holds");
+    } else {
+        error!("what was said in the votes on views before is of another firmware");
+    }
+}
+
+/// What was said in the votes on views `kept` again, or not any more.
+pub(crate) fn votes(kept: bool) {
+    if kept {
+        info!("what is said in the votes on views is kept again");
+    } else {
+        error!("what is said in the votes on views cannot be kept: a reboot in flight forgets it");
+    }
+}
+
 pub(crate) fn refused(why: Refused) {
     match why {
         Refused::Block(why) => error!("configuration refused: {}", Debug2Format(&why)),

@@ -8,6 +8,7 @@
 //! | the radio's driver enable | PA8 (D7, CN10 pin 23): high while this relay sends |
 //! | log | the ST-LINK on the board (RTT) |
 //! | clock | HSI, 16 MHz, no PLL |
+//! | votes | sectors 1 and 2, of 16 KiB each |
 //! | epochs | sectors 3 and 4 of the flash, of 16 and 64 KiB |
 //! | image | sector 0, the vectors alone; sectors 5 and 6 |
 //! | configuration block | sector 7 |
@@ -48,6 +49,7 @@ pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
             flash: Flash::new_blocking(flash),
             block: 0x6_0000,
             epochs: [0xC000..0x1_0000, 0x1_0000..0x2_0000],
+            views: [0x4000..0x8000, 0x8000..0xC000],
         },
     )
 }

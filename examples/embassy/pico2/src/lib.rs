@@ -8,6 +8,7 @@
 //! | log | the debug probe (RTT) |
 //! | configuration block | the last 4 KiB of the flash |
 //! | epochs | 4 KiB twice before them |
+//! | votes | 16 KiB twice before those; an erase of 16 KiB stops the core for 0.2 s or so |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -47,6 +48,7 @@ pub fn board(flash: Peri<'static, FLASH>, trng: Peri<'static, TRNG>) -> Board<Bo
             flash: Flash::new_blocking(flash),
             block: 0x3F_F000,
             epochs: [0x3F_D000..0x3F_E000, 0x3F_E000..0x3F_F000],
+            views: [0x3F_5000..0x3F_9000, 0x3F_9000..0x3F_D000],
         },
     )
 }

@@ -8,7 +8,7 @@
 //! | the radio's driver enable | PA1: high while this relay sends |
 //! | log | the debug probe (RTT) |
 //! | clock | HSI, 16 MHz, no PLL |
-//! | epochs, configuration block | the sectors of the other firmware |
+//! | votes, epochs, configuration block | the sectors of the other firmware |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -28,7 +28,7 @@ use relay_app::board::{Board, Storage};
 use relay_app::{BAUD, BUFFER, BURST};
 use static_cell::StaticCell;
 use uav_relay_block::ADDRESS;
-use uav_relay_kept::epoch;
+use uav_relay_kept::{epoch, views};
 
 bind_interrupts!(
     /// Who handles which interrupt.
@@ -52,6 +52,7 @@ pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
             flash: Flash::new_blocking(flash),
             block: ADDRESS - FLASH_START,
             epochs: epoch::SECTORS.map(|at| sector(at, 128 * KIB)),
+            views: views::SECTORS.map(|at| sector(at, 16 * KIB)),
         },
     )
 }

@@ -1,4 +1,4 @@
-//! A drone that runs the application, wired to a neighbour that does not: relays 1 and 2 of 2.
+//! A drone that runs the application among relays that do not: relay 1, with a wire to relay 2 of 2, or by radio with 2 and 3 of 3.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -10,6 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
 use embassy_time::MockDriver;
+use embedded_hal::digital::{ErrorType as PinType, OutputPin};
 use embedded_io_async::{ErrorType, Read, Write};
 use relay_app::EmbassyClock;
 use relay_app::board::Board;
@@ -19,7 +20,7 @@ use uav_relay::channel::AirGround;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Auth, Band, Event, Identity, Instant, Interference, Interferer, Key, Method, Mission,
-    MissionConfig, Placement, Port, Profile, Relay, Settings,
+    MissionConfig, Placement, Port, Profile, Relay, Settings, Wiring,
 };
 use uav_relay_block::{Block, ChannelNumbers, Config, Secret, Sites, write};
 
@@ -73,13 +74,31 @@ impl Pipe {
     }
 }
 
+/// A driver enable that nobody looks at.
+struct Enable;
+
+impl PinType for Enable {
+    type Error = Infallible;
+}
+
+impl OutputPin for Enable {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
 /// What an application is polled to.
 type Running = Pin<Box<dyn Future<Output = Result<Infallible, Refused>>>>;
 
 pub(crate) struct Bench {
-    neighbour: Relay,
+    wiring: Wiring,
+    others: Vec<Relay>,
     pub(crate) events: Vec<Event>,
-    /// To the neighbour, and from it.
+    /// From the drone, and to it.
     wire: [Pipe; 2],
     drone: Option<Running>,
     vehicle: Option<Vehicle>,
@@ -135,6 +154,12 @@ fn config(relays: u16, index: u16, sites: Option<Sites>) -> Config {
 pub(crate) fn block(epoch: Option<u32>, sites: Option<Sites>) -> Block {
     let secret = epoch.map(|epoch| Secret { key: KEY, epoch });
     write(&config(2, 1, sites), &numbers(), secret, None)
+}
+
+/// The block of relay 1 of 3, with a key.
+pub(crate) fn block_of_three() -> Block {
+    let secret = Secret { key: KEY, epoch: 1 };
+    write(&config(3, 1, None), &numbers(), Some(secret), None)
 }
 
 /// The block of the only relay between these sites.
@@ -194,18 +219,32 @@ fn running(board: Board<Ram>, rx: Pipe, tx: Pipe, autopilot: Option<(Pipe, Pipe)
 impl Bench {
     /// The neighbour alone, on its first epoch.
     pub(crate) fn new() -> Self {
+        Self::wired(Wiring::Pair, 2)
+    }
+
+    /// Two others by radio, on their first epochs.
+    pub(crate) fn radio() -> Self {
+        Self::wired(Wiring::Shared, 3)
+    }
+
+    fn wired(wiring: Wiring, relays: u16) -> Self {
         let clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
-        let said = config(2, 2, None);
         let settings = Settings {
             auth: Some(Auth {
                 key: Key::new(KEY),
                 epoch: 1,
             }),
+            wiring,
             ..Settings::default()
         };
         let now = EmbassyClock.now();
+        let other = |index| {
+            let said = config(relays, index, None);
+            Relay::new(said.mission, said.identity, settings, index.into(), now).unwrap()
+        };
         Self {
-            neighbour: Relay::new(said.mission, said.identity, settings, 2, now).unwrap(),
+            wiring,
+            others: (2..=relays).map(other).collect(),
             events: Vec::new(),
             wire: [Pipe::default(), Pipe::default()],
             drone: None,
@@ -221,7 +260,14 @@ impl Bench {
         }
         let [there, back] = self.wire.clone();
         let autopilot = self.vehicle.as_ref().map(Vehicle::port);
-        self.drone = Some(running(board, back, there, autopilot));
+        self.drone = Some(match self.wiring {
+            Wiring::Pair => running(board, back, there, autopilot),
+            Wiring::Shared => {
+                let room = Box::leak(Box::new(Room::new()));
+                let radio = (back, there);
+                Box::pin(relay_app::fly_shared(room, board, radio, Enable, autopilot))
+            }
+        });
     }
 
     /// The same with a vehicle at the application's third port.
@@ -259,25 +305,38 @@ impl Bench {
     }
 
     fn listen(&mut self) {
-        let (now, relay) = (EmbassyClock.now(), &mut self.neighbour);
+        let now = EmbassyClock.now();
+        let port = match self.wiring {
+            Wiring::Pair => Port::Upstream,
+            Wiring::Shared => Port::Shared,
+        };
         let mut bytes = [0; 256];
         let count = self.wire[0].take(&mut bytes);
-        relay.handle_bytes(now, Port::Upstream, &bytes[..count]);
-        relay.handle_timeout(now);
+        for other in &mut self.others {
+            other.handle_bytes(now, port, &bytes[..count]);
+            other.handle_timeout(now);
+        }
         let mut frame = [0; MAX_FRAME];
-        while let Some(sent) = relay.poll_transmit(now, &mut frame) {
-            if sent.port == Port::Upstream {
-                self.wire[1].0.borrow_mut().extend(&frame[..sent.len]);
+        for from in 0..self.others.len() {
+            while let Some(sent) = self.others[from].poll_transmit(now, &mut frame) {
+                if sent.port != port {
+                    continue;
+                }
+                let frame = &frame[..sent.len];
+                self.wire[1].0.borrow_mut().extend(frame);
+                for to in (0..self.others.len()).filter(|to| *to != from) {
+                    self.others[to].handle_bytes(now, port, frame);
+                }
             }
         }
-        while let Some(event) = relay.poll_event() {
+        while let Some(event) = self.others[0].poll_event() {
             self.events.push(event);
         }
     }
 
     /// Frames that the neighbour did not believe.
     pub(crate) fn disbelieved(&self) -> u32 {
-        let stats = self.neighbour.stats();
+        let stats = self.others[0].stats();
         stats.unsigned + stats.forged + stats.replayed
     }
 }

@@ -12,3 +12,4 @@ mod key;
 mod logger;
 mod ram;
 mod vehicle;
+mod votes;

@@ -31,6 +31,7 @@ impl Ram {
             flash: self.clone(),
             block: 0,
             epochs: [units(1, 2), units(2, 4)],
+            views: [units(4, 5), units(5, 6)],
         }
     }
 }
