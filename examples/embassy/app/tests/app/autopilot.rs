@@ -11,8 +11,8 @@ use crate::vehicle::Vehicle;
 
 /// How far apart two places are, m.
 fn apart(a: Placement, b: Placement) -> f32 {
-    let [x, y, h] = [a.x_m - b.x_m, a.y_m - b.y_m, a.altitude_m - b.altitude_m];
-    (x * x + y * y + h * h).sqrt()
+    let apart = [a.x_m - b.x_m, a.y_m - b.y_m, a.altitude_m - b.altitude_m];
+    apart.map(|part| part * part).iter().sum::<f32>().sqrt()
 }
 
 /// On the ground nothing is told, in the pilot's hands its own place; then it is led to the place of its relay, no faster than allowed.
