@@ -39,6 +39,7 @@ class Picture {
     this.axes = element("g", { "aria-hidden": "true" });
     this.hops = element("g", { "aria-hidden": "true" });
     this.signs = new Map();
+    this.unit = 1;
     svg.setAttribute("viewBox", `0 0 ${this.size.join(" ")}`);
     svg.replaceChildren(this.axes, this.hops);
   }
@@ -54,9 +55,10 @@ class Picture {
     return [there.x + this.view.x[0], this.view.down ? there.y + this.view.y[0] : this.view.y[1] - there.y];
   }
 
-  /** Metres of one pixel of the screen: signs and letters are as large on every screen. */
-  get unit() {
-    return this.size[0] / (this.svg.clientWidth || 850);
+  /** Finds out how many metres one pixel of the screen is: signs and letters are as large on every screen. Asked for before anything is
+   * changed, once: the browser lays out the page for it. */
+  measure() {
+    this.unit = this.size[0] / (this.svg.clientWidth || 850);
   }
 
   /** The axes, for the size that the picture has now. */

@@ -204,9 +204,13 @@ byId("controls").addEventListener("reset", () => {
   want.off.clear();
   setTimeout(typed, 0);
 });
-new ResizeObserver(() => draw()).observe(byId("above"));
+new ResizeObserver(() => {
+  for (const picture of Object.values(pictures)) picture.measure();
+  draw();
+}).observe(byId("above"));
 
 byId("moving").disabled = true;
+for (const picture of Object.values(pictures)) picture.measure();
 // The first run came with the page: it is to be seen before the code is there.
 take({ words: options(), toml: scenario(), tx: want.tx }, { text: byId("first").textContent, took_ms: 0 });
 
