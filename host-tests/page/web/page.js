@@ -38,6 +38,8 @@ function draw(moved) {
   const values = run ? sirs() : [];
   const speaks = player.playing && tick ? tick.says : null;
   const drift = want.moving && tick && wanted ? SPEED * tick.at_s : 0;
+  // Of the relays Tab comes to one, whichever of them are there.
+  const stop = all.some(({ relay }) => relay === hand.relay) ? hand.relay : (all[0] || {}).relay;
   const marks = new Map();
   if (wanted && values.length === chain.length + 1) marks.set(values.indexOf(Math.min(...values)), "worst");
   const by = speaks ? all.findIndex((relay) => relay.relay === speaks[0]) : -1;
@@ -65,7 +67,7 @@ function draw(moved) {
       ...all.map((relay, at) => ({
         id: `relay${relay.relay}`, shape: "relay", active, at: [relay.x, second(relay)], text: crowded ? "" : String(relay.relay),
         kind: [relay.on ? "" : "off", relay.told ? "" : "waits", at === by ? "says" : ""].join(" "),
-        attributes: active ? { tabindex: relay.relay === (hand.relay || all[0].relay) ? 0 : -1, role: "switch", "aria-checked": !want.off.has(relay.relay), "aria-label": `Relay ${relay.relay}` } : {},
+        attributes: active ? { tabindex: relay.relay === stop ? 0 : -1, role: "switch", "aria-checked": !want.off.has(relay.relay), "aria-label": `Relay ${relay.relay}` } : {},
       })),
     ]);
   }
@@ -78,6 +80,7 @@ function tell() {
   if (!run) return;
   const tick = player.now;
   const values = sirs();
+  byId("summary").setAttribute("aria-live", player.playing ? "off" : "polite");
   byId("summary").textContent = tick && !player.ended ? moment(tick, Math.min(...values)) : summary(run.report);
   const chain = relays().filter((relay) => relay.on && relay.told);
   if (values.length === chain.length + 1) list(values, [...chain.map((relay) => relay.relay), "Rx"]);

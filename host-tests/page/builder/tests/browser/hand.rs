@@ -1,7 +1,7 @@
 //! Mouse, finger, keyboard.
 
 use crate::numbers::is_native;
-use crate::opened::{middle, number, opened, settled, sir};
+use crate::opened::{choose, middle, number, opened, settled, sir};
 
 #[test]
 fn a_hand_and_the_keyboard_move_the_chain() {
@@ -48,6 +48,12 @@ fn a_hand_and_the_keyboard_move_the_chain() {
     browser.key("ArrowRight", 39);
     assert_eq!(browser.text("document.activeElement.id"), "relay5");
     assert_eq!(browser.value(stops), 1);
+    choose(&mut browser, "uavs", "3");
+    assert_eq!(
+        browser.value(stops),
+        1,
+        "where relay 5 is not there any more"
+    );
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
