@@ -273,6 +273,19 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
     assert_eq!(method, Method::Align);
     let line = "--method align counts, and not network.method = \"joint\" of ";
     assert!(said.starts_with(line), "{said}");
+    let others = network("id = 9\nrelays = 7\nprobe_after_ms = 5000\ndead_after_ms = 15000");
+    let (_, said) = written(&others, &["--network", "3"]);
+    let lines: Vec<&str> = said.lines().collect();
+    assert!(
+        lines[0].starts_with("--network 3 counts, and not network.id = 9 of "),
+        "{said}"
+    );
+    assert!(
+        lines[1].starts_with("--uavs 5 counts, and not network.relays = 7 of "),
+        "{said}"
+    );
+    let (_, said) = written(&network("id = 9\nrelays = 5"), &["--network", "9"]);
+    assert!(!said.contains("counts"), "{said}");
     let mut planned =
         "\n[plan]\nuavs = 5\ntolerance = 1e-4\nmethod = \"align\"\nsir_db = 3.0\n".to_owned();
     for k in 1..=5 {
@@ -286,6 +299,14 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
         (
             network("baud = 57600"),
             "network.baud = 57600: must be 115200, or left out: the firmware's ports run at that",
+        ),
+        (
+            network("probe_after_ms = 30000"),
+            "network.probe_after_ms = 30000: must be 5000, or left out: ",
+        ),
+        (
+            network("dead_after_ms = 90000"),
+            "network.dead_after_ms = 90000: must be 15000, or left out: ",
         ),
         (
             joint + &planned,

@@ -1,12 +1,13 @@
 //! `cargo provision`: what is written into one drone before it flies, from a scenario.
 
+mod network;
 mod options;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use clap::{Parser as _, ValueEnum as _};
+use clap::Parser as _;
 use uav_relay::{Adjust, ChannelLoad, Local, Measure, Settings};
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
@@ -15,7 +16,7 @@ use uav_relay_sim::simulator::medium::access::OVERHEAD;
 use uav_relay_tools::plan::carried::is_current;
 use uav_relay_tools::plan::flown::{Flown, flown};
 use uav_relay_tools::provision::block::Flight;
-use uav_relay_tools::provision::config::{ADDRESS, BAUD, LEN, Secret};
+use uav_relay_tools::provision::config::{ADDRESS, LEN, Secret};
 use uav_relay_tools::provision::folder;
 use uav_relay_tools::provision::summary::{Heading, summary};
 
@@ -92,14 +93,20 @@ fn run(options: &Options) -> Result<String, String> {
 impl<'a> Asked<'a> {
     /// What the options and the scenario's plan say together.
     fn new(options: &'a Options) -> Result<Self, String> {
-        let (scenario, Deployment { network, .. }) = match &options.scenario {
+        let (
+            scenario,
+            Deployment {
+                network: section, ..
+            },
+        ) = match &options.scenario {
             Some(file) => Deployment::load(file).map_err(|error| error.to_string())?,
             None => Default::default(),
         };
         // A path in the file is relative to its folder.
         let folder = options.scenario.as_deref().and_then(Path::parent);
-        let of_file = network
+        let of_file = section
             .key_file
+            .as_ref()
             .map(|file| folder.unwrap_or(Path::new("")).join(file));
         let name = options.scenario.as_ref().map_or_else(
             || "default scenario".to_owned(),
@@ -117,7 +124,7 @@ impl<'a> Asked<'a> {
                 ));
             }
             (_, Some(plan)) => plan.uavs,
-            (uavs, None) => uavs.or(network.relays).ok_or_else(|| {
+            (uavs, None) => uavs.or(section.relays).ok_or_else(|| {
                 format!(
                     "--uavs: is missing, and so are [plan] and network.relays in {name}; allowed: 1 to 1000"
                 )
@@ -127,7 +134,8 @@ impl<'a> Asked<'a> {
             PlannedMethod::Align => Method::Align,
             PlannedMethod::Joint => Method::Joint,
         });
-        let of_section = network.method.as_deref();
+        network::overridden(options, &section, of_file.as_deref(), &name);
+        let of_section = section.method.as_deref();
         let method = match (options.method, planned) {
             (Some(method), Some(planned)) if method != planned => {
                 return Err(other(
@@ -137,14 +145,8 @@ impl<'a> Asked<'a> {
             }
             (method, planned) => method.or(planned),
         };
-        let method = of_network(method, of_section, &name, planned.is_some())?;
-        if let Some(baud) = network.baud
-            && baud != BAUD
-        {
-            return Err(format!(
-                "{name}: network.baud = {baud}: must be {BAUD}, or left out: the firmware's ports run at that, and no block changes it; a radio's own data rate is --baud"
-            ));
-        }
+        let method = network::method(method, of_section, &name, planned.is_some())?;
+        network::of_the_firmware(&section, &name)?;
         let tolerance = match (options.tolerance, plan) {
             (Some(tolerance), Some(plan)) if tolerance.total_cmp(&plan.tolerance).is_ne() => {
                 return Err(other(
@@ -168,7 +170,7 @@ impl<'a> Asked<'a> {
             options,
             scenario,
             name,
-            network: options.network.or(network.id).unwrap_or(NETWORK),
+            network: options.network.or(section.id).unwrap_or(NETWORK),
             key_file: options.key_file.clone().or(of_file),
             uavs,
             method,
@@ -302,36 +304,6 @@ impl<'a> Asked<'a> {
             self.uavs,
             text.trim_end()
         ))
-    }
-}
-
-/// The method: that of the command line or of a plan, else that of section `network`, else `align`. A plan that was made by another one than
-/// the section's is refused; what the command line says otherwise is said.
-fn of_network(
-    method: Option<Method>,
-    of_file: Option<&str>,
-    name: &str,
-    is_planned: bool,
-) -> Result<Method, String> {
-    let Some(text) = of_file else {
-        return Ok(method.unwrap_or(Method::Align));
-    };
-    // The scenario has checked it.
-    let own = Method::from_str(text, false).unwrap_or(Method::Align);
-    match method {
-        Some(method) if method != own => {
-            let said = format!("{method:?}").to_lowercase();
-            if is_planned {
-                return Err(format!(
-                    "{name}: network.method = \"{text}\": must be \"{said}\", as its [plan] has it, or plan anew"
-                ));
-            }
-            command::complain(&format!(
-                "--method {said} counts, and not network.method = \"{text}\" of {name}"
-            ));
-            Ok(method)
-        }
-        _ => Ok(own),
     }
 }
 
