@@ -32,7 +32,7 @@ const isOf = (run) => Boolean(run) && run.words === options() && run.toml === sc
 /** Draws both views, with the relays where `moved` says. */
 function draw(moved) {
   const all = moved || relays();
-  const chain = all.filter((relay) => relay.on && relay.told);
+  const chain = all.filter((relay) => relay.on);
   const [tick, { run }] = [player.now, shown];
   const wanted = isOf(run);
   const values = run ? sirs() : [];
@@ -42,8 +42,11 @@ function draw(moved) {
   const stop = all.some(({ relay }) => relay === hand.relay) ? hand.relay : (all[0] || {}).relay;
   const marks = new Map();
   if (wanted && values.length === chain.length + 1) marks.set(values.indexOf(Math.min(...values)), "worst");
-  const by = speaks ? all.findIndex((relay) => relay.relay === speaks[0]) : -1;
-  if (speaks && speaks[1] !== 0 && chain.length === all.length) marks.set(by + (speaks[1] > 0 ? 1 : 0), "says");
+  chain.forEach((relay, at) => {
+    if (!relay.told) for (const hop of [at, at + 1]) marks.set(hop, "waits");
+  });
+  const by = speaks ? chain.findIndex((relay) => relay.relay === speaks[0]) : -1;
+  if (by >= 0 && speaks[1] !== 0) marks.set(by + (speaks[1] > 0 ? 1 : 0), "says");
   for (const [name, picture] of Object.entries(pictures)) {
     const active = name === "above";
     const second = (relay) => (active ? relay.y : relay.h);
@@ -64,9 +67,9 @@ function draw(moved) {
       { id: "rx", shape: "site", active, at: [want.rx, 0], text: "Rx", side: "right", attributes: knob("rx", "Receiver", [want.tx + APART, right - 40]) },
       ...(believed ? [{ id: "belief", shape: "belief", at: [believed[1] + run.tx, believed[2]], attributes: { "aria-hidden": "true" } }] : []),
       { id: "jammer", shape: "jammer", active, at: jammer, text: active ? "interferer" : "", side: "up", attributes: knob("jammer", "Interferer", [left + 20, right - 20]) },
-      ...all.map((relay, at) => ({
+      ...all.map((relay) => ({
         id: `relay${relay.relay}`, shape: "relay", active, at: [relay.x, second(relay)], text: crowded ? "" : String(relay.relay),
-        kind: [relay.on ? "" : "off", relay.told ? "" : "waits", at === by ? "says" : ""].join(" "),
+        kind: [relay.on ? "" : "off", relay.told ? "" : "waits", speaks && relay.relay === speaks[0] ? "says" : ""].join(" "),
         attributes: active ? { tabindex: relay.relay === stop ? 0 : -1, role: "switch", "aria-checked": !want.off.has(relay.relay), "aria-label": `Relay ${relay.relay}` } : {},
       })),
     ]);
@@ -81,8 +84,8 @@ function tell() {
   const tick = player.now;
   const values = sirs();
   byId("summary").setAttribute("aria-live", player.playing ? "off" : "polite");
-  byId("summary").textContent = tick && !player.ended ? moment(tick, Math.min(...values)) : summary(run.report);
-  const chain = relays().filter((relay) => relay.on && relay.told);
+  const chain = relays().filter((relay) => relay.on);
+  byId("summary").textContent = tick && !player.ended ? moment(tick, Math.min(...values), chain) : summary(run.report);
   if (values.length === chain.length + 1) list(values, [...chain.map((relay) => relay.relay), "Rx"]);
   else list([], []);
   mark(tick ? tick.told : Infinity);

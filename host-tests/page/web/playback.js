@@ -13,9 +13,9 @@ function ticks(film, timeline) {
   const moving = film.stands.filter((stand) => stand.relays.some(([, , place]) => place)).map((stand) => stand.at_s);
   let coming = 0;
   const spoken = [];
-  for (const [at_s, relay, to] of film.sent) {
+  for (const [sent, [at_s, relay, to]] of film.sent.entries()) {
     while (coming < moving.length && moving[coming] < at_s) coming += 1;
-    if (coming < moving.length && moving[coming] - at_s < BEFORE && spoken.length < FRAMES) spoken.push({ at_s, says: [relay, to] });
+    if (coming < moving.length && moving[coming] - at_s < BEFORE && spoken.length < FRAMES) spoken.push({ at_s, says: [relay, to], messages: sent + 1 });
   }
   const all = [...film.stands, ...spoken].sort((a, b) => a.at_s - b.at_s);
   let [relays, sirs, messages, believed] = [new Map(), [], 0, null];
@@ -26,8 +26,9 @@ function ticks(film, timeline) {
         relays = new Map(relays);
         for (const [relay, on, place] of change.relays) relays.set(relay, { on, place });
       }
-      [sirs, messages, believed] = [change.sirs, change.messages, change.believed || null];
+      [sirs, believed] = [change.sirs, change.believed || null];
     }
+    messages = Math.max(messages, change.messages);
     const before = told;
     while (told < timeline.length && timeline[told].at_s <= change.at_s) told += 1;
     return { at_s: change.at_s, relays, sirs, messages, believed, says: change.says || null, told, happens: told > before };

@@ -12,8 +12,9 @@ function summary(report) {
 }
 
 /** What is to be seen at a tick that is not the last. */
-function moment(tick, worst) {
-  const sir = tick.sirs.length === 0 ? "no place agreed on yet" : `worst hop: SIR ${worst.toPrecision(5)} (${decibels(worst)})`;
+function moment(tick, worst, chain) {
+  const told = chain.filter((relay) => relay.told).length;
+  const sir = told < chain.length ? `${told} of ${chain.length} relays have a place` : `worst hop: SIR ${worst.toPrecision(5)} (${decibels(worst)})`;
   return `At ${tick.at_s.toFixed(3)} s: ${sir}; ${tick.messages} messages.`;
 }
 

@@ -30,6 +30,11 @@ fn an_agreement_goes_from_hop_to_hop() {
     let there = (1..8).map(|relay| (relay, 1));
     let back = (2..=8).rev().map(|relay| (relay, -1));
     assert_eq!(says, there.chain(back).collect::<Vec<_>>());
+    // Each of them is counted when it is sent.
+    let counted =
+        browser.value("player.ticks.filter((tick) => tick.says).map((tick) => tick.messages)");
+    let all_of_them: Vec<u64> = (1..=14).collect();
+    assert_eq!(counted, serde_json::json!(all_of_them));
     let mut before = 0;
     for tick in &all {
         let told = tick["told"].as_u64().unwrap();
@@ -71,10 +76,9 @@ fn a_chain_is_seen_to_lose_a_relay_and_to_close_up() {
     // By the slider, from before to after: what is said and drawn is of that time.
     browser.run("byId('time').value = 0; byId('time').dispatchEvent(new Event('input'))");
     let words = said(&mut browser, "summary");
-    assert!(
-        words.starts_with("At 0.000 s: no place agreed on"),
-        "{words}"
-    );
+    assert_eq!(words, "At 0.000 s: 0 of 8 relays have a place; 0 messages.");
+    let waits = browser.value("document.querySelectorAll('#above .hop.waits').length");
+    assert_eq!(waits, 9);
     browser.run(&format!("player.seek({silent})"));
     let words = said(&mut browser, "summary");
     assert!(words.starts_with("At 20.000 s: worst hop"), "{words}");
