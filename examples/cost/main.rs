@@ -11,6 +11,8 @@ mod asynch;
 mod auth;
 #[cfg(target_os = "none")]
 mod counter;
+#[cfg(all(target_os = "none", feature = "async"))]
+mod flight;
 #[cfg(target_os = "none")]
 mod methods;
 #[cfg(target_os = "none")]
@@ -63,7 +65,10 @@ mod image {
         auth::auth();
         upload::upload();
         #[cfg(feature = "async")]
-        super::asynch::runners();
+        {
+            super::asynch::runners();
+            super::flight::flight();
+        }
         hprintln!("done 1");
         debug::exit(debug::EXIT_SUCCESS);
         counter::stop()

@@ -50,6 +50,7 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     // An image of its own: with more in it the compiler makes other choices in all of it.
     let runners = count(&build("cost", &["--features", "async"])?)?;
     rows.extend(table(&runners, RUNNERS)?);
+    rows.extend(table(&runners, FLOWN)?);
     Ok(rows)
 }
 
@@ -301,6 +302,28 @@ const COUNTED: &[Counted] = &[
         "the costliest call in a field",
         "instructions",
         &["field"],
+        None,
+    ),
+];
+
+/// The line on earth, in the image of the runners.
+const FLOWN: &[Counted] = &[
+    (
+        "the line between two sites",
+        "instructions",
+        &["line"],
+        None,
+    ),
+    (
+        "a place along it as latitude and longitude",
+        "instructions",
+        &["to_earth"],
+        None,
+    ),
+    (
+        "a latitude and longitude as a place along it",
+        "instructions",
+        &["from_earth"],
         None,
     ),
 ];
