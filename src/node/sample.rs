@@ -26,9 +26,9 @@ pub enum Sample {
     /// relative error is that of [`Listen`](crate::settings::Listen): without the signals of the chain itself; with the noise of the receiver,
     /// which the mission tells (`MissionConfig::noise_w`) and the relay takes off.
     Heard {
-        /// Where the drone was.
+        /// Where the drone was: at most 100 D from the transmitter in each coordinate.
         at: Placement,
-        /// That power, W: 1e-30 to 1e6.
+        /// That power, W: 1e-30 to 1e6 ([`MEASURED_W`](crate::sensing::level::MEASURED_W)) above the noise.
         power_w: f32,
     },
     /// The same at the ground transmitter, handed to relay 1, or to any of the first four.

@@ -9,10 +9,11 @@
 //! | too few places, or no source | a source that what is heard contradicts | the relays spread evenly |
 //! | too few places, or no source | a source | it is kept |
 
+use super::ends::{judge, v_at_end};
 use super::fit::{Fit, FoundSource, Unfit, misfit};
-use super::level::{Level, Levels};
+use super::level::{EndsOff, Level, Levels, is_level};
 use super::sums::Sums;
-use super::terms::{coefficients, terms, unit_w};
+use super::terms::{coefficients, expected_v, terms};
 use super::track::Track;
 use crate::mission::{Interferer, Mission};
 use crate::place::Placement;
@@ -134,6 +135,8 @@ pub(crate) struct Review {
     pub(crate) known: Knowledge,
     /// Why there is no source.
     pub(crate) unfit: Option<Unfit>,
+    /// Which ends measure something else than follows from what the relays hear.
+    pub(crate) ends: EndsOff,
 }
 
 /// Reviews `told`, of which `mission` is made, by `sums` along the chain and what its ends hear. `before` is what was
@@ -148,11 +151,22 @@ pub(crate) fn review(
     now: Instant,
 ) -> Review {
     let known = mission.known_source();
-    let (fit, found) = match fitted(mission, sums, levels, listen) {
+    let mut levels = *levels;
+    let (fit, found) = match fitted(mission, sums, &mut levels, listen) {
         Ok(found) => found,
-        Err(unfit) => return at_a_loss(mission, belief, sums, listen, before, unfit),
+        Err(unfit) => {
+            return Review {
+                ends: levels.off,
+                ..at_a_loss(mission, belief, sums, listen, before, unfit)
+            };
+        }
     };
-    let unfit = (!found.is_one).then_some(Unfit::NoSource);
+    let ends = levels.off;
+    let unfit = if found.is_one {
+        ends.unknown.then_some(Unfit::Contradiction)
+    } else {
+        Some(Unfit::NoSource)
+    };
     let still = listen.is_for_one_that_stands();
     let mut track = before.track;
     let heard = Instant::from_micros(now.as_micros().saturating_sub(sums.age_us()));
@@ -173,6 +187,7 @@ pub(crate) fn review(
         adopt: None,
         known: before,
         unfit,
+        ends,
     };
     let adopt = |refined| Review {
         adopt: Some(Belief::Source { source, receiver_w }),
@@ -183,6 +198,7 @@ pub(crate) fn review(
             track,
         },
         unfit,
+        ends,
     };
     let Some(known) = known else { return adopt(0) };
     let chance = fit.chance();
@@ -193,7 +209,8 @@ pub(crate) fn review(
     let receiver = match belief {
         Belief::Source {
             receiver_w: before, ..
-        } if receiver_w > 0.0 => {
+        } if receiver_w > 0.0 || *before > 0.0 => {
+            // Where only one of the two says anything, all of it is new.
             let ratio = f64::from(before - receiver_w) / f64::from(receiver_w);
             ratio * ratio
         }
@@ -219,14 +236,21 @@ pub(crate) fn review(
     }
 }
 
-/// The fit of all that is heard, and the source that it speaks of.
+/// The fit of all that is heard, and the source that it speaks of; and which ends are off, whose levels are taken away.
 fn fitted(
     mission: &Mission,
     sums: &Sums,
-    levels: &Levels,
+    levels: &mut Levels,
     listen: &Listen,
 ) -> Result<(Fit, FoundSource), Unfit> {
     let mut fit = Fit::of(sums, listen.relative_error)?;
+    levels.off = judge(mission, &fit, levels, listen.relative_error);
+    if levels.off.transmitter {
+        levels.transmitter = Level::default();
+    }
+    if levels.off.receiver {
+        levels.receiver = Level::default();
+    }
     let mut sums = *sums;
     let ends = [
         (0.0, levels.transmitter),
@@ -265,8 +289,8 @@ fn followed(
 /// The fit that counts the end at `x_m` as one place more, as far as what it hears is in line with the others: then the path loss over the
 /// ground is what the mission says.
 #[expect(
-    clippy::cast_possible_truncation,
-    reason = "v of a power that is a float"
+    clippy::large_types_passed_by_value,
+    reason = "it is what comes of it, too"
 )]
 fn with_end(
     mission: &Mission,
@@ -281,24 +305,23 @@ fn with_end(
     }
     let config = mission.config();
     let there = terms(config.distance_m, Placement::on_line(x_m, 0.0));
-    let ground = config.channel.eta() / config.channel.mu_nlos();
-    let v = f64::from(unit_w(mission)) * ground / f64::from(level.power_w);
+    let v = v_at_end(mission, level);
     let expected = fit.value(&there);
     let off = v / expected - 1.0;
     let chance = 25.0 * (fit.variance() + fit.relative_variance(&there));
-    if !(expected > 0.0 && off * off < chance) {
+    let (Some(v), Some(expected)) = (expected_v(v), expected_v(expected)) else {
+        return fit;
+    };
+    if !(off * off < chance) {
         return fit;
     }
-    sums.add(&there, v as f32, expected as f32, 1.0, level.count);
+    sums.add(&there, v, expected, 1.0, level.count);
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
 /// What the receiver hears, W: what it says, and, as far as that is in line with it, what the source makes of it over the ground. Both count
 /// by how sure they are. 0 where the receiver has said nothing.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a power between two that are floats"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,
     fit: &Fit,
@@ -324,7 +347,12 @@ fn at_receiver(
     if !(off * off < 25.0 * (chance + unsure)) {
         return receiver.power_w;
     }
-    (heard * (1.0 + off * chance / (chance + unsure))) as f32
+    let both_w = (heard * (1.0 + off * chance / (chance + unsure))) as f32;
+    if is_level(both_w) {
+        both_w
+    } else {
+        receiver.power_w
+    }
 }
 
 fn at_a_loss(
@@ -358,5 +386,6 @@ fn at_a_loss(
             before
         },
         unfit: Some(unfit),
+        ends: EndsOff::NONE,
     }
 }

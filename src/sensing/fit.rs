@@ -6,7 +6,7 @@
 use super::factor::Factor;
 use super::nearest::nearest;
 use super::sums::Sums;
-use super::terms::{Terms, coefficients, value};
+use super::terms::{Terms, coefficients, expected_v, strength, value};
 use crate::mission::{Interferer, Mission};
 
 /// Why sums are of no source.
@@ -18,6 +18,9 @@ pub enum Unfit {
     Places,
     /// No single source on the ground would be heard like that.
     NoSource,
+    /// What is heard does not fit together, and nobody knows whose measurements are wrong: of four relays or fewer nobody can, nor where more
+    /// than one is, nor where the ground between the interferer and an end takes more than the mission says.
+    Contradiction,
 }
 
 /// How much the operator's expectation of errors counts beside what is seen, in places.
@@ -45,8 +48,12 @@ pub struct Fit {
     products: [f64; 10],
     right: [f64; 4],
     factor: Factor,
-    /// Variance of the relative error of one place.
+    /// Variance of the relative error of one place, and what of it is expected.
     variance: f64,
+    expected: f64,
+    /// What is left of the sums, and the places beyond the unknowns.
+    seen: f64,
+    beyond: f64,
     count: f64,
 }
 
@@ -96,6 +103,9 @@ impl Fit {
             right,
             factor,
             variance: (EXPECTED * expected + seen) / (EXPECTED + beyond),
+            expected,
+            seen,
+            beyond,
             count,
         };
         Ok(fit)
@@ -131,6 +141,21 @@ impl Fit {
     /// The variance of what one place is off, relative.
     pub(crate) const fn variance(&self) -> f64 {
         self.variance
+    }
+
+    /// The variance of what one place is expected to be off, relative.
+    pub(crate) const fn expected(&self) -> f64 {
+        self.expected
+    }
+
+    /// What its places are off, relative: the sum of the squares.
+    pub(crate) const fn seen(&self) -> f64 {
+        self.seen
+    }
+
+    /// Whether there are more places than unknowns, and they are off no more than is expected.
+    pub(crate) fn is_of_one_mind(&self) -> bool {
+        self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
     /// How much its sums say: places over the variance of one.
@@ -180,7 +205,7 @@ impl Fit {
         let above = (a + d * t) / k;
         let squared = t * t + above - 1.0 / 3.0 - x * x;
         let source = |[x, y, k]: [f64; 3]| Interferer {
-            power_w: (f64::from(mission.config().common.power_w) / k) as f32,
+            power_w: strength(mission, k) as f32,
             x_m: ((x + 1.0) * half) as f32,
             y_m: (y * half) as f32,
         };
@@ -201,10 +226,13 @@ impl Fit {
                 });
             }
         }
-        let products = self.products.map(|product| product as f32);
-        let right = self.right.map(|product| product as f32);
+        // Of weights that add up to 1, so that an f32 holds their squares.
+        let scale = libm::sqrt(aa);
+        let products = self.products.map(|product| (product / aa) as f32);
+        let right = self.right.map(|product| (product / scale) as f32);
         let found = nearest(&products, &right, t as f32, sign as f32).ok_or(Unfit::NoSource)?;
-        let found = source(found.map(f64::from));
+        let [x, y, k] = found.map(f64::from);
+        let found = source([x, y, k / scale]);
         found
             .is_valid()
             .then_some(FoundSource {
@@ -252,17 +280,10 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// What is expected at terms by what the mission says, as v; `None` where it says nothing.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a float that fits by the ranges of the mission"
-)]
+/// What is expected at terms by what the mission says, as v; `None` where it says nothing, or what nobody measures.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()
         .map(|source| coefficients(mission, &source));
-    move |terms| {
-        let heard = value(&known?, terms) as f32;
-        (heard > 0.0).then_some(heard)
-    }
+    move |terms| expected_v(value(&known?, terms))
 }

@@ -1,4 +1,8 @@
-//! How strong the interference is at an end of the chain, on the ground.
+//! How strong the interference is at an end of the chain, on the ground; and what powers may be measured anywhere.
+
+/// The least and the largest interference that may be measured, W, at a relay less the noise of its receiver. The square of each, and of
+/// the ratio of any two, taken as [`sensing`](crate::sensing) takes them, is a finite number; what is outside is refused.
+pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 
 /// What an end hears.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -9,11 +13,29 @@ pub struct Level {
     pub count: f32,
 }
 
-/// What both ends hear.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
+/// Which ends are off, the transmitter and the receiver.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct EndsOff {
+    pub(crate) transmitter: bool,
+    pub(crate) receiver: bool,
+    /// They do not fit, and nobody knows who is wrong.
+    pub(crate) unknown: bool,
+}
+
+impl EndsOff {
+    pub(crate) const NONE: Self = Self {
+        transmitter: false,
+        receiver: false,
+        unknown: false,
+    };
+}
+
+/// What both ends hear, and which of them were off.
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Levels {
     pub(crate) transmitter: Level,
     pub(crate) receiver: Level,
+    pub(crate) off: EndsOff,
 }
 
 impl Level {
@@ -34,5 +56,5 @@ pub(crate) fn is_power(power_w: f32) -> bool {
 
 /// Whether an end may say that it hears that, W.
 pub(crate) fn is_level(power_w: f32) -> bool {
-    (1e-30..=1e6).contains(&power_w)
+    (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }

@@ -15,6 +15,13 @@ pub struct Sums {
     pub(crate) numbers: [f32; SUMS],
 }
 
+/// The largest sum: what would be larger stays there, and finite. Nothing that is measured within 2 D of the line comes near it.
+const MOST: f32 = 1e38;
+
+fn within(sum: f32) -> f32 {
+    sum.clamp(-MOST, MOST)
+}
+
 impl Sums {
     /// Of no place.
     pub const NONE: Self = Self {
@@ -44,7 +51,7 @@ impl Sums {
             v * v,
         ];
         for (sum, number) in self.numbers.iter_mut().zip(row) {
-            *sum += weight * number;
+            *sum = within(*sum + weight * number);
         }
         let [.., count, measurements, _] = &mut self.numbers;
         *count += share;
@@ -54,7 +61,7 @@ impl Sums {
     /// Adds those of others.
     pub(crate) fn merge(&mut self, other: &Self) {
         for (sum, number) in self.numbers.iter_mut().zip(other.numbers) {
-            *sum += number;
+            *sum = within(*sum + number);
         }
     }
 
@@ -71,6 +78,12 @@ impl Sums {
     pub fn count(&self) -> f32 {
         let [.., count, _, _] = self.numbers;
         count
+    }
+
+    /// How often each place was measured, on average.
+    pub(crate) fn measured(&self) -> f32 {
+        let [.., count, measured, _] = self.numbers;
+        if count > 0.0 { measured / count } else { 0.0 }
     }
 
     /// The weights of all places.

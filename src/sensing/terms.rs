@@ -13,22 +13,34 @@ pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
 }
 
-/// The interference that v = 1 stands for, W: 4 `p_u` / (eta D^2).
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a float that fits by the ranges of the mission"
-)]
-pub(crate) fn unit_w(mission: &Mission) -> f32 {
+/// The interference that v = 1 stands for, W: the middle of what may be measured, so that no square of a v leaves an f32.
+pub(crate) const UNIT_W: f32 = 1e-12;
+
+/// The least and the largest v: of what may be measured, [`MEASURED_W`](super::level::MEASURED_W).
+const V: (f32, f32) = (1e-18, 1e18);
+
+/// What is expected somewhere, as v; `None` where nothing may be measured like that.
+pub(crate) fn expected_v(v: f64) -> Option<f32> {
+    let (least, most) = (f64::from(V.0), f64::from(V.1));
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "within the range of an f32"
+    )]
+    (least..=most).contains(&v).then_some(v as f32)
+}
+
+/// k = eta D^2 [`UNIT_W`] / (4 P) of a source of `power_w`; and the power of one of that k.
+pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
-    (4.0 * f64::from(config.common.power_w) / (config.channel.eta() * d * d)) as f32
+    0.25 * config.channel.eta() * d * d * f64::from(UNIT_W) / power_w
 }
 
 /// The coefficients that `source` gives the terms: k (X'^2 + Y'^2 + 1/3), -2 k X', k and -2 k Y'.
 pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     let config = mission.config();
     let half = 0.5 * f64::from(config.distance_m);
-    let k = f64::from(config.common.power_w) / f64::from(source.power_w);
+    let k = strength(mission, f64::from(source.power_w));
     let (x, y) = (
         f64::from(source.x_m) / half - 1.0,
         f64::from(source.y_m) / half,

@@ -49,6 +49,11 @@ impl Axis {
         if !(sum > 0.0) {
             return;
         }
+        if !sum.is_finite() {
+            // It was seen too long ago to say anything.
+            *self = Self::new(found, variance);
+            return;
+        }
         let off = found - self.at;
         if off * off > ELSEWHERE * sum {
             *self = Self::new(found, variance);

@@ -6,6 +6,7 @@ mod ends;
 mod following;
 mod found;
 mod steady;
+mod wrong;
 
 /// How many scenes a row: `COUNT`, or `usual`.
 fn count(usual: u64) -> u64 {

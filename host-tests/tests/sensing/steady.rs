@@ -5,6 +5,7 @@ use uav_relay::{Duration, Instant, Interference};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Turning;
+use uav_relay_sim::simulator::sky::{Broken, Says};
 
 use uav_relay_tools::listening::found::quantile;
 use uav_relay_tools::listening::wild::Wild;
@@ -94,8 +95,11 @@ fn a_broken_sensor_is_named_and_left_out() {
                 let wild = Wild::new(seed, 8, 1);
                 let broken = 1 + (seed % 8) as u16;
                 let mut setup = wild.setup(Interference::Unknown).unwrap();
-                setup.sky.as_mut().unwrap().broken =
-                    vec![(broken, off_db, Instant::from_millis(since_s * 1_000))];
+                setup.sky.as_mut().unwrap().broken = vec![Broken {
+                    node: broken,
+                    says: Says::Times(10_f64.powf(off_db / 10.0)),
+                    since: Instant::from_millis(since_s * 1_000),
+                }];
                 let outcome = run(setup).unwrap();
                 let named = outcome
                     .moments

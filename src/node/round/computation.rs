@@ -114,9 +114,8 @@ impl Computation {
         }
     }
 
-    /// Places are along another line from now on: it has none to be at, nor has the neighbour.
-    #[cfg(feature = "upload")]
-    pub(crate) const fn leave_line(&mut self) {
+    /// Discards the agreed place, and that of the neighbour.
+    pub(crate) const fn discard_place(&mut self) {
         self.setpoint = None;
         self.after = None;
     }

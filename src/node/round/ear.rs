@@ -5,11 +5,12 @@ use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::sensing::average::{Average, left};
 use crate::sensing::belief::{Belief, Knowledge, Told};
+use crate::sensing::doubt::Trial;
 use crate::sensing::fit::{Unfit, expected_at};
-use crate::sensing::level::Level;
+use crate::sensing::level::{EndsOff, Level, is_level};
 use crate::sensing::listener::Listener;
 use crate::sensing::sums::Sums;
-use crate::sensing::terms::unit_w;
+use crate::sensing::terms::UNIT_W;
 use crate::settings::Listen;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
@@ -18,11 +19,15 @@ use crate::wire::message::Heard;
 /// Whether this crate was built to listen. If not, none of its code is reached.
 pub(crate) const SENSING: bool = cfg!(feature = "sensing");
 
+/// A relay hears nothing of its line from farther away than so many times the distance.
+const FARTHEST: f32 = 100.0;
+
 /// What a relay hears, and what it believes of it: nothing, and no room for it, where this crate was built without `sensing`.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing([Ear; SENSING as usize]);
 
 /// What a relay that listens hears, and what it believes of it.
+#[expect(clippy::struct_excessive_bools, reason = "each for itself")]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ear {
     pub(super) listener: Listener,
@@ -30,10 +35,21 @@ pub(super) struct Ear {
     /// What the transmitter and the receiver hear, as far as they have told this relay.
     pub(super) transmitter: Average,
     pub(super) receiver: Average,
-    /// Whether this relay hears something else than all the others.
+    /// Whether this relay hears something else than all the others, and leaves itself out.
     pub(super) off: bool,
-    /// Who does, as of the last pass.
+    /// Who was left out of the last pass, and of the last two; 0 for nobody.
+    pub(super) left_out: u16,
     pub(super) named: u16,
+    /// At the leader: the search for who is wrong, and the ends that are.
+    pub(super) trial: Trial,
+    pub(super) ends: EndsOff,
+    /// Whether what came back last does not fit together, and nobody knows who is wrong.
+    pub(super) contradicted: bool,
+    /// Whether it hears nothing where the others say that there is much to hear.
+    pub(super) deaf: bool,
+    /// Measurements in a row that were nothing above the noise, of a relay that has not heard anything yet, and where the last one was.
+    pub(super) silent: u8,
+    pub(super) silent_at: Placement,
     /// At the leader: whether it has told the relays of the view what it believes.
     pub(super) has_told: bool,
     /// How much was known when that was taken up.
@@ -64,7 +80,14 @@ impl Sensing {
             transmitter: Average::NONE,
             receiver: Average::NONE,
             off: false,
+            left_out: 0,
             named: 0,
+            trial: Trial::NONE,
+            ends: EndsOff::NONE,
+            contradicted: false,
+            deaf: false,
+            silent: 0,
+            silent_at: Placement::on_line(0.0, 0.0),
             has_told: false,
             known: Knowledge::NOTHING,
             unfit: None,
@@ -90,6 +113,7 @@ impl Sensing {
         if let Some(ear) = self.ear_mut() {
             ear.has_told = false;
             ear.at = None;
+            ear.trial = Trial::NONE;
         }
     }
 
@@ -102,6 +126,7 @@ impl Sensing {
             ear.transmitter = Average::NONE;
             ear.receiver = Average::NONE;
             ear.known = Knowledge::NOTHING;
+            ear.ends = EndsOff::NONE;
             ear.wait = 1;
         }
     }
@@ -148,6 +173,8 @@ impl Sensing {
             told: self.told(),
             unfit: self.unfit(),
             off: self.ear().map_or(0, |ear| ear.named),
+            ends: self.ear().map_or(EndsOff::NONE, |ear| ear.ends),
+            deaf: self.ear().is_some_and(|ear| ear.deaf),
         }
     }
 
@@ -174,19 +201,23 @@ impl Ear {
         // What is left above the receiver's own noise.
         let heard = |power_w: f32| {
             let heard_w = power_w - noise_w;
-            (1e-30..=1e6).contains(&heard_w).then_some(heard_w)
+            is_level(heard_w).then_some(heard_w)
         };
         let half_life = self.listener.half_life();
         match sample {
-            Sample::Heard { at, power_w } if is_near(at) => {
+            Sample::Heard { at, power_w } if is_near(at, member.mission.config().distance_m) => {
                 let Some(heard_w) = heard(power_w) else {
+                    if power_w >= 0.0 && power_w <= noise_w {
+                        self.silent = self.silent.saturating_add(1);
+                        self.silent_at = at;
+                    }
                     return false;
                 };
-                let unit = unit_w(&member.mission);
+                (self.silent, self.deaf) = (0, false);
                 let distance_m = member.mission.config().distance_m;
                 let expected = expected_at(&member.mission);
                 self.listener
-                    .take(now, distance_m, at, heard_w / unit, expected);
+                    .take(now, distance_m, at, heard_w / UNIT_W, expected);
                 true
             }
             Sample::Transmitter { power_w } => {
@@ -219,6 +250,24 @@ pub(super) struct Findings {
     pub(super) unfit: Option<Unfit>,
     /// Who hears something else than all the others, as of the last pass.
     pub(super) off: u16,
+    pub(super) ends: EndsOff,
+    pub(super) deaf: bool,
+}
+
+impl Findings {
+    /// The node whose measurements are off, and were not `before`, as node `own` of `all` sees it; the ends of the line are 0 and `all` + 1.
+    pub(super) fn newly_off(&self, before: &Self, own: u16, all: u16) -> Option<u16> {
+        if self.off != before.off && self.off != 0 {
+            return Some(self.off);
+        }
+        if self.deaf && !before.deaf {
+            return Some(own);
+        }
+        if self.ends.receiver && !before.ends.receiver {
+            return Some(all.saturating_add(1));
+        }
+        (self.ends.transmitter && !before.ends.transmitter).then_some(0)
+    }
 }
 
 /// Takes what an end hears, if that is anything above the noise; whether it is.
@@ -234,9 +283,10 @@ fn take_level(
     heard_w.is_some()
 }
 
-/// Whether a drone may be there.
-fn is_near(at: Placement) -> bool {
+/// Whether what is heard there says anything of the line: within so many times its length of Tx in each coordinate.
+fn is_near(at: Placement, distance_m: f32) -> bool {
+    let far_m = FARTHEST * distance_m;
     [at.x_m, at.y_m, at.altitude_m]
         .iter()
-        .all(|metres| (-1e7..=1e7).contains(metres))
+        .all(|metres| (-far_m..=far_m).contains(metres))
 }

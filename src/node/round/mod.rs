@@ -172,7 +172,7 @@ impl Round {
         Effects {
             believes: found.told != before.told,
             unclear: found.unfit.is_some() && found.unfit != before.unfit,
-            off: (found.off != before.off && found.off != 0).then_some(found.off),
+            off: found.newly_off(&before, context.member.node, context.member.all),
             ..effects
         }
     }
@@ -287,10 +287,9 @@ impl Round {
         self.computation.load(profile);
     }
 
-    /// Places are along another line from now on: it has none to be at.
-    #[cfg(feature = "upload")]
-    pub(crate) const fn leave_line(&mut self) {
-        self.computation.leave_line();
+    /// Discards the agreed place: the relay has none until the chain agrees anew.
+    pub(crate) const fn discard_place(&mut self) {
+        self.computation.discard_place();
     }
 
     /// What could not be said to the neighbour after can be now.

@@ -4,7 +4,9 @@
 //! | --- | --- |
 //! | a view is new, or it was switched on | a pass tells all what it believes; then the places are agreed on |
 //! | the chain has agreed, and its time has come | a pass; what comes back is reviewed |
+//! | nobody hears enough, and all three spreads were tried | the same, and the next pass comes after twice the time |
 //! | another belief is better | its number is one higher; a pass tells all; then new places are agreed on |
+//! | what comes back does not fit together | passes of which one relay after the other is left out, see [`doubt`](crate::sensing) |
 //! | none is | all hold their places; the next pass comes after twice the time, up to 64 times [`Listen::every`](crate::settings::Listen) |
 //!
 //! A relay that has missed such a pass can take no part in the next one: its number is not the one that follows. So whoever agrees on
@@ -14,11 +16,14 @@ use super::computation::{Computation, PassKind};
 use super::ear::{SENSING, Sense};
 use super::state::{Action, Phase};
 use crate::node::context::Context;
-use crate::sensing::belief::{Told, review};
-use crate::sensing::doubt::is_off;
-use crate::sensing::fit::expected_at;
+use crate::node::timing::PAUSE;
+use crate::sensing::belief::{Belief, Spread, Told, review};
+use crate::sensing::doubt::{Next, is_absurd, is_deaf, is_off};
+use crate::sensing::fit::{Unfit, expected_at};
 use crate::sensing::level::{Level, Levels};
 use crate::sensing::sums::Sums;
+use crate::sensing::terms::terms;
+use crate::time::Duration;
 use crate::wire::message::Heard;
 
 /// The time between passes grows up to so many times the least.
@@ -26,6 +31,12 @@ const RAREST: u32 = 64;
 
 /// and doubles when so many passes in a row have changed nothing.
 const PATIENCE: u8 = 4;
+
+/// Passes of a search for who is wrong in the least time between two usual ones.
+const TRIALS_A_PERIOD: u64 = 8;
+
+/// Measurements of nothing in a row after which a relay may be deaf.
+const SILENT: u8 = 8;
 
 impl Computation {
     /// Whether the chain finds its interferer by itself.
@@ -63,6 +74,7 @@ impl Computation {
             return Action::Nothing;
         };
         let has_told = core::mem::replace(&mut ear.has_told, true);
+        let left_out = ear.trial.left_out();
         let holds = has_told && self.state.phase() == Phase::Holding;
         self.begin();
         let hearing = Heard {
@@ -71,7 +83,7 @@ impl Computation {
             told: self.sensing.told(),
             sums: Sums::NONE,
             receiver: Level::default(),
-            off: 0,
+            off: if holds { left_out } else { 0 },
         };
         self.sense(context, hearing, holds)
     }
@@ -103,7 +115,13 @@ impl Computation {
             self.chosen = None;
         }
         let mission = context.mission();
-        let own = if ear.off {
+        // Who is left out twice is left out for good.
+        let twice = hearing.off == ear.left_out;
+        ear.named = if twice { hearing.off } else { 0 };
+        ear.left_out = hearing.off;
+        let is_out = hearing.off == context.member.node;
+        ear.off |= twice && is_out;
+        let own = if ear.off || is_out {
             Sums::NONE
         } else {
             let distance_m = mission.config().distance_m;
@@ -134,13 +152,16 @@ impl Computation {
 
     /// What came of it, from the relay after.
     pub(crate) fn on_sensed(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
-        if let PassKind::Sense(known) = &mut self.pass
+        if let (PassKind::Sense(known), Some(ear)) = (&mut self.pass, self.sensing.ear_mut())
             && self.state.awaits(hearing.number)
             && hearing.told == known.hearing.told
         {
             known.hearing.sums = hearing.sums;
             known.hearing.receiver = hearing.receiver;
-            known.hearing.off = hearing.off;
+            if hearing.off != known.hearing.off {
+                known.hearing.off = hearing.off;
+                ear.named = hearing.off;
+            }
             return self.conclude_sense(context);
         }
         Action::Stale
@@ -151,9 +172,6 @@ impl Computation {
         let PassKind::Sense(Sense { hearing, holds, .. }) = self.pass else {
             return Action::Stale;
         };
-        if let Some(ear) = self.sensing.ear_mut() {
-            ear.named = hearing.off;
-        }
         if holds {
             self.state.hold();
         } else {
@@ -161,6 +179,9 @@ impl Computation {
         }
         if !context.leads() {
             return Action::Answer { agreed: false };
+        }
+        if holds && self.tries(context, &hearing) {
+            return Action::Nothing;
         }
         if holds && !self.reconsiders(context, &hearing) {
             if let Some(ear) = self.sensing.ear_mut() {
@@ -175,6 +196,23 @@ impl Computation {
         Action::Work
     }
 
+    /// Whether the leader goes on with a search for who is wrong: then what came back counts for nothing else.
+    fn tries(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
+        let (Some(listen), Some(ear)) = (context.settings().listen, self.sensing.ear_mut()) else {
+            return false;
+        };
+        let (relays, nodes) = (context.mission().relays(), context.member.all);
+        let next = ear
+            .trial
+            .take(&hearing.sums, listen.relative_error, relays, nodes);
+        ear.contradicted = next == Next::Unknown;
+        if next == Next::Again {
+            let pause = Duration::from_micros(listen.every.as_micros() / TRIALS_A_PERIOD);
+            ear.at = Some(context.now + PAUSE.max(pause));
+        }
+        next == Next::Again
+    }
+
     /// Whether the leader believes something else from now on.
     fn reconsiders(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(ear)) = (context.settings().listen, self.sensing.ear_mut()) else {
@@ -183,6 +221,7 @@ impl Computation {
         let levels = Levels {
             transmitter: ear.level(&ear.transmitter, context.now),
             receiver: hearing.receiver,
+            off: ear.ends,
         };
         let review = review(
             context.mission(),
@@ -193,7 +232,11 @@ impl Computation {
             ear.known,
             context.now,
         );
-        ear.unfit = review.unfit;
+        ear.unfit = match review.unfit {
+            None if ear.contradicted => Some(Unfit::Contradiction),
+            unfit => unfit,
+        };
+        ear.ends = review.ends;
         ear.known = review.known;
         let Some(belief) = review.adopt else {
             return false;
@@ -204,14 +247,19 @@ impl Computation {
         };
         ear.has_told = false;
         ear.kept = 0;
-        ear.wait = 1;
+        ear.wait = match belief {
+            // All three spreads in vain: relays that cannot learn anything fly about less and less often.
+            Belief::Unknown(Spread::Even) => (2 * ear.wait).min(RAREST),
+            Belief::Unknown(_) => ear.wait,
+            _ => 1,
+        };
         self.task.rest();
         self.chosen = None;
         true
     }
 
-    /// Whether this relay hears something else than all the others do: then its share is not added to what those after it hear, and it is
-    /// named.
+    /// Adds this relay's share to what those after it hear. One that has left itself out looks whether it fits the others again; one that has
+    /// never heard anything, where the others say that there is much to hear, names itself.
     fn doubt(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(ear), PassKind::Sense(sense)) = (
             context.settings().listen,
@@ -221,19 +269,34 @@ impl Computation {
             return;
         };
         let mission = context.mission();
+        let distance_m = mission.config().distance_m;
         let mut others = sense.from;
         others.merge(&sense.hearing.sums);
-        let place = ear.listener.place(mission.config().distance_m);
-        let off = place.is_some_and(|place| {
-            let expected = expected_at(mission)(&place.terms);
-            is_off(&others, &place, expected, listen.relative_error)
-        });
-        if off {
-            sense.hearing.off = context.member.node;
+        let place = ear.listener.place(distance_m);
+        let expected = place.and_then(|place| expected_at(mission)(&place.terms));
+        let error = listen.relative_error;
+        if ear.off {
+            // What it heard elsewhere while it was off is nothing to go by.
             ear.listener.forget_past();
-        } else {
-            sense.hearing.sums.merge(&sense.own);
+            ear.off = place.is_some_and(|place| is_off(&others, &place, expected, error));
+        } else if place.is_some_and(|place| is_absurd(&others, &place, expected, error)) {
+            ear.off = true;
+            ear.named = context.member.node;
+            sense.hearing.off = context.member.node;
+            return;
+        } else if ear.silent >= SILENT {
+            let there = terms(distance_m, ear.silent_at);
+            if place.is_none()
+                && is_deaf(
+                    &others,
+                    &there,
+                    mission.config().noise_w,
+                    listen.relative_error,
+                )
+            {
+                ear.deaf = true;
+            }
         }
-        ear.off = off;
+        sense.hearing.sums.merge(&sense.own);
     }
 }

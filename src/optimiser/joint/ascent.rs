@@ -131,9 +131,14 @@ impl Ascent {
         self.spare * self.distance_m
     }
 
+    /// Returns true if [`tighten`](Self::tighten) would.
+    pub(crate) fn may_tighten(&self) -> bool {
+        !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
+    }
+
     /// Whether less of the slack is to count from now on: where there is a penalty.
     pub(crate) fn tighten(&mut self) -> bool {
-        if self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m {
+        if !self.may_tighten() {
             return false;
         }
         self.spare = (0.1 * self.spare).min(SPARE);

@@ -107,6 +107,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 (Some((sigma, _)), Purpose::Last) => {
                     if self.best.is_none_or(|(best, _)| sigma > best) {
                         self.best = Some((sigma, self.number));
+                        // No pass by the rules of the sweep has changed them.
+                        self.best_cells = self.cells;
+                        self.best_judged = self.judged_at;
                         // An ascent that went astray came to less than it says.
                         self.highest = self.ascent.sigma.min(sigma + 3.0 * JUDGED).max(sigma);
                     }
@@ -160,6 +163,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 self.next(turn, chain)
             }
             Purpose::Judge | Purpose::Last | Purpose::Probe | Purpose::Move => {
+                self.judged_at = Some(sigma).filter(|_| self.is_whole);
                 self.judged(sigma, chain.ceiling())
             }
         };
@@ -215,6 +219,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 Work::Settle(self.ascent.sigma, Purpose::Tighten)
             }
             AscentStep::Over => {
+                self.is_whole &= !self.ascent.may_tighten();
                 self.walled |= self.ascent.penalty > 0.0;
                 let sigma = self.ascent.sigma;
                 Work::Seek(

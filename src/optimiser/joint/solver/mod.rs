@@ -21,6 +21,15 @@
 
 mod chain;
 mod judge;
+#[cfg(all(test, feature = "altitude"))]
+#[expect(
+    clippy::indexing_slicing,
+    clippy::expect_used,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a test"
+)]
+mod kept;
 mod order;
 mod passes;
 mod plain;

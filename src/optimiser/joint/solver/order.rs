@@ -30,6 +30,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 return Poll::Ready(Err(Infeasible));
             };
             (self.number, self.again) = (number, true);
+            if let Some(sigma) = self.best_judged {
+                self.cells = self.best_cells;
+                self.restart();
+                self.work = self.judged(sigma, chain.ceiling());
+            }
             return Poll::Pending;
         };
         let Some(start) = start else {
@@ -54,6 +59,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
         self.start = start;
         self.ascent = Ascent::new(chain.distance_m(), 0.0, 0.0, 0.0);
+        (self.judged_at, self.is_whole) = (None, true);
         self.restart();
         self.work = match start {
             Start::Near => Work::Settle(floor + 0.04, Purpose::Start),

@@ -14,6 +14,10 @@ use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 
 /// A chain being solved, for at most `RELAYS` relays; `SEGMENTS` is at least a tenth of that.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is told on its own, by another part of the work"
+)]
 #[derive(Clone, Debug)]
 pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     pub(super) number: u8,
@@ -22,7 +26,15 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     pub(super) best: Option<(f32, u8)>,
     /// What the ascent of that start came to, before it was judged.
     pub(super) highest: f32,
-    /// Whether the best start is done once more, since the chain that is kept came of another.
+    /// Its cells, and the target at which it was judged, in ln gamma. `None` where doing the start once more would come to another chain: it was
+    /// judged before its ascent was over, or without an ascent.
+    pub(super) best_cells: [Cell; RELAYS],
+    pub(super) best_judged: Option<f32>,
+    /// The same target of the start that is being done.
+    pub(super) judged_at: Option<f32>,
+    /// True while the ascent that is being done would be the same with nothing to compare it with.
+    pub(super) is_whole: bool,
+    /// True once the best start is judged more finely, and polished.
     pub(super) again: bool,
     pub(super) ascent: Ascent,
     pub(super) work: Work,
@@ -51,6 +63,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             start: Start::Far,
             best: None,
             highest: f32::NEG_INFINITY,
+            best_cells: [Cell::default(); RELAYS],
+            best_judged: None,
+            judged_at: None,
+            is_whole: true,
             again: false,
             ascent: Ascent::new(1.0, 0.0, 0.0, 0.0),
             work: Work::Begin,

@@ -1,0 +1,176 @@
+//! One wrong sensor of any kind, at a relay or at an end: what it costs, and who is named; and nobody where all are right.
+
+use rayon::prelude::*;
+use uav_relay::{Instant, Interference, Wiring};
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::outcome::{Outcome, Turning};
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_sim::simulator::sky::{Broken, Says};
+
+use uav_relay_tools::listening::found::quantile;
+use uav_relay_tools::listening::wild::Wild;
+
+use crate::count;
+
+/// What a sensor says, and what that is called: about what is heard 500 m from an interferer of 10 W, the noise of a receiver, nothing.
+const KINDS: [(&str, Says); 7] = [
+    ("0.1 times", Says::Times(0.1)),
+    ("0.5 times", Says::Times(0.5)),
+    ("2 times", Says::Times(2.0)),
+    ("10 times", Says::Times(10.0)),
+    ("5e-9 W always", Says::Always(5e-9)),
+    ("1e-13 W always", Says::Always(1e-13)),
+    ("0 W always", Says::Always(0.0)),
+];
+
+/// A chain of which both ends measure, and say it on the air.
+fn setup(wild: &Wild) -> Setup {
+    let mut setup = wild.setup(Interference::Unknown).unwrap();
+    setup.settings.wiring = Wiring::Shared;
+    setup.auth = true;
+    setup
+}
+
+/// The share of the optimum in the end.
+fn share(wild: &Wild, outcome: &Outcome) -> f64 {
+    let goals = outcome.stands.last().unwrap().goals.as_ref();
+    goals.map_or(0.0, |goals| {
+        wild.scene().unwrap().chain_sir(goals) / wild.optimum().unwrap()
+    })
+}
+
+/// Who was named, each once.
+fn named(outcome: &Outcome) -> Vec<u16> {
+    let off = outcome.moments.iter().filter(|it| it.what == Turning::Off);
+    let mut named: Vec<u16> = off.filter_map(|it| it.other).collect();
+    named.sort_unstable();
+    named.dedup();
+    named
+}
+
+/// The shares of chains of which nothing is wrong: what loss is measured against, scene by scene.
+fn sound(relays: u16) -> Vec<f64> {
+    let one = |seed| {
+        let wild = Wild::new(seed, relays, 1);
+        share(&wild, &run(setup(&wild)).unwrap())
+    };
+    (0..count(24)).into_par_iter().map(one).collect()
+}
+
+/// What one wrong sensor of every kind costs, and whether it and others are named.
+fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync) {
+    for (what, says) in KINDS {
+        let one = |seed: usize| {
+            let (wild, node) = (Wild::new(seed as u64, relays, 1), node(seed as u64));
+            let mut wrong = setup(&wild);
+            wrong.sky.as_mut().unwrap().broken = vec![Broken {
+                node,
+                says,
+                since: Instant::ZERO,
+            }];
+            let outcome = run(wrong).unwrap();
+            let named = named(&outcome);
+            let other = named.iter().any(|it| *it != node);
+            let lost = 1.0 - share(&wild, &outcome) / sound[seed];
+            (lost, named.contains(&node), other)
+        };
+        let came: Vec<_> = (0..sound.len()).into_par_iter().map(one).collect();
+        let mut lost: Vec<f64> = came.iter().map(|it| it.0).collect();
+        let at = came
+            .iter()
+            .position(|it| it.0 >= came.iter().map(|it| it.0).fold(f64::MIN, f64::max));
+        let [median, ninety, most] = [0.5, 0.9, 1.0].map(|part| quantile(&mut lost, part));
+        let found = came.iter().filter(|it| it.1).count();
+        let other = came.iter().filter(|it| it.2).count();
+        println!(
+            "N = {relays}, {who} says {what}: lost {median:.4} in the median, {ninety:.4} in nine of ten, {most:.4} at most (seed {at:?}); named {found}, another {other} of {}",
+            came.len()
+        );
+        assert!(median < 0.03, "{relays} {who} {what}");
+    }
+}
+
+#[test]
+fn one_wrong_relay_costs_next_to_nothing() {
+    for relays in [5, 8] {
+        let of = |seed| 1 + (seed % u64::from(relays)) as u16;
+        hold(relays, &sound(relays), "a relay", of);
+    }
+}
+
+#[test]
+fn a_wrong_end_costs_next_to_nothing() {
+    for relays in [5, 8] {
+        let sound = sound(relays);
+        hold(relays, &sound, "the receiver", |_| relays + 1);
+        hold(relays, &sound, "the transmitter", |_| 0);
+    }
+}
+
+#[test]
+fn sensors_that_are_right_are_not_named() {
+    let mut all = 0;
+    for relays in [5, 8, 3, 2, 1, 20] {
+        let each: Vec<(Vec<u16>, f64)> = (0..count(24))
+            .into_par_iter()
+            .map(|seed| {
+                let wild = Wild::new(seed, relays, 1);
+                let outcome = run(setup(&wild)).unwrap();
+                (named(&outcome), share(&wild, &outcome))
+            })
+            .collect();
+        let wrong = each.iter().filter(|(named, _)| !named.is_empty()).count();
+        let mut shares: Vec<f64> = each.iter().map(|it| it.1).collect();
+        println!(
+            "N = {relays}: {wrong} of {} named somebody, median {:.4}",
+            each.len(),
+            quantile(&mut shares, 0.5)
+        );
+        let who: Vec<_> = (0..)
+            .zip(&each)
+            .filter(|(_, (named, _))| !named.is_empty())
+            .collect();
+        println!("{who:?}");
+        all += wrong;
+    }
+    assert_eq!(all, 0);
+}
+
+/// The ends are silent at first, and begin late; or stop early: behind a hill, of which only they know.
+#[test]
+fn measurements_of_an_end_may_come_late_or_stop() {
+    let [begin, late, end] = [0, 60_000, 10_000_000].map(Instant::from_millis);
+    let mut medians = Vec::new();
+    for (what, during) in [
+        ("from the beginning", [begin, end]),
+        ("after a minute", [late, end]),
+        ("for a minute", [begin, late]),
+        ("never", [begin, begin]),
+    ] {
+        let one = |seed| {
+            let mut late = setup(&Wild::new(seed, 5, 1));
+            let sky = late.sky.as_mut().unwrap();
+            sky.scene.mu_nlos *= 8.0;
+            sky.ends_during = during;
+            let truth = sky.scene.clone();
+            let outcome = run(late).unwrap();
+            let goals = outcome.stands.last().unwrap().goals.clone();
+            goals.map_or(0.0, |goals| truth.chain_sir(&goals))
+        };
+        let sirs: Vec<f64> = (0..count(24)).into_par_iter().map(one).collect();
+        medians.push((what, sirs));
+    }
+    let (_, first) = &medians[0];
+    for (what, sirs) in &medians {
+        let mut parts: Vec<f64> = sirs
+            .iter()
+            .zip(first)
+            .map(|(sir, best)| sir / best)
+            .collect();
+        let [tenth, median] = [0.1, 0.5].map(|part| quantile(&mut parts, part));
+        println!(
+            "ends that measure {what}: {median:.4} of the SIR in the median, {tenth:.4} in nine of ten"
+        );
+        assert!(median > 0.97 || *what == "never", "{what}");
+    }
+}
