@@ -77,6 +77,58 @@ impl ChannelLoad {
         baud
     }
 
+    /// Whether a channel of `baud` bit/s carries them, where a silent neighbour is asked after `probe_after`: the one rule that `cargo chain`,
+    /// `cargo provision` and the Linux companion go by.
+    ///
+    /// ```
+    /// use uav_relay::{ChannelLoad, Duration};
+    ///
+    /// let all = ChannelLoad { in_range: 50, overhead: 12 };
+    /// let usual = Duration::from_millis(5_000);
+    /// let full = all.carried(57_600, usual).expect_err("a slow radio");
+    /// assert_eq!((full.least_baud, full.most_in_range), (229_974, 13));
+    /// // Signs of life that are fewer fit.
+    /// assert_eq!(full.least_probe_after, Duration::from_millis(19_963));
+    /// assert_eq!(all.carried(57_600, full.least_probe_after), Ok(()));
+    /// ```
+    ///
+    /// # Errors
+    /// [`ChannelFull`] says what would fit.
+    pub const fn carried(self, baud: u32, probe_after: Duration) -> Result<(), ChannelFull> {
+        let least_baud = self.least_baud(probe_after);
+        if baud >= least_baud {
+            return Ok(());
+        }
+        // In whole milliseconds, as options have it.
+        let least_ms = self.least_probe_after(baud).as_micros().div_ceil(1_000);
+        Err(ChannelFull {
+            in_range: self.in_range,
+            least_baud,
+            least_probe_after: Duration::from_micros(least_ms.saturating_mul(1_000)),
+            most_in_range: self.most_in_range(baud, probe_after),
+        })
+    }
+
+    /// How many relays in one range such a channel carries.
+    const fn most_in_range(self, baud: u32, probe_after: Duration) -> u16 {
+        let pair = Self {
+            in_range: 2,
+            ..self
+        };
+        let needed = pair.needed();
+        let room = probe_after.as_micros().saturating_mul(baud as u64);
+        let pairs = room / if needed == 0 { 1 } else { needed };
+        // Fewer than there are, since these are too many.
+        let most = self.in_range.saturating_sub(1) as u64;
+        #[expect(clippy::cast_possible_truncation, reason = "it is not above the most")]
+        let pairs = if pairs < most {
+            pairs as u16
+        } else {
+            most as u16
+        };
+        pairs.saturating_add(1)
+    }
+
     /// The least `probe_after` with which a channel of `baud` bit/s carries them; `dead_after` is to be three times that.
     pub const fn least_probe_after(self, baud: u32) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
@@ -101,6 +153,34 @@ impl ChannelLoad {
         }
     }
 }
+
+/// What a channel that does not carry its relays needs: one of the three.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ChannelFull {
+    /// Relays that hear each other.
+    pub in_range: u16,
+    /// The least data rate that carries them, bit/s.
+    pub least_baud: u32,
+    /// The least [`Settings::probe_after`](crate::Settings::probe_after) with which the channel carries them, in whole milliseconds.
+    /// [`Settings::dead_after`](crate::Settings::dead_after) is to be three times that.
+    pub least_probe_after: Duration,
+    /// How many of them it carries.
+    pub most_in_range: u16,
+}
+
+impl core::fmt::Display for ChannelFull {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let ms = self.least_probe_after.as_micros() / 1_000;
+        write!(
+            f,
+            "{} relays share the channel at one place: it needs {} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {} relays in range",
+            self.in_range, self.least_baud, self.most_in_range
+        )
+    }
+}
+
+impl core::error::Error for ChannelFull {}
 
 #[cfg(test)]
 mod tests {

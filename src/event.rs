@@ -41,7 +41,7 @@ pub enum Event {
         node: u16,
     },
     /// A node was loaded with another mission, or flies one that this relay cannot come to; its messages are ignored. An operator loads
-    /// both with the same mission before take-off.
+    /// both with the same mission before take-off. Raised once a minute for each node.
     MissionMismatch {
         /// Which one.
         node: u16,
@@ -54,17 +54,17 @@ pub enum Event {
         node: u16,
     },
     /// Five handshakes in a row under a node's number, with the right key, are of an older epoch than is known of it, or of the same one
-    /// begun anew, and nothing newer between them: its epoch went back or stood still at its last start, and what it says is refused.
+    /// begun anew with the same seed, and nothing newer between them: its epoch went back or stood still at its last start, and what it says is refused.
     /// An operator raises that node's epoch and starts it again, or switches this relay and its other neighbours off and on. A frame that
-    /// was recorded and is played again and again does not raise it, but as many as these of one start, played in order, do.
+    /// was recorded and is played again and again does not raise it, but as many as these of one start, played in order, do. This relay's
+    /// own number: its neighbours show an epoch of it that is newer than its own, and it stands down, with [`Event::IndexTaken`].
     EpochWentBack {
         /// Which one.
         node: u16,
     },
-    /// Another node uses a number that is taken. Its own: this relay may have no set-point until the other one is gone, see
-    /// `Relay::stands_down`. A neighbour's: it is heard at both of the ports. An operator lands one of the two and gives it the right
-    /// number. Raised once until nothing was heard of the other for twice `dead_after`. Where frames are signed, somebody without the key
-    /// can raise it, and nothing more.
+    /// Two nodes use one number. This relay's own: of the two at most one has a setpoint, see `Relay::stands_down`. A neighbour's: it is
+    /// received at both of the ports. An operator lands one of the two and gives it the right number. Raised once until nothing was received
+    /// of the other node for twice `dead_after`. Where frames are signed, somebody without the key can raise it, and nothing more.
     IndexTaken {
         /// Which number.
         node: u16,
@@ -80,21 +80,23 @@ pub enum Event {
     NoQuorum,
     /// A newer mission has come: `Relay::upload`. Store it, and hand it to `Relay::resume` when the relay is next switched on.
     Uploaded,
-    /// A newer mission was refused, since it has no line on earth. It flies on as before. Raised once for each such mission. An operator uploads
-    /// one with sites that are as far apart as its distance says.
+    /// A newer mission was refused, since it has no line on earth, or leaves the relay's own geofence. It flies on as before, and the ground is
+    /// told. Raised once for each such mission. An operator uploads one with sites that are as far apart as its distance says, and within the
+    /// geofence.
     UploadRefused {
         /// What is wrong with it.
         why: LineError,
     },
     /// This relay believes something else of the interference than before: `Relay::belief`. New places follow.
     Believed,
-    /// Raised at the leader: what the relays hear is not of one source on the ground, or says too little. The last belief is kept, see
-    /// `Relay::unfit`.
+    /// Raised at the leader: what the relays hear is not of one source on the ground, says too little, or does not fit together and nobody
+    /// knows who is wrong. `Relay::unfit` says which of these.
     InterfererUnclear,
-    /// A relay hears something else of the interference than all the others, by more than 6 dB: what it measures is left out. An operator
-    /// looks at its receiver.
+    /// A node measures something else of the interference than follows from what all the others measure: that is left out until it fits
+    /// again. An operator looks at its receiver. An end is named by the leader alone, a relay that hears nothing at all by itself alone. With four relays or
+    /// fewer nobody can tell which of them is wrong ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
-        /// Which one.
+        /// Which one: 0 for the transmitter, one more than the relays that were loaded for the receiver.
         node: u16,
     },
     /// The chain has agreed to fly it: `Relay::mission`, `Relay::version` and `Relay::sites` have new values, and new places follow.
@@ -114,6 +116,18 @@ const LAST: &[Event] = &[
     #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Sites,
+    },
+    #[cfg(feature = "upload")]
+    Event::UploadRefused {
+        why: LineError::Altitude,
+    },
+    #[cfg(feature = "upload")]
+    Event::UploadRefused {
+        why: LineError::Lateral,
+    },
+    #[cfg(feature = "upload")]
+    Event::UploadRefused {
+        why: LineError::Length,
     },
     Event::Uploaded,
     Event::Adopted,

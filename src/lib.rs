@@ -40,7 +40,7 @@ pub mod wire;
 mod without_quorum;
 
 pub use channel::Channel;
-pub use channel_load::ChannelLoad;
+pub use channel_load::{ChannelFull, ChannelLoad};
 pub use event::Event;
 pub use field::{Field, FieldPoint};
 pub use geodetic::Geodetic;

@@ -49,6 +49,16 @@ impl ViewId {
         }
     }
 
+    /// The same view, or one on the way to it, where that is more than `most` numbers after this one.
+    pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
+        let number = self.number() + most;
+        if view.number() > number {
+            Self(number << NODE | view.proposer() as u32)
+        } else {
+            view
+        }
+    }
+
     /// What is added to the digest of a mission for the passes of a view: views of one number, and some thousand in a row, differ.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();

@@ -101,7 +101,7 @@ local messages = {
         { name = "holds_version", kind = "u16", unit = "", text = "version of that" },
         { name = "offer_number", kind = "u16", unit = "", text = "number for the offer that answers it; 0 at a node that takes none" },
         { name = "hears", kind = "u8", unit = "", text = "the nodes on this side that it hears, bit 0 for the nearest, bit 3 for the fourth" },
-        { name = "flags", kind = "flags", words = { "ask", "form", "fresh", "ready", "flies" }, unit = "", text = "flags" },
+        { name = "flags", kind = "flags", words = { "ask", "form", "fresh", "ready", "flies", "whole", "refused" }, unit = "", text = "flags" },
     } },
     [0x0b] = { name = "Proposal", fields = {
         { name = "mission", kind = "digest", unit = "", text = "digest of the mission that the view is to fly" },
@@ -144,7 +144,7 @@ local messages = {
         { name = "y_m", kind = "f32", unit = "m", text = "where the sender flies to across the line, y" },
         { name = "altitude_m", kind = "f32", unit = "m", text = "and its altitude" },
         { name = "apart_m", kind = "f32", unit = "m", text = "toward Rx, how far before the fence the sender stays along x; toward Tx 0" },
-        { name = "flags", kind = "flags", words = { "arrived", "agrees", "needs", "needed", "left" }, unit = "", text = "flags" },
+        { name = "flags", kind = "flags", words = { "arrived", "agrees", "needs", "needed", "left", "halts", "unplaced" }, unit = "", text = "flags" },
     } },
     [0x0e] = { name = "Offer", fields = {
         { name = "version", kind = "u16", unit = "", text = "version of the mission" },
@@ -227,6 +227,11 @@ local messages = {
         { name = "mission", kind = "digest", unit = "", text = "digest of the mission that the relays were loaded with" },
         { name = "power_w", kind = "f32", unit = "W", text = "mean received power, with the noise of its receiver" },
     } },
+    [0x14] = { name = "Claim", fields = {
+        { name = "claim", kind = "u32", unit = "", text = "claim number" },
+        { name = "other_claim", kind = "u32", unit = "", text = "claim number that the node that claims has received last from another node of its number; 0 for none" },
+        { name = "flags", kind = "flags", words = { "passive", "echo" }, unit = "", text = "flags" },
+    } },
 }
 
 local handshake = { name = "Handshake", fields = {
@@ -267,6 +272,7 @@ proto.experts = { wrong }
 local plain = {
     u8 = { 1, ProtoField.uint8 },
     u16 = { 2, ProtoField.uint16 },
+    u32 = { 4, ProtoField.uint32 },
     u64 = { 8, ProtoField.uint64 },
     i32 = { 4, ProtoField.int32 },
     f32 = { 4, ProtoField.float },

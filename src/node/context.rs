@@ -5,6 +5,10 @@ use super::timing::{longest_lease, tenths};
 use super::view::electorate::Held;
 #[cfg(feature = "upload")]
 use crate::guard::config::Geofence;
+#[cfg(feature = "upload")]
+use crate::line::LineError;
+#[cfg(feature = "upload")]
+use crate::mission::MissionConfig;
 use crate::mission::{Band, Heading, Interference, Mission};
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
@@ -30,6 +34,9 @@ pub(crate) struct Member {
     /// The distance of that, m.
     #[cfg(feature = "upload")]
     pub(crate) loaded_m: f32,
+    /// The altitudes of that, m.
+    #[cfg(feature = "upload")]
+    loaded_band: Band,
     /// The mission that it flies.
     pub(crate) active: MissionId,
     /// The sites of that, if it has its own: then places are along the line between these.
@@ -51,6 +58,8 @@ impl Member {
             digest,
             #[cfg(feature = "upload")]
             loaded_m: mission.config().distance_m,
+            #[cfg(feature = "upload")]
+            loaded_band: altitudes_of(mission.config()),
             active: MissionId { version: 0, digest },
             #[cfg(feature = "upload")]
             sites: None,
@@ -96,6 +105,44 @@ impl Member {
         Some(fence)
     }
 
+    /// Returns what is wrong where a relay that flies `config` could be sent outside of the box of its settings. With sites of its own
+    /// the box is as much longer as the line.
+    ///
+    /// The room of a mission is the same at all relays. So that they decide alike, the box counts without what it was widened by to the
+    /// altitude that this relay alone holds.
+    #[cfg(feature = "upload")]
+    pub(crate) fn encloses(&self, config: &MissionConfig, sited: bool) -> Result<(), LineError> {
+        let Some(guard) = self.settings.guard else {
+            return Ok(());
+        };
+        let fence = guard.fence;
+        let own_m = self.settings.profile.map(|own| own.altitude_m);
+        let edge = |edge_m: f32, loaded_m: f32| match own_m {
+            Some(own_m) if own_m.to_bits() == edge_m.to_bits() => loaded_m,
+            _ => edge_m,
+        };
+        let altitudes_m = Band {
+            least_m: edge(fence.least_altitude_m, self.loaded_band.least_m),
+            most_m: edge(fence.most_altitude_m, self.loaded_band.most_m),
+        };
+        let is_within = |inner: Band, outer: Band| {
+            inner.least_m >= outer.least_m && inner.most_m <= outer.most_m
+        };
+        let sides_m = Band {
+            least_m: fence.least_y_m,
+            most_m: fence.most_y_m,
+        };
+        if !is_within(altitudes_of(config), altitudes_m) {
+            Err(LineError::Altitude)
+        } else if !is_within(config.lateral, sides_m) {
+            Err(LineError::Lateral)
+        } else if !sited && config.distance_m > fence.most_x_m.max(self.loaded_m) {
+            Err(LineError::Length)
+        } else {
+            Ok(())
+        }
+    }
+
     /// Its place from the leader on, from 1, and how many there are, while nothing was counted.
     pub(crate) const fn place_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
@@ -108,6 +155,16 @@ impl Member {
     /// The digest that passes bear in the view agreed on.
     pub(crate) const fn pass_digest(&self) -> u16 {
         self.active.digest.wrapping_add(self.view.mark())
+    }
+}
+
+/// The altitudes of a mission, m: its band, and the one that the relays have in common.
+#[cfg(feature = "upload")]
+fn altitudes_of(config: &MissionConfig) -> Band {
+    let common_m = config.common.altitude_m;
+    Band {
+        least_m: config.band.least_m.min(common_m),
+        most_m: config.band.most_m.max(common_m),
     }
 }
 

@@ -59,23 +59,10 @@ struct Current {
     done: Option<Instant>,
 }
 
-/// How long a relay has held a lease.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Tenure {
-    /// It holds none.
-    None,
-    /// It holds one, and has not for long.
-    Recent,
-    /// For twice `dead_after`, with no gap as long as that.
-    Settled,
-}
-
 /// The lease of one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Lease {
     state: LeaseState,
-    /// Since when it has held one, with no long gap, and until when.
-    held: Option<(Instant, Instant)>,
     current: Option<Current>,
     /// Until when others may count on this relay.
     relied_on: Instant,
@@ -83,6 +70,8 @@ pub(crate) struct Lease {
     rest: (ViewId, Instant),
     /// Until when members of views before may hold what was agreed on there, as far as that is known.
     bound: Option<Instant>,
+    /// True once all relays of the view are known to have accepted it, or to have taken part in a pulse.
+    is_whole: bool,
     /// At the leader: when the next pulse begins, and how long they took lately.
     next_at: Option<Instant>,
     slowest: Duration,
@@ -99,11 +88,11 @@ impl Lease {
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
             state: LeaseState::Open,
-            held: None,
             current: None,
             relied_on: now + settings.dead_after,
             rest: (ViewId::LOADED, now),
             bound: Some(now),
+            is_whole: false,
             next_at: None,
             slowest: Duration::from_micros(0),
             retransmit: Retransmit::new(seed),
@@ -127,22 +116,6 @@ impl Lease {
     /// Whether nothing has been agreed on in this view, as far as is known here.
     pub(crate) const fn is_open(&self) -> bool {
         matches!(self.state, LeaseState::Open)
-    }
-
-    /// How long it has held one, as of `now`.
-    pub(crate) fn tenure(&self, now: Instant, settings: &Settings) -> Tenure {
-        let long = settings.dead_after.times(2);
-        let held = self.held.filter(|(_, until)| now.since(*until) <= long);
-        match held {
-            Some((since, _)) if now.since(since) >= long => Tenure::Settled,
-            _ if self.until().is_some_and(|until| until > now) => Tenure::Recent,
-            _ => Tenure::None,
-        }
-    }
-
-    /// It gives way to another relay of its number.
-    pub(crate) const fn give_way(&mut self) {
-        self.held = None;
     }
 
     /// How long a silence has to be until it says something.
@@ -180,6 +153,7 @@ impl Lease {
         let known = self.bound.filter(|_| self.rest.0 == base);
         self.bound = known.map(|until| until.max(rest).max(self.relied_on));
         self.rest = (view, rest);
+        self.is_whole = false;
         self.state = LeaseState::Open;
         self.current = None;
         self.next_at = None;
@@ -188,8 +162,16 @@ impl Lease {
     }
 
     /// All have accepted the view that this relay is in.
-    pub(crate) const fn commit(&mut self) {
+    pub(crate) fn commit(&mut self) {
         self.bound = Some(self.rest.1);
+        // The view that relays are switched on in was accepted by nobody.
+        self.is_whole |= self.rest.0 != ViewId::LOADED;
+    }
+
+    /// Returns true once all relays of the view are known to be in it.
+    #[cfg(feature = "upload")]
+    pub(crate) const fn is_whole(&self) -> bool {
+        self.is_whole
     }
 
     /// The leader has heard that all agree on their places: there is something to hold from now on.
@@ -244,12 +226,10 @@ impl Lease {
             return;
         }
         let until = pulse.handed_on + from_tenths(pulse.span);
+        self.is_whole = true;
         if until > now {
             let until = self.until().map_or(until, |at| at.max(until));
             self.state = LeaseState::Until(until);
-            let gap = context.settings().dead_after.times(2);
-            let held = self.held.filter(|(_, until)| now.since(*until) <= gap);
-            self.held = Some((held.map_or(now, |(since, _)| since), until));
         }
     }
 

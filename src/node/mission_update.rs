@@ -18,7 +18,8 @@
 //! | a hello of a node that holds a newer mission | a hello, so that it is offered here |
 //! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hello; an offer to the neighbour on the other side; a request for a view |
 //! | an offer of one that is not newer | a hello |
-//! | an offer of one for which there is no line on earth | it is counted; `Event::UploadRefused`, once |
+//! | an offer of one for which there is no line on earth, or that leaves the relay's own geofence | it is counted; `Event::UploadRefused`, once; from now on hellos name that mission, as refused; a hello |
+//! | a hello that names the mission held, as refused | hellos say so, too, until it is flown or a newer one is held; once a hello to the neighbour on the other side |
 //! | an offer that answers no hello of late | it is counted as stale; a hello, which the next one can answer |
 //! | a proposal is due, and the node after holds an older mission or has not said which | it is offered the newer one first |
 //! | an offer is owed, and the neighbour has said no hello of late | a hello that asks, and the offer answers what comes back |
@@ -114,7 +115,7 @@ pub(crate) struct MissionUpdate {
     /// The same, if it was uploaded.
     #[cfg(feature = "upload")]
     upload: Option<Upload>,
-    /// What was refused last, for want of a line.
+    /// What was refused last, here or by a relay beyond a neighbour.
     #[cfg(feature = "upload")]
     refused: Option<MissionId>,
     /// The number that hellos bear now, and the one before.
@@ -262,6 +263,17 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
+    /// The mission that was refused, if it is one of those that a relay flying `active` could fly next: the one held, or a newer one.
+    pub(crate) fn refused_of(&self, active: MissionId) -> Option<MissionId> {
+        self.refused
+            .filter(|refused| *refused >= self.latest && *refused != active)
+    }
+
+    /// A neighbour says that the mission of that number is refused; returns true where it is the one held, and this is new.
+    pub(crate) fn hear_refused(&mut self, refused: MissionId) -> bool {
+        refused == self.latest && self.refused.replace(refused) != Some(refused)
+    }
+
     /// Holds `upload` from now on, if it is for this relay and newer than what it holds.
     pub(crate) fn hold(&mut self, member: &Member, upload: &Upload) -> Offered {
         let id = upload.id();
@@ -272,6 +284,7 @@ impl MissionUpdate {
             Ok(()) => {
                 self.latest = id;
                 self.upload = Some(*upload);
+                self.refused = None;
                 Offered::Held
             }
             Err(UploadError::Line(why)) => Offered::Refused {
@@ -339,6 +352,9 @@ fn fits(member: &Member, upload: &Upload) -> Result<(), UploadError> {
         return Err(UploadError::Base);
     }
     let is_other = config.distance_m.to_bits() != member.loaded_m.to_bits();
+    member
+        .encloses(config, upload.sites().is_some())
+        .map_err(UploadError::Line)?;
     match upload.sites() {
         // Every relay checks that, whether it flies along a line on earth or not: all hold it, or none does.
         Some(sites) => line::check(sites, config.distance_m).map_err(UploadError::Line),

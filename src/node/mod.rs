@@ -15,7 +15,7 @@
 //! | above the layers | |
 //! | --- | --- |
 //! | `dispatch` | [`Node`], which holds the layers: a relay as its facade sees it. Begin there, with `incoming` |
-//! | `namesake` | another node with this relay's number, and which of the two stands down |
+//! | `duplicate` | another node with this relay's number, and which of the two becomes passive |
 //! | `steering` | the setpoint on its way to the agreed place |
 //!
 //! | below the layers | |
@@ -31,9 +31,9 @@
 
 pub(crate) mod context;
 mod dispatch;
+pub(crate) mod duplicate;
 mod lease;
 pub(crate) mod mission_update;
-pub(crate) mod namesake;
 pub(crate) mod neighbour;
 mod numbering;
 mod retransmit;

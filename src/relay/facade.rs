@@ -76,8 +76,10 @@ pub struct Relay {
 impl Relay {
     /// A relay that has just been switched on at `now`; relay 1 (in a field relay N) begins by itself.
     ///
-    /// `seed` should differ from relay to relay and from one start to the next (a chip's number, a noisy ADC); the timing of
-    /// repetitions, the numbering of sweeps and which frames a guard takes for old ones depend on it, never a placement.
+    /// `seed` must differ from board to board, also where image and configuration are copies of each other, and should differ from one
+    /// start to the next: a chip's unique number, a random number generator, the noise of RAM after power-up. Two relays with one index tell
+    /// each other apart by it, so that at most one of them has a setpoint. The timing of repetitions, the numbering of sweeps and
+    /// which frames a guard takes for old ones depend on it, too, but no placement.
     ///
     /// # Errors
     /// [`SetupError`] names the part of `identity` or `settings` that does not fit.
@@ -134,7 +136,9 @@ impl Relay {
     fn begin(&mut self, identity: Identity, seed: u32, now: Instant) {
         #[cfg(feature = "auth")]
         {
-            self.session = self.node.member().settings.auth.map(Session::new);
+            let number = self.node.claim_number();
+            let auth = self.node.member().settings.auth;
+            self.session = auth.map(|auth| Session::new(auth, number));
         }
         self.node.begin(identity, seed, now);
     }
@@ -181,16 +185,16 @@ impl Relay {
                         incoming::addressed(&mut self.node, now, self.network, port, plain);
                     let (side, frame) = match addressed {
                         Some(Addressed::By(side, frame)) => (side, frame),
-                        Some(Addressed::ByNamesake(frame)) => {
+                        Some(Addressed::ByDuplicate(frame)) => {
                             #[cfg(feature = "auth")]
-                            let claim = match &self.session {
-                                Some(session) => Some(signed::claim(session, &frame)),
-                                None => incoming::claim(&frame),
+                            let sender = match &self.session {
+                                Some(session) => Some(session.sender(&frame)),
+                                None => incoming::sender(&self.node, &frame),
                             };
                             #[cfg(not(feature = "auth"))]
-                            let claim = incoming::claim(&frame);
-                            if let Some(claim) = claim {
-                                self.node.hear_namesake(now, claim);
+                            let sender = incoming::sender(&self.node, &frame);
+                            if let Some(sender) = sender {
+                                self.node.hear_duplicate(now, sender);
                             }
                             continue;
                         }
@@ -274,7 +278,7 @@ impl Relay {
         };
         #[cfg(feature = "auth")]
         if let Some(session) = &mut self.session {
-            if self.node.stands_down() {
+            if self.node.is_passive() {
                 return None;
             }
             // A counter is never used twice: after four billion frames a new epoch is due.

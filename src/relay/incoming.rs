@@ -2,7 +2,7 @@
 
 use super::port::Port;
 use crate::node::Node;
-use crate::node::namesake::Claim;
+use crate::node::duplicate::Sender;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
@@ -14,7 +14,7 @@ pub(super) enum Addressed<'a> {
     /// By a neighbour, or a node that might become one.
     By(Side, Opened<'a>),
     /// Under this relay's own number, whoever it is for.
-    ByNamesake(Opened<'a>),
+    ByDuplicate(Opened<'a>),
 }
 
 /// One frame, decoded from COBS: whether it is intact, and what it is to this relay.
@@ -44,10 +44,10 @@ pub(super) fn addressed<'a>(
         bump(&mut stats.foreign);
         return None;
     }
-    let namesake = header.sender == own;
+    let duplicate = header.sender == own;
     if header.destination != own && port == Port::Shared {
         bump(&mut stats.overheard);
-        return namesake.then_some(Addressed::ByNamesake(frame));
+        return duplicate.then_some(Addressed::ByDuplicate(frame));
     }
     let through = match port {
         Port::Upstream => Some(Side::Upstream),
@@ -62,8 +62,8 @@ pub(super) fn addressed<'a>(
         return Some(Addressed::By(side, frame));
     }
     bump(&mut node.stats_mut().misaddressed);
-    if namesake {
-        return Some(Addressed::ByNamesake(frame));
+    if duplicate {
+        return Some(Addressed::ByDuplicate(frame));
     }
     if let Some(through) = through {
         node.hear_at_both(now, through, header.sender);
@@ -71,19 +71,15 @@ pub(super) fn addressed<'a>(
     None
 }
 
-/// What a frame under this relay's own number says of its sender, at a relay that asks for no tag; `None` if nothing.
-pub(super) fn claim(frame: &Opened<'_>) -> Option<Claim> {
+/// Returns what a frame under this relay's own number says of its sender, at a relay without a key; `None` if it is no message.
+pub(super) fn sender(node: &Node, frame: &Opened<'_>) -> Option<Sender> {
     if frame.tag.is_some() {
         return None;
     }
-    let message = Message::decode(frame.body).ok()?;
-    let fresh = matches!(message, Message::Hello(hello) if hello.fresh);
-    let hello = matches!(message, Message::Hello(_));
-    let takes_part = hello && !fresh || message.is_of_a_view() || message.is_of_a_proposal();
-    Some(if takes_part {
-        Claim::TakesPart
-    } else {
-        Claim::There
+    Some(match Message::decode(frame.body).ok()? {
+        Message::Claim(claim) if claim.echo => return None,
+        Message::Claim(claim) => node.rival(claim),
+        _ => Sender::Unknown,
     })
 }
 

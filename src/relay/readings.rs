@@ -35,7 +35,23 @@ impl Relay {
         self.node.final_setpoint()
     }
 
-    /// What keeps the drone from the agreed place at `side`, where `Settings::guard` is set.
+    /// Returns true unless the drone is known to be out of order with a flown neighbour: it must not be engaged before its pilot has flown
+    /// it to its own side along the line. Hand it to `Autopilot::handle_ready`.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::Settings;
+    ///
+    /// assert!(relay(Settings::default()).is_ready());
+    /// ```
+    pub fn is_ready(&self) -> bool {
+        let wrong = |side| self.hold_reason(side) == Some(HoldReason::Order);
+        !(wrong(Side::Upstream) || wrong(Side::Downstream))
+    }
+
+    /// Returns what keeps the drone from the agreed place on `side`, where `Settings::guard` is set. While the drone is not flown only
+    /// [`HoldReason::Order`] is possible.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.node.hold_reason(side)
     }
@@ -66,10 +82,11 @@ impl Relay {
         self.node.phase()
     }
 
-    /// Whether it takes part in nothing and has no set-point, because another relay that does take part uses its number. That is over
-    /// with [`clear_index_taken`](Self::clear_index_taken), or once nothing was heard of the other for twice `Settings::dead_after`.
+    /// Returns true while this relay is passive: it has no setpoint and takes part in nothing, because another relay uses its number and
+    /// has the larger claim to it. It becomes active with [`clear_index_taken`](Self::clear_index_taken), or once nothing was received
+    /// of the other relay for twice `Settings::dead_after`, and has a place again once the chain has agreed anew.
     pub fn stands_down(&self) -> bool {
-        self.node.stands_down()
+        self.node.is_passive()
     }
 
     /// What has been counted since the relay was switched on.

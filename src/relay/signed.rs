@@ -2,13 +2,17 @@
 
 use super::incoming::read;
 use crate::node::Node;
-use crate::node::namesake::Claim;
+use crate::node::duplicate::Sender;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::frame::{self, FrameBuf, Header, Opened};
 use crate::wire::message::Message;
 use crate::wire::session::{Checked, Session};
+
+/// One in so many questions to a silent neighbour goes with a handshake that asks: the neighbour may believe another node of this relay's
+/// number, and its answer shows which.
+const QUESTIONS: u16 = 4;
 
 /// A frame from a neighbour, or from somebody who says so.
 pub(super) fn receive(
@@ -18,7 +22,11 @@ pub(super) fn receive(
     side: Side,
     frame: &Opened<'_>,
 ) {
-    match session.check(frame.header.sender, frame) {
+    let checked = session.check(frame.header.sender, frame);
+    if let Some(rival) = session.poll_rival() {
+        node.hear_duplicate(now, Sender::Rival(rival));
+    }
+    match checked {
         Checked::Fresh { first } => {
             node.is_signed_right(side, frame.header.sender);
             node.meet(side, frame.header.sender, first);
@@ -49,15 +57,6 @@ pub(super) fn receive(
     }
 }
 
-/// What a frame under this relay's own number says of its sender.
-pub(super) fn claim(session: &Session, frame: &Opened<'_>) -> Claim {
-    if session.is_ahead(frame) {
-        Claim::Ahead
-    } else {
-        Claim::Unproven
-    }
-}
-
 /// Writes the next frame with a tag, a handshake before anything else.
 pub(super) fn next(
     node: &mut Node,
@@ -66,11 +65,30 @@ pub(super) fn next(
     header: &mut Header,
     frame: &mut FrameBuf,
 ) -> Option<(Side, usize)> {
+    if let Some(number) = node.poll_sessions() {
+        session.restart(number);
+    }
+    if let Some((_, to)) = node.poll_claim() {
+        session.ask(to);
+    }
     session.pin(node.neighbours());
     let len = if let Some(len) = greeting(session, header, frame) {
         len
     } else {
         let (_, to, message) = node.poll_message(now)?;
+        if let Message::Heartbeat { ask, .. } = message
+            && ask != 0
+            && ask % QUESTIONS == 0
+        {
+            session.ask(to);
+        }
+        if let Message::Hello(hello) = message
+            && hello.ask
+            && !hello.is_heard(header.sender, to)
+        {
+            // It may have been switched on since: then it reads nothing else, and has nothing to say by itself.
+            session.ask(to);
+        }
         say(session, to, &message, header, frame)?
     };
     let side = if header.destination < header.sender {

@@ -80,11 +80,11 @@ impl Relay {
         self.node.clear_lost(now, side);
     }
 
-    /// The other relay that used this one's number ([`Event::IndexTaken`](crate::Event::IndexTaken)) has landed, or has another number now: this one takes part
-    /// again, if it [stands down](Self::stands_down).
+    /// Reports that the other relay with this one's number ([`Event::IndexTaken`](crate::Event::IndexTaken)) has landed, or has another number
+    /// now: a relay that is [passive](Self::stands_down) becomes active, with a larger claim than the other one had.
     ///
     /// Constant work.
     pub fn clear_index_taken(&mut self, now: Instant) {
-        self.node.clear_namesake(now);
+        self.node.clear_duplicate(now);
     }
 }

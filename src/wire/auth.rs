@@ -72,7 +72,7 @@ pub struct Auth {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Auth {}
 
-/// The nonces of the two ends of a link. Each is an epoch and, below it, how many links the relay has begun since.
+/// The nonces of the two ends of a link. Each is an epoch and, below it, a number that counts links from the relay's claim number on.
 #[cfg(feature = "auth")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {

@@ -1,7 +1,7 @@
 //! Which frames a relay takes, and how it signs its own: one session with each node it talks to.
 //!
-//! For each node it talks to, a relay has a *nonce*: its epoch, and how many such entries it has made since it was switched
-//! on. A frame's tag covers the sender's nonce toward the receiver and the receiver's toward the sender, so a frame that was
+//! For each node it talks to, a relay has a *nonce*: its epoch, and below it a number that counts such entries from the relay's claim
+//! number on (`node::duplicate`). A frame's tag covers the sender's nonce toward the receiver and the receiver's toward the sender, so a frame that was
 //! recorded before either of them was switched on, or had forgotten the other, is worth nothing. What a relay has to know
 //! for that, the other's nonce, comes in a *handshake*: a frame whose body is the sender's nonce, the receiver's as far as the
 //! sender knows it, and whether the sender still lacks the proof that the receiver is there.
@@ -10,6 +10,8 @@
 //! | --- | --- |
 //! | a nonce below the one known, or a counter that has been taken | nothing; it is counted as a replay. Five of one older epoch in a row with rising counters, and nothing newer between them, are told: the node's epoch went back |
 //! | a nonce above the one known | the node has been switched on since: a new session begins |
+//! | a nonce below the one known, of the same epoch and of another claim number | another node of that number: it is answered, if it asks, so that it learns of the one that this relay believes |
+//! | a nonce of this relay's number that is not its own | another node of this relay's number, which the sender believes: see `node::duplicate` |
 //! | this relay's own nonce | it is proof that the node is there now |
 //! | a question, and none of that to learn by it here | nothing but the answer |
 //!
@@ -24,12 +26,16 @@
 
 use super::auth::{Auth, Nonces, Signer, TAG, Window, is_same};
 use super::frame::Opened;
+use crate::node::duplicate::{RAISED, Rival, Sender};
 
 /// Bytes of the body of a handshake.
 pub(crate) const HELLO: usize = 17;
 
 /// Nodes that a relay remembers at once.
 const PEERS: usize = 8;
+
+/// Nonces of one epoch whose numbers are this far apart, or less, are taken for those of one node.
+const NEAR: u32 = 1 << 12;
 
 /// So many handshakes of an older epoch in a row are no delayed ones.
 const WENT_BACK: u8 = 5;
@@ -40,6 +46,8 @@ struct Peer {
     node: u16,
     /// Whether a handshake is to be sent.
     handshake: bool,
+    /// Whether the handshake asks for an answer although the node is proven.
+    asks: bool,
     /// Whether it has shown this relay's nonce: it is there, and both know each other.
     proven: bool,
     /// When it was last used, on the session's own clock.
@@ -96,8 +104,12 @@ impl Peer {
 #[derive(Clone, Debug)]
 pub(crate) struct Session {
     auth: Auth,
-    /// Entries made since the start.
+    /// Claim number: the lower halves of this relay's nonces are above it.
+    claim: u32,
+    /// Lower half of the last nonce made.
     made: u32,
+    /// Claim to this relay's number that the last frame has shown.
+    rival: Option<Rival>,
     /// Counts uses of entries, wrapping.
     clock: u32,
     /// Nodes whose entries are kept.
@@ -125,11 +137,13 @@ pub(crate) enum Checked {
 }
 
 impl Session {
-    /// A session that knows nobody.
-    pub(crate) const fn new(auth: Auth) -> Self {
+    /// A session that knows nobody, of a node with claim number `claim`.
+    pub(crate) const fn new(auth: Auth, claim: u32) -> Self {
         Self {
             auth,
-            made: 0,
+            claim,
+            made: claim,
+            rival: None,
             clock: 0,
             pinned: [None; 2],
             peers: heapless::Vec::new(),
@@ -155,6 +169,29 @@ impl Session {
         }
     }
 
+    /// Forgets all nodes. Nonces made from now on are above `claim`, if that is a new claim number.
+    pub(crate) fn restart(&mut self, claim: u32) {
+        if claim > self.made {
+            self.claim = claim;
+            self.made = claim;
+        }
+        self.peers.clear();
+    }
+
+    /// Owes a handshake to node `to` that asks for one in return, by which its nodes learn this relay's nonce, and this relay theirs.
+    pub(crate) fn ask(&mut self, to: u16) {
+        self.make(to);
+        if let Some(peer) = self.touch(to) {
+            peer.handshake = true;
+            peer.asks = true;
+        }
+    }
+
+    /// Returns the claim to this relay's number that the last frame has shown.
+    pub(crate) const fn poll_rival(&mut self) -> Option<Rival> {
+        self.rival.take()
+    }
+
     /// A node that a handshake is to be sent to: it then has been.
     pub(crate) fn take_handshake(&mut self) -> Option<u16> {
         let peer = self.peers.iter_mut().find(|peer| peer.handshake)?;
@@ -168,13 +205,15 @@ impl Session {
     }
 
     /// The body of a handshake to node `to`.
-    pub(crate) fn handshake(&self, to: u16) -> [u8; HELLO] {
+    pub(crate) fn handshake(&mut self, to: u16) -> [u8; HELLO] {
         let mut body = [0; HELLO];
-        if let Some(peer) = self.find(to) {
-            let Nonces { sender, receiver } = peer.nonces(self.auth.epoch);
+        let epoch = self.auth.epoch;
+        if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
+            let Nonces { sender, receiver } = peer.nonces(epoch);
+            let asks = core::mem::take(&mut peer.asks) || !peer.proven;
             let told = sender.to_le_bytes().into_iter();
             let told = told.chain(receiver.to_le_bytes());
-            let told = told.chain([u8::from(!peer.proven)]);
+            let told = told.chain([u8::from(asks)]);
             for (place, byte) in body.iter_mut().zip(told) {
                 *place = byte;
             }
@@ -232,6 +271,9 @@ impl Session {
         if nonces.sender == 0 || !is_same(self.with(nonces).tag(frame.signed), told) {
             return None;
         }
+        if let Sender::Rival(rival) = self.owner(nonces.receiver) {
+            self.rival = Some(rival);
+        }
         self.make(sender);
         let epoch = self.auth.epoch;
         let peer = self.touch(sender)?;
@@ -245,6 +287,8 @@ impl Session {
         // A node that has shown this relay's nonce does not forget it without a new one of its own.
         let old = nonces.sender < peer.other || peer.proven && !proof;
         if old {
+            // Another node of this number has to learn of the one that this relay believes.
+            peer.handshake |= asks == 1 && is_rival(nonces.sender, peer.other);
             let [.., a, b, c, d] = nonces.sender.to_le_bytes();
             let epoch = u32::from_le_bytes([a, b, c, d]);
             let back = peer.older.count(epoch, frame.header.counter);
@@ -267,14 +311,36 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Whether `frame`, under this relay's own number, is a handshake with the right tag and a larger epoch than its own: whatever was
-    /// recorded of this relay has a smaller one. Work: that of one tag.
-    pub(crate) fn is_ahead(&self, frame: &Opened<'_>) -> bool {
-        let Some((nonces, told)) = said(frame).zip(frame.tag) else {
-            return false;
+    /// Returns what `frame`, under this relay's own number, says of its sender. Work: that of one tag.
+    pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
+        let epoch = self.auth.epoch;
+        let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
+        let nonces = if frame.handshake { said(frame) } else { own() };
+        let Some((nonces, told)) = nonces.zip(frame.tag) else {
+            return Sender::Unknown;
         };
-        nonces.sender >> 32 > u64::from(self.auth.epoch)
-            && is_same(self.with(nonces).tag(frame.signed), told)
+        if !is_same(self.with(nonces).tag(frame.signed), told) {
+            return Sender::Unknown;
+        }
+        self.owner(nonces.sender)
+    }
+
+    /// Returns which node of this relay's number has `nonce`; of an older epoch, or 0, it is not known.
+    fn owner(&self, nonce: u64) -> Sender {
+        let [number, epoch] = halves(nonce);
+        if epoch < self.auth.epoch {
+            return Sender::Unknown;
+        }
+        let made = (number & !RAISED).wrapping_sub(self.claim & !RAISED);
+        if epoch == self.auth.epoch && made <= (self.made - self.claim).saturating_add(NEAR) {
+            return Sender::Itself;
+        }
+        Sender::Rival(Rival {
+            number,
+            newer_epoch: epoch > self.auth.epoch,
+            passive: false,
+            is_current: true,
+        })
     }
 
     fn find(&self, node: u16) -> Option<&Peer> {
@@ -303,6 +369,7 @@ impl Session {
         let peer = Peer {
             node,
             handshake: false,
+            asks: false,
             proven: false,
             used: self.clock,
             own: made,
@@ -322,6 +389,22 @@ impl Session {
             }
         }
     }
+}
+
+/// Returns the number and the epoch of a nonce.
+const fn halves(nonce: u64) -> [u32; 2] {
+    let [a, b, c, d, e, f, g, h] = nonce.to_le_bytes();
+    [
+        u32::from_le_bytes([a, b, c, d]),
+        u32::from_le_bytes([e, f, g, h]),
+    ]
+}
+
+/// Returns true if two nonces of one epoch are of two nodes: their numbers are farther apart than those that a node makes. What a node adds
+/// to its claim number to keep its place makes no other node of it.
+const fn is_rival(one: u64, other: u64) -> bool {
+    let [[one, at], [other, epoch]] = [halves(one), halves(other)];
+    at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > NEAR
 }
 
 /// The nonces of its sender and its receiver that stand in a handshake; `None` if `frame` is none.

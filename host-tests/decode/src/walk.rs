@@ -66,6 +66,7 @@ fn one<'f>(kind: &'f Kind, rest: &mut Rest<'_>) -> Result<Value<'f>, String> {
     Ok(match kind {
         Kind::U8 => Value::Unsigned(rest.byte()?.into()),
         Kind::U16 => Value::Unsigned(u16::from_le_bytes(rest.take()?).into()),
+        Kind::U32 => Value::Unsigned(u32::from_le_bytes(rest.take()?).into()),
         Kind::U64 => Value::Unsigned(u64::from_le_bytes(rest.take()?)),
         Kind::I32 => Value::Signed(i32::from_le_bytes(rest.take()?).into()),
         Kind::F32 => Value::Single(f32::from_le_bytes(rest.take()?)),

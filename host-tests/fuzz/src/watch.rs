@@ -19,9 +19,9 @@ use frames::Frames;
 pub use frames::NETWORK;
 
 /// Frames that a relay can owe at once: a pass or what came of one, a sign that it is busy; the decision on a proposal; a pulse, and
-/// what came of it; to either side a heartbeat, four hellos, a fence, an offer and a hello to the ground; a handshake to each of
+/// what came of it; to either side a heartbeat, four hellos, a fence, an offer and a hello to the ground; a claim and an echo of one; a handshake to each of
 /// the eight nodes that it remembers.
-const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 8;
+const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 2 + 8;
 
 /// Events that can be pending at once.
 const MOST_EVENTS: usize = 14;
@@ -262,6 +262,7 @@ impl Watched {
         // One that stands down flies nothing, nor does one whose line has changed before the chain has agreed anew.
         let moved = self.sites != self.relay.sites();
         let silent = self.relay.stands_down() || moved;
+        let before = self.setpoint;
         self.setpoint = setpoint.or(self.setpoint.filter(|_| !silent));
         assert_eq!(setpoint, self.setpoint, "a place that was taken away");
         let Some(place) = setpoint else {
@@ -274,15 +275,23 @@ impl Watched {
                 let longer_m = self.relay.mission().config().distance_m - self.loaded_m;
                 fence.most_x_m += longer_m;
             }
-            let x = fence.least_x_m..=fence.most_x_m;
-            let y = fence.least_y_m..=fence.most_y_m;
-            let altitude = fence.least_altitude_m..=fence.most_altitude_m;
-            assert!(
-                x.contains(&place.x_m)
-                    && y.contains(&place.y_m)
-                    && altitude.contains(&place.altitude_m),
-                "{place:?} outside of {fence:?}"
-            );
+            // It begins anywhere, and from outside the fence it goes no farther out.
+            let before = before.unwrap_or(place);
+            for (is, was, least, most) in [
+                (place.x_m, before.x_m, fence.least_x_m, fence.most_x_m),
+                (place.y_m, before.y_m, fence.least_y_m, fence.most_y_m),
+                (
+                    place.altitude_m,
+                    before.altitude_m,
+                    fence.least_altitude_m,
+                    fence.most_altitude_m,
+                ),
+            ] {
+                assert!(
+                    (least.min(was)..=most.max(was)).contains(&is),
+                    "{place:?} outside of {fence:?}, and before at {before:?}"
+                );
+            }
         } else {
             assert_eq!(setpoint, self.relay.final_setpoint());
         }

@@ -169,7 +169,7 @@ impl Attacker {
         let mut kinds: Vec<u8> = messages.iter().map(|message| message.0[0]).collect();
         kinds.sort_unstable();
         kinds.dedup();
-        let all: Vec<u8> = (0..=19).collect();
+        let all: Vec<u8> = (0..=20).collect();
         assert_eq!(kinds, all);
         let mut rng = ChaCha8Rng::seed_from_u64(seed(1));
         rng.set_stream(stream);

@@ -2,6 +2,7 @@
 //!
 //! `COUNT` and `SEED` in the environment take other schedules.
 
+mod duplicates;
 mod flights;
 mod losses;
 mod parts;

@@ -363,7 +363,8 @@ impl Ledger {
             let looks = there && settings.method != Method::Joint;
             let idle = !looks || signs.missed;
             let asked = signs.asked.last().map_or(signs.last, |(_, asked)| *asked);
-            let due = (signs.perhaps + settings.probe_after).max(signs.last + tick);
+            // It looks once a tick. The bound shows only in a turn that something else causes, a claim for example.
+            let due = (signs.perhaps + settings.probe_after).max(signs.last) + tick;
             // Signed questions wait for the handshake.
             prop_assert!(
                 idle || scenario.signs() || turn.now <= due.max(asked + tick),

@@ -75,7 +75,8 @@ impl Signs {
             | Message::Fence { .. }
             | Message::Proposal(_)
             | Message::Decision(_)
-            | Message::Offer { .. } => {}
+            | Message::Offer { .. }
+            | Message::Claim(_) => {}
             // A pulse, a pass, or what came of one.
             _ => {
                 (self.last, self.perhaps) = (now, now);

@@ -22,7 +22,7 @@ mod votes;
 use serde::Deserialize;
 use uav_relay::guard::Fence;
 use uav_relay::place::CrossSection;
-use uav_relay::wire::message::{Message, MessageError, Pulse, Pulsed};
+use uav_relay::wire::message::{Claim, Message, MessageError, Pulse, Pulsed};
 
 pub(crate) use frame::{header, plain, sealed, wire};
 pub(crate) use hearing::Heard;
@@ -85,6 +85,12 @@ pub(crate) enum Said {
         mission: u16,
         power_w: f32,
     },
+    /// A claim to a node number, or the echo of one.
+    Claim {
+        number: u32,
+        heard: u32,
+        flags: u8,
+    },
 }
 
 /// How far a relay keeps off.
@@ -139,7 +145,7 @@ impl Fenced {
     fn in_range(&self) -> bool {
         let [places @ .., apart_m] = self.places;
         let within = places.iter().all(|place| place.abs() <= 1e7);
-        self.number != 0 && within && (0.0..=1e5).contains(&apart_m) && self.flags < 32
+        self.number != 0 && within && (0.0..=1e5).contains(&apart_m) && self.flags < 128
     }
 }
 
@@ -199,6 +205,17 @@ impl Said {
                 reals(&mut out, &[*power_w]);
                 out
             }
+            Self::Claim {
+                number,
+                heard,
+                flags,
+            } => {
+                let mut out = vec![20];
+                out.extend(number.to_le_bytes());
+                out.extend(heard.to_le_bytes());
+                out.push(*flags);
+                out
+            }
         }
     }
 
@@ -252,6 +269,16 @@ impl Said {
             Self::Sense(ref heard) => heard.message(17),
             Self::Sensed(ref heard) => heard.message(18),
             Self::Level { mission, power_w } => Message::Level { mission, power_w },
+            Self::Claim {
+                number,
+                heard,
+                flags,
+            } => Message::Claim(Claim {
+                number,
+                heard,
+                passive: flags % 2 == 1,
+                echo: flags / 2 % 2 == 1,
+            }),
         }
     }
 
@@ -325,6 +352,11 @@ impl Said {
                 mission: rest.word()?,
                 power_w: rest.real()?,
             },
+            20 => Self::Claim {
+                number: rest.long()?,
+                heard: rest.long()?,
+                flags: rest.byte()?,
+            },
             _ => return None,
         })
     }
@@ -339,6 +371,7 @@ impl Said {
             Self::Aside { sweep, y_m } => sweep.in_range() && is_beside(*y_m),
             Self::Verdict(judged) => judged.in_range(),
             Self::Busy { .. } | Self::Heartbeat { .. } | Self::Pulsed { .. } => true,
+            Self::Claim { flags, .. } => *flags < 4,
             Self::Pulse { lease, .. } => *lease > 0,
             Self::Gather(seats) | Self::Gathered(seats) => seats.in_range(),
             Self::Token(handed) => handed.in_range(),

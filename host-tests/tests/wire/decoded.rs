@@ -17,7 +17,7 @@ use super::strategies::{headers, messages};
 const EACH: usize = 10_000;
 
 /// Tags there are.
-const TAGS: u8 = 20;
+const TAGS: u8 = 21;
 
 fn digest(number: u16) -> Value {
     format!("{number:04x}").into()
@@ -54,7 +54,7 @@ fn heard(said: &Heard) -> Value {
     })
 }
 
-fn flags(bits: u8, names: [&str; 5]) -> Value {
+fn flags<const N: usize>(bits: u8, names: [&str; N]) -> Value {
     let set = (0..).zip(names).filter(|(bit, _)| bits >> bit & 1 == 1);
     set.map(|(_, name)| name).collect::<Vec<_>>().into()
 }
@@ -85,7 +85,7 @@ fn fence(said: &Fenced) -> Value {
     json!({
         "association": said.number, "line": digest(said.mission), "echo": said.echo, "fence": said.fence,
         "x_m": said.places[0], "target_m": said.places[1], "y_m": said.places[2], "altitude_m": said.places[3],
-        "apart_m": said.places[4], "flags": flags(said.flags, ["arrived", "agrees", "needs", "needed", "left"]),
+        "apart_m": said.places[4], "flags": flags(said.flags, ["arrived", "agrees", "needs", "needed", "left", "halts", "unplaced"]),
     })
 }
 
@@ -93,8 +93,16 @@ fn hello(said: &Greeting) -> Value {
     json!({
         "mission": digest(said.mission), "neighbour": said.neighbour, "behind": said.behind, "newest_view": said.newest,
         "holds": digest(said.holds.0), "holds_version": said.holds.1, "offer_number": said.nonce, "hears": said.hears,
-        "flags": flags(said.flags, ["ask", "form", "fresh", "ready", "flies"]),
+        "flags": flags(said.flags, ["ask", "form", "fresh", "ready", "flies", "whole", "refused"]),
     })
+}
+
+/// What a claim is decoded to.
+fn claim(number: u32, heard: u32, flags: u8) -> Value {
+    let names = [(1, "passive"), (2, "echo")];
+    let set = names.iter().filter(|(bit, _)| flags & bit != 0);
+    let flags: Vec<&str> = set.map(|(_, name)| *name).collect();
+    json!({"claim": number, "other_claim": heard, "flags": flags})
 }
 
 /// The name of a message, and what its fields say, by what was said and not by its bytes.
@@ -190,6 +198,11 @@ fn wanted(said: &Said) -> (&'static str, Value) {
             "Level",
             json!({"mission": digest(*mission), "power_w": power_w}),
         ),
+        Said::Claim {
+            number,
+            heard,
+            flags,
+        } => ("Claim", claim(*number, *heard, *flags)),
     }
 }
 

@@ -62,8 +62,15 @@ pub(crate) fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
     wire(&plain(header, &said.body()))
 }
 
-/// What `relay` sends at `now`: ports, and bodies as the rules read them.
+/// What `relay` sends at `now`, but for claims to its number: ports, and bodies as the rules read them.
 pub(crate) fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
+    let mut out = sent_with_claims(relay, now);
+    out.retain(|(_, said)| !matches!(said, Said::Claim { .. }));
+    out
+}
+
+/// What `relay` sends at `now`: ports, and bodies as the rules read them.
+pub(crate) fn sent_with_claims(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
     let mut out = Vec::new();
     let mut buffer = [0; MAX_FRAME];
     while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
@@ -93,6 +100,15 @@ pub(crate) fn seats(number: u16, mission: u16, index: u16) -> Seats {
         mission,
         after: 0,
         seats: vec![(index, 30.0, 0.5)],
+    }
+}
+
+/// The echo of a claim to the receiver's number.
+const fn an_echo() -> Said {
+    Said::Claim {
+        number: 1,
+        heard: 0,
+        flags: 2,
     }
 }
 
@@ -211,6 +227,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             mission,
             power_w: 1e-9,
         },
+        an_echo(),
     ]
 }
 

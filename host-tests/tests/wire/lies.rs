@@ -46,6 +46,7 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         | Said::Pulsed {
             number, mission, ..
         } => (*number, *mission) = (as_number, as_mission),
+        Said::Claim { number, .. } => *number = as_number.into(),
         Said::Busy { number } => *number = as_number,
         // The number of a fence is that of a talk, never 0.
         Said::Heartbeat { mission, .. }

@@ -15,6 +15,7 @@ mod codec;
 mod damage;
 mod decoded;
 mod document;
+mod duplicate;
 mod extremes;
 mod forming;
 mod gathered;

@@ -2,7 +2,7 @@
 //! along another.
 
 use host_tests::fixtures::paper;
-use uav_relay::guard::config::GuardConfig;
+use uav_relay::guard::config::{Geofence, GuardConfig};
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::upload::UploadError;
 use uav_relay::{
@@ -15,7 +15,7 @@ use super::codec::{Fenced, Said};
 use super::offer::Offer;
 use super::signed::{Peer, said, set};
 use super::uploads::{NOW, held, hello, mission_id, relay_4, upload};
-use super::votes::events;
+use super::votes::{FLIES, REFUSED, WHOLE, events};
 
 /// Sites a kilometre apart, to the millimetre.
 pub(crate) const A_KILOMETRE: [i32; 6] = [
@@ -95,7 +95,14 @@ fn an_upload_whose_sites_disagree_with_its_distance_is_refused_and_the_event_say
             for told in [vec![why], vec![]] {
                 peer.says(&mut relay, NOW, &Said::Offer(offer));
                 assert_eq!(events(&mut relay), told, "{offer:?}");
-                assert_eq!((said(&mut relay, NOW), held(&relay)), (vec![], None));
+                // It answers by a hello that names what it refuses.
+                let says = said(&mut relay, NOW);
+                let [(_, Said::Hello(hello))] = says.as_slice() else {
+                    panic!("{says:?}")
+                };
+                assert_eq!(hello.holds, mission_id(&offer));
+                assert_eq!(hello.flags & (FLIES | WHOLE | REFUSED), REFUSED);
+                assert_eq!(held(&relay), None);
             }
             assert_eq!(relay.stats().mission, 2 * refused);
             let upload = Upload::decode(&offer.kept()).unwrap();
@@ -160,8 +167,17 @@ fn the_sites_are_those_of_the_mission_that_is_flown() {
 fn guarded() -> (Relay, [Peer; 2], u16) {
     let (identity, settings) = set(4, Wiring::Pair);
     let mission = Mission::try_new(paper(8)).unwrap();
+    // With room for all that is offered here.
+    let mut guard = GuardConfig::of(&mission, mission.config().common);
+    guard.fence = Geofence {
+        least_y_m: -1e3,
+        most_y_m: 1e3,
+        least_altitude_m: 0.0,
+        most_altitude_m: 1e3,
+        ..guard.fence
+    };
     let settings = Settings {
-        guard: Some(GuardConfig::of(&mission, mission.config().common)),
+        guard: Some(guard),
         ..settings
     };
     let mut relay = Relay::new(mission, identity, settings, 1, NOW).unwrap();

@@ -277,6 +277,7 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         3 => sweeps(0),
         3 => verdicts,
         1 => any::<u16>().prop_map(|number| Said::Busy { number }),
+        1 => (any::<[u32; 2]>(), 0..4_u8).prop_map(|([number, heard], flags)| Said::Claim { number, heard, flags }),
         1 => (any::<u16>(), prop_oneof![Just(1e-30), 1e-12..1e-3_f32, Just(1e6)])
             .prop_map(|(mission, power_w)| Said::Level { mission, power_w }),
         1 => (any::<u16>(), questions(), questions())

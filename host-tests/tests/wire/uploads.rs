@@ -14,7 +14,10 @@ use super::kinds::{framed, sent};
 use super::offer::{Offer, offer};
 use super::receive::{counted, relay};
 use super::signed::{Peer, said, set, with_key};
-use super::votes::{ASKS, FLIES, FORMS, FRESH, events, granted, hearing, id, long, proposed};
+use super::votes::{
+    ASKS, FLIES, FORMS, FRESH, REFUSED as REFUSED_FLAG, events, granted, hearing, id, long,
+    proposed,
+};
 
 pub(crate) const NOW: Instant = Instant::ZERO;
 
@@ -187,7 +190,13 @@ fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
     for (times, told) in [(1, vec![REFUSED]), (2, vec![])] {
         peer.says(&mut relay, NOW, &Said::Offer(longer));
         assert_eq!((events(&mut relay), relay.stats().mission), (told, times));
-        assert_eq!((said(&mut relay, NOW), held(&relay)), (vec![], None));
+        let id = mission_id(&longer);
+        let refusal = Greeting {
+            hears: 1,
+            ..greeting(base, 5, id, FRESH | REFUSED_FLAG)
+        };
+        let says = (said(&mut relay, NOW), held(&relay));
+        assert_eq!(says, (vec![(5, Said::Hello(refusal))], None));
     }
     let next = Offer {
         version: 3,

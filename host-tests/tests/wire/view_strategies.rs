@@ -103,7 +103,7 @@ pub(crate) fn formings() -> BoxedStrategy<Said> {
         1..=u16::MAX,
         any::<[u16; 3]>(),
         [-1e7, -1e7, -1e7, -1e7, 0.0].map(metres),
-        0_u8..32,
+        0_u8..128,
     )
         .prop_map(|(number, [mission, echo, fence], places, flags)| {
             Said::Fence(Fenced {

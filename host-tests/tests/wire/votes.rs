@@ -12,6 +12,8 @@ pub(crate) const FORMS: u8 = 2;
 pub(crate) const FRESH: u8 = 4;
 pub(crate) const READY: u8 = 8;
 pub(crate) const FLIES: u8 = 16;
+pub(crate) const WHOLE: u8 = 32;
+pub(crate) const REFUSED: u8 = 64;
 
 /// What node `sender` says to node `destination`, on network 7.
 pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {

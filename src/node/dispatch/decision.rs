@@ -86,7 +86,7 @@ impl Node {
         #[cfg(feature = "upload")]
         {
             if self.member.fly_between(self.layers.update.sites()) {
-                self.layers.round.leave_line();
+                self.layers.round.discard_place();
                 self.steering.leave_line(now);
             }
             self.steering.set_box(self.member.geofence());

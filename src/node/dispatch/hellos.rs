@@ -6,7 +6,16 @@ use crate::node::mission_update::takes_uploads;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::side::Side;
 use crate::time::Instant;
+use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
+
+/// What a hello says of a mission.
+struct MissionSaid {
+    holds: MissionId,
+    flies: bool,
+    whole: bool,
+    refused: bool,
+}
 
 impl Node {
     /// Owes node `to` at `side` a hello, which may ask for one in return.
@@ -40,7 +49,7 @@ impl Node {
     }
 
     pub(super) fn hello(&self, now: Instant, side: Side, ask: bool, nonce: u16) -> Hello {
-        let latest = self.layers.update.latest();
+        let said = self.says_of_mission();
         Hello {
             mission: self.member.digest,
             newest: self.layers.view.newest(),
@@ -60,9 +69,36 @@ impl Node {
                 .neighbours
                 .at(side)
                 .hears(now, &self.member.settings),
-            holds: latest,
-            flies: self.member.active == latest,
+            holds: said.holds,
+            flies: said.flies,
+            whole: said.whole,
+            refused: said.refused,
             nonce,
+        }
+    }
+
+    /// What a hello says of the mission: of the one that is held, or of a newer one that this relay has refused.
+    fn says_of_mission(&self) -> MissionSaid {
+        let (active, latest) = (self.member.active, self.layers.update.latest());
+        #[cfg(feature = "upload")]
+        if let Some(refused) = self.layers.update.refused_of(active) {
+            return MissionSaid {
+                holds: refused,
+                flies: false,
+                whole: false,
+                refused: true,
+            };
+        }
+        let flies = active == latest;
+        #[cfg(feature = "upload")]
+        let whole = flies && latest.version > 0 && self.layers.lease.is_whole();
+        #[cfg(not(feature = "upload"))]
+        let whole = false;
+        MissionSaid {
+            holds: latest,
+            flies,
+            whole,
+            refused: false,
         }
     }
 

@@ -1,76 +1,129 @@
-//! Another node under this relay's number: who stands down, and what it says meanwhile.
+//! Another node under this relay's number: what follows for the other layers, and which claims are sent.
 
 use super::state::Node;
 use crate::event::{About, Event};
-use crate::node::namesake::{Claim, Twice};
+use crate::node::duplicate::{Duplicated, Sender};
 use crate::side::Side;
 use crate::time::Instant;
-use crate::wire::message::{Hello, Message};
+use crate::wire::message::{Claim, Message};
+
+/// A claim to repeat: at which side, to which node.
+pub(crate) type Echo = (Side, u16, Claim);
 
 impl Node {
-    /// A frame under this relay's own number, from another node.
-    pub(crate) fn hear_namesake(&mut self, now: Instant, claim: Claim) {
+    /// Handles a frame under this relay's own number.
+    pub(crate) fn hear_duplicate(&mut self, now: Instant, sender: Sender) {
         let settings = self.member.settings;
-        if self.namesake.is_news(now, Twice::Own, &settings) {
+        let shown = match sender {
+            Sender::Itself => false,
+            // It may be a frame of its own, which only a claim shows.
+            Sender::Unknown => settings.auth.is_some(),
+            Sender::Rival(rival) => rival.is_current,
+        };
+        if shown
+            && self
+                .duplicate
+                .should_report(now, Duplicated::Own, &settings)
+        {
             let node = self.member.node;
             self.raise_about(About::Index, Side::Upstream, node);
+            #[cfg(feature = "auth")]
+            if let Sender::Rival(rival) = sender
+                && rival.newer_epoch
+            {
+                // The other one may be this relay itself, as it was before its epoch went back.
+                self.raise_about(About::Epoch, Side::Upstream, node);
+            }
         }
-        let tenure = self.layers.lease.tenure(now, &settings);
         let placed = self.setpoint().is_some();
-        if self.namesake.hear(now, claim, tenure, &settings) {
-            self.stood_down(placed);
+        let has_lease = self.layers.lease.until().is_some_and(|until| until > now);
+        if self.duplicate.hear(now, sender, has_lease, &settings) {
+            self.layers.round.discard_place();
+            if placed {
+                self.raise(Event::SetpointChanged);
+            }
         }
     }
 
-    fn stood_down(&mut self, placed: bool) {
-        self.layers.lease.give_way();
-        if placed {
-            self.raise(Event::SetpointChanged);
+    /// Handles a claim from node `from` at `side`: one to repeat there, or an echo for this relay. Returns false where it has no meaning.
+    pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
+        if self.member.settings.auth.is_some() {
+            return false;
         }
+        if claim.echo {
+            let sender = self.duplicate.rival(claim);
+            if sender != Sender::Itself {
+                self.hear_duplicate(now, sender);
+            }
+        } else if !self.is_passive() {
+            let claim = Claim {
+                echo: true,
+                ..claim
+            };
+            self.echo = Some((side, from, claim));
+        }
+        true
     }
 
-    /// Whether it stands down from now on, as it is not settled and another node of its number takes part.
-    pub(super) fn gives_way(&mut self, now: Instant) -> bool {
-        let settings = &self.member.settings;
-        let tenure = self.layers.lease.tenure(now, settings);
-        let placed = self.setpoint().is_some();
-        let down = self.namesake.review(now, tenure, settings);
-        if down {
-            self.stood_down(placed);
+    /// Returns the next claim, or the next echo of one.
+    pub(super) fn next_claim(&mut self) -> Option<(Side, u16, Message)> {
+        if let Some((side, to, claim)) = self.echo.take() {
+            return Some((side, to, Message::Claim(claim)));
         }
-        down
+        let (side, to) = self.poll_claim()?;
+        let claim = Claim {
+            number: self.duplicate.number(),
+            heard: self.duplicate.heard(),
+            passive: self.is_passive(),
+            echo: false,
+        };
+        Some((side, to, Message::Claim(claim)))
     }
 
-    /// What it says to its own number: while it stands down as one that has taken part in nothing, else that the number is taken.
-    pub(super) fn next_to_namesake(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
-        if !self.namesake.take_hello() {
+    /// Returns the node to which a claim is due, and marks it as sent: the neighbours in turn, or its own number on a channel
+    /// without any.
+    pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
+        if !self.duplicate.poll_claim() {
             return None;
         }
-        let hello = Hello {
-            fresh: self.stands_down(),
-            form: false,
-            ..self.hello(now, Side::Upstream, false, 0)
-        };
-        Some((Side::Upstream, self.member.node, Message::Hello(hello)))
+        let side = self.claim_side;
+        self.claim_side = side.other();
+        let nodes = [side, side.other()].map(|side| (side, self.layers.neighbours.at(side).node()));
+        let neighbour = nodes.into_iter().find(|(_, node)| *node != 0);
+        neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Whether it takes part in nothing, because another relay has its number.
-    pub(crate) const fn stands_down(&self) -> bool {
-        self.namesake.stands_down()
+    /// Returns the claim number for all sessions to begin anew with, if they have to.
+    #[cfg(feature = "auth")]
+    pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
+        self.duplicate.poll_sessions()
     }
 
-    /// The other relay with this number is gone.
-    pub(crate) fn clear_namesake(&mut self, now: Instant) {
-        if self.namesake.clear() {
-            self.stand_up(now);
+    /// Returns the claim number of this relay.
+    #[cfg(feature = "auth")]
+    pub(crate) const fn claim_number(&self) -> u32 {
+        self.duplicate.number()
+    }
+
+    /// Classifies a claim number under this relay's own node number.
+    pub(crate) fn rival(&self, claim: Claim) -> Sender {
+        self.duplicate.rival(claim)
+    }
+
+    /// Returns true while it takes part in nothing, because another relay has its number.
+    pub(crate) const fn is_passive(&self) -> bool {
+        self.duplicate.is_passive()
+    }
+
+    /// Handles the report that the other relay with this number is gone.
+    pub(crate) fn clear_duplicate(&mut self, now: Instant) {
+        if self.duplicate.clear(now, &self.member.settings) {
+            self.become_active(now);
         }
     }
 
-    /// It takes part again: in nothing that goes on without it.
-    pub(super) fn stand_up(&mut self, now: Instant) {
-        if self.setpoint().is_some() {
-            self.raise(Event::SetpointChanged);
-        }
+    /// Takes part again, in nothing that goes on without this relay.
+    pub(super) fn become_active(&mut self, now: Instant) {
         if !self.layers.round.is_fresh() {
             self.layers.view.asking.ask(now);
         }

@@ -21,7 +21,10 @@ impl Node {
         from: u16,
         message: &Message,
     ) -> bool {
-        if self.stands_down() {
+        if let Message::Claim(claim) = message {
+            return self.on_claim(now, side, from, *claim);
+        }
+        if self.is_passive() {
             return false;
         }
         #[cfg(feature = "upload")]
@@ -38,7 +41,7 @@ impl Node {
         let neighbour = self.layers.neighbours.at_mut(side);
         neighbour.heard(distance, taken, now, &self.member.settings);
         if let Message::Hello(hello) = message {
-            if self.is_of_mission(side, from, hello.mission) {
+            if self.is_of_mission(now, side, from, hello.mission) {
                 self.on_hello(now, side, from, *hello);
                 self.steer(now);
             }
@@ -50,7 +53,7 @@ impl Node {
             && takes_uploads(&self.member)
         {
             // It takes this relay for its neighbour: a hello alone would only make it say the same again.
-            if self.is_of_mission(side, from, upload.base()) {
+            if self.is_of_mission(now, side, from, upload.base()) {
                 self.on_offer(now, side, from, upload, *answer);
             }
             return true;
@@ -81,10 +84,10 @@ impl Node {
         let proposes = message.is_of_a_proposal();
         #[cfg(feature = "upload")]
         if let Message::Fence { .. } = message {
-            return self.is_of_line(side, from, digest);
+            return self.is_of_line(now, side, from, digest);
         }
         if !proposes && !message.is_of_a_view() {
-            return self.is_of_mission(side, from, digest);
+            return self.is_of_mission(now, side, from, digest);
         }
         let known = match message {
             Message::Proposal(proposal) => proposal.mission_id == latest,
@@ -106,27 +109,31 @@ impl Node {
 
     /// Whether a place that `from` tells is along the line of this relay. It is not while one of the two flies an upload with other sites.
     #[cfg(feature = "upload")]
-    fn is_of_line(&mut self, side: Side, from: u16, digest: u16) -> bool {
+    fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.member.line();
         if !same && self.layers.neighbours.at(side).holds.is_some() {
             bump(&mut self.telemetry.stats.stale);
         } else if !same {
-            self.refuse_mission(side, from);
+            self.refuse_mission(now, side, from);
         }
         same
     }
 
-    fn is_of_mission(&mut self, side: Side, from: u16, digest: u16) -> bool {
+    fn is_of_mission(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.member.digest;
         if !same {
-            self.refuse_mission(side, from);
+            self.refuse_mission(now, side, from);
         }
         same
     }
 
-    pub(super) fn refuse_mission(&mut self, side: Side, from: u16) {
+    pub(super) fn refuse_mission(&mut self, now: Instant, side: Side, from: u16) {
         bump(&mut self.telemetry.stats.mission);
-        self.raise_about(About::Mission, side, from);
+        let distance = from.abs_diff(self.member.node);
+        let neighbour = self.layers.neighbours.at_mut(side);
+        if neighbour.is_stranger(distance, now) {
+            self.raise_about(About::Mission, side, from);
+        }
     }
 
     /// A message of this mission, and of this view if it is of one, from the neighbour `from` at `side`.

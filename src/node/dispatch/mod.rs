@@ -11,14 +11,16 @@
 //! | `incoming` | a message comes: is it for this relay, of its mission and view, and which layer takes it |
 //! | `outgoing` | what is said next |
 //! | `timeouts` | what has run out |
+//! | `adrift` | a part without a quorum gives its links up |
 //! | `hellos` | the hellos that are owed |
 //! | `pairing` | a hello comes: who is taken for the neighbour |
 //! | `decision` | a proposal is decided on: the new view, its mission |
 //! | `offers` | newer missions between neighbours, and with the ground |
 //! | `setpoint` | where to be, and where to fly now |
-//! | `identity` | another node under this relay's number |
+//! | `identity` | another node under this relay's number, and claims to it |
 //! | `keys` | what tags say of a neighbour |
 
+mod adrift;
 mod decision;
 mod hellos;
 mod identity;

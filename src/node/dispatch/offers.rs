@@ -25,7 +25,7 @@ impl Node {
             Message::Offer { .. } | Message::Hello(_) | Message::Level { .. }
                 if message.mission() != Some(base) =>
             {
-                self.refuse_mission(side, from);
+                self.refuse_mission(now, side, from);
             }
             Message::Offer { upload, answer } => {
                 if self.is_asked(now, *answer) {
@@ -95,12 +95,14 @@ impl Node {
             neighbour.holds = neighbour.holds.max(Some(id));
         }
         self.hold(now, upload);
-        if self.layers.update.latest() >= id {
+        let refused = self.layers.update.refused_of(self.member.active);
+        if self.layers.update.latest() >= id || refused == Some(id) {
             self.owe_hello(side, from, false);
         }
     }
 
-    /// Holds `upload` from now on, if it is newer than what is held. One that has no line on earth is counted, and told once.
+    /// Holds `upload` from now on, if it is newer than what is held. One that has no line on earth, or leaves the geofence, is counted, and
+    /// told once.
     fn hold(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.hold(&self.member, upload) {
             Offered::Held => self.held(now),
@@ -147,6 +149,22 @@ impl Node {
     /// The newest mission held, if it was uploaded.
     pub(crate) const fn upload(&self) -> Option<&Upload> {
         self.layers.update.upload()
+    }
+
+    /// The neighbour at `side` says that the mission of that number is refused, by itself or beyond it.
+    pub(super) fn hear_refused(&mut self, side: Side, refused: MissionId) {
+        let is_held = refused == self.layers.update.latest() && refused != self.member.active;
+        if !is_held || !takes_uploads(&self.member) {
+            return;
+        }
+        self.layers.update.stop_offers(side);
+        if self.layers.update.hear_refused(refused) {
+            let other = side.other();
+            let to = self.layers.neighbours.at(other).node();
+            if to != 0 {
+                self.owe_hello(other, to, false);
+            }
+        }
     }
 
     /// The neighbour `from` at `side` says that it holds the mission of that number.

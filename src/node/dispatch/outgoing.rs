@@ -8,10 +8,12 @@ use crate::wire::message::Message;
 impl Node {
     /// The next message to send, to which node at which side. Call until there is none.
     pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
-        if let Some(message) = self.next_to_namesake(now) {
-            return Some(message);
+        if self.member.settings.auth.is_none()
+            && let Some(claim) = self.next_claim()
+        {
+            return Some(claim);
         }
-        if self.stands_down() {
+        if self.is_passive() {
             return None;
         }
         if let Some(message) = self.next_of_a_round(now) {
@@ -48,8 +50,8 @@ impl Node {
         let (onward, back) = (self.onward(), self.back());
         let peer = |side| {
             let neighbour = self.layers.neighbours.at(side);
-            neighbour
-                .is_mutual()
+            // To one that is lost nothing is repeated until something comes from it.
+            (neighbour.is_mutual() && !neighbour.is_silent())
                 .then_some((neighbour.node(), neighbour.is_agreed()))
         };
         let (next, before) = (peer(onward), peer(back));

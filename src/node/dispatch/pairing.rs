@@ -4,16 +4,9 @@ use super::state::Node;
 use crate::event::About;
 use crate::node::mission_update::takes_uploads;
 use crate::node::neighbour::candidate::Candidate;
-use crate::node::neighbour::hearing::CANDIDATES;
 use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::message::Hello;
-
-/// Whether node `other`, which hears the nodes of `mask` on that side, hears node `own`.
-const fn hears(own: u16, other: u16, mask: u8) -> bool {
-    let distance = own.abs_diff(other);
-    distance >= 1 && distance <= CANDIDATES && mask >> (distance - 1) & 1 == 1
-}
 
 impl Node {
     /// A hello from node `from` at `side`, of the same mission.
@@ -22,7 +15,7 @@ impl Node {
         let known = self.layers.view.newest();
         self.layers.view.heard_of(hello.newest);
         if self.searches() {
-            let heard = hears(own, from, hello.hears);
+            let heard = hello.is_heard(from, own);
             // One that asks for nothing may be the answer to what was heard just now.
             if heard || hello.ask {
                 self.says_it_hears(side, from, heard);
@@ -39,11 +32,15 @@ impl Node {
             {
                 self.layers.neighbours.at_mut(side).asked = hello.nonce;
                 self.layers.update.may_answer(side, now);
-                self.compare(side, from, hello.holds);
+                if hello.refused {
+                    self.hear_refused(side, hello.holds);
+                } else {
+                    self.compare(side, from, hello.holds);
+                }
             }
             self.layers.neighbours.at_mut(side).holds = Some(hello.holds);
             if self.searches() {
-                let two_way = hears(own, from, hello.hears);
+                let two_way = hello.is_heard(from, own);
                 // A run of lost frames does not undo what was heard before: silence has its own measure.
                 let linked = self.layers.neighbours.at(side).is_mutual();
                 let mutual = hello.neighbour == own && (two_way || linked);
@@ -51,7 +48,9 @@ impl Node {
             }
             let waits = self.layers.view.awaited().is_some();
             // One that holds a newer mission takes part in no view without it: it is asked for once this relay holds it, too.
-            let newer = takes_uploads(&self.member) && hello.holds > self.layers.update.latest();
+            let newer = takes_uploads(&self.member)
+                && !hello.refused
+                && hello.holds > self.layers.update.latest();
             if hello.form && !newer && (hello.newest >= known || hello.fresh && !waits) {
                 if self.layers.view.newest() > known {
                     self.layers.view.asking.ask_anew(now);
@@ -90,7 +89,7 @@ impl Node {
         // It would rather have this relay than one that is farther away.
         let farther = hello.neighbour.abs_diff(from) > own.abs_diff(from);
         let taken = hello.neighbour != own && hello.neighbour != 0 && !farther;
-        if taken || !hears(own, from, hello.hears) {
+        if taken || !hello.is_heard(from, own) {
             return;
         }
         let pairs = hello.neighbour == own;
@@ -104,6 +103,7 @@ impl Node {
             longer: hello.behind > there,
         };
         if neighbour.consider(candidate, now, settings) {
+            let tells = neighbour.tells_found();
             neighbour.holds = Some(hello.holds);
             #[cfg(feature = "upload")]
             {
@@ -112,7 +112,9 @@ impl Node {
                 layers.update.begin_offers(side);
             }
             self.steering.link(side, Some(from));
-            self.raise_about(About::Back, side, from);
+            if tells {
+                self.raise_about(About::Back, side, from);
+            }
             self.owe_hello(side, from, true);
             self.told(now, side, pairs);
         }

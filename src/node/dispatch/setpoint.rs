@@ -50,7 +50,7 @@ impl Node {
 
     /// Where to fly now.
     pub(crate) fn setpoint(&self) -> Option<Placement> {
-        if self.stands_down() {
+        if self.is_passive() {
             return None;
         }
         self.steering.setpoint(self.wanted())

@@ -2,8 +2,8 @@
 
 use super::state::Node;
 use crate::event::About;
+use crate::node::duplicate::Duplicated;
 use crate::node::mission_update::takes_uploads;
-use crate::node::namesake::Twice;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::settings::Wiring;
 use crate::side::Side;
@@ -64,7 +64,9 @@ impl Node {
         };
         let settings = self.member.settings;
         if self.layers.neighbours.at(side).is_there()
-            && self.namesake.is_news(now, Twice::Neighbour, &settings)
+            && self
+                .duplicate
+                .should_report(now, Duplicated::Neighbour, &settings)
         {
             self.raise_about(About::Index, side, from);
         }

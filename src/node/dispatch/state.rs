@@ -1,13 +1,15 @@
 //! What a relay holds, and how its layers come to know of each other.
 
+use super::adrift::Adrift;
+use super::identity::Echo;
 use super::layers::Layers;
 use super::telemetry::Telemetry;
 use crate::event::{About, Event};
 use crate::mission::Mission;
 use crate::node::context::{Effects, Member};
+use crate::node::duplicate::DuplicateIndex;
 use crate::node::lease::Lease;
 use crate::node::mission_update::MissionUpdate;
-use crate::node::namesake::Namesake;
 use crate::node::neighbour::Neighbours;
 use crate::node::round::Round;
 use crate::node::round::state::Phase;
@@ -26,7 +28,12 @@ pub(crate) struct Node {
     pub(super) member: Member,
     pub(super) layers: Layers,
     pub(super) steering: Steering,
-    pub(super) namesake: Namesake,
+    pub(super) duplicate: DuplicateIndex,
+    pub(super) adrift: Adrift,
+    /// Claim of a neighbour that is to be repeated to it.
+    pub(super) echo: Option<Echo>,
+    /// Side of the next claim.
+    pub(super) claim_side: Side,
     pub(super) telemetry: Telemetry,
 }
 
@@ -61,7 +68,10 @@ impl Node {
                 round: Round::new(leads, number, profile, settings, seed, now),
             },
             steering: Steering::NONE,
-            namesake: Namesake::new(seed.rotate_left(24)),
+            duplicate: DuplicateIndex::new(seed.rotate_left(24), now, settings),
+            adrift: Adrift::NONE,
+            echo: None,
+            claim_side: Side::Upstream,
             telemetry: Telemetry::default(),
             member,
         }
@@ -136,6 +146,7 @@ impl Node {
         }
         if let Some(decided) = effects.decided {
             self.decided(now, decided);
+            self.drift(now);
         }
         if effects.converged {
             self.raise(Event::Converged);
@@ -239,7 +250,7 @@ impl Node {
     /// The leader begins again, at `now`; nobody else has anything to begin.
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
-        let may = leads && !self.layers.view.has_no_quorum() && !self.stands_down();
+        let may = leads && !self.layers.view.has_no_quorum() && !self.is_passive();
         if may && self.layers.view.awaited().is_none() {
             let context = self.layers.context(now, &self.member);
             let effects = self.layers.round.restart(&context);

@@ -11,13 +11,10 @@ use crate::time::Instant;
 impl Node {
     /// Handles what has run out by `now`, each layer once; the work is that of one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
-        if self.stands_down() {
-            if !self.namesake.handle_timeout(now, &self.member.settings) {
-                return;
-            }
-            self.stand_up(now);
+        if self.duplicate.handle_timeout(now, &self.member.settings) {
+            self.become_active(now);
         }
-        if self.gives_way(now) {
+        if self.is_passive() {
             return;
         }
         let solved = self.is_solving(now);
@@ -30,6 +27,7 @@ impl Node {
         if solved && !self.is_solving(now) {
             self.solved(now);
         }
+        self.search_anew(now);
         for side in [Side::Upstream, Side::Downstream] {
             if self.layers.neighbours.at(side).is_due(now) {
                 self.silence(now, side);
@@ -53,15 +51,17 @@ impl Node {
     }
 
     pub(crate) fn poll_timeout(&self) -> Option<Instant> {
-        if self.stands_down() {
-            return self.namesake.next_timeout();
+        if self.is_passive() {
+            return self.duplicate.next_timeout();
         }
         [
+            self.duplicate.next_timeout(),
             self.layers.neighbours.next_timeout(),
             self.layers.view.next_timeout(),
             self.layers.lease.next_timeout(),
             self.layers.round.next_timeout(),
             self.steering.next_timeout(),
+            self.adrift.next_timeout(),
             #[cfg(feature = "upload")]
             self.layers.update.next_timeout(),
         ]

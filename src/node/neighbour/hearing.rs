@@ -1,10 +1,13 @@
 //! Which nodes on one side were heard lately, and what was so of each of them in a row.
 
 use crate::settings::Settings;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// Nodes on one side that are sent a hello.
 pub(crate) const CANDIDATES: u16 = 4;
+
+/// The time after which the same is told again.
+const MINUTE: Duration = Duration::from_millis(60_000);
 
 /// How often something was so for each of the nearest nodes, in a row; the nearest first.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +38,33 @@ pub(super) struct Hearing {
     since: Instant,
     now: u8,
     before: u8,
+}
+
+/// Which nodes on one side were told of lately: of each once a minute.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ToldOf {
+    since: Instant,
+    nodes: u8,
+}
+
+impl ToldOf {
+    pub(super) const NONE: Self = Self {
+        since: Instant::ZERO,
+        nodes: 0,
+    };
+
+    /// The node `distance` nodes away is to be told of; whether it was not yet.
+    pub(super) fn tell(&mut self, distance: u16, now: Instant) -> bool {
+        if now.since(self.since) >= MINUTE {
+            *self = Self {
+                since: now,
+                nodes: 0,
+            };
+        }
+        let new = mask(distance) & !self.nodes;
+        self.nodes |= new;
+        new != 0
+    }
 }
 
 /// The bit of the node `distance` places away.

@@ -124,6 +124,11 @@ impl Liveness {
         self.met && !self.lost
     }
 
+    /// Whether it is lost, and nothing has come since.
+    pub(crate) const fn is_silent(&self) -> bool {
+        self.lost && !self.met
+    }
+
     /// How long a run of lost frames may be, by what the channel has shown.
     pub(crate) fn run(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
@@ -192,6 +197,7 @@ impl Liveness {
         let gone = silent >= dead && (enough || silent >= longest_lease(settings));
         let lost = gone && !self.lost;
         self.lost |= gone;
+        self.met &= !lost;
         let look_again = if self.lost {
             now + settings.probe_after
         } else {

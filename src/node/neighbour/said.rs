@@ -55,19 +55,26 @@ impl Neighbour {
     /// An intact frame from the node `distance` nodes away, which is the one `taken` or not.
     pub(crate) fn heard(&mut self, distance: u16, taken: bool, now: Instant, settings: &Settings) {
         self.hearing.add(distance, now, settings);
+        self.damping.hear(distance, now, settings);
         if taken {
             self.liveness.met();
         }
     }
 
-    /// The nodes that were heard lately: bit 0 is the nearest one.
+    /// The nodes that were heard lately, without one whose link is held down: bit 0 is the nearest one.
     pub(crate) fn hears(&self, now: Instant, settings: &Settings) -> u8 {
-        self.hearing.recent(now, settings)
+        let held = self.damping.held(now, settings);
+        self.hearing.recent(now, settings) & !held
     }
 
     /// The node `distance` nodes away has said whether it hears this relay; whether it does not, for the last of so many times in a row.
     pub(crate) fn says_it_hears(&mut self, distance: u16, heard: bool) -> bool {
         self.unheard.count(distance, !heard, UNHEARD)
+    }
+
+    /// The node `distance` nodes away is of another mission; whether that is to be told.
+    pub(crate) fn is_stranger(&mut self, distance: u16, now: Instant) -> bool {
+        self.strangers.tell(distance, now)
     }
 
     /// A handshake under the number of the node `distance` nodes away was signed with another key; whether that is certain now.

@@ -2,10 +2,10 @@
 //!
 //! | state | the node taken is lost | its hello does not name this relay | a hello comes from a node not taken that hears this relay | time passes |
 //! | --- | --- | --- | --- | --- |
-//! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead after a hold-down, if it is better | - |
-//! | `Pairing` | `Searching` | - | as above | after a span `Searching` |
-//! | `Searching` | - | - | taken, a farther one not before nearer ones could be heard; one that comes and goes after a hold-down | after a span `NoPeer` |
-//! | `NoPeer` | - | - | taken, if it takes this relay; else, or if it comes and goes, after a hold-down | the four nearest nodes are sent a hello every `dead_after`, every half of `probe_after` once one was heard |
+//! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead after `probe_after`, if it is better | without a quorum for three times `dead_after`, and every four times from then on, `Searching` |
+//! | `Pairing` | `Searching` | - | as above | after a span `Searching`; without a quorum as above |
+//! | `Searching` | - | - | taken, a farther one not before nearer ones could be heard; one that was given up for want of a quorum after `probe_after` | after a span `NoPeer` |
+//! | `NoPeer` | - | - | taken, if it takes this relay; else after `probe_after` | the four nearest nodes are sent a hello every `dead_after`, every half of `probe_after` once one was heard |
 //!
 //! A span is `dead_after` less `probe_after`, or as long as a run of lost frames may be by what the channel has shown. A node that has been
 //! taken is paired with until its hello names this relay and hears it, or anything else comes from it: then it is `Linked`. A hello of the
@@ -16,16 +16,17 @@
 //! given up, 4 takes 3, and 2 is left out.
 //!
 //! While it pairs or searches, it sends hellos that ask to the four nearest nodes there, the one taken among them: as many as three relays in
-//! a row may be lost at once. In a hold-down
-//! a node has to be heard all through: `probe_after` at first; after a fourth loss on that side `dead_after`, and twice as long after every
-//! other one up to sixteen times, so that a link that comes and goes disturbs the chain less and less. A loss is forgotten after 32 times
-//! `dead_after` without another. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be
+//! a row may be lost at once. Where a node is taken after `probe_after` it has to be heard all through that; of several the nearest one counts.
+//! After a third loss on one side the link that was lost is held down (`damping`): its node is not taken, and not said to be heard, until it
+//! has been heard for `dead_after`, and twice as long after every other loss up to six times, so that a link that comes and goes disturbs
+//! the chain less and less. A loss is forgotten after 32 times `dead_after` without another. To a neighbour that is lost, on wires, nothing
+//! but questions is sent until something comes from it. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be
 //! about to take it, too.
 
 use super::agreed::AgreedNodes;
 use super::candidate::Candidate;
 use super::damping::Damping;
-use super::hearing::{CANDIDATES, Hearing, InRow};
+use super::hearing::{CANDIDATES, Hearing, InRow, ToldOf, mask};
 use super::hellos::Hellos;
 use super::liveness::{Liveness, patience, tick};
 use super::signs::Signs;
@@ -59,7 +60,9 @@ pub(crate) struct Neighbour {
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
-    damping: Damping,
+    pub(super) damping: Damping,
+    /// The node that was taken when the links were given up; 0 for none.
+    given_up: u16,
     /// How far away the node taken is.
     pub(super) distance: u16,
     /// The nodes that have said that they hear this relay.
@@ -72,6 +75,10 @@ pub(crate) struct Neighbour {
     pub(super) hearing: Hearing,
     /// How often each of them said that it does not hear this relay.
     pub(super) unheard: InRow,
+    /// Those that were told of as found since another one was linked, or lost: bit 0 is the nearest one.
+    found: u8,
+    /// Those of another mission.
+    pub(super) strangers: ToldOf,
     /// How often a handshake under its number was signed with another key.
     #[cfg(feature = "auth")]
     pub(super) forged: InRow,
@@ -106,12 +113,15 @@ impl Neighbour {
         state: NeighbourState::NoPeer,
         liveness: Liveness::NONE,
         damping: Damping::new(Instant::ZERO),
+        given_up: 0,
         distance: 0,
         both_ways: Hearing::new(Instant::ZERO),
         taken_by: [0; CANDIDATES as usize],
         near: None,
         hearing: Hearing::new(Instant::ZERO),
         unheard: InRow::NONE,
+        found: 0,
+        strangers: ToldOf::NONE,
         #[cfg(feature = "auth")]
         forged: InRow::NONE,
         tick: Duration::from_micros(0),
@@ -145,6 +155,7 @@ impl Neighbour {
         self.hearing = Hearing::new(now);
         self.jitter = Jitter::new(seed);
         self.distance = 1;
+        self.found = mask(1);
         self.grace = now;
         self.tick = tick(settings, all);
         self.patience = patience(settings, all);
@@ -184,6 +195,11 @@ impl Neighbour {
         self.liveness.is_there()
     }
 
+    /// Whether the node taken is lost, and nothing has come from it since.
+    pub(crate) const fn is_silent(&self) -> bool {
+        self.liveness.is_silent()
+    }
+
     /// The neighbour was there `at` that time or later; whether it had been lost until now.
     pub(crate) fn confirmed(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.confirmed(at);
@@ -211,8 +227,18 @@ impl Neighbour {
             _ => return false,
         };
         self.state = next;
+        if mutual {
+            self.found &= mask(self.distance);
+        }
         self.look_at = Some(now + wait);
         true
+    }
+
+    /// Whoever is taken just now is to be told of, unless it was and nobody has been linked or lost since.
+    pub(crate) const fn tells_found(&mut self) -> bool {
+        let told = self.found;
+        self.found |= mask(self.distance);
+        self.found != told
     }
 
     /// The silence so far of a neighbour of the same view is excused; whether there is one, and it is not lost.
@@ -262,7 +288,7 @@ impl Neighbour {
                 self.signs.ask = true;
                 if lost && searches {
                     let counts = self.liveness.is_clear();
-                    self.damping.lose(self.node, counts, now, settings);
+                    self.damping.lose(self.distance, counts, now, settings);
                     self.search(now);
                 } else {
                     look_again = silence.look_again;
@@ -295,6 +321,9 @@ impl Neighbour {
                 look_again = now + self.jitter.spread(wait);
             }
         }
+        if lost {
+            self.found = 0;
+        }
         self.look_at = Some(look_again);
         lost
     }
@@ -319,6 +348,23 @@ impl Neighbour {
         self.hellos.owe_all();
     }
 
+    /// Whether `node` was taken when the links were given up, and nobody else has been since.
+    const fn was_given_up(&self, node: u16) -> bool {
+        node != 0 && self.given_up == node
+    }
+
+    /// Whoever is taken is taken no more, and sought like any other: the part that is linked so has no quorum.
+    pub(crate) fn give_up(&mut self, now: Instant) {
+        if matches!(
+            self.state,
+            NeighbourState::Linked | NeighbourState::Pairing { .. }
+        ) {
+            self.given_up = self.node;
+            self.search(now);
+            self.look_at = Some(now + self.tick);
+        }
+    }
+
     /// A node that is not taken has sent a hello: whether it is taken from now on.
     ///
     /// It is one that hears this relay, and takes it for its neighbour or nobody.
@@ -329,18 +375,24 @@ impl Neighbour {
         settings: &Settings,
     ) -> bool {
         let node = candidate.node;
-        // A link that comes and goes has to stay for a while first.
         let none = Duration::from_micros(0);
-        let flaps = self.damping.flaps(node);
+        let distance = candidate.distance;
+        // A link that comes and goes has to stay for a while first.
+        if self.damping.holds(distance, now, settings) {
+            return false;
+        }
         let takes = match self.state {
             NeighbourState::Searching { since } => {
-                // One that is nearer may be about to be heard.
-                let wait = self.tick.times(u32::from(candidate.beyond()) * 2);
+                // One that is nearer may be about to be heard, or anybody else than the one that led nowhere.
+                let wait = if self.was_given_up(node) {
+                    settings.probe_after
+                } else {
+                    self.tick.times(u32::from(candidate.beyond()) * 2)
+                };
                 now.since(since) >= wait
-                    && (!flaps || self.damping.passes(node, none, now, settings))
             }
             NeighbourState::NoPeer => {
-                candidate.pairs && !flaps || self.damping.passes(node, none, now, settings)
+                candidate.pairs || self.damping.passes(distance, none, now, settings)
             }
             NeighbourState::Linked | NeighbourState::Pairing { .. } => {
                 // Of two that could leave somebody out the one nearer to Rx does, unless it takes long.
@@ -350,7 +402,7 @@ impl Neighbour {
                 } else {
                     none
                 };
-                candidate.is_better() && self.damping.passes(node, more, now, settings)
+                candidate.is_better() && self.damping.passes(distance, more, now, settings)
             }
         };
         if !takes {
@@ -360,6 +412,7 @@ impl Neighbour {
             self.grace = now + settings.probe_after;
         }
         self.signs = Signs::NONE;
+        self.given_up = 0;
         self.node = node;
         self.distance = candidate.distance;
         self.state = NeighbourState::Pairing { since: now };

@@ -12,8 +12,14 @@ pub(crate) struct Asking {
     /// How often it has since.
     tries: u8,
     at: Option<Instant>,
+    /// After a refusal: how often in a row, and when to ask again as soon as anything is new.
+    refusals: u8,
+    soon: Option<Instant>,
     jitter: Jitter,
 }
+
+/// Doublings of the wait after one refusal after the other.
+const DOUBLINGS: u8 = 3;
 
 impl Asking {
     pub(super) const fn new(seed: u32) -> Self {
@@ -21,6 +27,8 @@ impl Asking {
             asks: false,
             tries: 0,
             at: None,
+            refusals: 0,
+            soon: None,
             jitter: Jitter::new(seed),
         }
     }
@@ -34,6 +42,10 @@ impl Asking {
     pub(crate) fn ask(&mut self, now: Instant) {
         if !self.asks {
             self.ask_anew(now);
+        } else if let Some(soon) = self.soon.take() {
+            self.refusals = 0;
+            let soon = soon.max(now + PAUSE);
+            self.at = Some(self.at.map_or(soon, |at| at.min(soon)));
         }
     }
 
@@ -42,6 +54,8 @@ impl Asking {
     pub(crate) fn ask_anew(&mut self, now: Instant) {
         self.asks = true;
         self.tries = 0;
+        self.refusals = 0;
+        self.soon = None;
         self.at = Some(now + PAUSE);
     }
 
@@ -52,16 +66,20 @@ impl Asking {
         }
     }
 
-    /// Asks after about `wait`.
-    pub(super) fn ask_after(&mut self, now: Instant, wait: Duration) {
+    /// Asks after about `wait`, the more so the more often it was refused; after `wait` once anything is new.
+    pub(super) fn ask_after_refusal(&mut self, now: Instant, wait: Duration) {
         self.asks = true;
-        self.at = Some(now + self.jitter.spread(wait));
+        let wait = self.jitter.spread(wait);
+        self.soon = Some(now + wait);
+        self.at = Some(now + wait.times(1 << self.refusals.min(DOUBLINGS)));
+        self.refusals = self.refusals.saturating_add(1);
     }
 
     /// What was asked for has come.
     pub(super) const fn stop(&mut self) {
         self.asks = false;
         self.at = None;
+        self.soon = None;
     }
 
     /// The first pass should have come by `at`; if it has not, a view is asked for.
@@ -84,6 +102,7 @@ impl Asking {
             self.asks = true;
             self.tries = 0;
         }
+        self.soon = None;
         self.at = Some(now + self.patience(settings));
         true
     }

@@ -6,8 +6,8 @@
 //! | `Proposed` | hand on | say busy | hand back: `Decided` | decide: `Decided` |
 //! | `Decided` | hand on: `Proposed` | hand back again | stale | - |
 //!
-//! While a view is proposed no pass goes on. One that was refused leaves the places where they are; its leader proposes again every
-//! `probe_after`. A proposal that was handed on stays with the node that it was handed to: once another one, or nobody, is there, a
+//! While a view is proposed no pass goes on. One that was refused leaves the places where they are; its leader proposes again after
+//! `probe_after` or later ([`Asking`]), and alone not before its own vote would suffice. A proposal that was handed on stays with the node that it was handed to: once another one, or nobody, is there, a
 //! later one is asked for.
 
 use super::asking::Asking;
@@ -17,13 +17,12 @@ use super::record::{RecordError, ViewRecord};
 use crate::node::context::{Context, Decided, Effects, Member, Proposer};
 use crate::node::numbering::Stragglers;
 use crate::node::retransmit::Retransmit;
-use crate::node::timing::PAUSE;
 use crate::time::Instant;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// How far ahead of all it has heard of a view may be that a relay hears of.
+/// How much later than all it has heard of before a relay takes a view to be on one hearing.
 const LEAP: u32 = 256;
 
 /// Where the view change is.
@@ -109,11 +108,11 @@ impl ViewChange {
         self.newest
     }
 
-    /// Somebody knows that view. One too far ahead is not believed: it could be the last there can be.
+    /// Somebody knows that view. Toward one far ahead it goes step by step: a single one could be the last there can be, and
+    /// whoever was apart for long says it again and again.
     pub(crate) fn heard_of(&mut self, view: ViewId) {
-        let near = view.number() <= self.newest.number().saturating_add(LEAP);
-        if view > self.newest && near {
-            self.newest = view;
+        if view > self.newest {
+            self.newest = self.newest.toward(view, LEAP);
         }
     }
 
@@ -163,7 +162,14 @@ impl ViewChange {
             Message::Proposal(proposal) if proposal.place < all => {
                 self.on_proposal(context, proposal)
             }
-            Message::Decision(decision) if decision.view.is_none_or(|view| view.relays <= all) => {
+            // What is decided on follows its base, and this relay has proposed nothing later.
+            Message::Decision(decision)
+                if decision.view.is_none_or(|view| {
+                    let is_own = view.id.proposer() == context.member.node;
+                    let is_known = !is_own || view.id <= decision.proposal;
+                    decision.base.id < view.id && is_known && view.relays <= all
+                }) =>
+            {
                 self.on_decision(context, decision)
             }
             _ => Effects::STALE,
@@ -305,6 +311,12 @@ impl ViewChange {
         self.conclude(context, conclusion)
     }
 
+    /// Somebody may be back who could not be heard.
+    pub(super) fn wait_after_refusal(&mut self, context: &Context<'_>) {
+        let wait = context.settings().probe_after;
+        self.asking.ask_after_refusal(context.now, wait);
+    }
+
     fn on_decision(&mut self, context: &Context<'_>, decision: &Decision) -> Effects {
         match self.awaited() {
             Some(proposed)
@@ -367,13 +379,12 @@ impl ViewChange {
         };
         self.asking.stop();
         if leads && decided.is_none() {
-            // Somebody may be back who could not be heard. Who has heard of a newer view only now has a voice at once.
-            let wait = if taught {
-                PAUSE
+            // Who has heard of a newer view only now has a voice at once.
+            if taught {
+                self.asking.ask_anew(context.now);
             } else {
-                context.member.settings.probe_after
-            };
-            self.asking.ask_after(context.now, wait);
+                self.wait_after_refusal(context);
+            }
         }
         let came = match decided {
             Some(view) if view.id == proposal => Decided::Granted {

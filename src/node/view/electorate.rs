@@ -167,6 +167,19 @@ impl Electorate {
         Some(poll)
     }
 
+    /// Whether `proposal` of relay `node` would be refused, were it alone of `all`. Nothing is said by asking.
+    pub(super) fn is_refused_alone(
+        &self,
+        node: u16,
+        proposal: ViewId,
+        all: u16,
+        held: Held,
+    ) -> bool {
+        let mut asked = *self;
+        let poll = asked.vote(node, proposal, None, held);
+        poll.is_some_and(|poll| decide(&poll, proposal, 1, all) == Outcome::Refused)
+    }
+
     /// It has taken part in `proposal`. Where there is no room for more the earliest ones stay: once some have accepted a view, the
     /// later proposals that come to them bring that one again.
     fn remember(&mut self, proposal: ViewId) {

@@ -14,7 +14,10 @@
 //! | a hello that asks, of a neighbour that knows as new a view, or has just been switched on | asks for a view |
 //! | a newer mission than the one it flies | asks for a view, which flies it if all hold it |
 //! | a proposal, when it is the last | decides, by the rules of [`electorate`] |
-//! | the lease of its view has run out, or a view was refused | asks for a view, less and less often |
+//! | the lease of its view has run out | asks for a view, less and less often |
+//! | a view was refused | asks for one after `probe_after` as soon as anything is new, else after up to eight times that; alone it asks itself first, and proposes where it would not be refused |
+//! | a view far ahead of all that it has heard of | takes in 256 numbers of the way to it on each hearing |
+//! | no quorum for three times `dead_after` | gives its links up and searches anew, on a shared channel |
 //!
 //! | file | one idea |
 //! | --- | --- |

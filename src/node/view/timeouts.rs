@@ -1,7 +1,7 @@
 //! What has run out of a view change: something is to be said again, or a view to be asked for, which the leader proposes.
 
 use super::change::{ViewChange, ViewState};
-use crate::node::context::{Context, Effects, Proposer};
+use crate::node::context::{Context, Effects, Member, Proposer};
 use crate::node::retransmit::Again;
 use crate::node::timing::earliest;
 use crate::time::Instant;
@@ -52,6 +52,17 @@ impl ViewChange {
         let Some(view) = next.filter(|_| !under_way) else {
             return Effects::NONE;
         };
+        // A number is spent where something may come of it.
+        let Member { node, all, .. } = *context.member;
+        let alone = self.refused && context.end && context.settings().quorum;
+        if alone
+            && self
+                .electorate
+                .is_refused_alone(node, view, all, context.held)
+        {
+            self.wait_after_refusal(context);
+            return Effects::NONE;
+        }
         self.heard_of(view);
         let Some(effects) = self.propose(context, view, context.latest, 0, None) else {
             return Effects::NONE;

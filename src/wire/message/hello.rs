@@ -9,7 +9,7 @@ use crate::wire::digest::MissionId;
 /// What one node tells another about the chain as it sees it.
 #[expect(
     clippy::struct_excessive_bools,
-    reason = "five flags of the wire format"
+    reason = "seven flags of the wire format"
 )]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -36,18 +36,39 @@ pub struct Hello {
     pub holds: MissionId,
     /// Whether that is the one it flies.
     pub flies: bool,
+    /// Whether all relays of its view fly that, an uploaded mission.
+    pub whole: bool,
+    /// Whether a relay that it knows of refuses that: the sender itself, which then flies and holds another one, or one beyond it.
+    pub refused: bool,
     /// A number for the offer that answers it; 0 at a node that takes none.
     pub nonce: u16,
 }
 
 impl Hello {
+    /// Whether node `by`, which says this, hears node `of`, which is on the side that it says it to.
+    pub(crate) const fn is_heard(&self, by: u16, of: u16) -> bool {
+        let distance = by.abs_diff(of);
+        distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
+    }
+
     /// The mission; the neighbour; how many are behind; the newest view; digest and version of what it holds; the number for an offer; whom it hears; flags from bit 0: asks for
-    /// a hello, asks for a new view, fresh, ready, flies what it holds.
+    /// a hello, asks for a new view, fresh, ready, flies what it holds, so do all of its view, refused.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        let flags = [self.ask, self.form, self.fresh, self.ready, self.flies]
-            .into_iter()
-            .rev()
-            .fold(0_u8, |flags, flag| flags << 1 | u8::from(flag));
+        let Self {
+            ask, form, fresh, ..
+        } = *self;
+        let flags = [
+            ask,
+            form,
+            fresh,
+            self.ready,
+            self.flies,
+            self.whole,
+            self.refused,
+        ]
+        .into_iter()
+        .rev()
+        .fold(0_u8, |flags, flag| flags << 1 | u8::from(flag));
         let last = [self.holds.digest, self.holds.version, self.nonce].map(Word::new);
         let newest = self.newest.bits().to_le_bytes();
         let near = [self.mission, self.neighbour, self.behind].map(Word::new);
@@ -67,7 +88,7 @@ impl Hello {
         let neighbour = neighbour.number();
         let behind = behind.number();
         let known = neighbour <= MAX_RELAYS && (1..=MAX_RELAYS).contains(&behind);
-        if !known || hears > 0x0F || flags > 0x1F {
+        if !known || hears > 0x0F || flags > 0x7F {
             return Err(MessageError::Value);
         }
         Ok(Self {
@@ -80,6 +101,8 @@ impl Hello {
             ready: flags & 8 != 0,
             behind,
             flies: flags & 16 != 0,
+            whole: flags & 32 != 0,
+            refused: flags & 64 != 0,
             hears,
             nonce: nonce.number(),
             holds: MissionId {

@@ -4,6 +4,7 @@
 //! its ranges: what is read holds no number that a relay would have to doubt. A body is a byte, the `tag`, and postcard of a
 //! tuple, whose order is the format. `parts` has what several kinds have in common.
 
+mod claim;
 mod fence;
 mod hearing;
 mod hello;
@@ -19,6 +20,7 @@ mod tag;
 mod turn;
 mod view;
 
+pub use self::claim::Claim;
 pub use self::hearing::Heard;
 pub use self::hello::Hello;
 pub use self::parts::MessageError;
@@ -125,15 +127,17 @@ pub enum Message {
         /// Mean received power, W: 1e-30 to 1e6, with the noise of the end's receiver.
         power_w: f32,
     },
+    /// Either way: a claim to the sender's node number, or the echo of one.
+    Claim(Claim),
 }
 
 impl Message {
-    /// The digest of the sender's mission; a [`Message::Busy`] bears none.
+    /// The digest of the sender's mission; a [`Message::Busy`] and a [`Message::Claim`] bear none.
     pub const fn mission(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.mission),
             Self::Verdict(answer) => Some(answer.mission),
-            Self::Busy { .. } => None,
+            Self::Busy { .. } | Self::Claim(_) => None,
             Self::Heartbeat { mission, .. } | Self::Fence { mission, .. } => Some(*mission),
             Self::Pulse(pulse) => Some(pulse.mission),
             Self::Pulsed(pulsed) => Some(pulsed.mission),
@@ -226,6 +230,7 @@ impl Message {
             Self::Offer { upload, answer } => offer::encode(upload, *answer, buffer),
             #[cfg(feature = "upload")]
             Self::Level { mission, power_w } => level::encode(*mission, *power_w, buffer),
+            Self::Claim(claim) => claim.encode(buffer),
         }
     }
 
@@ -287,6 +292,7 @@ impl Message {
                 let (mission, power_w) = level::decode(body)?;
                 Ok(Self::Level { mission, power_w })
             }
+            tag::CLAIM => Claim::decode(body).map(Self::Claim),
             _ => Err(MessageError::Encoding),
         }
     }

@@ -22,3 +22,4 @@ pub(super) const SENSE: u8 = 17;
 pub(super) const SENSED: u8 = 18;
 #[cfg(feature = "upload")]
 pub(super) const LEVEL: u8 = 19;
+pub(super) const CLAIM: u8 = 20;

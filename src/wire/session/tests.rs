@@ -1,6 +1,7 @@
 //! Two sessions that say handshake to each other, and a table that is too small for all who do.
 
 use super::{Checked, HELLO, PEERS, Session};
+use crate::node::duplicate::{RAISED, Rival, Sender};
 use crate::wire::auth::{Auth, Key};
 use crate::wire::frame::{self, FrameBuf, Header, MAX_FRAME};
 use crate::wire::message::Message;
@@ -15,7 +16,7 @@ const KEY: Key = Key::new([0xA5; 32]);
 
 /// Node 1 of epoch 5.
 fn session() -> Session {
-    Session::new(Auth { key: KEY, epoch: 5 })
+    Session::new(Auth { key: KEY, epoch: 5 }, 0)
 }
 
 /// A frame without COBS.
@@ -85,7 +86,7 @@ fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
 
 /// Session of node `node`, epoch `epoch`, that has met node 1's `own`.
 fn met(own: &mut Session, node: u16, epoch: u32, counters: &mut [u32; 2]) -> Session {
-    let mut other = Session::new(Auth { key: KEY, epoch });
+    let mut other = Session::new(Auth { key: KEY, epoch }, 0);
     other.greet(1);
     counters[1] = 0;
     meet([(own, 1), (&mut other, node)], counters);
@@ -213,7 +214,7 @@ fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
 fn recorded_handshakes_do_not_drive_out_who_is_known() {
     let mut handshakes = Vec::new();
     for node in 100..200 {
-        let mut stranger = Session::new(Auth { key: KEY, epoch: 1 });
+        let mut stranger = Session::new(Auth { key: KEY, epoch: 1 }, 0);
         stranger.greet(1);
         handshakes.push(frame(&mut stranger, (node, 1), true, 0));
     }
@@ -242,7 +243,7 @@ fn a_greeting_mends_what_only_one_end_knows() {
     let mut own = session();
     let mut counters = [0; 2];
     met(&mut own, 2, 1, &mut counters);
-    let mut anew = Session::new(Auth { key: KEY, epoch: 2 });
+    let mut anew = Session::new(Auth { key: KEY, epoch: 2 }, 0);
     let unread = frame(&mut own, (1, 2), false, 1000);
     assert_eq!(check(&mut anew, &unread), Checked::Forged);
     assert!(own.knows(2));
@@ -293,7 +294,7 @@ fn an_epoch_that_went_back_is_told_once_and_a_frame_that_is_played_again_is_not(
         let mut own = session();
         let mut counters = [0; 2];
         met(&mut own, 2, 7, &mut counters);
-        let mut back = Session::new(Auth { key: KEY, epoch });
+        let mut back = Session::new(Auth { key: KEY, epoch }, 0);
         back.greet(1);
         let mut told = 0;
         for counter in 0..20 {
@@ -314,7 +315,7 @@ fn what_the_node_itself_says_in_between_keeps_old_handshakes_from_being_told() {
     let mut own = session();
     let mut counters = [0; 2];
     let mut other = met(&mut own, 2, 7, &mut counters);
-    let mut back = Session::new(Auth { key: KEY, epoch: 3 });
+    let mut back = Session::new(Auth { key: KEY, epoch: 3 }, 0);
     back.greet(1);
     for counter in 0..20 {
         let old = frame(&mut back, (2, 1), true, counter);
@@ -324,23 +325,90 @@ fn what_the_node_itself_says_in_between_keeps_old_handshakes_from_being_told() {
     }
 }
 
+/// What a frame under the own number says: claim numbers and epochs of the sender, by the own key or another.
 #[test]
-fn only_a_handshake_with_the_key_and_a_larger_epoch_is_ahead() {
-    let own = session();
-    for (key, epoch, handshake, ahead) in [
-        (KEY, 6, true, true),
-        (KEY, 5, true, false),
-        (KEY, 4, true, false),
-        (KEY, 6, false, false),
-        (Key::new([1; 32]), 6, true, false),
+fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
+    const FAR: u32 = 1 << 20;
+    let own = Session::new(Auth { key: KEY, epoch: 5 }, FAR);
+    let other_key = Key::new([1; 32]);
+    let rival = |number, newer_epoch| {
+        Sender::Rival(Rival {
+            number,
+            newer_epoch,
+            passive: false,
+            is_current: true,
+        })
+    };
+    for (key, epoch, claim, handshake, expected) in [
+        (KEY, 6, 0, true, rival(1, true)),
+        (KEY, 5, 0, true, rival(1, false)),
+        (KEY, 5, 2 * FAR, true, rival(2 * FAR + 1, false)),
+        (KEY, 5, FAR, true, Sender::Itself),
+        (KEY, 5, FAR | RAISED, true, Sender::Itself),
+        (KEY, 4, 2 * FAR, true, Sender::Unknown),
+        (KEY, 6, 0, false, Sender::Unknown),
+        (other_key, 6, 0, true, Sender::Unknown),
     ] {
-        let mut other = Session::new(Auth { key, epoch });
+        let mut other = Session::new(Auth { key, epoch }, claim);
         other.greet(2);
         let plain = frame(&mut other, (1, 2), handshake, 0);
-        assert_eq!(
-            own.is_ahead(&frame::open(&plain).unwrap()),
-            ahead,
-            "{epoch} {handshake}"
-        );
+        let opened = frame::open(&plain).unwrap();
+        assert_eq!(own.sender(&opened), expected, "{epoch} {claim} {handshake}");
+    }
+}
+
+/// An echo of what a node has sent to its neighbour, handshake and message.
+#[test]
+fn frames_of_its_own_are_recognised() {
+    let mut counters = [0; 2];
+    let mut own = session();
+    met(&mut own, 2, 7, &mut counters);
+    for handshake in [true, false] {
+        let plain = frame(&mut own, (1, 2), handshake, 50);
+        assert_eq!(own.sender(&frame::open(&plain).unwrap()), Sender::Itself);
+    }
+}
+
+/// Two nodes 2 of one epoch at node 1: it believes the larger claim, and shows that to the smaller one, which thus learns of it.
+#[test]
+fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
+    const FAR: u32 = 1 << 20;
+    let auth = Auth { key: KEY, epoch: 7 };
+    for first_is_larger in [false, true] {
+        let mut counters = [0; 2];
+        let (mut one, mut small) = (session(), Session::new(auth, FAR));
+        let mut large = Session::new(auth, 2 * FAR);
+        let (first, second) = if first_is_larger {
+            (&mut large, &mut small)
+        } else {
+            (&mut small, &mut large)
+        };
+        first.greet(1);
+        meet([(&mut one, 1), (first, 2)], &mut counters);
+        second.greet(1);
+        let asks = frame(second, (2, 1), true, 0);
+        let taken = if first_is_larger {
+            Checked::Replayed
+        } else {
+            Checked::Unproven
+        };
+        assert_eq!(check(&mut one, &asks), taken);
+        assert_eq!(one.take_handshake(), Some(2), "it is answered");
+        let answer = frame(&mut one, (1, 2), true, 90);
+        check(&mut small, &answer);
+        let rival = Rival {
+            number: 2 * FAR + 1,
+            newer_epoch: false,
+            passive: false,
+            is_current: true,
+        };
+        assert_eq!(small.poll_rival(), Some(rival));
+        check(&mut large, &answer);
+        assert_eq!(large.poll_rival(), None);
+        // It raises its claim number, to keep its place: the node believes it from then on.
+        small.restart(FAR | RAISED);
+        small.greet(1);
+        let asks = frame(&mut small, (2, 1), true, 0);
+        assert_eq!(check(&mut one, &asks), Checked::Unproven);
     }
 }

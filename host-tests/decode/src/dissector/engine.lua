@@ -31,6 +31,7 @@ proto.experts = { wrong }
 local plain = {
     u8 = { 1, ProtoField.uint8 },
     u16 = { 2, ProtoField.uint16 },
+    u32 = { 4, ProtoField.uint32 },
     u64 = { 8, ProtoField.uint64 },
     i32 = { 4, ProtoField.int32 },
     f32 = { 4, ProtoField.float },

@@ -157,6 +157,7 @@ fn plain(kind: &str) -> Result<Kind, String> {
     Ok(match kind {
         "u8" => Kind::U8,
         "u16" => Kind::U16,
+        "u32" => Kind::U32,
         "u64" => Kind::U64,
         "i32" => Kind::I32,
         "f32" => Kind::F32,

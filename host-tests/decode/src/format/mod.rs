@@ -15,6 +15,8 @@ pub enum Kind {
     U16,
     /// Eight bytes.
     U64,
+    /// Four bytes.
+    U32,
     /// Four bytes, two's complement.
     I32,
     /// binary32.

@@ -53,7 +53,7 @@ fn one(kind: &Kind, rng: &mut ChaCha8Rng, out: &mut Vec<u8>) {
         Kind::Flags(names) => out.push(rng.random_range(0..1 << names.len())),
         Kind::U16 | Kind::Digest => out.extend(rng.random::<[u8; 2]>()),
         Kind::U64 => out.extend(rng.random::<[u8; 8]>()),
-        Kind::I32 | Kind::View => out.extend(rng.random::<[u8; 4]>()),
+        Kind::U32 | Kind::I32 | Kind::View => out.extend(rng.random::<[u8; 4]>()),
         Kind::F32 => {
             let number = match rng.random_range(0..4) {
                 0 => f32::from_bits(rng.random()),

@@ -292,8 +292,8 @@ impl Link {
                 assert_eq!(self.kind.replace(kind), None, "found twice");
             }
             events += 1;
-            // Four, and four kinds of mistrust.
-            assert!(events <= 8, "it never ends");
+            // Seven, and four kinds of mistrust.
+            assert!(events <= 11, "it never ends");
         }
         assert_eq!(
             self.autopilot.is_flown(),

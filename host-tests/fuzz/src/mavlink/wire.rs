@@ -22,6 +22,7 @@ pub(super) const ACK: Kind = (77, 143, 10);
 pub(super) const TUNNEL: Kind = (385, 147, 133);
 pub(super) const SET_POSITION: Kind = (86, 5, 53);
 pub(super) const COMMAND: Kind = (76, 152, 33);
+pub(super) const TIMESYNC: Kind = (111, 34, 16);
 pub(super) const TEXT: Kind = (253, 83, 54);
 pub(super) const VALUE: Kind = (251, 170, 18);
 
@@ -43,6 +44,7 @@ pub(super) fn extra(id: u32) -> u8 {
         TUNNEL,
         SET_POSITION,
         COMMAND,
+        TIMESYNC,
         TEXT,
         VALUE,
     ];
@@ -53,7 +55,7 @@ pub(super) fn extra(id: u32) -> u8 {
 }
 
 /// What the link may send.
-pub(super) const SENT: [Kind; 5] = [HEARTBEAT, COMMAND, SET_POSITION, TEXT, VALUE];
+pub(super) const SENT: [Kind; 6] = [HEARTBEAT, COMMAND, SET_POSITION, TIMESYNC, TEXT, VALUE];
 
 /// A frame; zeros at the end of its payload are left out, but for the first byte.
 pub(super) fn frame(kind: Kind, from: [u8; 2], payload: &[u8], flags: u8) -> Vec<u8> {

@@ -20,6 +20,7 @@ pub(super) const fn number_of(message: &Message) -> Option<u16> {
         | Message::Decision(_)
         | Message::Fence { .. }
         | Message::Offer { .. }
-        | Message::Level { .. } => return None,
+        | Message::Level { .. }
+        | Message::Claim(_) => return None,
     })
 }

@@ -6,7 +6,7 @@ use crate::simulator::deaf::Deaf;
 use crate::simulator::medium::Access;
 use crate::simulator::setup::Setup;
 use clap::{Args, ValueEnum};
-use uav_relay::{Instant, Wiring};
+use uav_relay::{Duration, Instant, Wiring};
 
 use super::times::{instant, span};
 
@@ -20,6 +20,13 @@ pub struct Air {
     /// Bits per second of every link, or of the channel, 300 to 10000000; a byte takes ten
     #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = whole(300_u32, 10_000_000))]
     baud: u32,
+    /// Milliseconds of silence after which a neighbour is asked for a sign of life, 1 to 1200000, and a third of those after which it counts
+    /// as lost; 5000 without it. A slow channel carries more relays with more
+    #[arg(long, value_name = "MS", value_parser = whole(1_u64, 1_200_000))]
+    probe_after_ms: Option<u64>,
+    /// The radios reach K relays far, 1 to 1000, on one channel that relays share; four without it
+    #[arg(long, value_name = "K", conflicts_with = "wires", value_parser = whole(1_usize, 1_000))]
+    reach: Option<usize>,
     /// Losses come in runs of L frames on average, 1 to 1e6, each direction of a link by itself (Gilbert-Elliott), with --loss P as
     /// the mean share; 1 is for independent losses, anything else at least 1 / (1 - P)
     #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 1.0, 1e6))]
@@ -101,6 +108,13 @@ impl Air {
         }
         setup.burst = self.burst;
         setup.link.baud = self.baud;
+        if let Some(ms) = self.probe_after_ms {
+            setup.settings.probe_after = Duration::from_millis(ms);
+            setup.settings.dead_after = Duration::from_millis(3 * ms);
+        }
+        if let Some(reach) = self.reach {
+            setup.radio_reach = reach;
+        }
         setup.deaf.clone_from(&self.deaf);
         setup.access = match (setup.settings.wiring, self.sharing) {
             (Wiring::Pair, _) | (_, Some(Sharing::Ideal)) => Access::Ideal,

@@ -1,6 +1,9 @@
 //! Drones with autopilots: that there are any, and what their pilots do.
 
 use crate::command::Failure;
+use std::path::{Path, PathBuf};
+
+use crate::simulator::drones::Point;
 use crate::simulator::fleet::spec::{FleetSpec, Takeover, somewhere};
 use crate::simulator::setup::Setup;
 use clap::Args;
@@ -29,7 +32,13 @@ pub struct Flight {
     /// The pilot of drone I has the sticks from S seconds on, until E or for good. Repeatable
     #[arg(long, value_name = "I@S[-E]", value_parser = takeover)]
     takeover: Vec<Takeover>,
+    /// Place of each drone when it is handed over first: a file with a line `index, x_m, y_m, h_m` for each
+    #[arg(long, value_name = "FILE", requires = "fly")]
+    start: Option<PathBuf>,
 }
+
+/// Greatest |x| and |y| and height of a start, m.
+const START_WITHIN_M: f64 = 5_000.0;
 
 impl Flight {
     pub const fn is_chosen(&self) -> bool {
@@ -77,17 +86,22 @@ impl Flight {
                 "--fly: the line is {distance_m} m long: must be within {SHORTEST_M} to {LONGEST_M} m"
             ))
         })?;
-        let all = f64::from(config.relays);
+        let start = match &self.start {
+            Some(file) => starts(file, config.relays)?,
+            None => (0..config.relays)
+                .map(|index| {
+                    let share = (f64::from(index) + 0.5) / f64::from(config.relays);
+                    [distance_m * share, 0.0, f64::from(config.common.altitude_m)]
+                })
+                .collect(),
+        };
         let mut guard = GuardConfig::of(&setup.mission, config.common);
         guard.hover_m = HOVER_M;
         setup.settings.guard = Some(guard);
         setup.settings.sited = true;
         setup.fleet = Some(FleetSpec {
             axis,
-            start_x_m: (0..config.relays)
-                .map(|index| distance_m * (f64::from(index) + 0.5) / all)
-                .collect(),
-            height_m: f64::from(config.common.altitude_m),
+            start,
             takeovers: self.takeover.clone(),
             restarts: Vec::new(),
             gust_mps: GUST_MPS,
@@ -106,5 +120,62 @@ fn takeover(text: &str) -> Result<Takeover, String> {
     if until.is_some_and(|until| until <= from) {
         return Err("must be I@S-E with E after S".to_owned());
     }
-    Ok(Takeover { relay, from, until })
+    Ok(Takeover {
+        relay,
+        from,
+        until,
+        to: None,
+    })
+}
+
+/// Reads where each of so many drones begins.
+fn starts(file: &Path, relays: u16) -> Result<Vec<Point>, Failure> {
+    let named = |what: String| Failure::input(format!("--start {}: {what}", file.display()));
+    let text = std::fs::read_to_string(file).map_err(|error| named(error.to_string()))?;
+    let mut starts = vec![None; usize::from(relays)];
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let at = |what: String| named(format!("line {}: {what}", number + 1));
+        let form = || at(format!("`{line}`: must be `index, x_m, y_m, h_m`"));
+        let mut parts = line.split(',').map(str::trim);
+        let index: u16 = parts
+            .next()
+            .and_then(|part| part.parse().ok())
+            .ok_or_else(form)?;
+        let mut place = [0.0; 3];
+        for (value, least) in place
+            .iter_mut()
+            .zip([-START_WITHIN_M, -START_WITHIN_M, 2.0])
+        {
+            *value = parts
+                .next()
+                .and_then(|part| part.parse::<f64>().ok())
+                .ok_or_else(form)?;
+            if !(least..=START_WITHIN_M).contains(value) {
+                return Err(at(format!(
+                    "{value} m: must be within {least} to {START_WITHIN_M}"
+                )));
+            }
+        }
+        if parts.next().is_some() {
+            return Err(form());
+        }
+        let start = index
+            .checked_sub(1)
+            .and_then(|index| starts.get_mut(usize::from(index)))
+            .ok_or_else(|| at(format!("drone {index}: must be within 1 to {relays}")))?;
+        if start.replace(place).is_some() {
+            return Err(at(format!("drone {index} is there twice")));
+        }
+    }
+    let complete: Option<Vec<Point>> = starts.iter().copied().collect();
+    complete.ok_or_else(|| {
+        let missing = starts.iter().position(Option::is_none).unwrap_or(0) + 1;
+        named(format!(
+            "drone {missing} is missing: a line for each of 1 to {relays}"
+        ))
+    })
 }

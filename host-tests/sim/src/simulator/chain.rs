@@ -215,6 +215,9 @@ impl Chain {
                 member.relay = relay;
                 member.killed = None;
                 member.wake = None;
+                if let Some(vehicle) = self.fleet.get_mut(index) {
+                    vehicle.boot(now);
+                }
                 self.tell(index, Turning::Booted, None);
             }
             _ if member.killed.is_some() => return,

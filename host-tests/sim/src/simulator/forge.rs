@@ -149,6 +149,8 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
             behind: place,
             holds: mission_id,
             flies: true,
+            whole: rng.random(),
+            refused: rng.random(),
             nonce: rng.random(),
         }),
         (3, _) => Message::Proposal(Proposal {

@@ -193,6 +193,11 @@ pub struct Outcome {
     pub nearest: Option<Nearest>,
     /// The same of drones with an autopilot that no pilot had.
     pub nearest_lent: Option<Nearest>,
+    /// Least of the distance of two drones with an autopilot that no pilot had, less the lesser of the separation and their distance when
+    /// both were handed over last, m; infinite where there were none.
+    pub margin_m: f64,
+    /// When that was.
+    pub margin_at: Option<Nearest>,
     /// Targets that an autopilot was told for more than a second after it had said that none may be sent. Anything but 0 is a bug.
     pub stray_targets: u64,
     /// Where the drones with an autopilot are in the end, along the line of the mission that their relays fly, and whether these fly them.

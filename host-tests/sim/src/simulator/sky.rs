@@ -25,8 +25,10 @@ pub struct Sky {
     pub once: bool,
     /// What relays are handed instead of what is heard where they are, once, at the first measurement: index from 1, and what.
     pub handed: Vec<(u16, Sample)>,
-    /// Relays whose receiver says something else: index from 1, by how many dB too much, and since when.
-    pub broken: Vec<(u16, f64, Instant)>,
+    /// Receivers that say something else.
+    pub broken: Vec<Broken>,
+    /// When the ends begin to measure, and when they stop.
+    pub ends_during: [Instant; 2],
     /// Whether the transmitter and the receiver measure, too: with keys they say it on the air, without them the receiver has a wire to the
     /// last relay.
     pub ends: bool,
@@ -34,6 +36,26 @@ pub struct Sky {
     pub until: Instant,
     /// Seed of the shadows.
     pub seed: u64,
+}
+
+/// A receiver that says something else than it hears.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Broken {
+    /// Whose: index from 1, 0 for the transmitter, one more than there are relays for the receiver.
+    pub node: u16,
+    /// What it says.
+    pub says: Says,
+    /// Since when.
+    pub since: Instant,
+}
+
+/// What a broken receiver says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Says {
+    /// So many times what it hears.
+    Times(f64),
+    /// Always this, W.
+    Always(f64),
 }
 
 /// Places nearer than this have the same shadow, m.
@@ -51,6 +73,7 @@ impl Sky {
             once: false,
             handed: Vec::new(),
             broken: Vec::new(),
+            ends_during: [Instant::ZERO, Instant::from_micros(u64::MAX)],
             ends: true,
             until: Instant::from_millis(600_000),
             seed: 1,
@@ -78,26 +101,49 @@ impl Sky {
         at: Placement,
         rng: &mut ChaCha8Rng,
     ) -> f64 {
-        let broken = self
-            .broken
-            .iter()
-            .find(|(which, _, since)| *which == index && now >= *since);
-        let off_db = broken.map_or(0.0, |(_, db, _)| *db) + self.shadow_db * self.shadow(at.into());
-        (scene.interference_w(at) * decibel(off_db) + scene.noise_w) * self.mean(rng)
+        let true_w = scene.interference_w(at) * decibel(self.shadow_db * self.shadow(at.into()));
+        self.said_w(scene, index, now, true_w, rng)
     }
 
-    /// What the receiver measures, W.
-    pub(super) fn receiver_w(&self, scene: &Scene, rng: &mut ChaCha8Rng) -> f64 {
-        self.on_ground_w(scene, scene.distance_m, rng)
+    /// What the receiver of `node` makes of an interference of `true_w`, W.
+    fn said_w(
+        &self,
+        scene: &Scene,
+        node: u16,
+        now: Instant,
+        true_w: f64,
+        rng: &mut ChaCha8Rng,
+    ) -> f64 {
+        let mut broken = self.broken.iter();
+        let broken = broken.find(|broken| broken.node == node && now >= broken.since);
+        match broken.map(|broken| broken.says) {
+            Some(Says::Times(times)) => (true_w * times + scene.noise_w) * self.mean(rng),
+            Some(Says::Always(power_w)) => power_w,
+            None => (true_w + scene.noise_w) * self.mean(rng),
+        }
+    }
+
+    /// What the receiver of a chain of `relays` measures, W.
+    pub(super) fn receiver_w(
+        &self,
+        scene: &Scene,
+        now: Instant,
+        relays: u16,
+        rng: &mut ChaCha8Rng,
+    ) -> f64 {
+        let true_w = scene.interference_on_ground_w(scene.distance_m);
+        self.said_w(scene, relays + 1, now, true_w, rng)
     }
 
     /// What the transmitter measures, W.
-    pub(super) fn transmitter_w(&self, scene: &Scene, rng: &mut ChaCha8Rng) -> f64 {
-        self.on_ground_w(scene, 0.0, rng)
+    pub(super) fn transmitter_w(&self, scene: &Scene, now: Instant, rng: &mut ChaCha8Rng) -> f64 {
+        self.said_w(scene, 0, now, scene.interference_on_ground_w(0.0), rng)
     }
 
-    fn on_ground_w(&self, scene: &Scene, x_m: f64, rng: &mut ChaCha8Rng) -> f64 {
-        (scene.interference_on_ground_w(x_m) + scene.noise_w) * self.mean(rng)
+    /// Whether the ends measure now.
+    pub(super) fn ends_measure(&self, now: Instant) -> bool {
+        let [from, until] = self.ends_during;
+        self.ends && now >= from && now < until
     }
 
     /// The mean of so many exponential samples with a mean of 1.

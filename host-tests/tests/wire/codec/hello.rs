@@ -51,11 +51,13 @@ impl Greeting {
             holds: mission_id(self.holds),
             nonce: self.nonce,
             flies: self.flag(4),
+            whole: self.flag(5),
+            refused: self.flag(6),
         })
     }
 
     pub(super) fn in_range(self) -> bool {
-        self.neighbour <= 1000 && is_count(self.behind) && self.hears <= 15 && self.flags <= 31
+        self.neighbour <= 1000 && is_count(self.behind) && self.hears <= 15 && self.flags <= 127
     }
 
     pub(super) fn read(rest: &mut Reader) -> Option<Self> {

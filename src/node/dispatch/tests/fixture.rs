@@ -60,6 +60,9 @@ pub(super) fn relay_of(mission: Mission, index: u16, signs: bool) -> Node {
 pub(super) fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
     let mut said = heapless::Vec::new();
     while let Some((_, to, message)) = node.poll_message(NOW) {
+        if let Message::Claim(_) = message {
+            continue;
+        }
         let known = matches!(
             message,
             Message::Hello(_)
@@ -87,6 +90,8 @@ pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
         hears: 0x0F,
         holds,
         flies: true,
+        whole: false,
+        refused: false,
         nonce: 9,
     })
 }

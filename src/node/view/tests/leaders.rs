@@ -81,9 +81,29 @@ fn a_leader_proposes_after_all_it_has_heard_of_and_one_at_a_time() {
     relay.view.heard_of(id(8, 2));
     assert!(relay.leads().began);
     assert_eq!(relay.view.newest(), id(9, 1));
-    // What is too far ahead is not believed.
-    relay.view.heard_of(id(1000, 1));
-    assert_eq!(relay.view.newest(), id(9, 1));
+    // Toward what is far ahead it goes step by step.
+    for number in [265, 521, 777, 1000, 1000] {
+        relay.view.heard_of(id(1000, 3));
+        assert_eq!(relay.view.newest(), id(number, 3));
+    }
+}
+
+/// A relay that is alone for hours spends one number, not one every five seconds.
+#[test]
+fn a_leader_that_is_alone_and_was_refused_asks_itself_before_it_proposes_again() {
+    let mut relay = Relay::second();
+    relay.end = true;
+    assert_eq!(relay.leads().decided, Some(Decided::Refused));
+    let newest = relay.view.newest();
+    for _ in 0..1_000 {
+        assert_eq!(relay.leads(), Effects::NONE);
+        assert!(relay.view.has_no_quorum() && relay.view.asking.asks());
+    }
+    assert_eq!(relay.view.newest(), newest);
+    // With somebody after it the poll may come out otherwise.
+    relay.end = false;
+    let began = (0..8).any(|_| relay.leads().began);
+    assert!(began && relay.view.newest() > newest);
 }
 
 #[test]

@@ -20,6 +20,9 @@ const THERE_M: f64 = 1.0;
 /// So often an operator looks at the fleet.
 const LOOKS: Duration = Duration::from_millis(5_000);
 
+/// A pilot gives no drone back while another one moves within the separation and this, m.
+const TRAFFIC_M: f64 = 30.0;
+
 /// The pilot of a drone whose relay is silent, or who has taken it for good, lands it after so long.
 pub(super) const LANDS_AFTER: Duration = Duration::from_millis(30_000);
 
@@ -37,6 +40,7 @@ impl Chain {
 
     /// All fly on for a step.
     pub(super) fn fly_fleet(&mut self) {
+        self.look_for_traffic();
         for index in 0..self.fleet.len() {
             self.drive(index);
         }
@@ -53,11 +57,58 @@ impl Chain {
         if least(nearest) < least(self.outcome.nearest_lent) {
             self.outcome.nearest_lent = nearest;
         }
+        self.measure_pairs();
         self.outcome.stray_targets = self.fleet.iter().map(|vehicle| vehicle.strays).sum();
         if self.now.as_micros().is_multiple_of(LOOKS.as_micros()) {
             self.look_around();
         }
         self.queue.put(self.now + STEP, 0, Happening::Fly);
+    }
+
+    /// Compares the distance of each pair with what it may be.
+    fn measure_pairs(&mut self) {
+        let separation_m = f64::from(self.setup.mission.config().min_separation_m);
+        let count = self.fleet.len();
+        self.handed_over_m.resize(count * count, None);
+        for (index, one) in self.fleet.iter().enumerate() {
+            for (other, beside) in self.fleet.iter().enumerate().skip(index + 1) {
+                let Some(begun) = self.handed_over_m.get_mut(index * count + other) else {
+                    continue;
+                };
+                if !one.is_in_its_hands(self.now) || !beside.is_in_its_hands(self.now) {
+                    *begun = None;
+                    continue;
+                }
+                let apart_m = apart(one.at(), beside.at());
+                let least_m = begun.get_or_insert(apart_m).min(separation_m);
+                if apart_m - least_m < self.outcome.margin_m {
+                    self.outcome.margin_m = apart_m - least_m;
+                    self.outcome.margin_at = Some(Nearest {
+                        apart_m,
+                        pair: [index + 1, other + 1],
+                        at: self.now,
+                    });
+                }
+            }
+        }
+    }
+
+    /// Has each pilot look whether another drone flies past.
+    fn look_for_traffic(&mut self) {
+        let separation_m = f64::from(self.setup.mission.config().min_separation_m);
+        let seen: Vec<(Point, bool)> = self
+            .fleet
+            .iter()
+            .map(|vehicle| (vehicle.at(), vehicle.flies() && vehicle.moves()))
+            .collect();
+        for (index, vehicle) in self.fleet.iter_mut().enumerate() {
+            let near = |at: &Point| apart(vehicle.at(), *at) < separation_m + TRAFFIC_M;
+            let traffic = seen
+                .iter()
+                .enumerate()
+                .any(|(other, (at, moves))| other != index && *moves && near(at));
+            vehicle.is_clear = !traffic;
+        }
     }
 
     /// One drone flies on, and talks with its relay's link: as a firmware's loop does, unless that is off.
@@ -82,6 +133,9 @@ impl Chain {
         // Before it hears where the drone is: flown again it begins with the next place.
         let is_flown = vehicle.link.is_flown();
         member.relay.handle_control(now, is_flown);
+        vehicle.link.handle_ready(now, member.relay.is_ready());
+        let holds = [Side::Upstream, Side::Downstream].map(|side| member.relay.hold_reason(side));
+        vehicle.link.handle_hold(now, holds);
         vehicle.link.handle_setpoint(now, member.relay.setpoint());
         while let Some(frame) = vehicle.link.poll_transmit(now) {
             vehicle.hear(now, &frame);

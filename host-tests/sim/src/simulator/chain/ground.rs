@@ -58,8 +58,11 @@ impl Chain {
         for at in 0..self.stations.len() {
             if let Some(station) = self.stations.get_mut(at) {
                 let power_w = match station.end {
-                    Side::Upstream => sky.transmitter_w(scene, &mut self.rng),
-                    Side::Downstream => sky.receiver_w(scene, &mut self.rng),
+                    Side::Upstream => sky.transmitter_w(scene, self.now, &mut self.rng),
+                    Side::Downstream => {
+                        let relays = self.setup.mission.relays();
+                        sky.receiver_w(scene, self.now, relays, &mut self.rng)
+                    }
                 };
                 station.ground.measured(narrow(power_w));
             }

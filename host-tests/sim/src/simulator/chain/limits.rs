@@ -31,13 +31,32 @@ impl Chain {
             let chosen = (0.0..=end).contains(&place.x_m)
                 && aside
                 && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
-            // With a guard it may be on its way from anywhere in the box.
+            // With a guard it may be on its way from anywhere: from outside the box it goes no farther out.
+            let before = member.before.unwrap_or(place);
             let guard = self.setup.settings.guard;
-            let inside = guard.map_or(chosen, |guard| guard.fence.contains(place));
+            let inside = guard.map_or(chosen, |guard| {
+                let fence = guard.fence;
+                // The box goes along with the line of an upload.
+                let longer_m = end - self.setup.mission.config().distance_m;
+                let most_x_m = fence.most_x_m + longer_m;
+                [
+                    (place.x_m, before.x_m, fence.least_x_m, most_x_m),
+                    (place.y_m, before.y_m, fence.least_y_m, fence.most_y_m),
+                    (
+                        place.altitude_m,
+                        before.altitude_m,
+                        fence.least_altitude_m,
+                        fence.most_altitude_m,
+                    ),
+                ]
+                .iter()
+                .all(|(is, was, least, most)| (least.min(*was)..=most.max(*was)).contains(is))
+            });
             self.outcome.unsafe_setpoints += u64::from(!inside);
             // With a new mission it stays where it is until the next agreement.
             member.safe = inside.then_some(place);
         }
+        member.before = member.relay.setpoint();
         if let Some((done, sir)) = member.relay.rounds()
             && sir > 0.0
             && self.outcome.rounds.len() <= usize::from(done)

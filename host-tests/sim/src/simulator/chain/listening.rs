@@ -56,15 +56,22 @@ impl Chain {
                     power_w: uav_relay_scenario::number::narrow(power_w),
                 },
             );
-            if sky.ends && !self.setup.auth && member.node == self.setup.mission.relays() {
-                let power_w =
-                    uav_relay_scenario::number::narrow(sky.receiver_w(&scene, &mut self.rng));
+            if sky.ends_measure(now)
+                && !self.setup.auth
+                && member.node == self.setup.mission.relays()
+            {
+                let power_w = uav_relay_scenario::number::narrow(sky.receiver_w(
+                    &scene,
+                    now,
+                    member.node,
+                    &mut self.rng,
+                ));
                 member
                     .relay
                     .handle_sample(now, Sample::Receiver { power_w });
             }
         }
-        if sky.ends && sky.handed.is_empty() {
+        if sky.ends_measure(now) && sky.handed.is_empty() {
             self.measure_at_ends(&sky, &scene);
         }
         self.stand(places);

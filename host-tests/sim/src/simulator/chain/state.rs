@@ -36,6 +36,8 @@ pub(super) struct Member {
     pub(super) stored: Option<Upload>,
     /// Where it was told to fly when that was last found to be within its limits.
     pub(super) safe: Option<Placement>,
+    /// Setpoint when it was checked last.
+    pub(super) before: Option<Placement>,
     /// Where it has measured the interference last.
     pub(super) measured: Option<Placement>,
     /// What it looked like when it was filmed last: whether it was on, and where it was told to fly.
@@ -62,6 +64,8 @@ pub struct Chain {
     pub(super) attacker: Option<Attacker>,
     pub(super) flight: Option<Flight>,
     pub(super) fleet: Vec<Vehicle>,
+    /// Of each pair of drones that no pilot has: their distance when both were handed over last, m.
+    pub(super) handed_over_m: Vec<Option<f64>>,
     /// The channel that all share, unless each has a line of its own.
     pub(super) medium: Option<Medium>,
     /// Where losses come in runs.

@@ -21,7 +21,7 @@ impl Station {
     pub(super) fn is_busy(&self) -> bool {
         matches!(
             self.ground.progress(),
-            Progress::Offering | Progress::Held { .. }
+            Progress::Offering | Progress::Held { .. } | Progress::Adopted { .. }
         )
     }
 }

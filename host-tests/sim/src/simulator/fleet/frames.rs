@@ -14,6 +14,12 @@ pub(super) enum Says {
         autopilot: u8,
         armed: bool,
         custom_mode: u32,
+        /// `MAV_STATE` 5: it is in its failsafe.
+        is_critical: bool,
+    },
+    /// The answer to a TIMESYNC.
+    Sync {
+        asked: u64,
     },
     State {
         landed: u8,
@@ -36,11 +42,18 @@ impl Says {
                 autopilot,
                 armed,
                 custom_mode,
+                is_critical,
             } => {
                 payload.extend(custom_mode.to_le_bytes());
-                // A quadrotor; its mode is its own; active.
-                payload.extend([2, autopilot, 1 | if armed { 128 } else { 0 }, 4, 3]);
+                // A quadrotor; its mode is its own; active, or critical.
+                let status = if is_critical { 5 } else { 4 };
+                payload.extend([2, autopilot, 1 | if armed { 128 } else { 0 }, status, 3]);
                 id::HEARTBEAT
+            }
+            Self::Sync { asked } => {
+                payload.extend(1_u64.to_le_bytes());
+                payload.extend(asked.to_le_bytes());
+                id::TIMESYNC
             }
             Self::State { landed } => {
                 payload.extend([0, landed]);
@@ -87,6 +100,8 @@ pub(super) enum Heard {
     Interval { id: u32, interval_us: u64 },
     /// To fly there.
     Target(Geodetic),
+    /// To send that back.
+    Sync(u64),
 }
 
 /// What a frame tells an autopilot, if anything.
@@ -113,6 +128,10 @@ pub(super) fn heard(frame: &[u8]) -> Option<Heard> {
             lon_e7: i32::from_le_bytes(bytes(8)),
             amsl_mm: (float(12) * 1e3).round() as i32,
         })),
+        id::TIMESYNC => {
+            let [low, high] = [8, 12].map(|at| u64::from(u32::from_le_bytes(bytes(at))));
+            Some(Heard::Sync(high << 32 | low))
+        }
         _ => None,
     }
 }

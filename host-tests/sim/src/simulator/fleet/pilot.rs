@@ -3,6 +3,7 @@
 use uav_relay::Instant;
 
 use super::spec::Takeover;
+use crate::simulator::drones::Point;
 
 /// Drones take off one after the other.
 const FIRST_S: u64 = 5;
@@ -60,18 +61,29 @@ impl Pilot {
         self.hands_over_at = Some(now + uav_relay::Duration::from_millis(1_000 * RECOVERS_S));
     }
 
-    /// The mode that the pilot chooses now, if any.
-    pub(super) fn chooses(&mut self, now: Instant) -> Option<Mode> {
+    /// The mode that the pilot chooses now, if any. A drone that flies, or that another one flies past, is not handed over.
+    pub(super) fn chooses(&mut self, now: Instant, may_hand_over: bool) -> Option<Mode> {
         if self.has_sticks(now) {
             // It is handed over once more afterwards.
             self.hands_over_at = Some(now);
             return Some(Mode::Sticks);
         }
-        if self.hands_over_at.is_some_and(|at| at <= now) {
+        if may_hand_over && self.hands_over_at.is_some_and(|at| at <= now) {
             self.hands_over_at = None;
             return Some(Mode::Companion);
         }
         None
+    }
+
+    /// Place to which the pilot who has the sticks flies it, if that is any.
+    pub(super) fn flies_to(&self, now: Instant) -> Option<Point> {
+        let during = |it: &&Takeover| now >= it.from && it.until.is_none_or(|until| now < until);
+        self.takeovers.iter().find(during)?.to
+    }
+
+    /// The autopilot has refused the mode.
+    pub(super) fn tries_again(&mut self, now: Instant) {
+        self.hands_over_at = Some(now + uav_relay::Duration::from_millis(1_000 * LOOKS_S));
     }
 
     pub(super) fn has_sticks(&self, now: Instant) -> bool {

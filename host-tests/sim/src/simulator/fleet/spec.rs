@@ -5,15 +5,19 @@ use uav_relay::Instant;
 use uav_relay::flight::autopilot::Kind;
 use uav_relay::flight::axis::Axis;
 
+use crate::simulator::drones::Point;
+
 /// The pilot of a drone has the sticks for a time.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Takeover {
     /// Whose, from 1.
     pub relay: u16,
     /// From when on.
     pub from: Instant,
-    /// When the pilot gives it back, if that is ever.
+    /// When the pilot gives it back, if that is ever: from then on once it hovers and no other drone flies past.
     pub until: Option<Instant>,
+    /// Place that the pilot flies it to, m along the line of the run, to its right and up; `None` to climb where it is.
+    pub to: Option<Point>,
 }
 
 /// All drones of a run.
@@ -21,10 +25,8 @@ pub struct Takeover {
 pub struct FleetSpec {
     /// The line on earth that they fly along.
     pub axis: Axis,
-    /// Where each stands on the ground before it takes off, m along the line.
-    pub start_x_m: Vec<f64>,
-    /// How high they climb before they are handed over, m.
-    pub height_m: f64,
+    /// Place in the air at which each is handed over first, m along the line, to its right and up. It takes off below it.
+    pub start: Vec<Point>,
     /// Pilots who take over.
     pub takeovers: Vec<Takeover>,
     /// Autopilots that are switched off and on in the air: whose, from 1, and when.

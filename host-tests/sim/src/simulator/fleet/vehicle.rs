@@ -24,6 +24,9 @@ const ACCELERATION_MPS2: f64 = 3.0;
 /// A PX4 that hears no target for so long leaves its mode, and hovers (COM_OBL_RC_ACT 5).
 const LOST: Duration = Duration::from_millis(1_000);
 
+/// It resumes its mode by itself once it has heard targets again for so long.
+const RESUMES: Duration = Duration::from_millis(1_200);
+
 /// An autopilot that is switched off and on is away for so long.
 const AWAY: Duration = Duration::from_millis(3_000);
 
@@ -64,7 +67,14 @@ pub(in crate::simulator) struct Vehicle {
     mode: Mode,
     /// Where it hovers, or flies to.
     goal: Point,
+    /// Height at which it is handed over first, m.
+    climbs_to_m: f64,
+    /// True while no other drone flies past it, as its pilot sees.
+    pub(in crate::simulator) is_clear: bool,
     told_at: Option<Instant>,
+    /// A PX4 is in its failsafe; it resumes its mode by itself where it is streamed targets again.
+    is_failing: bool,
+    streamed_since: Instant,
     began: Instant,
     away_until: Option<Instant>,
     rates: [Rate; 4],
@@ -80,8 +90,8 @@ impl Vehicle {
     pub(in crate::simulator) fn new(spec: &FleetSpec, index: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(DRONES + u64::try_from(index).unwrap_or(0));
-        let x_m = spec.start_x_m.get(index).copied().unwrap_or(0.0);
-        let at = [x_m, 0.0, 0.0];
+        let start = spec.start.get(index).copied().unwrap_or_default();
+        let at = [start[0], start[1], 0.0];
         let bias = [0; 3].map(|_| spec.bias_m * rng.random_range(-1.0..=1.0));
         Self {
             kind: FleetSpec::kind(index),
@@ -95,7 +105,11 @@ impl Vehicle {
             landed: ON_GROUND,
             mode: Mode::Sticks,
             goal: at,
+            climbs_to_m: start[2],
+            is_clear: true,
             told_at: None,
+            is_failing: false,
+            streamed_since: Instant::ZERO,
             began: Instant::ZERO,
             away_until: None,
             rates: Self::rates(Instant::ZERO),
@@ -158,6 +172,11 @@ impl Vehicle {
         self.body.at
     }
 
+    /// Returns true while it moves.
+    pub(in crate::simulator) fn moves(&self) -> bool {
+        self.body.velocity_mps.iter().any(|v| v.abs() > 0.5)
+    }
+
     /// Whether it is in the air.
     pub(in crate::simulator) const fn flies(&self) -> bool {
         self.landed != ON_GROUND
@@ -177,11 +196,19 @@ impl Vehicle {
     pub(in crate::simulator) fn restart(&mut self, now: Instant) {
         self.away_until = Some(now + AWAY);
         self.mode = Mode::Hold;
+        self.is_failing = false;
         // A climb is finished: nobody would hand over a drone that stopped on its way up.
         if self.landed == IN_AIR {
             self.goal = self.taken();
         }
         self.told_at = None;
+        self.pilot.has_seen_a_restart(now);
+    }
+
+    /// Its relay is switched on again, and with it the link, which knows nothing of before.
+    pub(in crate::simulator) fn boot(&mut self, now: Instant) {
+        self.link = Autopilot::new(self.spec.axis, Pace::default(), now);
+        self.sites = None;
         self.pilot.has_seen_a_restart(now);
     }
 
@@ -246,9 +273,9 @@ impl Vehicle {
             self.armed = true;
             self.landed = TAKING_OFF;
             self.goal = self.taken();
-            self.goal[2] = self.spec.height_m;
+            self.goal[2] = self.climbs_to_m;
         }
-        if self.landed == TAKING_OFF && (self.taken()[2] - self.spec.height_m).abs() < 0.3 {
+        if self.landed == TAKING_OFF && (self.taken()[2] - self.climbs_to_m).abs() < 0.3 {
             self.landed = IN_AIR;
             self.pilot.is_up(now);
         }
@@ -259,19 +286,42 @@ impl Vehicle {
         if self.landed != IN_AIR {
             return;
         }
-        if let Some(mode) = self.pilot.chooses(now)
-            && mode != self.mode
+        let streamed = self.told_at.is_some_and(|at| now.since(at) <= LOST);
+        let hovers = self.body.velocity_mps.iter().all(|v| v.abs() < 0.3);
+        if let Some(mode) = self.pilot.chooses(now, hovers && self.is_clear)
+            && (mode != self.mode || mode == Mode::Companion)
         {
-            self.mode = mode;
-            self.goal = self.taken();
-            if mode == Mode::Sticks {
-                self.goal[2] += ASIDE_M;
+            let refuses = self.kind == Kind::Px4 && (!streamed || self.is_failing);
+            // A failsafe is ended by a mode of the pilot's own; then OFFBOARD is tried again.
+            self.is_failing = false;
+            if mode == self.mode {
+                // The autopilot was in it all along, and the link that was started meanwhile has seen no other.
+                self.mode = Mode::Hold;
+                self.goal = self.taken();
+                self.pilot.tries_again(now);
+            } else if refuses && mode == Mode::Companion {
+                self.pilot.tries_again(now);
+            } else {
+                self.mode = mode;
+                self.goal = self.taken();
+                if mode == Mode::Sticks {
+                    self.goal[2] += ASIDE_M;
+                    self.goal = self.pilot.flies_to(now).unwrap_or(self.goal);
+                }
             }
         }
-        let streamed = self.told_at.is_some_and(|at| now.since(at) <= LOST);
         if self.kind == Kind::Px4 && self.mode == Mode::Companion && !streamed {
             self.mode = Mode::Hold;
+            self.is_failing = true;
+            self.pilot.has_seen_a_restart(now);
             self.goal = self.taken();
+        }
+        if !streamed {
+            self.streamed_since = now;
+        }
+        if self.is_failing && now.since(self.streamed_since) >= RESUMES {
+            self.mode = Mode::Companion;
+            self.is_failing = false;
         }
     }
 
@@ -316,6 +366,7 @@ impl Vehicle {
                     (Kind::ArduCopter, Mode::Hold) => 5,
                     (Kind::ArduCopter, Mode::Companion) => 4,
                 },
+                is_critical: self.is_failing,
             }),
             id::EXTENDED_SYS_STATE => Some(Says::State {
                 landed: self.landed,
@@ -359,6 +410,11 @@ impl Vehicle {
                 {
                     self.goal = point(place);
                 }
+            }
+            Some(Heard::Sync(asked)) => {
+                self.sequence = self.sequence.wrapping_add(1);
+                let answer = Says::Sync { asked }.frame(self.sequence);
+                self.link.handle_bytes(now, &answer);
             }
             None => {}
         }

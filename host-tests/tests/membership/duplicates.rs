@@ -1,0 +1,285 @@
+//! Two drones with one index: a cloned image, so that number, key and epoch are equal.
+//!
+//! `COUNT` gives the number of chains for each kind of medium.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{Auth, Event, Identity, Key, Port, Relay, Settings, Wiring};
+
+use super::*;
+
+/// Time from one step of the medium to the next; a frame arrives one step after it was sent.
+const STEP_MS: u64 = 10;
+
+/// Time in which one of two duplicates has to give up its setpoint once it has heard of the other.
+const LIMIT_MS: u64 = 2_000;
+
+/// The same for two that receive each other: the first frames may all be lost, and a chain that has its places sends few.
+const HEARD_MS: u64 = 10_000;
+
+/// Longest time that two duplicates that do not receive each other may both have a setpoint: at a loss of 30 % several claims and their
+/// echoes may be lost in a row.
+const HIDDEN_MS: u64 = 40_000;
+
+/// Time until the whole chain has setpoints for good, with one of the two.
+const FLIES_MS: u64 = 60_000;
+
+/// Time that each chain is watched after the second duplicate was switched on.
+const WATCHED_MS: u64 = 100_000;
+
+/// How frames reach the duplicates.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Medium {
+    /// One channel; the duplicates receive each other.
+    Shared,
+    /// A link to each neighbour, to which both duplicates are connected; they receive each other.
+    Links,
+    /// A link to each neighbour, to which both duplicates are connected; they do not receive each other.
+    HiddenLinks,
+}
+
+impl Medium {
+    /// The port at which another drone with index `receiver` receives what `sender` sends through `port`, if it does.
+    fn carries(self, sender: u16, port: Port, receiver: u16) -> Option<Port> {
+        match port {
+            Port::Shared => Some(Port::Shared),
+            _ if sender == receiver => (self == Self::Links).then_some(port),
+            Port::Upstream => (receiver + 1 == sender).then_some(Port::Downstream),
+            Port::Downstream => (receiver == sender + 1).then_some(Port::Upstream),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Case {
+    medium: Medium,
+    signed: bool,
+    loss: f64,
+    /// Whether both are switched on at time 0.
+    at_once: bool,
+    seed: u64,
+}
+
+/// What became of one chain, in ms.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    /// Longest time that both duplicates had a setpoint, counted from `LIMIT_MS` after the first frame that one received of the other.
+    both: u64,
+    /// Longest time that both had a setpoint, counted from the start of the second.
+    both_at_all: u64,
+    /// Total time, after the second was switched on, in which neither had a setpoint.
+    neither: u64,
+    /// Time from the start of the second until the whole chain, with one of the two, has setpoints for good.
+    flies: u64,
+    /// Whether the duplicate that was switched on first has the setpoint in the end.
+    first_stays: bool,
+    /// Whether each of the two raised `Event::IndexTaken`.
+    reported: [bool; 2],
+}
+
+struct Drone {
+    index: u16,
+    relay: Relay,
+    on_at: u64,
+}
+
+/// A drone for each index and the time at which it is switched on, ms, with a seed of its own.
+fn switched_on(
+    mission: Mission,
+    settings: Settings,
+    starts: &[(u16, u64)],
+    rng: &mut ChaCha8Rng,
+) -> Vec<Drone> {
+    let drone = |&(index, on_at)| {
+        let identity = Identity { network: 7, index };
+        let at = Instant::from_millis(on_at);
+        let relay = Relay::new(mission, identity, settings, rng.random(), at).unwrap();
+        Drone {
+            index,
+            relay,
+            on_at,
+        }
+    };
+    starts.iter().map(drone).collect()
+}
+
+fn flown(case: Case) -> Found {
+    let rng = &mut ChaCha8Rng::seed_from_u64(case.seed);
+    let relays = rng.random_range(3..=8);
+    let twice = rng.random_range(1..=relays);
+    let mission = mission(relays);
+    let wiring = match case.medium {
+        Medium::Shared => Wiring::Shared,
+        _ => Wiring::Pair,
+    };
+    let settings = Settings {
+        wiring,
+        auth: case.signed.then(|| Auth {
+            key: Key::new([7; 32]),
+            epoch: 5,
+        }),
+        ..Settings::default()
+    };
+    let later = if case.at_once {
+        0
+    } else {
+        10 * rng.random_range(1..6_000)
+    };
+    let starts = (1..=relays).map(|index| (index, 0)).chain([(twice, later)]);
+    let starts: Vec<_> = starts.collect();
+    let mut drones = switched_on(mission, settings, &starts, rng);
+    let (first, second) = (usize::from(twice) - 1, drones.len() - 1);
+    let mut flying: Vec<(usize, Port, Vec<u8>)> = Vec::new();
+    let mut found = Found::default();
+    let (mut heard, mut run, mut run_at_all) = (None, 0, 0);
+    let mut reported = [false; 2];
+    for step in 0..(later + WATCHED_MS) / STEP_MS {
+        let ms = step * STEP_MS;
+        let now = Instant::from_millis(ms);
+        for (from, port, bytes) in std::mem::take(&mut flying) {
+            let sender = drones[from].index;
+            for (at, drone) in drones.iter_mut().enumerate() {
+                if at == from || drone.on_at > ms {
+                    continue;
+                }
+                let Some(through) = case.medium.carries(sender, port, drone.index) else {
+                    continue;
+                };
+                if rng.random_bool(case.loss) {
+                    continue;
+                }
+                if drone.index == sender {
+                    heard.get_or_insert(ms);
+                }
+                drone.relay.handle_bytes(now, through, &bytes);
+            }
+        }
+        for (at, drone) in drones.iter_mut().enumerate() {
+            if drone.on_at > ms {
+                continue;
+            }
+            let relay = &mut drone.relay;
+            if relay.poll_timeout().is_some_and(|due| due <= now) {
+                relay.handle_timeout(now);
+            }
+            let mut frame = [0; MAX_FRAME];
+            while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
+                flying.push((at, transmit.port, frame[..transmit.len].to_vec()));
+            }
+            while let Some(event) = relay.poll_event() {
+                let taken = event == Event::IndexTaken { node: twice };
+                if taken && at == first {
+                    reported[0] = true;
+                } else if taken && at == second {
+                    reported[1] = true;
+                }
+            }
+            assert!(relay.poll_timeout().is_none_or(|due| due > now), "it spins");
+        }
+        if ms < later {
+            continue;
+        }
+        let has = |at: usize| drones[at].relay.setpoint().is_some();
+        let both = has(first) && has(second);
+        let limited = heard.is_some_and(|heard| ms > heard + LIMIT_MS);
+        run_at_all = if both { run_at_all + STEP_MS } else { 0 };
+        run = if both && limited { run + STEP_MS } else { 0 };
+        found.both = found.both.max(run);
+        found.both_at_all = found.both_at_all.max(run_at_all);
+        found.neither += if has(first) || has(second) {
+            0
+        } else {
+            STEP_MS
+        };
+        let others = (0..relays.into()).all(|at| at == first || has(at));
+        if !(others && (has(first) || has(second))) {
+            found.flies = ms + STEP_MS - later;
+        }
+    }
+    found.first_stays = drones[first].relay.setpoint().is_some();
+    found.reported = reported;
+    found
+}
+
+fn count() -> u64 {
+    std::env::var("COUNT").map_or(12, |text| text.parse().unwrap())
+}
+
+/// Flies `count` chains of one kind and prints what became of them.
+fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Found)> {
+    let found: Vec<(u64, Found)> = (0..count())
+        .map(|seed| {
+            let case = Case {
+                medium,
+                signed,
+                loss,
+                at_once,
+                seed,
+            };
+            (seed, flown(case))
+        })
+        .collect();
+    let most = |of: fn(&Found) -> u64| found.iter().map(|(_, found)| of(found)).max().unwrap();
+    let both = found.iter().filter(|(_, found)| found.both > 0).count();
+    let stays = found.iter().filter(|(_, found)| found.first_stays).count();
+    let reported = found
+        .iter()
+        .filter(|(_, found)| found.reported == [true; 2])
+        .count();
+    println!(
+        "{medium:?}, signed {signed}, loss {loss}, at once {at_once}: {both} of {} chains with two setpoints later than {LIMIT_MS} ms after the \
+         first frame heard, for {} ms at most; two setpoints at all for {} ms at most; none for {} ms at most; whole after {} ms at most; \
+         the first stays in {stays}; both report it in {reported}",
+        found.len(),
+        most(|found| found.both),
+        most(|found| found.both_at_all),
+        most(|found| found.neither),
+        most(|found| found.flies),
+    );
+    found
+}
+
+fn kinds() -> impl Iterator<Item = (bool, f64, bool)> {
+    [false, true].into_iter().flat_map(|signed| {
+        [0.0, 0.3]
+            .into_iter()
+            .flat_map(move |loss| [true, false].map(move |at_once| (signed, loss, at_once)))
+    })
+}
+
+/// At most one has a setpoint from `LIMIT_MS` after the first frame heard on, and from `most_ms` after its start on in any case; one of them
+/// reports it; and the chain, with one of the two, flies for good within `FLIES_MS`.
+fn at_most_one_flies(medium: Medium, most_ms: u64) {
+    let mut faults = Vec::new();
+    for (signed, loss, at_once) in kinds() {
+        for (seed, found) in fly(medium, signed, loss, at_once) {
+            let reported = found.reported.contains(&true);
+            let both = found.both > 0 || found.both_at_all > most_ms;
+            if both || found.flies > FLIES_MS || !reported {
+                faults.push((signed, loss, at_once, seed, found));
+            }
+        }
+    }
+    assert!(
+        faults.is_empty(),
+        "{} of them: {:#?}",
+        faults.len(),
+        &faults[..faults.len().min(4)]
+    );
+}
+
+#[test]
+fn of_two_with_one_index_on_a_shared_channel_one_has_a_setpoint() {
+    at_most_one_flies(Medium::Shared, HEARD_MS);
+}
+
+#[test]
+fn of_two_with_one_index_on_links_one_has_a_setpoint() {
+    at_most_one_flies(Medium::Links, HEARD_MS);
+}
+
+#[test]
+fn of_two_with_one_index_that_do_not_hear_each_other_one_has_a_setpoint() {
+    at_most_one_flies(Medium::HiddenLinks, HIDDEN_MS);
+}

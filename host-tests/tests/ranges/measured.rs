@@ -1,0 +1,164 @@
+//! Measured powers and places of drones: whatever is handed in, the chain agrees, and goes on agreeing once the sensors are in order.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use uav_relay::{
+    Duration, Instant, Interference, Listen, Mission, MissionConfig, Placement, Sample, Settings,
+};
+
+use crate::draw::{mission, scaled, settings, signed};
+use crate::each;
+use crate::line::Line;
+
+/// What relay `index` is handed: any float there is, from the range that is accepted more often than not.
+fn power_w(rng: &mut ChaCha8Rng) -> f32 {
+    match rng.random_range(0..8) {
+        0 => f32::from_bits(rng.random()),
+        1 => [
+            0.0,
+            f32::INFINITY,
+            f32::NAN,
+            f32::MAX,
+            -1.0,
+            f32::MIN_POSITIVE,
+        ][rng.random_range(0..6)],
+        2 => scaled(rng, 1e-30, 1e-32, 1e-28),
+        3 => scaled(rng, 1e-26, 1e-30, 1e-20),
+        4 => scaled(rng, 1e6, 1e-3, 1e8),
+        _ => scaled(rng, 1e-9, 1e-30, 1e6),
+    }
+}
+
+/// A drone of a line of that length, anywhere that `handle_sample` has a range for.
+fn place(rng: &mut ChaCha8Rng, distance_m: f32) -> Placement {
+    let far = [distance_m, 1e7, 1e9][rng.random_range(0..3)].max(2e-3);
+    Placement {
+        x_m: signed(rng, 0.5 * distance_m, far),
+        y_m: signed(rng, 0.0, far),
+        altitude_m: signed(rng, 20.0, far),
+    }
+}
+
+/// Measures for a minute, every relay and both ends, one kind of number a relay; then what a relay of 1 W hears at 300 m.
+fn fly(seed: u64, mission: Mission, settings: Settings) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let Some(mut line) = Line::new(mission, Instant::ZERO, |_| settings) else {
+        return;
+    };
+    let distance_m = mission.config().distance_m;
+    let own: Vec<(f32, Placement)> = (0..mission.relays() + 2)
+        .map(|_| (power_w(&mut rng), place(&mut rng, distance_m)))
+        .collect();
+    let changing = rng.random_ratio(1, 4);
+    for second in 1..=90 {
+        for at in 0..line.relays.len() {
+            let (mut power, mut place_of) = own[at];
+            if changing {
+                (power, place_of) = (power_w(&mut rng), place(&mut rng, distance_m));
+            }
+            let mut ends = [own[own.len() - 1].0, own[own.len() - 2].0];
+            if second > 60 {
+                power = 1e-9;
+                ends = [1e-9; 2];
+                place_of = line.relays[at].setpoint().unwrap_or_default();
+            }
+            let now = line.now;
+            let relay = &mut line.relays[at];
+            relay.handle_sample(
+                now,
+                Sample::Heard {
+                    at: place_of,
+                    power_w: power,
+                },
+            );
+            relay.handle_sample(now, Sample::Interference { power_w: power });
+            relay.handle_sample(now, Sample::FirstHop { sir: power });
+            if at == 0 {
+                relay.handle_sample(now, Sample::Transmitter { power_w: ends[0] });
+            }
+            relay.handle_sample(now, Sample::Receiver { power_w: ends[1] });
+        }
+        line.run_for(Duration::from_millis(1_000));
+        line.check();
+    }
+    // A new belief may be on its way just then.
+    for _ in 0..80 {
+        line.run_for(Duration::from_millis(370));
+        line.check();
+        if line.has_agreed() {
+            return;
+        }
+    }
+    let phases: Vec<_> = line.relays.iter().map(uav_relay::Relay::phase).collect();
+    assert!(
+        line.has_agreed(),
+        "seed {seed}: {phases:?}, {own:?}, {mission:?}"
+    );
+}
+
+fn paper(relays: u16) -> Mission {
+    let config = host_tests::fixtures::paper(relays);
+    Mission::try_new(MissionConfig {
+        interference: Interference::Unknown,
+        ..config
+    })
+    .unwrap()
+}
+
+fn listening() -> Settings {
+    Settings {
+        listen: Some(Listen::default()),
+        ..Settings::default()
+    }
+}
+
+#[test]
+fn every_measured_power_and_place_in_the_papers_chain() {
+    each(2_000, |seed| {
+        fly(seed, paper(1 + (seed % 6) as u16), listening());
+    });
+}
+
+#[test]
+fn every_measured_power_and_place_in_every_mission() {
+    each(2_000, |seed| {
+        let mut rng = ChaCha8Rng::seed_from_u64(!seed);
+        let Some(mission) = mission(&mut rng, 4) else {
+            return;
+        };
+        let settings = settings(&mut rng, &mission);
+        let settings = Settings {
+            listen: mission
+                .field()
+                .is_none()
+                .then(|| settings.listen.unwrap_or_default()),
+            hop_time: Duration::from_millis(30),
+            probe_after: Duration::from_millis(5_000),
+            dead_after: Duration::from_millis(15_000),
+            ..settings
+        };
+        fly(seed, mission, settings);
+    });
+}
+
+/// All relays hear one power, at their places: the case, whose square is no finite number.
+#[test]
+fn one_power_everywhere_over_the_accepted_range() {
+    let decades: Vec<i32> = (-300..=60).collect();
+    decades.into_par_iter().for_each(|tenths| {
+        let power_w = 10_f32.powf(0.1 * tenths as f32);
+        let mut line = Line::new(paper(5), Instant::ZERO, |_| listening()).unwrap();
+        for _ in 0..60 {
+            for at in 0..line.relays.len() {
+                let now = line.now;
+                if let Some(place) = line.relays[at].setpoint() {
+                    line.relays[at].handle_sample(now, Sample::Heard { at: place, power_w });
+                }
+            }
+            line.run_for(Duration::from_millis(1_000));
+            line.check();
+        }
+        assert!(line.has_agreed(), "{power_w} W");
+    });
+}

@@ -1,0 +1,81 @@
+//! Places of drones, control and clocks: whatever a guarded relay is told, every number stays finite; once it is told the truth, the chain agrees.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::guard::config::GuardConfig;
+use uav_relay::{Duration, Instant, Mission, Placement, Settings, Side};
+
+use crate::draw::signed;
+use crate::each;
+use crate::line::Line;
+
+/// Anywhere, near the line more often than not.
+fn anywhere(rng: &mut ChaCha8Rng) -> Placement {
+    let mut metres = || match rng.random_range(0..6) {
+        0 => f32::from_bits(rng.random()),
+        1 => signed(rng, 1_000.0, 1e7),
+        2 => signed(rng, 1_000.0, 6e3),
+        _ => rng.random_range(-50.0..1_050.0),
+    };
+    Placement {
+        x_m: metres(),
+        y_m: metres(),
+        altitude_m: metres(),
+    }
+}
+
+fn fly(seed: u64) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let relays = rng.random_range(1..=4);
+    let mission = Mission::try_new(host_tests::fixtures::paper(relays)).unwrap();
+    let settings = Settings {
+        guard: Some(GuardConfig {
+            lag: Duration::from_micros(10_u64.pow(rng.random_range(0..19))),
+            ..GuardConfig::of(&mission, mission.config().common)
+        }),
+        ..Settings::default()
+    };
+    let begin = Instant::from_micros([0, 1 << 40, 1 << 62][rng.random_range(0..3)]);
+    let mut line = Line::new(mission, begin, |_| settings).unwrap();
+    for _ in 0..60 {
+        let now = line.now;
+        for relay in &mut line.relays {
+            // A measurement of any time, before and after now.
+            let at = match rng.random_range(0..4) {
+                0 => Instant::from_micros(rng.random()),
+                1 => Instant::ZERO,
+                _ => now,
+            };
+            relay.handle_position(now, at, anywhere(&mut rng));
+            match rng.random_range(0..10) {
+                0 => relay.handle_control(now, rng.random()),
+                1 => relay.clear_lost(now, Side::Upstream),
+                2 => relay.restart(now),
+                _ => {}
+            }
+        }
+        line.run_for(Duration::from_millis(rng.random_range(1..2_000)));
+        line.check();
+    }
+    for _ in 0..120 {
+        let now = line.now;
+        for (index, relay) in (1_u16..).zip(&mut line.relays) {
+            relay.handle_control(now, true);
+            let at = Placement {
+                x_m: 1_000.0 * f32::from(index) / f32::from(relays + 1),
+                y_m: 0.0,
+                altitude_m: 20.0,
+            };
+            relay.handle_position(now, now, at);
+        }
+        line.run_for(Duration::from_millis(1_000));
+        line.check();
+    }
+    let phases: Vec<_> = line.relays.iter().map(uav_relay::Relay::phase).collect();
+    assert!(line.has_agreed(), "seed {seed}: {phases:?}");
+}
+
+#[test]
+fn every_place_time_and_control_of_a_guarded_chain() {
+    each(1_000, fly);
+}

@@ -1,0 +1,470 @@
+//! A medium of relays on the public interface alone: a clock that jumps from one event to the next, links that can be cut one way, and
+//! relays that are switched on, off and on again with the record of their votes.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+use std::rc::Rc;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::{
+    Auth, Event, Identity, Instant, Key, Mission, Phase, Port, Relay, Settings, Upload, ViewRecord,
+    Wiring,
+};
+use uav_relay_sim::simulator::flying::{Seen, groups};
+
+/// Bits per second of a link, and of each relay's share of the channel.
+const BAUD: u64 = 115_200;
+
+/// Time from the last bit sent to the last bit received, µs.
+const LATENCY_US: u64 = 2_000;
+
+/// Settings of every relay, and what it stands for.
+#[derive(Clone, Debug)]
+pub(crate) struct Kind {
+    pub(crate) mission: Mission,
+    pub(crate) wiring: Wiring,
+    pub(crate) signed: bool,
+    pub(crate) seed: u64,
+    /// Distance at which a relay is received on a shared channel, in places.
+    pub(crate) reach: usize,
+    /// A relay that was loaded with another mission.
+    pub(crate) stranger: Option<(usize, Mission)>,
+    /// A relay whose epoch goes back at its second start.
+    pub(crate) goes_back: Option<usize>,
+}
+
+/// What happens at a time, to one relay or one link. Relays are counted from 0.
+#[derive(Clone, Debug)]
+pub(crate) enum Deed {
+    /// A relay is switched on, with its record of votes and its upload where it was on before.
+    On(usize),
+    Off(usize),
+    /// Frames of `from` to `to` are all lost from now on, for one more reason, or for one less.
+    Cut {
+        from: usize,
+        to: usize,
+    },
+    Mend {
+        from: usize,
+        to: usize,
+    },
+    /// The share of frames that are lost on all links.
+    Loss(f64),
+    /// A mission is handed to a relay.
+    Upload(usize, Box<Upload>),
+}
+
+#[derive(Clone, Debug)]
+enum Happening {
+    Deed(Deed),
+    Frame {
+        to: usize,
+        port: Port,
+        bytes: Rc<[u8]>,
+    },
+    Wake(usize),
+}
+
+#[derive(Debug)]
+struct Entry(u64, u64, Happening);
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        (self.0, self.1) == (other.0, other.1)
+    }
+}
+
+impl Eq for Entry {}
+
+impl PartialOrd for Entry {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Entry {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        (self.0, self.1).cmp(&(other.0, other.1))
+    }
+}
+
+#[derive(Debug)]
+struct Drone {
+    relay: Relay,
+    is_on: bool,
+    starts: u32,
+    stored: Option<(ViewRecord, Option<Upload>)>,
+    wake_us: Option<u64>,
+    /// When its transmitter is free again, by port, µs.
+    free_us: [u64; 2],
+}
+
+/// A chain in flight.
+#[derive(Debug)]
+pub(crate) struct Air {
+    kind: Kind,
+    drones: Vec<Drone>,
+    queue: BinaryHeap<Reverse<Entry>>,
+    order: u64,
+    pub(crate) now_us: u64,
+    cuts: Vec<u16>,
+    loss: f64,
+    rng: ChaCha8Rng,
+    seen: Vec<Seen>,
+    /// The most separate groups that flew an agreement of their own at once, and when that was.
+    pub(crate) groups: usize,
+    pub(crate) groups_us: u64,
+    /// Since when it has been whole, if it is.
+    pub(crate) whole_since_us: Option<u64>,
+    /// Time in which all relays but `spare` have flown one agreement, and the longest without that since the first, µs.
+    pub(crate) spare: usize,
+    pub(crate) flown_us: u64,
+    pub(crate) first_us: Option<u64>,
+    pub(crate) longest_us: u64,
+    flies: bool,
+    changed_us: u64,
+    /// Frames sent, and events by relay and name.
+    pub(crate) frames: u64,
+    pub(crate) events: BTreeMap<(usize, String), u32>,
+    pub(crate) story: bool,
+}
+
+fn instant(us: u64) -> Instant {
+    Instant::from_micros(us)
+}
+
+impl Air {
+    /// All relays are switched off, and all links whole.
+    pub(crate) fn new(kind: Kind) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(kind.seed);
+        let all = usize::from(kind.mission.relays());
+        let drones: Vec<Drone> = (0..all)
+            .map(|at| Drone {
+                relay: switched_on(&kind, at, 1, rng.random(), 0),
+                is_on: false,
+                starts: 0,
+                stored: None,
+                wake_us: None,
+                free_us: [0; 2],
+            })
+            .collect();
+        let seen = drones
+            .iter()
+            .map(|drone| Seen::of(&drone.relay, false))
+            .collect();
+        Self {
+            kind,
+            drones,
+            queue: BinaryHeap::new(),
+            order: 0,
+            now_us: 0,
+            cuts: vec![0; all * all],
+            loss: 0.0,
+            rng,
+            seen,
+            groups: 0,
+            groups_us: 0,
+            whole_since_us: None,
+            spare: 0,
+            flown_us: 0,
+            first_us: None,
+            longest_us: 0,
+            flies: false,
+            changed_us: 0,
+            frames: 0,
+            events: BTreeMap::new(),
+            story: std::env::var_os("STORY").is_some(),
+        }
+    }
+
+    fn put(&mut self, at_us: u64, happening: Happening) {
+        self.queue
+            .push(Reverse(Entry(at_us, self.order, happening)));
+        self.order += 1;
+    }
+
+    /// Has `deed` happen at `at_us`.
+    pub(crate) fn plan(&mut self, at_us: u64, deed: Deed) {
+        self.put(at_us, Happening::Deed(deed));
+    }
+
+    /// Runs until `until_us`.
+    pub(crate) fn run(&mut self, until_us: u64) {
+        while let Some(Reverse(Entry(at_us, ..))) = self.queue.peek()
+            && *at_us <= until_us
+        {
+            let Some(Reverse(Entry(at_us, _, happening))) = self.queue.pop() else {
+                break;
+            };
+            self.now_us = at_us;
+            let touched = match happening {
+                Happening::Wake(at) => {
+                    let drone = &mut self.drones[at];
+                    if drone.wake_us != Some(at_us) || !drone.is_on {
+                        continue;
+                    }
+                    drone.wake_us = None;
+                    drone.relay.handle_timeout(instant(at_us));
+                    at
+                }
+                Happening::Frame { to, port, bytes } => {
+                    if !self.drones[to].is_on {
+                        continue;
+                    }
+                    let relay = &mut self.drones[to].relay;
+                    relay.handle_bytes(instant(at_us), port, &bytes);
+                    to
+                }
+                Happening::Deed(deed) => {
+                    if self.story {
+                        println!("{:10.3} {deed:?}", at_us as f64 / 1e6);
+                    }
+                    match self.act(deed) {
+                        Some(at) => at,
+                        None => continue,
+                    }
+                }
+            };
+            self.drain(touched);
+        }
+        self.now_us = until_us;
+    }
+
+    fn act(&mut self, deed: Deed) -> Option<usize> {
+        let all = self.drones.len();
+        match deed {
+            Deed::On(at) => {
+                let seed = self.rng.random();
+                let drone = &mut self.drones[at];
+                if drone.is_on {
+                    return None;
+                }
+                drone.starts += 1;
+                drone.is_on = true;
+                drone.wake_us = None;
+                drone.relay = switched_on(&self.kind, at, drone.starts, seed, self.now_us);
+                if let Some((record, upload)) = &drone.stored {
+                    if let Some(upload) = upload {
+                        drone.relay.resume(upload).unwrap();
+                    }
+                    let now = instant(self.now_us);
+                    drone.relay.resume_view(now, record).unwrap();
+                }
+                return Some(at);
+            }
+            Deed::Off(at) => {
+                self.drones[at].is_on = false;
+                return Some(at);
+            }
+            Deed::Cut { from, to } => self.cuts[from * all + to] += 1,
+            Deed::Mend { from, to } => self.cuts[from * all + to] -= 1,
+            Deed::Loss(loss) => self.loss = loss,
+            Deed::Upload(at, upload) => {
+                if self.drones[at].is_on {
+                    let now = instant(self.now_us);
+                    // One that is refused is as old as the one held.
+                    let _ = self.drones[at].relay.handle_upload(now, &upload);
+                    return Some(at);
+                }
+            }
+        }
+        None
+    }
+
+    /// Sends what relay `at` has to say, and takes in what is to be seen of it.
+    fn drain(&mut self, at: usize) {
+        let now = instant(self.now_us);
+        let mut frame = [0; MAX_FRAME];
+        if self.drones[at].is_on {
+            let drone = &mut self.drones[at];
+            if drone.relay.poll_timeout().is_some_and(|due| due <= now) {
+                // It came due in the same microsecond.
+                drone.relay.handle_timeout(now);
+            }
+            let upload = drone.relay.upload().copied();
+            drone.stored = Some((drone.relay.view_record(), upload));
+            while let Some(sent) = self.drones[at].relay.poll_transmit(now, &mut frame) {
+                self.send(at, sent.port, &frame[..sent.len]);
+            }
+            while let Some(event) = self.drones[at].relay.poll_event() {
+                self.tell(at, event);
+            }
+            let drone = &mut self.drones[at];
+            if let Some(wake) = drone.relay.poll_timeout() {
+                assert!(wake > now, "it spins");
+                let wake_us = wake.as_micros();
+                if drone.wake_us.is_none_or(|known| known != wake_us) {
+                    drone.wake_us = Some(wake_us);
+                    self.put(wake_us, Happening::Wake(at));
+                }
+            }
+        }
+        let seen = Seen::of(&self.drones[at].relay, self.drones[at].is_on);
+        if seen == self.seen[at] {
+            return;
+        }
+        self.seen[at] = seen;
+        let groups = groups(&self.seen);
+        if groups > self.groups {
+            self.groups = groups;
+            self.groups_us = self.now_us;
+        }
+        self.measure();
+        if self.is_whole() {
+            self.whole_since_us.get_or_insert(self.now_us);
+        } else {
+            self.whole_since_us = None;
+        }
+    }
+
+    fn tell(&mut self, at: usize, event: Event) {
+        if self.story {
+            let relay = &self.drones[at].relay;
+            println!(
+                "{:10.3} relay {}: {event:?}; view {}.{} of {}, {:?}, {:?}",
+                self.now_us as f64 / 1e6,
+                at + 1,
+                relay.view().number(),
+                relay.view().proposer(),
+                relay.mission().relays(),
+                relay.phase(),
+                relay.neighbours()
+            );
+        }
+        let text = format!("{event:?}");
+        let name = text.split([' ', '{']).next().unwrap_or_default().to_owned();
+        *self.events.entry((at, name)).or_default() += 1;
+    }
+
+    fn send(&mut self, from: usize, port: Port, frame: &[u8]) {
+        self.frames += 1;
+        let line = usize::from(port == Port::Downstream);
+        let free_us = &mut self.drones[from].free_us[line];
+        *free_us = (*free_us).max(self.now_us) + frame.len() as u64 * 10_000_000 / BAUD;
+        let at_us = *free_us + LATENCY_US;
+        let (all, reach) = (self.drones.len(), self.kind.reach);
+        let (receivers, into) = match port {
+            Port::Shared => (
+                from.saturating_sub(reach)..(from + reach + 1).min(all),
+                port,
+            ),
+            Port::Upstream => (from.saturating_sub(1)..from, Port::Downstream),
+            Port::Downstream => (from + 1..(from + 2).min(all), Port::Upstream),
+        };
+        let bytes: Rc<[u8]> = frame.into();
+        for to in receivers.filter(|to| *to != from) {
+            if self.cuts[from * all + to] == 0
+                && self.drones[to].is_on
+                && (self.loss == 0.0 || !self.rng.random_bool(self.loss))
+            {
+                let bytes = Rc::clone(&bytes);
+                self.put(
+                    at_us,
+                    Happening::Frame {
+                        to,
+                        port: into,
+                        bytes,
+                    },
+                );
+            }
+        }
+    }
+
+    /// Takes in for how long the relays have flown, or have not.
+    pub(crate) fn measure(&mut self) {
+        let span_us = self.now_us - self.changed_us;
+        if self.flies {
+            self.flown_us += span_us;
+        } else if self.first_us.is_some() {
+            self.longest_us = self.longest_us.max(span_us);
+        }
+        let flies = self.flying() + self.spare >= self.seen.len();
+        if flies {
+            self.first_us.get_or_insert(self.now_us);
+        }
+        if flies != self.flies || self.flies {
+            self.changed_us = self.now_us;
+        }
+        self.flies = flies;
+    }
+
+    /// How many relays fly the largest agreement that all of its view fly.
+    fn flying(&self) -> usize {
+        let holds = |seen: &&Seen| {
+            seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding
+        };
+        let holding: Vec<&Seen> = self.seen.iter().filter(holds).collect();
+        let of = |one: &&Seen| {
+            let same = holding.iter().filter(|other| other.view == one.view);
+            let count = same.count();
+            (count == usize::from(one.relays)).then_some(count)
+        };
+        holding.iter().filter_map(of).max().unwrap_or(0)
+    }
+
+    /// Views that the relays have accepted, in all.
+    pub(crate) fn views(&self) -> u32 {
+        self.drones
+            .iter()
+            .map(|drone| drone.relay.stats().views)
+            .sum()
+    }
+
+    /// Whether all relays are on, in one view of them all, and have a setpoint in it.
+    fn is_whole(&self) -> bool {
+        let view = self.seen[0].view;
+        self.seen.iter().all(|seen| {
+            seen.is_on
+                && seen.view == view
+                && usize::from(seen.relays) == self.seen.len()
+                && seen.place.is_some()
+                && seen.phase == Phase::Holding
+                && seen.target == self.seen[0].target
+        })
+    }
+
+    /// What is to be seen of each relay, for a person.
+    pub(crate) fn described(&self) -> String {
+        let each = self.drones.iter().map(|drone| {
+            let relay = &drone.relay;
+            let ends = relay.neighbours().map(|node| node.unwrap_or(0));
+            format!(
+                "{}{}.{}/{}{}{:?}{:?}",
+                if drone.is_on { "" } else { "off " },
+                relay.view().number(),
+                relay.view().proposer(),
+                relay.mission().relays(),
+                if relay.setpoint().is_some() { "*" } else { "" },
+                relay.phase(),
+                ends
+            )
+        });
+        each.collect::<Vec<_>>().join(" ")
+    }
+}
+
+fn switched_on(kind: &Kind, at: usize, start: u32, seed: u32, now_us: u64) -> Relay {
+    let index = u16::try_from(at + 1).unwrap();
+    let auth = kind.signed.then(|| Auth {
+        key: Key::new([7; 32]),
+        epoch: if kind.goes_back == Some(at) {
+            10 - start
+        } else {
+            start
+        },
+    });
+    let settings = Settings {
+        wiring: kind.wiring,
+        auth,
+        hop_time: uav_relay_sim::simulator::link::LinkSpec::default().hop_time(),
+        ..Settings::default()
+    };
+    let identity = Identity { network: 7, index };
+    let mission = match kind.stranger {
+        Some((stranger, mission)) if stranger == at => mission,
+        _ => kind.mission,
+    };
+    Relay::new(mission, identity, settings, seed, instant(now_us)).unwrap()
+}

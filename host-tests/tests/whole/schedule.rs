@@ -1,0 +1,217 @@
+//! Random schedules that mix all faults.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::{Interference, Interferer, Upload, Wiring};
+
+use super::air::{Air, Deed, Kind};
+use host_tests::fixtures::mission;
+
+/// One second, µs.
+pub(crate) const SECOND: u64 = 1_000_000;
+
+/// A schedule, and when its last fault has ended.
+#[derive(Clone, Debug)]
+pub(crate) struct Schedule {
+    pub(crate) kind: Kind,
+    pub(crate) deeds: Vec<(u64, Deed)>,
+    pub(crate) faults_end_us: u64,
+}
+
+impl Schedule {
+    /// Relays of one chain, all switched on at time 0.
+    pub(crate) fn of(relays: u16, seed: u64) -> Self {
+        let kind = Kind {
+            mission: mission(relays),
+            wiring: Wiring::Shared,
+            signed: false,
+            seed,
+            reach: 4,
+            stranger: None,
+            goes_back: None,
+        };
+        let on = (0..usize::from(relays)).map(|at| (0, Deed::On(at)));
+        Self {
+            kind,
+            deeds: on.collect(),
+            faults_end_us: 0,
+        }
+    }
+
+    pub(crate) fn begun(&self) -> Air {
+        let mut air = Air::new(self.kind.clone());
+        for (at_us, deed) in &self.deeds {
+            air.plan(*at_us, deed.clone());
+        }
+        air
+    }
+
+    fn put(&mut self, at_us: u64, deed: Deed) {
+        self.deeds.push((at_us, deed));
+        self.faults_end_us = self.faults_end_us.max(at_us);
+    }
+
+    /// Relay `at` is switched off at a time, and on again.
+    pub(crate) fn reboot(&mut self, at: usize, off_us: u64, on_us: u64) {
+        self.put(off_us, Deed::Off(at));
+        self.put(on_us, Deed::On(at));
+    }
+
+    /// Frames of `from` do not reach `to` for a time.
+    pub(crate) fn deafen(&mut self, from: usize, to: usize, from_us: u64, until_us: u64) {
+        self.put(from_us, Deed::Cut { from, to });
+        self.put(until_us, Deed::Mend { from, to });
+    }
+
+    /// Neither hears the other for a time.
+    pub(crate) fn part(&mut self, one: usize, other: usize, from_us: u64, until_us: u64) {
+        self.deafen(one, other, from_us, until_us);
+        self.deafen(other, one, from_us, until_us);
+    }
+
+    /// The relays of `part` and all others do not hear each other for a time.
+    pub(crate) fn cut(&mut self, is_in: impl Fn(usize) -> bool, from_us: u64, until_us: u64) {
+        let all = usize::from(self.kind.mission.relays());
+        for one in 0..all {
+            for other in (0..one).filter(|other| is_in(*other) != is_in(one)) {
+                self.part(one, other, from_us, until_us);
+            }
+        }
+    }
+
+    /// The link of two relays comes and goes until a time.
+    pub(crate) fn flap(
+        &mut self,
+        (one, other): (usize, usize),
+        (down_us, up_us): (u64, u64),
+        from_us: u64,
+        until_us: u64,
+    ) {
+        let mut at_us = from_us;
+        while at_us < until_us {
+            self.part(one, other, at_us, (at_us + down_us).min(until_us));
+            at_us += down_us + up_us;
+        }
+    }
+}
+
+/// Relays of a random chain: two to fifty, mostly few.
+fn relays(rng: &mut ChaCha8Rng) -> u16 {
+    match rng.random_range(0..40) {
+        0 => rng.random_range(13..=50),
+        1..8 => rng.random_range(9..=12),
+        _ => rng.random_range(2..=8),
+    }
+}
+
+/// A span of a fault, µs: from two seconds to four minutes, its logarithm uniform.
+fn span(rng: &mut ChaCha8Rng) -> u64 {
+    let seconds = 2.0 * f64::powf(120.0, rng.random_range(0.0..1.0));
+    (seconds * 1e6) as u64
+}
+
+/// A random schedule: cuts of seconds to minutes, in one of twenty of hours; one-way links; flapping links; losses; reboots; early and
+/// late starts; uploads.
+pub(crate) fn random(seed: u64) -> Schedule {
+    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    let count = relays(rng);
+    let all = usize::from(count);
+    let mut schedule = Schedule::of(count, rng.random());
+    schedule.kind.signed = rng.random_bool(0.3);
+    if rng.random_bool(0.2) {
+        schedule.kind.wiring = Wiring::Pair;
+    }
+    if rng.random_bool(0.3) {
+        // Early and late starts: within seconds or minutes, in one of ten within an hour.
+        let most = match rng.random_range(0..10) {
+            0 => 3_600 * SECOND,
+            1..5 => 10 * SECOND,
+            _ => 240 * SECOND,
+        };
+        for (at_us, _) in &mut schedule.deeds {
+            if rng.random_bool(0.5) {
+                *at_us = rng.random_range(0..most);
+            }
+        }
+        let starts = schedule.deeds.iter().map(|(at_us, _)| *at_us);
+        schedule.faults_end_us = starts.max().unwrap_or(0);
+    }
+    let begun = schedule.faults_end_us.min(600 * SECOND);
+    let long = rng.random_bool(0.05);
+    let faults = rng.random_range(1..=6);
+    for number in 0..faults {
+        let from_us = rng.random_range(0..=begun + 240 * SECOND);
+        let until_us = from_us
+            + if long && number == 0 {
+                rng.random_range(3_600..4 * 3_600) * SECOND
+            } else {
+                span(rng)
+            };
+        let one = rng.random_range(0..all);
+        let near = |rng: &mut ChaCha8Rng| {
+            let reach = rng.random_range(1..=4.min(all - 1));
+            if one + reach < all {
+                one + reach
+            } else {
+                one - reach.min(one)
+            }
+        };
+        let mut other = near(rng);
+        if other == one {
+            other = (one + 1) % all;
+        }
+        let kind = if long && number == 0 {
+            rng.random_range(0..3)
+        } else {
+            rng.random_range(0..9)
+        };
+        match kind {
+            // The radio of one relay, the chain at one place, any two parts.
+            0 => schedule.cut(|at| at == one, from_us, until_us),
+            1 => schedule.cut(|at| at <= one, from_us, until_us),
+            2 => {
+                let part: Vec<bool> = (0..all).map(|_| rng.random()).collect();
+                schedule.cut(|at| part[at], from_us, until_us);
+            }
+            3 => schedule.part(one, other, from_us, until_us),
+            4 => schedule.deafen(one, other, from_us, until_us),
+            5 => {
+                // One relay hears nobody, or is not heard.
+                let mute = rng.random_bool(0.5);
+                for other in (0..all).filter(|other| *other != one) {
+                    let (from, to) = if mute { (one, other) } else { (other, one) };
+                    schedule.deafen(from, to, from_us, until_us);
+                }
+            }
+            6 => {
+                let period = (span(rng), span(rng));
+                schedule.flap((one, other), period, from_us, until_us);
+            }
+            7 => {
+                schedule.put(from_us, Deed::Loss(rng.random_range(0.05..0.7)));
+                schedule.put(until_us, Deed::Loss(0.0));
+            }
+            _ => schedule.reboot(one, from_us, until_us),
+        }
+    }
+    if schedule.kind.signed && rng.random_bool(0.5) {
+        let at_us = rng.random_range(0..=schedule.faults_end_us);
+        let upload = moved(&schedule, rng);
+        schedule.put(at_us, Deed::Upload(rng.random_range(0..all), upload));
+    }
+    schedule
+}
+
+/// A mission with the interferer at another place.
+fn moved(schedule: &Schedule, rng: &mut ChaCha8Rng) -> Box<Upload> {
+    let base = &schedule.kind.mission;
+    let mut config = *base.config();
+    if let Interference::Source(Interferer { power_w, .. }) = config.interference {
+        config.interference = Interference::Source(Interferer {
+            power_w,
+            x_m: rng.random_range(100.0..900.0),
+            y_m: rng.random_range(100.0..500.0),
+        });
+    }
+    Box::new(Upload::new(base, 1, config).unwrap())
+}

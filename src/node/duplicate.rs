@@ -1,0 +1,591 @@
+//! Duplicate index: another node uses this relay's node number, and at most one of the two may have a setpoint.
+//!
+//! Each start has a *claim number*, drawn from the seed of `Relay::new`: 30 bits. Without a key it is sent in a Claim to a neighbour; the
+//! other node with this number receives that directly, or as the neighbour's echo. It names the claim
+//! number that its sender has received last: only a claim that names this relay's is known not to be from before this relay was switched on.
+//! With a key the claim number is where the lower half of
+//! the nonces begins: handshakes carry it, and neighbours show the largest nonce that they have received. Of two claims the larger epoch is
+//! the larger, then the larger claim number. A relay is *active* or *passive*: a passive relay has no setpoint, takes part in nothing and
+//! sends nothing but claims.
+//!
+//! | state | event | action | next state |
+//! | --- | --- | --- | --- |
+//! | any | own claim, or a frame with a tag of its own, received | none: an echo of its own radio | same |
+//! | any | claim of another node received, the first for twice `dead_after` | `Event::IndexTaken` | same |
+//! | active | other frame under its own number, no key | send a claim, and 8 more every four `hop_time`; an echo of its own was received within `probe_after`: none | active |
+//! | active | smaller claim, or one that does not name its own | send a claim, and 32 more every four `hop_time` while the other node is not known to be passive | active |
+//! | active | claim of a passive node | send a claim | active |
+//! | active | larger claim of the same epoch, it holds a lease, and its claim number plus 2^31 is the larger one | raise its claim number by 2^31; send claims as before | active |
+//! | active | larger claim otherwise | discard its agreed place | passive |
+//! | active | 2.25, 2.75, 3.75, 5.75, 9.75, 17.75 s after it became active, 0.25, 0.75 s and so on after a claim of another active node, then every `dead_after`, on links, no key | send a claim | active |
+//! | passive | every quarter of `probe_after`, no key | send a claim with the flag passive | passive |
+//! | passive | claim of an active node, or other frame under its own number | restart the timer | passive |
+//! | passive | timer of twice `dead_after`, and up to an eighth more by chance, expired | ask for a view | active |
+//! | passive | its firmware reports that the other node is gone | raise its claim number above the other one; ask for a view | active |
+//!
+//! Claims are sent at most once in four `hop_time`.
+//!
+//! # Safety
+//!
+//! A relay becomes passive as soon as it receives a larger claim, and the order of claims is total. Of two active nodes that exchange claims
+//! the one with the smaller claim thus becomes passive, unless it holds a lease and raises its claim number; since it does so once, the
+//! exchange ends after three claims. A relay that holds a lease therefore keeps its place when a copy of it is switched on later.
+//!
+//! With a key, only a handshake with the right tag counts as a claim, and nothing else that bears this relay's number is answered. A recorded
+//! handshake has no effect: those of this relay have an older epoch or its own claim number, and those of another node are true or have been
+//! overtaken by a larger claim. A message under its own number cannot be checked, because its tag covers nonces that only its two ends
+//! know: it raises the event and restarts the timer of a passive relay, and makes no relay passive.
+//! The neighbours apply the same order: they believe the larger nonce, and show it to the node that sends the smaller one.
+
+use crate::jitter::Jitter;
+use crate::settings::{Settings, Wiring};
+use crate::time::{Duration, Instant};
+use crate::wire::message::Claim;
+
+/// What a frame under this relay's own number says of its sender.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Sender {
+    /// The frame is this relay's own.
+    Itself,
+    /// Another node, which has not stated its claim number; with a key, perhaps a forger.
+    Unknown,
+    /// Another node with this claim.
+    Rival(Rival),
+}
+
+/// The claim of another node to this relay's number.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Rival {
+    /// Claim number.
+    pub(crate) number: u32,
+    /// True if it is of a newer epoch than this relay, else it is of the same.
+    pub(crate) newer_epoch: bool,
+    /// True if its sender is passive.
+    pub(crate) passive: bool,
+    /// True if it was made since this relay was switched on: it names this relay's claim, or a key proves it.
+    pub(crate) is_current: bool,
+}
+
+/// Bit that a relay with a lease sets in its claim number to keep its place.
+pub(crate) const RAISED: u32 = 1 << 31;
+
+/// Time from the start to the first claim; each interval is twice the one before.
+const FIRST_CLAIM: Duration = Duration::from_millis(250);
+
+/// Time from the start to the claims that nothing else causes: a hundred relays have agreed by `align` by then.
+const AFTER_START: Duration = Duration::from_millis(2_000);
+
+/// Longest of these intervals.
+const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
+
+/// Claims after a claim of an active node, [`least_interval`] apart.
+const DEFENCES: u8 = 32;
+
+/// Claims after another frame under this relay's number, as far apart.
+const QUESTIONS: u8 = 8;
+
+/// Least time from one claim to the next: those of two relays and their echoes leave a channel room for other frames.
+fn least_interval(settings: &Settings) -> Duration {
+    settings.hop_time.times(4)
+}
+
+/// Time from one claim of a passive relay to the next: many fit into the time after which it becomes active.
+const fn passive_interval(settings: &Settings) -> Duration {
+    Duration::from_micros(settings.probe_after.as_micros() / 4)
+}
+
+/// Claims of this relay to its number, and what is known of another node that uses it.
+#[derive(Clone, Debug)]
+pub(crate) struct DuplicateIndex {
+    number: u32,
+    /// Largest claim number of another node of this epoch.
+    rival: u32,
+    /// The one received last.
+    heard: u32,
+    /// Times when a duplicate of its own index, and of a neighbour's, was last observed.
+    observed: [Option<Instant>; 2],
+    /// Time when this relay last received a frame of its own.
+    echoed: Option<Instant>,
+    /// Time when a passive relay becomes active again; `None` while it is active.
+    passive_until: Option<Instant>,
+    /// Time of the next claim that nothing else causes, and the interval that follows it.
+    next_claim: Option<Instant>,
+    interval: Duration,
+    /// Claims left that are sent because of an active node of this number.
+    defences: u8,
+    /// Time before which no other claim is sent.
+    quiet_until: Instant,
+    claim_due: bool,
+    /// True once new sessions are due, with the present claim number.
+    sessions_due: bool,
+    jitter: Jitter,
+}
+
+/// Whose index is used by two nodes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Duplicated {
+    Own,
+    Neighbour,
+}
+
+impl DuplicateIndex {
+    pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
+        let mut jitter = Jitter::new(seed);
+        let number = (jitter.draw() >> 2).max(1);
+        let mut duplicate = Self {
+            number,
+            rival: 0,
+            heard: 0,
+            observed: [None; 2],
+            echoed: None,
+            passive_until: None,
+            next_claim: None,
+            interval: FIRST_CLAIM,
+            defences: 0,
+            quiet_until: now,
+            claim_due: false,
+            sessions_due: false,
+            jitter,
+        };
+        duplicate.announce(now + AFTER_START, settings);
+        duplicate
+    }
+
+    /// Claim number of this relay.
+    pub(crate) const fn number(&self) -> u32 {
+        self.number
+    }
+
+    /// Records that an index is used by two nodes; returns true if that should be reported.
+    pub(crate) fn should_report(
+        &mut self,
+        now: Instant,
+        duplicated: Duplicated,
+        settings: &Settings,
+    ) -> bool {
+        let [own, neighbour] = &mut self.observed;
+        let observed = match duplicated {
+            Duplicated::Own => own,
+            Duplicated::Neighbour => neighbour,
+        };
+        let since = observed.replace(now).map(|observed| now.since(observed));
+        since.is_none_or(|since| since > settings.dead_after.times(2))
+    }
+
+    /// Returns whose claim to this relay's number `claim` is.
+    pub(crate) fn rival(&self, claim: Claim) -> Sender {
+        if claim.number | RAISED == self.number | RAISED {
+            return Sender::Itself;
+        }
+        Sender::Rival(Rival {
+            number: claim.number,
+            newer_epoch: false,
+            passive: claim.passive,
+            is_current: claim.heard | RAISED == self.number | RAISED,
+        })
+    }
+
+    /// Claim number of another node that was received last; 0 for none.
+    pub(crate) const fn heard(&self) -> u32 {
+        self.heard
+    }
+
+    /// Handles a frame under this relay's number; returns true if the relay becomes passive.
+    pub(crate) fn hear(
+        &mut self,
+        now: Instant,
+        sender: Sender,
+        has_lease: bool,
+        settings: &Settings,
+    ) -> bool {
+        match sender {
+            Sender::Itself => {
+                self.echoed = Some(now);
+                self.defences = 0;
+            }
+            Sender::Unknown if self.is_passive() => self.wait(now, settings),
+            Sender::Unknown => {
+                let echoes = self.echoed;
+                let echoes = echoes.is_some_and(|at| now.since(at) < settings.probe_after);
+                if settings.auth.is_none() && !echoes {
+                    self.defences = self.defences.max(QUESTIONS);
+                    self.announce(now, settings);
+                    self.claim(now, settings);
+                }
+            }
+            Sender::Rival(rival) => return self.compare(now, rival, has_lease, settings),
+        }
+        false
+    }
+
+    /// Compares claims; returns true if the relay becomes passive.
+    fn compare(
+        &mut self,
+        now: Instant,
+        rival: Rival,
+        has_lease: bool,
+        settings: &Settings,
+    ) -> bool {
+        if !rival.newer_epoch {
+            self.rival = self.rival.max(rival.number);
+            self.heard = rival.number;
+        }
+        if self.is_passive() {
+            if !rival.passive {
+                self.wait(now, settings);
+            }
+            return false;
+        }
+        let larger = rival.newer_epoch || rival.number > self.number;
+        if !larger || rival.passive || !rival.is_current {
+            self.defend(now, rival, settings);
+            return false;
+        }
+        let raised = self.number | RAISED;
+        if !rival.newer_epoch && has_lease && raised > rival.number {
+            self.number = raised;
+            self.sessions_due = true;
+            self.defend(now, rival, settings);
+            return false;
+        }
+        self.wait(now, settings);
+        self.claim_due = settings.auth.is_none();
+        let next = now + passive_interval(settings);
+        self.next_claim = settings.auth.is_none().then_some(next);
+        true
+    }
+
+    /// Schedules a claim unless one was sent just now.
+    fn claim(&mut self, now: Instant, settings: &Settings) {
+        if self.quiet_until <= now {
+            self.quiet_until = now + least_interval(settings);
+            self.claim_due = true;
+        }
+    }
+
+    /// Sends claims until `rival` is passive.
+    fn defend(&mut self, now: Instant, rival: Rival, settings: &Settings) {
+        self.defences = 0;
+        if !rival.passive {
+            self.defences = DEFENCES;
+            self.announce(now, settings);
+        }
+        self.claim(now, settings);
+    }
+
+    fn wait(&mut self, now: Instant, settings: &Settings) {
+        self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
+    }
+
+    /// Begins the claims that nothing else causes, and those of a defence.
+    ///
+    /// On one channel for all, which every unasked frame loads, the other node is received directly, by whatever it sends.
+    fn announce(&mut self, now: Instant, settings: &Settings) {
+        self.interval = FIRST_CLAIM;
+        let announces = settings.wiring == Wiring::Pair || self.defences > 0;
+        self.next_claim =
+            (announces && settings.auth.is_none()).then(|| now + self.jitter.spread(FIRST_CLAIM));
+    }
+
+    pub(crate) const fn is_passive(&self) -> bool {
+        self.passive_until.is_some()
+    }
+
+    /// Returns true if a claim is due, and marks it as sent.
+    pub(crate) const fn poll_claim(&mut self) -> bool {
+        core::mem::replace(&mut self.claim_due, false)
+    }
+
+    /// Returns the claim number that all sessions have to begin anew with, if they have to.
+    #[cfg(feature = "auth")]
+    pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
+        core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
+    }
+
+    /// Handles expired timers; returns true if the relay becomes active.
+    pub(crate) fn handle_timeout(&mut self, now: Instant, settings: &Settings) -> bool {
+        if self.passive_until.is_some_and(|until| until <= now) {
+            self.activate(now, settings);
+            return true;
+        }
+        if self.next_claim.is_some_and(|at| at <= now) {
+            self.claim_due = true;
+            let interval = if self.is_passive() {
+                Some(passive_interval(settings))
+            } else if let Some(left) = self.defences.checked_sub(1) {
+                self.defences = left;
+                Some(least_interval(settings))
+            } else if settings.wiring == Wiring::Shared {
+                None
+            } else if self.interval < LAST_INTERVAL {
+                self.interval = self.interval.times(2);
+                Some(self.interval)
+            } else {
+                Some(settings.dead_after)
+            };
+            self.next_claim = interval.map(|interval| now + self.jitter.spread(interval));
+        }
+        false
+    }
+
+    fn activate(&mut self, now: Instant, settings: &Settings) {
+        self.passive_until = None;
+        self.sessions_due = true;
+        self.announce(now + AFTER_START, settings);
+    }
+
+    /// Forgets the other node, which is gone; returns true if the relay becomes active.
+    pub(crate) fn clear(&mut self, now: Instant, settings: &Settings) -> bool {
+        let passive = self.is_passive();
+        if passive {
+            self.number = (self.number | RAISED).max(self.rival.saturating_add(1));
+            self.activate(now, settings);
+        }
+        passive
+    }
+
+    pub(crate) fn next_timeout(&self) -> Option<Instant> {
+        super::timing::earliest(self.passive_until, self.next_claim)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::{Claim, DuplicateIndex, Duplicated, RAISED, Rival, Sender, Settings, Wiring};
+    use crate::time::Instant;
+
+    fn at(seconds: u64) -> Instant {
+        Instant::from_millis(1_000 * seconds)
+    }
+
+    fn duplicate() -> DuplicateIndex {
+        DuplicateIndex::new(1, at(0), &Settings::default())
+    }
+
+    fn rival(number: u32) -> Rival {
+        Rival {
+            number,
+            newer_epoch: false,
+            passive: false,
+            is_current: true,
+        }
+    }
+
+    fn claim(number: u32) -> Claim {
+        Claim {
+            number,
+            heard: 0,
+            passive: false,
+            echo: true,
+        }
+    }
+
+    /// A claim that was on its way when the relay was switched off and on is of its last start: nothing has answered this one.
+    #[test]
+    fn a_claim_that_does_not_answer_this_start_is_answered_and_has_no_other_effect() {
+        let settings = Settings::default();
+        for has_lease in [false, true] {
+            let mut duplicate = duplicate();
+            let own = duplicate.number();
+            let before = Claim {
+                heard: 5,
+                ..claim(own + 9)
+            };
+            let sender = duplicate.rival(before);
+            assert!(matches!(sender, Sender::Rival(rival) if !rival.is_current));
+            assert!(!duplicate.hear(at(1), sender, has_lease, &settings));
+            assert!(duplicate.poll_claim() && !duplicate.is_passive());
+            assert_eq!((duplicate.number(), duplicate.heard()), (own, own + 9));
+            // Its sender is there, and answers.
+            let answer = Claim {
+                heard: own,
+                ..before
+            };
+            let sender = duplicate.rival(answer);
+            assert_eq!(
+                duplicate.hear(at(2), sender, has_lease, &settings),
+                !has_lease
+            );
+        }
+    }
+
+    /// The rows of the state table for claims: of every order, lease, epoch and state of the other node.
+    #[test]
+    fn the_smaller_claim_becomes_passive_unless_a_lease_raises_it() {
+        let settings = Settings::default();
+        let own = duplicate().number();
+        assert!(own < RAISED >> 1, "30 bits");
+        for (number, raised_wins) in [
+            (own - 1, true),
+            (own + 1, true),
+            (RAISED | (own - 1), true),
+            (RAISED | (own + 1), false),
+        ] {
+            for has_lease in [false, true] {
+                for newer_epoch in [false, true] {
+                    for passive in [false, true] {
+                        let mut duplicate = duplicate();
+                        let rival = Rival {
+                            number,
+                            newer_epoch,
+                            passive,
+                            is_current: true,
+                        };
+                        let sender = Sender::Rival(rival);
+                        let becomes = duplicate.hear(at(1), sender, has_lease, &settings);
+                        let larger = !passive && (newer_epoch || number > own);
+                        let raises = larger && !newer_epoch && has_lease && raised_wins;
+                        assert_eq!(becomes, larger && !raises, "{rival:?} {has_lease}");
+                        assert_eq!(duplicate.is_passive(), becomes);
+                        let claimed = if raises { own | RAISED } else { own };
+                        assert_eq!(duplicate.number(), claimed);
+                        #[cfg(feature = "auth")]
+                        assert_eq!(duplicate.poll_sessions(), raises.then_some(claimed));
+                        assert!(duplicate.poll_claim(), "the other one has to know");
+                    }
+                }
+            }
+        }
+    }
+
+    /// Two relays that hold a lease, whichever has the larger claim, come to one that is active within three claims.
+    #[test]
+    fn two_that_hold_a_lease_come_to_one_within_three_claims() {
+        let settings = Settings::default();
+        for seeds in [[1, 2], [2, 1], [3, 9], [9, 3]] {
+            let mut both = seeds.map(|seed| DuplicateIndex::new(seed, at(0), &settings));
+            let mut claims = 0;
+            while both.iter().all(|one| !one.is_passive()) {
+                let [from, to] = if claims % 2 == 0 { [0, 1] } else { [1, 0] };
+                let claim = rival(both[from].number());
+                both[to].hear(at(claims), Sender::Rival(claim), true, &settings);
+                claims += 1;
+            }
+            assert!(claims <= 4, "{claims} with {seeds:?}");
+            let active = both.iter().filter(|one| !one.is_passive()).count();
+            assert_eq!(active, 1);
+        }
+    }
+
+    #[test]
+    fn an_echo_of_its_own_claim_makes_it_ignore_its_own_frames() {
+        let settings = Settings::default();
+        let mut duplicate = duplicate();
+        let own = duplicate.number();
+        assert_eq!(duplicate.rival(claim(own)), Sender::Itself);
+        assert_eq!(duplicate.rival(claim(own | RAISED)), Sender::Itself);
+        assert!(!duplicate.hear(at(1), Sender::Unknown, false, &settings));
+        assert!(duplicate.poll_claim());
+        assert!(!duplicate.hear(at(2), Sender::Itself, false, &settings));
+        assert!(!duplicate.hear(at(6), Sender::Unknown, false, &settings));
+        assert!(!duplicate.poll_claim());
+        duplicate.hear(at(7), Sender::Unknown, false, &settings);
+        assert!(duplicate.poll_claim());
+    }
+
+    #[test]
+    fn claims_are_sent_at_most_once_in_four_hop_times() {
+        let settings = Settings::default();
+        let mut duplicate = duplicate();
+        let smaller = Sender::Rival(rival(0));
+        let mut sent = 0;
+        for tenth in 0..100 {
+            let now = Instant::from_millis(20 * tenth);
+            duplicate.hear(now, smaller, false, &settings);
+            sent += u32::from(duplicate.poll_claim());
+        }
+        assert_eq!(sent, 17, "one in 0.12 s");
+    }
+
+    #[test]
+    fn a_start_is_announced_on_links_and_not_on_a_shared_channel() {
+        let settings = Settings {
+            wiring: Wiring::Shared,
+            ..Settings::default()
+        };
+        let shared = DuplicateIndex::new(1, at(0), &settings);
+        assert_eq!(shared.next_timeout(), None);
+        let settings = Settings::default();
+        let mut duplicate = duplicate();
+        let mut sent = std::vec::Vec::new();
+        for _ in 0..6 {
+            let next = duplicate.next_timeout().unwrap();
+            assert!(!duplicate.handle_timeout(next, &settings));
+            assert!(duplicate.poll_claim());
+            sent.push(next.as_micros() / 1_000);
+        }
+        for (least, at) in [2_250, 2_750, 3_750, 5_750, 9_750, 17_750]
+            .into_iter()
+            .zip(sent)
+        {
+            assert!((least..=least + least / 8).contains(&at), "{at}");
+        }
+        let mut duplicate = DuplicateIndex::new(1, at(0), &settings);
+        let mut sent = 0;
+        while let Some(next) = duplicate.next_timeout().filter(|next| *next < at(3_600)) {
+            duplicate.handle_timeout(next, &settings);
+            sent += u32::from(duplicate.poll_claim());
+        }
+        assert!((200..=245).contains(&sent), "{sent} in an hour");
+    }
+
+    /// One that has heard of an active node claims its number for four seconds, or until that is passive.
+    #[test]
+    fn a_number_is_defended_for_four_seconds_or_until_the_other_is_passive() {
+        let settings = Settings::default();
+        for passive in [false, true] {
+            let mut duplicate = duplicate();
+            duplicate.hear(at(100), Sender::Rival(rival(0)), false, &settings);
+            assert!(duplicate.poll_claim());
+            let other = Rival {
+                passive: true,
+                ..rival(0)
+            };
+            if passive {
+                duplicate.hear(at(101), Sender::Rival(other), false, &settings);
+            }
+            let mut sent = 0;
+            while let Some(next) = duplicate.next_timeout().filter(|next| *next < at(105)) {
+                duplicate.handle_timeout(next, &settings);
+                sent += u32::from(duplicate.poll_claim());
+            }
+            let expected = if passive { 3..=4 } else { 33..=36 };
+            assert!(expected.contains(&sent), "{sent} {passive}");
+        }
+    }
+
+    #[test]
+    fn it_becomes_active_after_silence_of_twice_dead_after_or_once_the_other_is_gone() {
+        let settings = Settings::default();
+        let mut duplicate = duplicate();
+        let own = duplicate.number();
+        let larger = rival(own + 7);
+        assert!(duplicate.hear(at(0), Sender::Rival(larger), false, &settings));
+        assert!(!duplicate.hear(at(20), Sender::Unknown, false, &settings));
+        assert!(!duplicate.hear(at(40), Sender::Rival(larger), false, &settings));
+        // A passive node keeps nobody passive.
+        let passive = Rival {
+            passive: true,
+            ..larger
+        };
+        duplicate.hear(at(60), Sender::Rival(passive), false, &settings);
+        assert!(!duplicate.handle_timeout(at(69), &settings) && duplicate.poll_claim());
+        assert!(duplicate.handle_timeout(at(75), &settings) && !duplicate.is_passive());
+        assert_eq!(duplicate.number(), own, "the other one may be there still");
+        assert!(duplicate.hear(at(80), Sender::Rival(larger), false, &settings));
+        assert!(duplicate.clear(at(81), &settings) && !duplicate.is_passive());
+        assert!(duplicate.number() > own + 7 && !duplicate.clear(at(82), &settings));
+    }
+
+    #[test]
+    fn a_duplicate_index_is_reported_once_until_silence() {
+        let settings = Settings::default();
+        let mut duplicate = duplicate();
+        let mut reported = |seconds, of| duplicate.should_report(at(seconds), of, &settings);
+        assert!(reported(1, Duplicated::Own) && reported(1, Duplicated::Neighbour));
+        assert!(!reported(31, Duplicated::Own) && !reported(60, Duplicated::Own));
+        assert!(reported(91, Duplicated::Own) && reported(91, Duplicated::Neighbour));
+    }
+}
