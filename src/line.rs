@@ -1,4 +1,4 @@
-//! Whether a mission can be flown along a line on earth.
+//! Whether a mission can be flown along a line on earth, and within a relay's own geofence.
 
 #[cfg(feature = "upload")]
 use crate::sites::Sites;
@@ -22,7 +22,7 @@ pub(crate) fn check(sites: Sites, distance_m: f32) -> Result<(), LineError> {
     }
 }
 
-/// Why a newer mission cannot be flown along a line on earth.
+/// Why a newer mission cannot be flown along a line on earth, or within the relay's own geofence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -32,6 +32,12 @@ pub enum LineError {
     Distance,
     /// Its sites are nearer to each other than 10 m or farther apart than 100 km.
     Sites,
+    /// It has altitudes outside of the relay's own geofence, [`GuardConfig::fence`](crate::guard::config::GuardConfig).
+    Altitude,
+    /// It has room to the side outside of that.
+    Lateral,
+    /// It is over a distance that reaches out of that, between the sites that the relays were loaded with or without any.
+    Length,
 }
 
 impl core::fmt::Display for LineError {
@@ -39,6 +45,9 @@ impl core::fmt::Display for LineError {
         f.write_str(match self {
             Self::Distance => "its distance must be that between its sites; without sites of its own, between those that the relays were loaded with",
             Self::Sites => "its sites must be on earth, 10 m to 100 km apart",
+            Self::Altitude => "its altitudes must be within the relay's own geofence",
+            Self::Lateral => "its room to the side must be within the relay's own geofence",
+            Self::Length => "its distance must be within the relay's own geofence",
         })
     }
 }

@@ -1,5 +1,7 @@
 //! What is different in a new mission, as the options that begin with `--new-` give it.
 
+use core::fmt;
+
 use clap::Args;
 use uav_relay::flight::axis::Axis;
 use uav_relay::wire::upload::UploadError;
@@ -55,6 +57,12 @@ pub(crate) struct NewOptions {
     new_min_separation: Option<f32>,
 }
 
+/// Distance along the line at which the order of two relays is certain, m: twice the companion's usual position error.
+const ORDER_M: f32 = 2.0;
+
+/// How far the ends of the new line may be from the one that was loaded, beside its own length, m.
+const FAR_M: f64 = 100_000.0;
+
 impl NewOptions {
     /// The upload of a mission in place of `loaded`, which was flown between the sites `sited` if any were given, over the band `loaded_band` if
     /// one was.
@@ -68,7 +76,7 @@ impl NewOptions {
         sited: Option<Sites>,
         loaded_band: Option<Band>,
     ) -> Result<Upload, String> {
-        let (sites, along_m) = match self.moved(sited)? {
+        let (sites, along_m) = match self.moved(sited, loaded.config())? {
             Some((sites, along_m)) => (Some(sites), Some(along_m)),
             None => (None, None),
         };
@@ -89,8 +97,12 @@ impl NewOptions {
         }
     }
 
-    /// Between which sites the mission is flown from now on, and how far apart they are, m, where one has moved.
-    fn moved(&self, loaded: Option<Sites>) -> Result<Option<(Sites, f32)>, String> {
+    /// Returns the sites of the new mission and their distance, m, if one has moved.
+    fn moved(
+        &self,
+        loaded: Option<Sites>,
+        config: &MissionConfig,
+    ) -> Result<Option<(Sites, f32)>, String> {
         let (tx, rx) = (self.new_site_tx, self.new_site_rx);
         let Some(loaded) = loaded.filter(|_| tx.is_some() || rx.is_some()) else {
             return Ok(None);
@@ -100,7 +112,17 @@ impl NewOptions {
             rx: rx.unwrap_or(loaded.rx),
         };
         let name = if rx.is_some() { "rx" } else { "tx" };
-        let axis = Axis::between(sites).map_err(|error| format!("--new-site-{name}: {error}"))?;
+        let named = |error: &dyn fmt::Display| format!("--new-site-{name}: {error}");
+        let axis = Axis::between(sites).map_err(|error| named(&error))?;
+        let before = Axis::between(loaded).map_err(|error| named(&error))?;
+        near(&before, &axis, sites).map_err(|line| named(&line))?;
+        let (turn, most) = (before.turn_rad(&axis).to_degrees(), most_turn_deg(config));
+        if turn > most {
+            return Err(named(&format_args!(
+                "turns the line by {turn:.1} degrees: must be within 0 to {most:.1}, so that relays that are {} m apart keep their order along it",
+                config.min_separation_m
+            )));
+        }
         #[expect(clippy::cast_possible_truncation, reason = "as a mission has it")]
         let along_m = axis.distance_m() as f32;
         match self.new_distance {
@@ -139,4 +161,53 @@ impl NewOptions {
             ..*loaded
         }
     }
+}
+
+/// Refuses a line that is far from the one that was loaded: drones fly there, and have no place along it.
+///
+/// # Errors
+/// How far it is, how far it may be, and whether latitude and longitude look swapped.
+fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
+    let away_m = |tx, rx| {
+        let ends = [tx, rx].map(|site| before.away_m(site).unwrap_or(f64::INFINITY));
+        ends[0].min(ends[1])
+    };
+    let far_m = away_m(sites.tx, sites.rx);
+    // Either line may be the longer one.
+    let most_m = axis.distance_m() + FAR_M;
+    if far_m <= most_m {
+        return Ok(());
+    }
+    let turned = |site: Geodetic| Geodetic {
+        lat_e7: site.lon_e7,
+        lon_e7: site.lat_e7,
+        ..site
+    };
+    let is_swapped = away_m(turned(sites.tx), turned(sites.rx)) <= most_m;
+    let hint = if is_swapped {
+        ": are latitude and longitude swapped?"
+    } else {
+        ""
+    };
+    Err(format!(
+        "the new line is {:.0} km from the one of --site-tx and --site-rx: must be within {:.0} km, where the drones are{hint}",
+        far_m / 1e3,
+        most_m / 1e3
+    ))
+}
+
+/// Returns the largest turn of the line, degrees, after which relays that are the separation apart along it are in order along the new
+/// one, by positions that are off by 1 m: s cos t - w sin t is the lesser of 2 m and s / 2, for the separation s and the width w of the room to the side.
+fn most_turn_deg(config: &MissionConfig) -> f32 {
+    let (separation_m, width_m) = (
+        config.min_separation_m,
+        config.lateral.most_m - config.lateral.least_m,
+    );
+    let most_m = separation_m.hypot(width_m);
+    if most_m <= 0.0 {
+        return 90.0;
+    }
+    let order_m = ORDER_M.min(0.5 * separation_m);
+    let off = (order_m / most_m).acos();
+    (off - width_m.atan2(separation_m)).max(0.0).to_degrees()
 }

@@ -1,8 +1,9 @@
 //! What the station says, one line each.
 
 use serde_json::json;
+use uav_relay::guard::config::GuardConfig;
 use uav_relay::wire::digest::digest;
-use uav_relay::{Ground, Instant, Progress, Side, Stats, Upload};
+use uav_relay::{Ground, Instant, Mission, MissionConfig, Progress, Side, Stats, Upload};
 use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::site::Between;
@@ -36,7 +37,7 @@ pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
 
 /// How far the upload is.
 pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progress) {
-    let version = upload.version();
+    let (version, all) = (upload.version(), upload.config().relays);
     match progress {
         Progress::Offering => {
             let digest = upload.id().digest;
@@ -53,11 +54,20 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             "held",
             format_args!("relay {by} holds version {version}, and the others are asked"),
         ),
-        Progress::Flown { by, view } => log.tell(
+        Progress::Adopted { by } => log.say(
+            now,
+            "adopted",
+            json!({ "version": version, "flown_by": 1, "relays": all }),
+            format_args!(
+                "relay {by} flies version {version}: 1 of {all} relays is known to, and it is asked for the others"
+            ),
+        ),
+        Progress::Flown { by, view, relays } => log.say(
             now,
             "flown",
+            json!({ "version": version, "flown_by": relays, "relays": all }),
             format_args!(
-                "relay {by} flies version {version}, view {} of the chain",
+                "{relays} of {all} relays fly version {version}, as relay {by} says, view {} of the chain",
                 view.number()
             ),
         ),
@@ -81,6 +91,50 @@ pub(crate) fn outdated(upload: &Upload, held: u16) -> String {
     }
 }
 
+/// That a relay refuses it, and by which number most likely: relays that were loaded with the mission that this station was told of have
+/// the geofence of that, unless a firmware set another one.
+pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
+    let (loaded, new) = (plan.loaded.config(), upload.config());
+    let fence = |config: &MissionConfig| {
+        let guard =
+            Mission::try_new(*config).map(|mission| GuardConfig::of(&mission, config.common));
+        guard.map(|guard| guard.fence)
+    };
+    let version = upload.version();
+    let who = format!("--version {version}: relay {by}, or one beyond it, refuses it");
+    let (Ok(own), Ok(asked)) = (fence(loaded), fence(new)) else {
+        return who;
+    };
+    let range = |what: &str, is: [f32; 2], of: [f32; 2], options: &str| {
+        let is = match is {
+            [least, most] if least.to_bits() == most.to_bits() => least.to_string(),
+            [least, most] => format!("{least} to {most}"),
+        };
+        let [least, most] = of;
+        format!(
+            "{who}: {what} {is} m: must be within {least} to {most} m, the geofence of relays that were loaded with {options}"
+        )
+    };
+    let asked_h = [asked.least_altitude_m, asked.most_altitude_m];
+    let own_h = [own.least_altitude_m, own.most_altitude_m];
+    let (asked_y, own_y) = (
+        [asked.least_y_m, asked.most_y_m],
+        [own.least_y_m, own.most_y_m],
+    );
+    let leaves = |is: [f32; 2], of: [f32; 2]| is[0] < of[0] || is[1] > of[1];
+    if leaves(asked_h, own_h) {
+        range("altitude", asked_h, own_h, "this --altitude and --band")
+    } else if leaves(asked_y, own_y) {
+        let options = "this --lateral-min-m and --lateral-max-m";
+        range("room to the side", asked_y, own_y, options)
+    } else if upload.sites().is_none() && asked.most_x_m > own.most_x_m {
+        let (is, of) = ([asked.most_x_m; 2], [own.least_x_m, own.most_x_m]);
+        range("distance", is, of, "this --distance")
+    } else {
+        format!("{who}: the log of the one that does says why")
+    }
+}
+
 /// That the chain does not fly it in time, and why most likely.
 pub(crate) fn late(plan: &Plan, upload: &Upload, progress: Progress, ground: &Ground) -> String {
     let seconds = plan.timeout.as_micros() / 1_000_000;
@@ -89,6 +143,9 @@ pub(crate) fn late(plan: &Plan, upload: &Upload, progress: Progress, ground: &Gr
         Progress::Held { by } => {
             format!("relay {by} holds version {version}, and the chain does not fly it yet")
         }
+        Progress::Adopted { by } => format!(
+            "relay {by} flies version {version}, and not all relays of its view are known to"
+        ),
         _ => format!(
             "no relay is known to hold version {version}: {}",
             why(plan, ground.stats())

@@ -178,6 +178,10 @@ impl<'a> Station<'a> {
                 self.late_at = None;
                 is_new.then(|| report::outdated(upload, version))
             }
+            Progress::Refused { by } => {
+                self.late_at = None;
+                is_new.then(|| report::refused(self.plan, upload, by))
+            }
             _ => {
                 let is_late = self.late_at.take_if(|at| *at <= time).is_some();
                 is_late.then(|| report::late(self.plan, upload, progress, &self.ground))
@@ -251,9 +255,16 @@ fn upload(plan: &Plan, ground: &Ground) -> Value {
     };
     let progress = match ground.progress() {
         Progress::Held { .. } => "held",
+        Progress::Adopted { .. } => "adopted",
+        Progress::Refused { .. } => "refused",
         Progress::Flown { .. } => "flown",
         Progress::Outdated { .. } => "outdated",
         _ => "offering",
     };
-    json!({ "version": upload.version(), "progress": progress })
+    let flown_by = match ground.progress() {
+        Progress::Adopted { .. } => 1,
+        Progress::Flown { relays, .. } => relays,
+        _ => 0,
+    };
+    json!({ "version": upload.version(), "progress": progress, "flown_by": flown_by, "relays": upload.config().relays })
 }

@@ -5,7 +5,9 @@
 //! | --- | --- | --- |
 //! | `Offering` | it holds an older mission, or has not answered | it is asked by a hello every second, and offered the new one in answer to its own hello; after three questions without an answer the next one of the four nearest is |
 //! | `Held` | it holds the new one, and flies another yet | it is asked every second |
-//! | `Flown` | it flies it: so does every relay of its view, or it takes part in nothing until it does | done |
+//! | `Adopted` | it flies it, and does not know yet that all relays of its view do | it is asked every second |
+//! | `Flown` | it flies it, and so do all relays of its view; one that is in no view takes part in nothing until it does | done |
+//! | `Refused` | it refuses it, or knows of a relay that does | done: another upload, of a larger version, has to fit |
 //! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
 
 mod levels;
@@ -129,7 +131,7 @@ impl Ground {
             again: None,
             levels: Levels::NONE,
             deframer: Deframer::new(),
-            session: Session::new(auth),
+            session: Session::new(auth, 0),
             counter: 0,
             stats: Stats::default(),
         }
@@ -265,26 +267,45 @@ impl Ground {
         let mission_id = upload.id();
         self.unanswered = 0;
         self.distance = distance;
-        self.holds = Some(hello.holds);
-        self.progress = if hello.holds > mission_id {
+        // What it refuses it does not hold, and what is refused may be another mission.
+        let is_refused = hello.refused && hello.holds == mission_id;
+        let holds = if hello.refused && !is_refused {
+            MissionId {
+                version: 0,
+                digest: self.base,
+            }
+        } else {
+            hello.holds
+        };
+        self.holds = Some(holds);
+        let progress = if is_refused {
+            Progress::Refused { by }
+        } else if holds > mission_id {
             Progress::Outdated {
                 version: hello.holds.version,
             }
-        } else if hello.holds < mission_id {
+        } else if holds < mission_id {
             // An offer is answered, too: only a question leads to one, or the two would not come to an end.
             if core::mem::take(&mut self.asked) {
                 self.answer = Some(hello.nonce);
                 self.due = true;
             }
             Progress::Offering
-        } else if hello.flies {
+        } else if hello.flies && hello.whole {
             Progress::Flown {
                 by,
                 view: hello.newest,
+                relays: hello.behind,
             }
+        } else if hello.flies {
+            Progress::Adopted { by }
         } else {
             Progress::Held { by }
         };
+        // What is over stays over, though another relay has not heard of it yet.
+        if self.is_under_way() || !is_under_way(progress) {
+            self.progress = progress;
+        }
         if !self.is_under_way() {
             self.due = false;
             self.again = None;
@@ -292,7 +313,7 @@ impl Ground {
     }
 
     const fn is_under_way(&self) -> bool {
-        matches!(self.progress, Progress::Offering | Progress::Held { .. })
+        is_under_way(self.progress)
     }
 
     /// Asks again, or the next relay, if it is time to. Constant work.
@@ -380,6 +401,8 @@ impl Ground {
                 ready: true,
                 holds: upload.id(),
                 flies: false,
+                whole: false,
+                refused: false,
                 nonce: 0,
             })
         };
@@ -396,4 +419,11 @@ impl Ground {
         let to = self.at(distance);
         say(&mut self.session, to, &message, header, frame)
     }
+}
+
+const fn is_under_way(progress: Progress) -> bool {
+    matches!(
+        progress,
+        Progress::Offering | Progress::Held { .. } | Progress::Adopted { .. }
+    )
 }

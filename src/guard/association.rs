@@ -8,11 +8,16 @@
 use super::fence::Fence;
 use super::own::Own;
 use crate::jitter::Jitter;
-use crate::place::CrossSection;
 use crate::side::Side;
 
 /// So many messages of another association in a row are of a new one, not late ones of an old.
 const STRAYS: u8 = 3;
+
+/// Reminders, of one a second, after which a request to halt that is not repeated is forgotten.
+const HALT_REMINDERS: u8 = 15;
+
+/// Reminders after which a place that is not repeated is forgotten.
+const SEEN_REMINDERS: u8 = 15;
 
 /// An association that this relay has left, until the neighbour has begun anew.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +28,10 @@ struct Parting {
 }
 
 /// An association with the neighbour on one side.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "flags of the messages, each for itself"
+)]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Association {
     /// The neighbour, 0 for none.
@@ -35,13 +44,21 @@ pub(super) struct Association {
     strays: u8,
     /// Whether there is something to tell.
     pub(super) due: bool,
-    /// Whether the neighbour passed on that the chain is to open, and whether it was last told so.
+    /// True if the neighbour passed on that the chain is to open, and if it was last told so.
     pub(super) opens: bool,
-    pub(super) told_open: bool,
+    told_open: bool,
+    /// Reminders until the neighbour's request to halt is forgotten, 0 for none.
+    halt_left: u8,
+    /// True while the neighbour is told to halt.
+    told_halt: bool,
     /// The neighbour's number of the association that it has left, 0 for none: it is counted as absent.
     absent: u16,
     /// What this relay still has to say of the one that it has left itself.
     parting: Option<Parting>,
+    /// Place along x that the neighbour told last, in whichever association, m; NaN before that.
+    seen_m: f32,
+    /// Reminders until that place is forgotten.
+    seen_left: u8,
 }
 
 impl Association {
@@ -55,14 +72,44 @@ impl Association {
             due: true,
             opens: false,
             told_open: false,
+            halt_left: 0,
+            told_halt: false,
             absent: 0,
             parting: None,
+            seen_m: f32::NAN,
+            seen_left: 0,
         }
     }
 
     /// Whether nobody is there that this relay could agree with: the chain ends, or the neighbour is not flown.
     pub(super) const fn is_none(&self) -> bool {
         self.node == 0 || self.is_absent()
+    }
+
+    /// Takes the place along x that a message of the neighbour tells.
+    pub(super) const fn see(&mut self, x_m: f32) {
+        (self.seen_m, self.seen_left) = (x_m, SEEN_REMINDERS);
+    }
+
+    /// Returns how far this relay was reported beyond the place that the neighbour told last, m: along x for the neighbour upstream, against
+    /// x for the one downstream. NaN if either is unknown.
+    fn beyond_m(&self, own: &Own, side: Side) -> f32 {
+        let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
+        match side {
+            _ if self.seen_left == 0 => f32::NAN,
+            Side::Upstream => x_m - self.seen_m,
+            Side::Downstream => self.seen_m - x_m,
+        }
+    }
+
+    /// Returns true if this relay was reported on the wrong side of the place that the neighbour told last.
+    pub(super) fn is_passed(&self, own: &Own, side: Side) -> bool {
+        self.beyond_m(own, side) < -2.0 * own.config.hover_m
+    }
+
+    /// Returns true if this relay was reported on its own side of the place that the neighbour told last.
+    pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
+        self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
 
     /// Whether the neighbour is not flown.
@@ -143,15 +190,9 @@ impl Association {
     /// What there is to tell of the association that this relay has left.
     pub(super) fn part(&mut self) -> Option<Fence> {
         let parting = self.parting.as_mut()?;
-        core::mem::take(&mut parting.due).then_some(Fence {
-            association: parting.own,
-            echo: parting.heard,
-            number: 0,
-            x_m: 0.0,
-            target_m: 0.0,
-            across: CrossSection::on_line(0.0),
-            apart_m: 0.0,
+        core::mem::take(&mut parting.due).then(|| Fence {
             flags: Fence::RELEASED,
+            ..Fence::without_place(parting.own, parting.heard)
         })
     }
 
@@ -176,20 +217,67 @@ impl Association {
             apart_m: 0.0,
             flags: u8::from(own.still) * Fence::STILL
                 + u8::from(self.told_open) * Fence::OPENS
-                + u8::from(self.opens) * Fence::ECHO_OPENS,
+                + u8::from(self.opens) * Fence::ECHO_OPENS
+                + u8::from(self.told_halt) * Fence::HALTS,
         }
     }
 
-    /// What a message of this association says of opening the chain; it is answered if the neighbour has not heard the last of that.
+    /// Takes from a message of this association whether the chain is to open. It is answered if the neighbour has not received the last
+    /// of that.
     pub(super) const fn hear_open(&mut self, fence: &Fence) {
         self.opens = fence.says(Fence::OPENS);
         self.due |= fence.says(Fence::ECHO_OPENS) != self.told_open;
     }
 
-    /// This is passed on from now on.
+    /// Passes on that the chain is to open.
     pub(super) const fn pass_open(&mut self, opens: bool) {
         self.due |= self.told_open != opens;
         self.told_open = opens;
+    }
+
+    /// Takes from any message of the neighbour whether the chain is to halt.
+    pub(super) const fn hear_halt(&mut self, fence: &Fence) {
+        self.halt_left = if fence.says(Fence::HALTS) {
+            HALT_REMINDERS
+        } else {
+            0
+        };
+    }
+
+    /// Returns true while the neighbour requests a halt.
+    pub(super) const fn requests_halt(&self) -> bool {
+        self.halt_left > 0
+    }
+
+    /// Passes on that the chain is to halt.
+    pub(super) const fn pass_halt(&mut self, halts: bool) {
+        self.due |= self.told_halt != halts;
+        self.told_halt = halts;
+    }
+
+    /// Returns true while the neighbour is told to halt.
+    pub(super) const fn tells_halt(&self) -> bool {
+        self.told_halt
+    }
+
+    /// Counts a reminder: a request to halt, and a place, that was not repeated for long is forgotten.
+    pub(super) const fn age(&mut self) {
+        self.halt_left = self.halt_left.saturating_sub(1);
+        self.seen_left = self.seen_left.saturating_sub(1);
+    }
+
+    /// Returns the message of a relay that is not flown, or has just begun, and so is in no association: its place, and a halt that it
+    /// passes on.
+    pub(super) fn tell_alone(&mut self, own: &Own) -> Option<Fence> {
+        let is_due = self.due && self.node != 0 && self.parting.is_none();
+        let place = own.reported.filter(|_| is_due)?;
+        self.due = false;
+        Some(Fence {
+            x_m: place.x_m,
+            across: place.cross_section(),
+            flags: Fence::RELEASED | Fence::UNPLACED | (u8::from(self.told_halt) * Fence::HALTS),
+            ..Fence::without_place(self.own, 0)
+        })
     }
 
     /// One more message of another association; whether they are too many to be late ones.
@@ -257,6 +345,11 @@ impl KeepOut {
     /// The relay that was lost last was nearer than the separation, or may have been, unless this one is at `near_m` or beyond.
     pub(super) const fn near(&mut self, near_m: f32) {
         self.near_m = near_m;
+    }
+
+    /// Returns the place along x from which on the relay that was lost last is the separation away, m; NaN if it is.
+    pub(super) const fn near_m(&self) -> f32 {
+        self.near_m
     }
 
     /// Whether that may still be so.

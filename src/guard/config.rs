@@ -8,9 +8,11 @@ use crate::without_quorum::WithoutQuorum;
 
 use super::fence::is_place;
 
-/// How long a relay may fly away from a new setpoint, unless told otherwise: it takes 0.2 s to the flight controller, and a multicopter
-/// that brakes with 3 m/s^2 stops from 11 m/s in what is left.
-const LAG: Duration = Duration::from_millis(4_000);
+/// Default time that a relay may fly away from a new setpoint: the stopping time of the autopilot link's default pace.
+const LAG: Duration = Duration::from_millis(9_800);
+
+/// Greatest distance from the box, m in each coordinate, at which a relay may begin.
+pub const BEGIN_WITHIN_M: f32 = 5_000.0;
 
 /// Where setpoints may be.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -52,8 +54,9 @@ pub struct GuardConfig {
     /// How far off its setpoint a relay may be reported that hovers there, m in each coordinate: 0 to 1e3. This much is taken from the separation at
     /// each of two relays.
     pub hover_m: f32,
-    /// How long after [`Guard::steer`](super::Guard::steer) gave a setpoint the relay flies toward it at the latest: the way of the
-    /// setpoint to the flight controller, and the time to stop from the greatest speed.
+    /// Time after [`Guard::steer`](super::Guard::steer) gave a setpoint within which the relay flies toward it: the way of the setpoint to
+    /// the flight controller, and the time to stop from the greatest speed. With the autopilot link it is
+    /// [`Pace::stopping_time`](crate::flight::autopilot::carrot::Pace::stopping_time).
     pub lag: Duration,
 }
 
@@ -63,7 +66,7 @@ impl GuardConfig {
     /// Where relays leave the line without a quorum ([`Settings::without_quorum`](crate::Settings)), the box needs
     /// [room](Self::with_room_for) for that: they go no farther than it.
     ///
-    /// `hover_m` is 0 and `lag` 4 s.
+    /// `hover_m` is 0 and `lag` 9.8 s, the [stopping time](crate::flight::autopilot::carrot::Pace::stopping_time) of the default pace.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -120,7 +123,7 @@ impl GuardConfig {
             && (0.0..=1e3).contains(&self.hover_m)
     }
 
-    /// The place in the box that is nearest to `place`.
+    /// Returns the place in the box that is nearest to `place`.
     #[inline(never)] // called from several places
     pub(super) fn cut(&self, place: Placement) -> Placement {
         let fence = &self.fence;
@@ -134,10 +137,30 @@ impl GuardConfig {
         }
     }
 
-    /// Whether a relay reported at `x_m` may be inside the box along x.
-    pub(super) fn holds(&self, x_m: f32) -> bool {
+    /// Returns the place nearest to `place` that is no farther outside the box than `before`.
+    pub(super) fn cut_toward(&self, place: Placement, before: Placement) -> Placement {
         let fence = &self.fence;
-        x_m >= fence.least_x_m - self.hover_m && x_m <= fence.most_x_m + self.hover_m
+        let cut = |is: f32, before: f32, least: f32, most: f32| {
+            is.max(least.min(before)).min(most.max(before))
+        };
+        Placement {
+            x_m: cut(place.x_m, before.x_m, fence.least_x_m, fence.most_x_m),
+            y_m: cut(place.y_m, before.y_m, fence.least_y_m, fence.most_y_m),
+            altitude_m: cut(
+                place.altitude_m,
+                before.altitude_m,
+                fence.least_altitude_m,
+                fence.most_altitude_m,
+            ),
+        }
+    }
+
+    /// Returns true if a relay may begin at `place`: near enough to the box that no number is too large to be exact.
+    pub(super) fn may_begin_at(&self, place: Placement) -> bool {
+        let (near, box_place) = (BEGIN_WITHIN_M, self.cut(place));
+        (place.x_m - box_place.x_m).abs() <= near
+            && (place.y_m - box_place.y_m).abs() <= near
+            && (place.altitude_m - box_place.altitude_m).abs() <= near
     }
 
     /// Where node `node`, which is to be at `x_m`, waits while the chain is open: places in order stay in order, and come to be the

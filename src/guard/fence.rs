@@ -22,7 +22,7 @@ pub struct Fence {
     /// From the owner: how far before the fence it stays, m along x, 0 to 1e5. Where that is less than the separation, the
     /// follower stays where it is across the line.
     pub apart_m: f32,
-    /// What else it says: the sum of those of [`STILL`](Self::STILL) to [`RELEASED`](Self::RELEASED) that hold.
+    /// What else it says: the sum of those of [`STILL`](Self::STILL) to [`UNPLACED`](Self::UNPLACED) that hold.
     pub flags: u8,
 }
 
@@ -41,6 +41,26 @@ impl Fence {
     /// The sender has left this association: it does not fly to its setpoints any more, or did not for a time. Places and the number of
     /// the fence mean nothing.
     pub const RELEASED: u8 = 16;
+    /// The sender, or a relay beyond it, is not in order with its neighbours: all relays stay where they are. It is told again every
+    /// second, and holds in whichever association.
+    pub const HALTS: u8 = 32;
+    /// The place shows the order only, and grants nothing. From the follower: it is not in order with its neighbour downstream. With
+    /// [`RELEASED`](Self::RELEASED): the sender is not flown, and `x_m` is the place reported last.
+    pub const UNPLACED: u8 = 64;
+
+    /// Returns a message that has no places and no flags.
+    pub(super) const fn without_place(association: u16, echo: u16) -> Self {
+        Self {
+            association,
+            echo,
+            number: 0,
+            x_m: 0.0,
+            target_m: 0.0,
+            across: CrossSection::on_line(0.0),
+            apart_m: 0.0,
+            flags: 0,
+        }
+    }
 
     pub(super) const fn says(&self, flag: u8) -> bool {
         self.flags & flag != 0
@@ -53,22 +73,24 @@ impl Fence {
         self.association != 0
             && places.into_iter().all(is_place)
             && (0.0..=1e5).contains(&self.apart_m)
-            && self.flags < 2 * Self::RELEASED
+            && self.flags < 2 * Self::UNPLACED
     }
 }
 
-/// Why a relay may not get where it is to be.
+/// Reason that keeps a relay from the place agreed on.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HoldReason {
     /// The neighbour has not agreed to a fence yet.
     Unheard,
-    /// The neighbour stands on the wrong side of this relay: neither moves.
+    /// The neighbour is on the wrong side of this relay along the line, or too near along it to be certain: neither moves.
     Order,
     /// The two are to be closer along x than they may come yet, by where they are across the line.
     Close,
     /// A relay that fell silent may still hover there.
     Lost,
+    /// Another relay of the chain is not in order with its neighbours: all stay where they are.
+    Halted,
 }
 
 /// Whether it is a number that may be a place along x, m; not so for NaN.

@@ -110,11 +110,17 @@ impl FenceFollower {
     }
 
     pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
+        self.association.hear_halt(fence);
+        // With a number it is the place of a fence, which may be far from its owner.
+        if fence.says(Fence::UNPLACED) || !fence.says(Fence::RELEASED) && fence.number == 0 {
+            self.association.see(fence.x_m);
+        }
         if self.association.is_over(fence) || fence.says(Fence::RELEASED) {
             if self.association.is_left(fence) {
                 self.release(fence.association, own, jitter);
             }
-            self.association.due = true;
+            // A relay that is in no association needs no answer.
+            self.association.due |= !fence.says(Fence::UNPLACED);
             return;
         }
         if self.association.heard == 0 {
@@ -196,6 +202,11 @@ impl FenceFollower {
         self.association.is_none() || self.is_agreed()
     }
 
+    /// Returns true if the neighbour upstream has told that it is beyond this relay.
+    pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
+        !self.is_ordered() && self.association.is_passed(own, Side::Upstream)
+    }
+
     /// Whether a fence was heard of.
     pub(super) const fn is_agreed(&self) -> bool {
         self.number != 0
@@ -209,31 +220,36 @@ impl FenceFollower {
         }
     }
 
-    /// What there is to tell.
-    pub(super) fn tell(&mut self, own: &Own) -> Option<Fence> {
-        if self.association.node == 0 || !core::mem::take(&mut self.association.due) {
+    /// Returns the pending message. A relay that is not `placed`, in order with its neighbour downstream, has one only for a request.
+    pub(super) fn tell(&mut self, own: &Own, placed: bool) -> Option<Fence> {
+        let is_due = self.association.due && (placed || self.association.tells_halt());
+        if self.association.node == 0 || !is_due {
             return None;
         }
+        self.association.due = false;
         self.told = own.reachable.low_m >= self.fence_m;
         let mut fence = self.association.fence(own);
         (fence.number, fence.x_m) = (self.number, own.reachable.low_m);
-        if self.taken_m <= self.asked_m {
-            fence.flags += Fence::AGREES;
+        if !placed {
+            fence.flags |= Fence::UNPLACED;
+        } else if self.taken_m <= self.asked_m {
+            fence.flags |= Fence::AGREES;
         }
         Some(fence)
     }
 
     pub(super) fn hold_reason(&self, own: &Own) -> Option<HoldReason> {
         let target_m = own.target_m();
-        if self
-            .keep_out
-            .limit_m()
-            .is_some_and(|limit| target_m < limit)
-        {
+        let limit = self.keep_out.limit_m();
+        let stays = self.keep_out.is_near() && !own.is_across();
+        if stays || limit.is_some_and(|limit| target_m < limit) {
             return Some(HoldReason::Lost);
         }
         if self.association.is_none() {
             return None;
+        }
+        if self.is_out_of_order(own) {
+            return Some(HoldReason::Order);
         }
         if !self.is_agreed() {
             return Some(HoldReason::Unheard);

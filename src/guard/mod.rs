@@ -1,49 +1,60 @@
-//! Keeps relays apart while they fly from one agreed set of places to the next, whatever is lost or late between them.
+//! Motion guard: keeps relays apart while they fly from one agreed set of places to the next, whatever is lost or late between them.
 //!
 //! Relays stand in order along x. As a rule neighbours are the separation apart *along x*, and then so are all relays, whatever they do
-//! across the line. Where two are to be closer along x, since they fly beside or above each other, they come closer once both have
-//! arrived across the line, and stay there until they are the separation apart along x again: what the two are apart across the line
-//! then counts. Two relays with one between them stay the separation apart along x in any case, so that no relay has to know more
-//! than its neighbours. Places that do not allow that are approached as far as it does, and [`Guard::hold_reason`] says so.
+//! across the line. Two relays that are agreed beside or above each other come closer along x once both have arrived across the line; what
+//! they are apart across the line then counts. Two relays with one between them stay the separation apart along x in any case, so no
+//! relay has to know more than its neighbours. Places that do not allow that are approached as far as they can be, and
+//! [`Guard::hold_reason`] says so.
 //!
-//! Between two neighbours there is a *fence*, a plane across x. The relay upstream of it, its *owner*, stays so far before it as the two
-//! have agreed on, the *step*; the other one, the *follower*, stays at it or beyond.
+//! Between two neighbours there is a *fence*, a plane across x. The relay upstream of it, its *owner*, stays a *step* before it; the relay
+//! downstream, the *follower*, stays at it or beyond.
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`config`] | the box that no setpoint leaves, and what else is set before flight |
-//! | `own` | where the relay is to be, was told to fly, and whether it has arrived across the line |
-//! | `reachable` | where the relay may be along x, by what was reported and what it was told to fly to |
-//! | `association` | which incarnation of the neighbour a message is from, so that late ones cannot be mistaken |
+//! | [`config`] | the geofence of setpoints, and other settings |
+//! | `own` | the relay's own setpoint and place across the line |
+//! | `reachable` | the interval along x in which the relay may be, by its reports and setpoints |
+//! | `association` | the incarnation of the neighbour that a message belongs to, and requests that relays pass on |
 //! | `owner` | the fence downstream, which this relay places |
 //! | `follower` | the fence upstream, which the neighbour places |
 //!
 //! # Rules
 //!
-//! *Own stretch*: from the lowest to the highest x at which the relay may be, be it stopped anywhere on its way.
+//! *Own interval*: from the lowest to the highest x at which the relay may be, wherever it stops on its way. *In order*: the follower is
+//! beyond the owner along x. Reports are off by up to `hover_m`: two relays whose reports are within twice that along x are in order only if
+//! they are the separation apart across the line, so that they may pass each other.
 //!
 //! | | rule | so that |
 //! | --- | --- | --- |
-//! | 1 | The follower never lowers its setpoint below the newest fence it has heard of, and flies up to it if it is below. | what it promises holds |
-//! | 2 | It tells the newest fence it has heard of, and the low end of its own stretch. | - |
-//! | 3 | The owner counts on the lowest of: that low end, if told together with the newest fence; every fence announced since. | no message under way can make the follower come nearer than it is counted on |
-//! | 4 | The owner never raises its setpoint to less than the step before what it counts on. | the stretches of the two are the step apart |
-//! | 5 | The owner announces no fence nearer than the step beyond the high end of its own stretch. | a fence it lowers is one it has cleared already |
-//! | 6 | As far as 5 allows, the fence goes halfway between the two agreed places (and half the step on). | both can get where they are to be |
-//! | 7 | The first fence is the separation beyond the owner's own stretch; other fences, and moves across the line, begin when the follower has cleared it. | a start that is too close is opened first, and no relay sinks onto another |
-//! | 8 | A setpoint stays until both neighbours are known to be in order: the follower has told that it is beyond the owner, the owner has announced a fence. It tells one of them only once it knows that of the other one. | nothing is granted unheard (switched on, rebooted, newly linked); relays in the wrong order, and all others, stay where they are |
-//! | 9 | Nothing lapses with time: of a neighbour that is replaced or starts anew, the last limit stays until it speaks for itself, or [`Guard::forget`]; if it was never heard, this relay goes no farther toward it. | a silent relay that still hovers is not flown into |
-//! | 10 | With a fence the owner says which step it asks for. From one below the separation until the next one that is the separation, neither moves across the line: not the owner since it asked, not the follower since it heard. | what the follower told of its place across the line stays true |
+//! | 1 | The follower never lowers its setpoint below the newest fence that it has received, and flies up to that fence if it is below. | its promise holds |
+//! | 2 | It tells the newest fence that it has received, and the low end of its own interval. | - |
+//! | 3 | The owner counts on the lowest of that low end, if told together with the newest fence, and every fence announced since. | no message under way lets the follower come nearer than it is counted on |
+//! | 4 | The owner never raises its setpoint to less than the step before what it counts on. | the two intervals are the step apart |
+//! | 5 | The owner announces no fence nearer than the step beyond the high end of its own interval. | a fence that is lowered has been cleared already |
+//! | 6 | As far as 5 allows, the fence goes halfway between the two agreed places, and half the step on. | both can reach their places |
+//! | 7 | The first fence is the separation beyond the owner's own interval. Other fences, and moves across the line, begin when the follower has cleared it. | a start that is too close is opened first, and no relay sinks onto another |
+//! | 8 | The first setpoint is the place reported last, side and altitude included, even outside the geofence. It stays until both neighbours are known to be in order: the follower has told that it is beyond the owner, the owner has announced a fence. A relay tells the one neighbour a place that counts only once it is in order with the other one. | nothing is granted before the order is known, after a start as after a reboot or a new link |
+//! | 9 | Nothing lapses with time: the last limit of a neighbour that is replaced or starts anew stays until it speaks for itself, or [`Guard::forget`]; if it was never heard, this relay goes no farther toward it. | no relay flies into a silent one that still hovers |
+//! | 10 | With a fence the owner tells the step that it asks for. From a step below the separation until the next one that is the separation, neither moves across the line: the owner from asking on, the follower from receiving on. | the place across the line that the follower told stays true |
 //! | 11 | The step is the separation. It becomes less when the follower has told, together with the newest fence, that it has arrived across the line, where, and that it agrees: then it is the largest of what is asked for, of what the two places across the line leave to be kept along x, and of what rule 12 asks for. The owner announces a larger one only once it is that far before what it counts on. | the two are the separation apart in space |
 //! | 12 | The steps upstream and downstream of a relay add up to the separation at least: it agrees to no smaller one upstream before, and takes no smaller one downstream after. | relays that are not neighbours are the separation apart along x |
-//! | 13 | A relay that has to move across the line and may not by rule 10, or that started too close to a neighbour that is to be close, has the chain *open*: it says so to both sides, and everybody passes that on. Then all go to places in the same order that are the separation apart along x, and steps are the separation. | there is room to move across the line |
-//! | 14 | From a neighbour that fell silent within the separation along x this relay goes off to the separation, and does not move across the line before; nor where it never heard the neighbour, or had not cleared the first fence, before it has gone as far. | where the silent one hovers across the line still counts |
-//!
-//! | 15 | A relay that is not flown to its setpoints, since a pilot has it or it is on the ground, has none. It leaves both associations and says so until the neighbour has begun anew; flown again it begins as after a start. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 off to the separation); if the two were in order it is otherwise free, until it hears of a new association. | nobody counts on a drone that is flown by hand, and nobody comes nearer to it |
+//! | 13 | A relay that has to move across the line and may not by rule 10, or that started too close to a neighbour that is to be close, has the chain *open*: it tells both sides, and every relay passes that on. Then all go to places in the same order that are the separation apart along x, and steps are the separation. | there is room to move across the line |
+//! | 14 | From a neighbour that fell silent within the separation along x this relay goes off to the separation, and does not move across the line before; nor where it never heard the neighbour, or had not cleared the first fence, before it has gone as far. | the place of the silent one across the line still counts |
+//! | 15 | A relay that is not flown to its setpoints, in its pilot's hands or on the ground, has none. It leaves both associations and says so until the neighbour has begun anew; flown again it begins as after a start. Meanwhile it tells the place at which it was reported, which grants nothing. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 off to the separation); if the two were in order it is otherwise free, until it receives a new association. | no relay counts on a drone that is flown by hand, and none comes nearer to it |
+//! | 16 | A relay that is out of order with a neighbour, or not in order with both for three reminders and not seen to be so by the places of those that are not flown, has the chain *halt*: it tells both sides at every reminder, and every relay passes that on, also one that is not flown. A relay that halts on its way stops where it was reported last. A request that is not repeated for 15 reminders is forgotten. | no relay flies into a drone that was given back, or has started, at a wrong place |
 //!
 //! Where places are along another line from one moment to the next ([`Guard::leave_line`]), a relay has no setpoint and begins as after a
-//! start, once it has stopped. Whoever says something along another line is not heard: it is counted on as before, where it was, and the
-//! relay does not move before both neighbours speak along the new one.
+//! start, once it has stopped. A neighbour that speaks along another line is not heard: it is counted on as before, where it was, and the
+//! relay does not move before both neighbours speak along the new line. Relays that the new line puts out of order stay where they are.
+//!
+//! # Why the order along x suffices
+//!
+//! Let all neighbours be in order. A pair of neighbours less than the separation apart only parts: the owner's setpoint does not rise
+//! (rule 4) and the follower's does not fall (rules 1 and 7). From then on the pair stays the separation apart. So no gap between
+//! neighbours ever falls below the lesser of the separation and the gap at the start, nor does a sum of gaps: that is the distance along x
+//! of any two relays. Until a relay's two gaps are the separation, it does not move across the line. So no two relays come nearer in
+//! space than the lesser of the separation and their distance at the start, less what their places are off by.
+//! `cargo test --test guard anywhere` flies it.
 //!
 //! # Why everybody arrives
 //!
@@ -63,8 +74,9 @@
 //!   much again each time that one is rebooted before a fence has opened what is missing. What a relay hovers off across the line counts
 //!   where the two are within the separation along x.
 //! - A relay says nothing before it has both a place to go to and a report of where it is: until then nobody moves toward it.
-//! - Where a pilot takes a drone by hand is the pilot's affair: others only come no nearer. Given back it has to stand between its
-//!   neighbours, the separation from them.
+//! - A drone in its pilot's hands is the pilot's affair: its neighbours only come no nearer. A drone that is given back at a wrong place
+//!   stays there, and the chain halts around it; a drone that is just flying past needs some seconds for that. A drone that is given back
+//!   in motion overshoots as far as its autopilot takes to stop it.
 //! - A relay that starts, or is flown again, beside one that is not flown has not heard it, and stays where it is until that one is
 //!   flown or is linked around.
 //! - A relay that is rebooted has forgotten whom it was linked to: it has to begin with the neighbours of the mission and be
@@ -87,6 +99,7 @@ use crate::stats::bump;
 use crate::time::Instant;
 
 use crate::jitter::Jitter;
+use association::Association;
 use config::{Geofence, GuardConfig};
 use fence::is_place;
 pub use fence::{Fence, HoldReason};
@@ -111,8 +124,20 @@ pub struct Guard {
     flown: bool,
     follower: FenceFollower,
     owner: FenceOwner,
+    /// True while this relay has the whole chain halt: it is out of order with a neighbour, or not in order for some reminders.
+    disorder: bool,
+    /// Reminders in a row at which this relay was not in order.
+    waits: u8,
+    /// Reminders so far.
+    reminders: u8,
     refused: u32,
 }
+
+/// Reminders from one message of a relay that is not flown to the next.
+const ALONE_EVERY: u8 = 4;
+
+/// Reminders in a row without order after which the whole chain halts.
+const MOST_WAITS: u8 = 3;
 
 impl Guard {
     /// A guard that starts at `now` between `neighbours`, toward Tx and toward Rx, as the mission has them; `None` where the chain ends.
@@ -125,6 +150,9 @@ impl Guard {
             own: Own::new(config, upstream.saturating_add(1), now),
             follower: FenceFollower::new(upstream, &mut jitter),
             owner: FenceOwner::new(downstream, &mut jitter),
+            disorder: false,
+            waits: 0,
+            reminders: 0,
             jitter,
             born: now,
             found: None,
@@ -150,17 +178,19 @@ impl Guard {
 
     /// The flight controller has found that the relay was at `place` at time `at`: when that was measured, not when it was read.
     ///
-    /// The first setpoint is a place reported since the start and inside the box along x.
+    /// The first setpoint is a place reported since the start, altitude and side included, even outside the box; nothing farther than
+    /// [`BEGIN_WITHIN_M`](config::BEGIN_WITHIN_M) from the box.
     pub fn position(&mut self, at: Instant, place: Placement) {
         if !is_placement(place) {
             return bump(&mut self.refused);
         }
         let own = &mut self.own;
+        own.reported = Some(place);
         if own.setpoint.is_some() {
             own.reachable.report(at, place.x_m, &own.config);
             own.report(at, place);
-        } else if self.flown && at >= self.born && own.config.holds(place.x_m) {
-            self.found = Some(own.config.cut(place));
+        } else if self.flown && at >= self.born && own.config.may_begin_at(place) {
+            self.found = Some(place);
         }
     }
 
@@ -173,6 +203,7 @@ impl Guard {
             return false;
         }
         self.flown = flown;
+        (self.disorder, self.waits) = (false, 0);
         (self.born, self.found) = (now, None);
         if self.own.setpoint.is_some() {
             self.own.release(now);
@@ -191,6 +222,8 @@ impl Guard {
             self.born = self.born.max(now + self.own.config.lag);
         }
         self.found = None;
+        (self.disorder, self.waits) = (false, 0);
+        self.own.reported = None;
         self.own.target = None;
         self.own.release(self.born);
         self.follower.leave_line(&mut self.jitter);
@@ -259,6 +292,9 @@ impl Guard {
         };
         self.follower.settle(&self.own);
         self.clear_near();
+        let is_ordered = self.is_ordered();
+        self.halt(is_ordered, now);
+        let before = self.own.setpoint.unwrap_or(before);
         let clear = self.follower.is_clear(&self.own) && self.owner.is_clear(&self.own);
         self.open(clear);
         let own = &self.own;
@@ -268,16 +304,22 @@ impl Guard {
         } else {
             self.owner.apart(own, taken_m)
         };
-        let least = self.follower.least(own);
-        let most = self.owner.most(own, apart);
+        let mut least = self.follower.least(own);
+        let mut most = self.owner.most(own, apart);
+        if !own.is_across() {
+            // A relay that has to move across the line goes off from one that fell silent near by.
+            least = least.max(self.follower.keep_out.near_m());
+            most = most.min(self.owner.keep_out.near_m());
+        }
         let x_m = own.goal_m().max(least).min(most);
         // Whatever the limits ask for: toward a neighbour only as far as it has granted, back never beyond what was promised.
         let x_m = x_m.max(least.min(before.x_m)).min(most.max(before.x_m));
-        let is_ordered = self.follower.is_ordered() && self.owner.is_ordered(own);
-        let x_m = if is_ordered { x_m } else { before.x_m };
-        let across = if clear { target } else { before };
+        let moves = is_ordered && !own.halted;
+        let x_m = if moves { x_m } else { before.x_m };
+        let across = if clear && moves { target } else { before };
+        // A relay outside the box comes back as far as its limits allow, and goes no farther out.
         let wanted = across.cross_section().at(x_m);
-        let next = own.config.cut(wanted);
+        let next = own.config.cut_toward(wanted, before);
         self.own.reachable.go(next.x_m, now);
         self.own.go(next, now);
         if self.follower.is_ordered() {
@@ -307,6 +349,41 @@ impl Guard {
         down.pass_open(downward);
     }
 
+    /// Returns true if this relay is known to be in order with both neighbours.
+    fn is_ordered(&self) -> bool {
+        self.follower.is_ordered() && self.owner.is_ordered(&self.own)
+    }
+
+    /// Returns true if this relay and a neighbour are known not to be in order.
+    fn is_out_of_order(&self) -> bool {
+        self.follower.is_out_of_order(&self.own) || self.owner.is_out_of_order(&self.own)
+    }
+
+    /// Returns true if this relay is on its own side of both neighbours, by what they told or by the places at which they were reported.
+    fn is_seen_in_order(&self) -> bool {
+        let own = &self.own;
+        let seen = |association: &Association, side| association.is_seen_in_order(own, side);
+        (self.follower.is_ordered() || seen(&self.follower.association, Side::Upstream))
+            && (self.owner.is_ordered(own) || seen(&self.owner.association, Side::Downstream))
+    }
+
+    /// Halts this relay while it, or a relay that requests it, is not in order.
+    fn halt(&mut self, is_ordered: bool, now: Instant) {
+        self.disorder &= !is_ordered && !self.is_seen_in_order();
+        self.disorder |= self.is_out_of_order();
+        let halted = self.pass_halt();
+        self.own.halt(halted || !is_ordered, now);
+    }
+
+    /// Passes on requests to halt, and returns true if there are any.
+    fn pass_halt(&mut self) -> bool {
+        let (up, down) = (&mut self.follower.association, &mut self.owner.association);
+        let (upstream, downstream) = (up.requests_halt(), down.requests_halt());
+        up.pass_halt(self.disorder || downstream);
+        down.pass_halt(self.disorder || upstream);
+        self.disorder || upstream || downstream
+    }
+
     /// Where it is safe to fly, as [`steer`](Self::steer) gave it last.
     pub const fn setpoint(&self) -> Option<Placement> {
         self.own.setpoint
@@ -320,16 +397,24 @@ impl Guard {
                 return Some((side, association.node, fence));
             }
         }
-        let own = &self.own;
-        if own.target.is_none() || !own.reachable.is_known() {
-            return None;
+        if !self.flown || self.own.target.is_none() || !self.own.reachable.is_known() {
+            self.pass_halt();
+            let (up, down) = (&mut self.follower.association, &mut self.owner.association);
+            return [(Side::Upstream, up), (Side::Downstream, down)]
+                .into_iter()
+                .find_map(|(side, association)| {
+                    let fence = association.tell_alone(&self.own)?;
+                    Some((side, association.node, fence))
+                });
         }
-        if self.owner.is_ordered(own) {
+        let own = &self.own;
+        let placed = self.owner.is_ordered(own);
+        if placed {
             let taken_m = self.follower.taken_m();
             self.follower.agree(own, self.owner.kept(own, taken_m));
-            if let Some(fence) = self.follower.tell(own) {
-                return Some((Side::Upstream, self.follower.association.node, fence));
-            }
+        }
+        if let Some(fence) = self.follower.tell(own, placed) {
+            return Some((Side::Upstream, self.follower.association.node, fence));
         }
         let moves = self.follower.is_ordered();
         let fence = self.owner.tell(own, self.follower.taken_m(), moves)?;
@@ -338,13 +423,24 @@ impl Guard {
 
     /// Has everything told again that may have been lost, and says whether there was anything. To be called every second or so.
     pub fn remind(&mut self) -> bool {
+        let begun = self.own.setpoint.is_some() && self.own.reachable.is_known();
+        self.waits = if begun && !self.is_ordered() {
+            self.waits.saturating_add(1)
+        } else {
+            0
+        };
+        self.disorder |= self.waits >= MOST_WAITS && !self.is_seen_in_order();
         let there = self.is_there();
         let follower = self.follower.association.node != 0 && !(there && self.follower.is_agreed());
         let owner = self.owner.association.node != 0 && !(there && self.owner.is_agreed());
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
-        // Who is absent asks when it is back.
-        up.due |= follower && !up.is_absent();
-        down.due |= owner && !down.is_absent();
+        // A relay that is in no association tells its place less often.
+        self.reminders = self.reminders.wrapping_add(1);
+        let speaks = begun || self.reminders.is_multiple_of(ALONE_EVERY);
+        up.due |= follower && (speaks || up.tells_halt());
+        down.due |= owner && (speaks || down.tells_halt());
+        up.age();
+        down.age();
         let leaves = up.remind() | down.remind();
         follower || owner || leaves
     }
@@ -354,7 +450,7 @@ impl Guard {
         let own = &self.own;
         match (own.target, own.setpoint) {
             (Some(target), Some(setpoint)) => {
-                !own.open
+                !(own.open || own.halted)
                     && (target.x_m - setpoint.x_m).abs() <= own.config.rounding()
                     && own.reachable.is_still()
                     && own.is_across()
@@ -364,15 +460,30 @@ impl Guard {
         }
     }
 
-    /// What at `side` keeps this relay from its place, by what was heard so far; `None` if nothing does, or no place is agreed.
+    /// Returns what keeps this relay from its place on `side`, by what was received so far; `None` if nothing does, or no place is agreed.
     ///
-    /// While a new agreement spreads it may tell of places that are not to be. Nothing does while the relay is not flown.
+    /// While a new agreement spreads it may be about places of the one before. While the relay is not flown only
+    /// [`HoldReason::Order`] is possible: the drone is on the wrong side of a neighbour that is flown.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
-        self.own.target.filter(|_| self.flown)?;
-        match side {
-            Side::Upstream => self.follower.hold_reason(&self.own),
-            Side::Downstream => self.owner.hold_reason(&self.own, self.follower.taken_m()),
+        let own = &self.own;
+        if !self.flown {
+            let wrong = match side {
+                Side::Upstream => self.follower.association.is_passed(own, side),
+                Side::Downstream => self.owner.association.is_passed(own, side),
+            };
+            return wrong.then_some(HoldReason::Order);
         }
+        own.target?;
+        let reason = match side {
+            Side::Upstream => self.follower.hold_reason(own),
+            Side::Downstream => self.owner.hold_reason(own, self.follower.taken_m()),
+        };
+        let association = match side {
+            Side::Upstream => &self.follower.association,
+            Side::Downstream => &self.owner.association,
+        };
+        let halted = association.requests_halt();
+        reason.or(halted.then_some(HoldReason::Halted))
     }
 
     /// Inputs that were refused: not a number, or out of range. It stays at its maximum.

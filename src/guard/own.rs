@@ -21,6 +21,10 @@ pub(super) struct Own {
     pub(super) still: bool,
     /// Whether the chain is to open, by what is known here.
     pub(super) open: bool,
+    /// True while this relay stays where it is, because it or another one is not in order with its neighbours.
+    pub(super) halted: bool,
+    /// Place reported last.
+    pub(super) reported: Option<Placement>,
 }
 
 impl Own {
@@ -34,6 +38,8 @@ impl Own {
             turned: now,
             still: false,
             open: false,
+            halted: true,
+            reported: None,
         }
     }
 
@@ -50,7 +56,28 @@ impl Own {
     pub(super) const fn release(&mut self, now: Instant) {
         self.setpoint = None;
         self.reachable = ReachableInterval::unknown(now);
-        (self.turned, self.still, self.open) = (now, false, false);
+        (self.turned, self.still) = (now, false);
+        (self.open, self.halted) = (false, true);
+    }
+
+    /// Halts the relay, or ends that. A relay that halts on its way stops where it was reported last: its own stretch holds that place.
+    pub(super) fn halt(&mut self, halted: bool, now: Instant) {
+        let begins = halted && !self.halted;
+        self.halted = halted;
+        if let Some(mut stop) = self.setpoint.filter(|_| begins)
+            && let Some(reported) = self.reported
+        {
+            let ReachableInterval { low_m, high_m, .. } = self.reachable;
+            let reported = self.config.cut_toward(reported, stop);
+            if !self.reachable.is_still() {
+                stop.x_m = reported.x_m.max(low_m).min(high_m);
+            }
+            if !self.still {
+                stop = reported.cross_section().at(stop.x_m);
+            }
+            self.reachable.go(stop.x_m, now);
+            self.go(stop, now);
+        }
     }
 
     /// It was at `place` at time `at`: across the line it has arrived if that was long enough after it was told to go there.

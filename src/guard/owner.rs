@@ -118,10 +118,25 @@ impl FenceOwner {
         self.association.is_none() || self.is_heard() && self.is_beyond(own)
     }
 
-    /// Whether the neighbour is known to be beyond this relay, but for what the two were reported off: one above the other may both have
-    /// been rebooted.
+    /// Returns true if the neighbour downstream has told that it is not beyond this relay.
+    pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
+        self.is_heard() && !self.is_beyond(own) && self.counted_m > f32::NEG_INFINITY
+    }
+
+    /// Returns true if the neighbour is known to be beyond this relay along x.
+    ///
+    /// Reported places are off by up to `hover_m` each. Before the first fence is cleared, two relays whose reports are nearer than
+    /// that along x are in order only if they may pass each other: the separation apart across the line. Such a pair, or one that has
+    /// been in order, may have moved by that error once more at each of the two since then: each time that one halts or is rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
-        self.counted_m + 2.0 * own.config.hover_m >= own.reachable.high_m
+        let off_m = 2.0 * own.config.hover_m;
+        let may_pass = self.clear || own.config.least_step(own.across(), self.across) <= 0.0;
+        let least_m = if may_pass {
+            -2.0 * off_m - own.config.rounding()
+        } else {
+            off_m
+        };
+        self.counted_m - own.reachable.high_m >= least_m
     }
 
     /// How far this relay stays from what the neighbour is counted on, m, where the follower has allowed the one upstream `taken_m`.
@@ -147,11 +162,16 @@ impl FenceOwner {
     }
 
     pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
+        self.association.hear_halt(fence);
+        if !fence.says(Fence::RELEASED) || fence.says(Fence::UNPLACED) {
+            self.association.see(fence.x_m);
+        }
         if self.association.is_over(fence) || fence.says(Fence::RELEASED) {
             if self.association.is_left(fence) {
                 self.release(fence.association, own, jitter);
             }
-            self.association.due = true;
+            // A relay that is in no association needs no answer.
+            self.association.due |= !fence.says(Fence::UNPLACED);
             return;
         }
         if !self.is_heard() && fence.echo == self.association.own {
@@ -164,11 +184,13 @@ impl FenceOwner {
             if self.is_heard() && self.association.stray() {
                 self.renew(own, jitter);
             }
-            // Nobody is reminded who is absent: who is back asks.
             self.association.due |= self.association.is_absent();
             return;
         }
         self.association.hear_open(fence);
+        if fence.says(Fence::UNPLACED) {
+            return;
+        }
         self.target_m = fence.target_m;
         (self.across, self.still) = (fence.across, fence.says(Fence::STILL));
         self.answered = fence.number == self.number;
@@ -299,11 +321,9 @@ impl FenceOwner {
 
     pub(super) fn hold_reason(&self, own: &Own, taken_m: f32) -> Option<HoldReason> {
         let target_m = own.target_m();
-        if self
-            .keep_out
-            .limit_m()
-            .is_some_and(|limit| target_m > limit)
-        {
+        let limit = self.keep_out.limit_m();
+        let stays = self.keep_out.is_near() && !own.is_across();
+        if stays || limit.is_some_and(|limit| target_m > limit) {
             return Some(HoldReason::Lost);
         }
         if self.association.is_none() {

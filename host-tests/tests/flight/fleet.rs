@@ -46,11 +46,7 @@ fn flight(seed: u64) -> Setup {
     let axis = somewhere(f64::from(config.distance_m)).unwrap();
     let mut spec = FleetSpec {
         axis,
-        start_x_m: in_a_row(&mut rng, SEPARATION_M + 2.0)
-            .iter()
-            .map(|at| at[0])
-            .collect(),
-        height_m: f64::from(config.common.altitude_m),
+        start: in_a_row(&mut rng, SEPARATION_M + 2.0),
         takeovers: Vec::new(),
         restarts: Vec::new(),
         gust_mps: rng.random_range(0.0..=GUST_MPS),
@@ -72,6 +68,7 @@ fn flight(seed: u64) -> Setup {
                     relay,
                     from,
                     until: None,
+                    to: None,
                 });
             }
             3..=5 => {
@@ -81,6 +78,7 @@ fn flight(seed: u64) -> Setup {
                     relay,
                     from,
                     until: Some(until),
+                    to: None,
                 });
             }
             6 => spec.restarts.push((relay, from)),

@@ -2,6 +2,7 @@
 //!
 //! `COUNT` and `SEED` in the environment take other sequences of faults; a failure names the seed of its one.
 
+mod anywhere;
 mod between;
 mod closer;
 mod cuts;

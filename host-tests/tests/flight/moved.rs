@@ -79,11 +79,7 @@ fn flight(seed: u64) -> Setup {
     }
     setup.fleet = Some(FleetSpec {
         axis,
-        start_x_m: in_a_row(&mut rng, SEPARATION_M + 2.0)
-            .iter()
-            .map(|at| at[0])
-            .collect(),
-        height_m: f64::from(config.common.altitude_m),
+        start: in_a_row(&mut rng, SEPARATION_M + 2.0),
         takeovers: Vec::new(),
         restarts: Vec::new(),
         gust_mps: rng.random_range(0.0..=0.3),

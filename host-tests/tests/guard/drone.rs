@@ -46,6 +46,8 @@ pub(crate) struct Drone {
     pub(crate) latency_s: f64,
     /// `None` while it is switched off.
     pub(crate) guard: Option<Guard>,
+    /// First setpoint since it had none.
+    begun: Option<Placement>,
     /// Which nodes are its neighbours.
     pub(crate) links: [Option<usize>; 2],
     /// Whether it is in the air.
@@ -87,6 +89,7 @@ impl Drone {
             acceleration: f64::INFINITY,
             latency_s: f64::INFINITY,
             guard: None,
+            begun: None,
             links,
             flies: true,
             speaks: true,
@@ -206,24 +209,32 @@ impl Drone {
             return;
         };
         let before = guard.setpoint();
+        if before.is_none() {
+            self.begun = None;
+        }
         let after = guard.steer(instant(now_s));
         assert_eq!(after, guard.setpoint());
         let Some(setpoint) = after.filter(|_| after != before && !self.taken) else {
             return;
         };
+        // It begins where it is, and comes into the box as soon as it may.
+        let begun = *self.begun.get_or_insert(setpoint);
         let fence = confines.fence;
-        assert!(
-            (fence.least_x_m..=fence.most_x_m).contains(&setpoint.x_m),
-            "{setpoint:?}"
-        );
-        assert!(
-            (fence.least_y_m..=fence.most_y_m).contains(&setpoint.y_m),
-            "{setpoint:?}"
-        );
-        assert!(
-            (fence.least_altitude_m..=fence.most_altitude_m).contains(&setpoint.altitude_m),
-            "{setpoint:?}"
-        );
+        for (is, begun, least, most) in [
+            (setpoint.x_m, begun.x_m, fence.least_x_m, fence.most_x_m),
+            (setpoint.y_m, begun.y_m, fence.least_y_m, fence.most_y_m),
+            (
+                setpoint.altitude_m,
+                begun.altitude_m,
+                fence.least_altitude_m,
+                fence.most_altitude_m,
+            ),
+        ] {
+            assert!(
+                (least.min(begun)..=most.max(begun)).contains(&is),
+                "{setpoint:?}"
+            );
+        }
         let lag_s = self.latency_s.min(confines.lag.as_micros() as f64 / 1e6);
         // In the order in which they were given.
         let before_s = self.orders.back().map_or(0.0, |order| order.0);

@@ -3,6 +3,7 @@
 //! `COUNT` and `SEED` in the environment take other schedules; a failure names the seed of its one.
 
 mod agenda;
+mod anywhere;
 mod drone;
 mod known;
 mod medium;

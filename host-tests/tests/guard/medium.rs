@@ -26,6 +26,8 @@ pub(crate) struct Letter {
     /// On whose side of the receiver the sender is.
     pub(crate) side: Side,
     pub(crate) fence: Fence,
+    /// Number of the line that its places are along.
+    pub(crate) line: u32,
 }
 
 /// Everything under way.
@@ -41,7 +43,7 @@ impl Medium {
         faults: Faults,
         now_s: f64,
         (from, to, side): (usize, usize, Side),
-        fence: Fence,
+        (fence, line): (Fence, u32),
     ) {
         let copies = if rng.random_bool(faults.twice) { 2 } else { 1 };
         for _ in 0..copies {
@@ -57,6 +59,7 @@ impl Medium {
                 from,
                 side,
                 fence,
+                line,
             });
         }
     }

@@ -150,7 +150,7 @@ impl World {
             let way = (k, usize::from(to) - 1, heard_from);
             if drone.speaks {
                 self.medium
-                    .send(&mut self.rng, self.faults, self.now_s, way, fence);
+                    .send(&mut self.rng, self.faults, self.now_s, way, (fence, 0));
             }
         }
     }

@@ -180,7 +180,8 @@ fn a_relay_alone_flies_what_it_is_uploaded_and_the_ground_hears_of_it() {
             ground.progress(),
             Progress::Flown {
                 by: 1,
-                view: ViewId::from_bits(1 << 10 | 1)
+                view: ViewId::from_bits(1 << 10 | 1),
+                relays: 1,
             }
         );
         assert_eq!(ground.poll_timeout(), None);

@@ -8,6 +8,8 @@ mod hand;
 mod restarts;
 mod schedules;
 mod sites;
+mod told;
+mod wires;
 
 use std::collections::{BTreeMap, BTreeSet};
 

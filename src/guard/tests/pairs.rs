@@ -237,9 +237,9 @@ fn a_new_life_is_told_from_an_old_one() {
     );
 }
 
-/// Who is not in order with the one neighbour does not tell the other one, who would count on it.
+/// A relay that is not in order with one neighbour grants the other one nothing: it tells it to halt, without a place that counts.
 #[test]
-fn who_does_not_know_the_order_tells_nobody() {
+fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
     let heard = fence(9, 50.0, 50.0);
     one.hears(Side::Upstream, 1, heard);
@@ -255,12 +255,36 @@ fn who_does_not_know_the_order_tells_nobody() {
     };
     one.hears(Side::Downstream, 3, beyond);
     one.is_at(100.0);
-    while let Some((side, ..)) = one.guard.poll() {
-        assert_eq!(side, Side::Downstream, "it stands before this relay");
-    }
+    let upward = one.says(Side::Upstream);
+    assert_eq!(
+        upward.flags & (Fence::HALTS | Fence::UNPLACED | Fence::AGREES),
+        Fence::HALTS | Fence::UNPLACED,
+        "its neighbour downstream stands before it"
+    );
+    assert!(one.says(Side::Downstream).flags & Fence::HALTS != 0);
+    assert_eq!(
+        one.guard.hold_reason(Side::Downstream),
+        Some(HoldReason::Order)
+    );
+    // What is told so grants nothing to the neighbour upstream.
+    let mut owner = One::new([None, Some(2)], 50.0, 60.0);
+    let association = owner.says(Side::Downstream).association;
+    let told = Fence {
+        echo: association,
+        ..upward
+    };
+    owner.hears(Side::Downstream, 2, told);
+    owner.is_at(50.0);
+    assert_eq!(owner.setpoint().to_bits(), 50.0_f32.to_bits());
+    assert_eq!(
+        owner.says(Side::Downstream).number,
+        0,
+        "no fence is announced"
+    );
     beyond.x_m = 120.0;
     one.hears(Side::Downstream, 3, beyond);
-    // Now it tells; but no fence downstream before it has heard of one upstream.
+    // Now its place counts; but no fence downstream before it has heard of one upstream.
+    assert_eq!(one.says(Side::Upstream).flags & Fence::UNPLACED, 0);
     assert_eq!(one.says(Side::Upstream).x_m.to_bits(), 100.0_f32.to_bits());
     assert_eq!(one.says(Side::Downstream).number, 0);
     assert_eq!(one.setpoint().to_bits(), 100.0_f32.to_bits());

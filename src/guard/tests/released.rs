@@ -197,6 +197,7 @@ fn two_in_a_row_are_taken_and_given_back() {
     let now = row.all[2].now;
     row.all[2].guard.control(now, false);
     row.talk();
+    // Each tells its place now and then, and neither answers that.
     assert!(row.all[1].guard.poll().is_none() && row.all[2].guard.poll().is_none());
     row.give();
     row.all[1].is_at(200.0);

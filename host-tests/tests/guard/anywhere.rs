@@ -1,0 +1,608 @@
+//! Guards of drones that begin anywhere in the air, are given back anywhere, and fly along a line that turns.
+//!
+//! Drones fly as the autopilot link has them fly: toward the setpoint no faster than 5 m/s, slowing down before it, and overshooting by
+//! what the flight controller lags behind.
+//!
+//! | quantity | distribution |
+//! | --- | --- |
+//! | relays, separation | 2 to 8; 4 m to 20 m |
+//! | stated position error | 0.5 m to 1.5 m in x, y and altitude: two fifths of it a bias, three tenths noise, the rest is left to what the autopilot lags behind |
+//! | start | up to 3 separations apart across the line, 0 m to 2 separations apart along it; in 30 % two are in the wrong order |
+//! | medium | loses 0 to 40 %, delays up to 2 s |
+//! | pilots | take a drone with 30 %, fly it to anywhere within 5 separations of the chain, and give it back |
+//! | reboots | a relay with 20 % |
+//! | uploads | the line turns by up to 85 degrees once in 50 % of the flights, heard by each relay up to 5 s late |
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use uav_relay::flight::autopilot::carrot::Pace;
+use uav_relay::guard::Guard;
+use uav_relay::guard::config::{Geofence, GuardConfig};
+use uav_relay::{Placement, Side};
+use uav_relay_oracle::random::seed;
+use uav_relay_sim::simulator::drones::Point;
+
+use crate::drone::{instant, length, node, way};
+use crate::medium::{Faults, Medium};
+use crate::world::beside;
+
+const STEP_S: f64 = 0.1;
+const SPEED: f64 = 5.0;
+
+/// Acceleration of a target, and of a drone that follows it, m/s².
+const TARGET_ACCELERATION: f64 = 1.0;
+const ACCELERATION: f64 = 3.0;
+
+/// A drone that is given back at full speed overshoots, comes back, and hovers after so long at most.
+const BRAKES_S: f64 = 8.0;
+
+/// Faults happen until then; the flight ends when all have arrived, or at `LAST_S`.
+const ROUGH_S: f64 = 120.0;
+const LAST_S: f64 = 900.0;
+
+/// Line over the ground, from a transmitter that all lines share.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    number: u32,
+    angle: f64,
+}
+
+impl Line {
+    fn along(self, [x, y, h]: Point) -> Point {
+        let (sin, cos) = self.angle.sin_cos();
+        [x * cos + y * sin, y * cos - x * sin, h]
+    }
+
+    fn over_ground(self, [x, y, h]: Point) -> Point {
+        let (sin, cos) = self.angle.sin_cos();
+        [x * cos - y * sin, y * cos + x * sin, h]
+    }
+}
+
+fn placement([x, y, h]: Point) -> Placement {
+    Placement {
+        x_m: x as f32,
+        y_m: y as f32,
+        altitude_m: h as f32,
+    }
+}
+
+fn point(place: Placement) -> Point {
+    [place.x_m, place.y_m, place.altitude_m].map(f64::from)
+}
+
+fn plus(a: Point, b: Point, share: f64) -> Point {
+    [0, 1, 2].map(|part| a[part] + share * b[part])
+}
+
+#[derive(Debug)]
+struct Drone {
+    at: Point,
+    velocity: Point,
+    bias: Point,
+    /// What the autopilot flies to: place and velocity over the ground.
+    target: Point,
+    target_velocity: Point,
+    guard: Guard,
+    line: Line,
+    agreed: Option<(u32, Point)>,
+    /// Where its pilot flies it.
+    pilot: Option<Point>,
+    reminder_s: f64,
+    letters: u64,
+}
+
+impl Drone {
+    fn taken_at(&self) -> Point {
+        plus(self.at, self.bias, 1.0)
+    }
+
+    fn setpoint(&self) -> Option<Point> {
+        let setpoint = self.guard.setpoint()?;
+        Some(self.line.over_ground(point(setpoint)))
+    }
+
+    fn fly(&mut self) {
+        let goal = match self.pilot {
+            Some(goal) => Some(plus(goal, self.bias, 1.0)),
+            None => self.setpoint(),
+        };
+        let before = self.target;
+        if let Some(goal) = goal {
+            let to = way(self.target, goal);
+            let left = length(to);
+            // As the link's target: only the speed toward the goal counts.
+            let toward: f64 = to
+                .iter()
+                .zip(self.target_velocity)
+                .map(|(to, v)| to * v)
+                .sum();
+            let speed = (toward / left.max(1e-9)).max(0.0) + TARGET_ACCELERATION * STEP_S;
+            let most = speed
+                .min(SPEED)
+                .min((2.0 * TARGET_ACCELERATION * left).sqrt());
+            let share = if left > 0.0 {
+                (most * STEP_S / left).min(1.0)
+            } else {
+                0.0
+            };
+            // It turns no faster than it may change its speed: the guard counts on places between the setpoints only.
+            let change = way(self.target_velocity, to.map(|part| part * share / STEP_S));
+            let part = (1.5 * TARGET_ACCELERATION * STEP_S / length(change).max(1e-9)).min(1.0);
+            let velocity = plus(self.target_velocity, change, part);
+            self.target = plus(self.target, velocity, STEP_S);
+        } else {
+            let speed = length(self.target_velocity);
+            let left = (1.0 - 1.5 * TARGET_ACCELERATION * STEP_S / speed.max(1e-9)).max(0.0);
+            self.target = plus(self.target, self.target_velocity, left * STEP_S);
+        }
+        self.target_velocity = way(before, self.target).map(|part| part / STEP_S);
+        let off = way(self.taken_at(), self.target);
+        let wanted = plus(self.target_velocity, off, 1.0);
+        let change = way(self.velocity, wanted);
+        let most = ACCELERATION * STEP_S;
+        let share = (most / length(change).max(1e-9)).min(1.0);
+        self.velocity = plus(self.velocity, change, share);
+        self.at = plus(self.at, self.velocity, STEP_S);
+    }
+}
+
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "how a flight ended, each for itself"
+)]
+#[derive(Debug, Default)]
+struct Report {
+    /// Least distance over the allowed one, m; and between which drones, when.
+    margin_m: f64,
+    nearest: Option<(usize, usize, f64, f64)>,
+    in_order: bool,
+    arrived: bool,
+    told: bool,
+    turned: bool,
+    given_back: u64,
+    end: String,
+}
+
+struct World {
+    config: GuardConfig,
+    drones: Vec<Drone>,
+    medium: Medium,
+    faults: Faults,
+    now_s: f64,
+    noise_m: f64,
+    /// What each pair may come to: least of the separation and of what it was at the start, m.
+    least_m: Vec<f64>,
+    /// Drones that their pilots give back once no other one is on its way past them.
+    later: Vec<usize>,
+    /// Drones that were given back in motion, and until when they brake: their distances count from then on.
+    brakes: Vec<(usize, f64)>,
+    rng: ChaCha8Rng,
+}
+
+impl World {
+    fn pair(&self, k: usize, other: usize) -> usize {
+        k * self.drones.len() + other
+    }
+
+    /// The distances of `k` count from now on.
+    fn begin(&mut self, k: usize) {
+        for other in 0..self.drones.len() {
+            let apart = length(way(self.drones[k].at, self.drones[other].at));
+            let least = apart.min(f64::from(self.config.separation_m));
+            for pair in [self.pair(k, other), self.pair(other, k)] {
+                self.least_m[pair] = least;
+            }
+        }
+    }
+
+    /// Returns true if another drone is on its way past drone `k`.
+    fn is_in_the_way(&self, k: usize) -> bool {
+        let (apart, at) = (f64::from(self.config.separation_m), self.drones[k].at);
+        let flown = |drone: &&Drone| drone.pilot.is_none();
+        self.drones.iter().filter(flown).any(|drone| {
+            let Some(goal) = drone.setpoint() else {
+                return false;
+            };
+            let (to, off) = (way(drone.at, goal), way(drone.at, at));
+            let left = length(to);
+            let dot: f64 = to.iter().zip(off).map(|(to, off)| to * off).sum();
+            let share = (dot / (left * left).max(1e-9)).clamp(0.0, 1.0);
+            left > 1.0 && length(way(plus(drone.at, to, share), at)) < apart + 15.0
+        })
+    }
+
+    fn boot(&mut self, k: usize) {
+        let links = beside(k, self.drones.len()).map(|link| link.map(node));
+        let seed = self.rng.random();
+        let drone = &mut self.drones[k];
+        drone.guard = Guard::new(self.config, links, seed, instant(self.now_s));
+        drone
+            .guard
+            .control(instant(self.now_s), drone.pilot.is_none());
+        if let Some((_, place)) = drone.agreed.filter(|(line, _)| *line == drone.line.number) {
+            drone.guard.commit(placement(place));
+        }
+    }
+
+    fn step(&mut self, report: &mut Report) {
+        self.now_s += STEP_S;
+        let now = instant(self.now_s);
+        for k in 0..self.drones.len() {
+            let drone = &mut self.drones[k];
+            drone.fly();
+            let noise = [0; 3].map(|_| self.noise_m * self.rng.random_range(-1.0..=1.0));
+            let said = drone.line.along(plus(drone.taken_at(), noise, 1.0));
+            drone.guard.position(now, placement(said));
+        }
+        for letter in self.medium.arrived(self.now_s) {
+            let drone = &mut self.drones[letter.to];
+            if drone.line.number == letter.line {
+                drone
+                    .guard
+                    .hear(letter.side, node(letter.from), &letter.fence);
+            }
+        }
+        for k in 0..self.drones.len() {
+            let drone = &mut self.drones[k];
+            if self.now_s >= drone.reminder_s {
+                drone.reminder_s = self.now_s + 1.0;
+                drone.guard.remind();
+            }
+            let before = drone.guard.setpoint();
+            if drone.guard.steer(now).is_some() && before.is_none() {
+                // The autopilot's target begins where the drone takes itself to be.
+                drone.target = drone.taken_at();
+            }
+            while let Some((side, to, fence)) = drone.guard.poll() {
+                drone.letters += 1;
+                let from = match side {
+                    Side::Upstream => Side::Downstream,
+                    Side::Downstream => Side::Upstream,
+                };
+                let line = drone.line.number;
+                let way = (k, usize::from(to) - 1, from);
+                self.medium
+                    .send(&mut self.rng, self.faults, self.now_s, way, (fence, line));
+            }
+        }
+        self.brakes.retain(|(_, until_s)| self.now_s < *until_s);
+        for k in 0..self.drones.len() {
+            let drone = &self.drones[k];
+            let moves =
+                length(drone.velocity) > 0.3 || length(way(drone.taken_at(), drone.target)) > 1.0;
+            if moves && self.brakes.iter().any(|(other, _)| *other == k) {
+                self.begin(k);
+            }
+        }
+        self.check(report);
+    }
+
+    fn check(&self, report: &mut Report) {
+        let off_m = 2.0 * f64::from(self.config.hover_m);
+        for k in 0..self.drones.len() {
+            for other in 0..k {
+                let (one, two) = (&self.drones[k], &self.drones[other]);
+                if one.pilot.is_some() || two.pilot.is_some() {
+                    continue;
+                }
+                let apart = length(way(one.at, two.at));
+                let margin = apart - (self.least_m[self.pair(k, other)] - off_m);
+                if margin < report.margin_m {
+                    report.margin_m = margin;
+                    report.nearest = Some((other + 1, k + 1, apart, self.now_s));
+                }
+            }
+        }
+    }
+}
+
+/// Places on a line, in order and the separation apart; across it within the box.
+fn agreed(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
+    let distance = f64::from(config.fence.most_x_m);
+    let step = f64::from(config.separation_m) * 1.001;
+    let slack = distance - step * relays as f64;
+    let mut spare: Vec<f64> = (0..relays).map(|_| rng.random_range(0.0..=slack)).collect();
+    spare.sort_by(f64::total_cmp);
+    let across = [
+        (config.fence.least_y_m, config.fence.most_y_m),
+        (config.fence.least_altitude_m, config.fence.most_altitude_m),
+    ];
+    (0..relays)
+        .map(|k| {
+            let [y, h] =
+                across.map(|(least, most)| rng.random_range(f64::from(least)..=f64::from(most)));
+            [spare[k] + step * k as f64, y, h]
+        })
+        .collect()
+}
+
+fn config(rng: &mut ChaCha8Rng, relays: usize) -> GuardConfig {
+    let separation = rng.random_range(4.0..=20.0);
+    let room = if rng.random_bool(0.5) { 0.0 } else { 30.0 };
+    GuardConfig {
+        fence: Geofence {
+            least_x_m: 0.0,
+            most_x_m: (separation * relays as f64 * rng.random_range(1.3..=6.0)) as f32,
+            least_y_m: -room,
+            most_y_m: room,
+            least_altitude_m: 30.0,
+            most_altitude_m: 30.0 + room,
+        },
+        separation_m: separation as f32,
+        relays: relays as u16,
+        hover_m: rng.random_range(0.5..=1.5),
+        lag: Pace::default().stopping_time(),
+    }
+}
+
+/// Where drones begin: anywhere across the line, and a little along it.
+fn starts(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
+    let apart = f64::from(config.separation_m);
+    let step = apart
+        * match rng.random_range(0..3) {
+            0 => 0.05,
+            1 => 0.5,
+            _ => 2.0,
+        };
+    let wide = match rng.random_range(0..3) {
+        0 => [0.0, 0.0],
+        1 => [0.0, 3.0 * apart],
+        _ => [3.0 * apart; 2],
+    };
+    let mut x = rng.random_range(-20.0..=0.5 * f64::from(config.fence.most_x_m));
+    let mut places: Vec<Point> = (0..relays)
+        .map(|_| {
+            x += step * rng.random_range(0.0..=1.0);
+            let [y, h] = wide.map(|most| most * rng.random_range(-1.0..=1.0));
+            [x, y, (60.0 + h).max(5.0)]
+        })
+        .collect();
+    if rng.random_bool(0.3) {
+        let (one, other) = (rng.random_range(0..relays), rng.random_range(0..relays));
+        places.swap(one, other);
+    }
+    places
+}
+
+#[derive(Clone, Copy, Debug)]
+enum What {
+    Take(usize, Point),
+    Tell(usize),
+    Give(usize),
+    Reboot(usize),
+    Agree(u32, usize, Point),
+    Turn(usize, Line),
+}
+
+fn agenda(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<(f64, What)> {
+    let mut plan = Vec::new();
+    let mut agree = |rng: &mut ChaCha8Rng, line, at_s: f64| {
+        for (k, place) in agreed(rng, config, relays).into_iter().enumerate() {
+            let at_s = at_s + rng.random_range(0.0..=2.0);
+            plan.push((at_s, What::Agree(line, k, place)));
+        }
+    };
+    agree(rng, 0, 0.0);
+    if rng.random_bool(0.5) {
+        let at_s = rng.random_range(5.0..100.0);
+        agree(rng, 0, at_s);
+    }
+    let turns_s = rng.random_bool(0.5).then(|| rng.random_range(10.0..110.0));
+    if let Some(turns_s) = turns_s {
+        agree(rng, 1, turns_s + 5.0);
+    }
+    if let Some(turns_s) = turns_s {
+        let most = f64::to_radians(85.0);
+        let angle = rng.random_range(-most..=most);
+        for k in 0..relays {
+            let at_s = turns_s + rng.random_range(0.0..=5.0);
+            plan.push((at_s, What::Turn(k, Line { number: 1, angle })));
+        }
+    }
+    let apart = f64::from(config.separation_m);
+    for k in 0..relays {
+        if rng.random_bool(0.3) {
+            let at_s = rng.random_range(1.0..80.0);
+            let to = [
+                rng.random_range(-20.0..=f64::from(config.fence.most_x_m)),
+                rng.random_range(-5.0..=5.0) * apart,
+                (40.0 + rng.random_range(-1.0..=5.0) * apart).max(5.0),
+            ];
+            plan.push((at_s, What::Take(k, to)));
+            plan.push((at_s + rng.random_range(0.0..=1.5), What::Tell(k)));
+            plan.push((at_s + rng.random_range(5.0..=60.0), What::Give(k)));
+        }
+        if rng.random_bool(0.2) {
+            plan.push((rng.random_range(1.0..ROUGH_S), What::Reboot(k)));
+        }
+    }
+    plan.sort_by(|a, b| a.0.total_cmp(&b.0));
+    plan
+}
+
+fn happen(world: &mut World, what: What, report: &mut Report) {
+    let now = instant(world.now_s);
+    match what {
+        What::Take(k, to) => {
+            let drone = &mut world.drones[k];
+            (drone.pilot, drone.target) = (Some(to), drone.taken_at());
+        }
+        What::Tell(k) => {
+            let drone = &mut world.drones[k];
+            drone.guard.control(now, drone.pilot.is_none());
+        }
+        What::Give(k) => {
+            if world.is_in_the_way(k) {
+                world.later.push(k);
+                return;
+            }
+            let drone = &mut world.drones[k];
+            drone.pilot = None;
+            drone.target = drone.taken_at();
+            drone.guard.control(now, true);
+            world.brakes.push((k, world.now_s + BRAKES_S));
+            world.begin(k);
+            report.given_back += 1;
+        }
+        What::Reboot(k) => world.boot(k),
+        What::Agree(line, k, place) => {
+            let drone = &mut world.drones[k];
+            if line < drone.line.number {
+                return;
+            }
+            drone.agreed = Some((line, place));
+            if drone.line.number == line {
+                drone.guard.commit(placement(place));
+            }
+        }
+        What::Turn(k, line) => {
+            let drone = &mut world.drones[k];
+            drone.line = line;
+            drone.guard.leave_line(Some(now));
+            if let Some((number, place)) = drone.agreed
+                && number == line.number
+            {
+                drone.guard.commit(placement(place));
+            }
+            report.turned = true;
+        }
+    }
+}
+
+fn fly(seed: u64) -> Report {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let relays = rng.random_range(2..=8);
+    let config = config(&mut rng, relays);
+    let starts = starts(&mut rng, &config, relays);
+    let plan = agenda(&mut rng, &config, relays);
+    let error_m = f64::from(config.hover_m);
+    let line = Line {
+        number: 0,
+        angle: 0.0,
+    };
+    let drones = starts.iter().map(|at| {
+        let bias = [0; 3].map(|_| 0.4 * error_m * rng.random_range(-1.0..=1.0));
+        let taken_at = plus(*at, bias, 1.0);
+        Drone {
+            at: *at,
+            velocity: [0.0; 3],
+            bias,
+            target: taken_at,
+            target_velocity: [0.0; 3],
+            guard: Guard::new(config, [None; 2], 1, instant(0.0)),
+            line,
+            agreed: None,
+            pilot: None,
+            reminder_s: 0.0,
+            letters: 0,
+        }
+    });
+    let drones: Vec<Drone> = drones.collect();
+    let faults = Faults {
+        loss: rng.random_range(0.0..=0.4),
+        twice: 0.05,
+        delay_s: 20.0_f64.powf(rng.random_range(0.0..=1.0)) / 10.0,
+    };
+    let mut world = World {
+        config,
+        least_m: vec![0.0; relays * relays],
+        drones,
+        medium: Medium::default(),
+        faults,
+        now_s: 0.1,
+        noise_m: 0.3 * error_m,
+        later: Vec::new(),
+        brakes: Vec::new(),
+        rng,
+    };
+    for k in 0..relays {
+        world.boot(k);
+        world.begin(k);
+    }
+    let mut report = Report {
+        margin_m: f64::INFINITY,
+        ..Report::default()
+    };
+    let mut plan = plan.into_iter().peekable();
+    loop {
+        while let Some((_, what)) = plan.next_if(|(at_s, _)| *at_s <= world.now_s) {
+            happen(&mut world, what, &mut report);
+        }
+        for k in std::mem::take(&mut world.later) {
+            happen(&mut world, What::Give(k), &mut report);
+        }
+        world.step(&mut report);
+        let all = world.drones.iter();
+        report.arrived = plan.peek().is_none()
+            && world.later.is_empty()
+            && all.clone().all(|drone| drone.guard.is_there());
+        if report.arrived || world.now_s > LAST_S {
+            break;
+        }
+    }
+    let sides = [Side::Upstream, Side::Downstream];
+    let reasons = world
+        .drones
+        .iter()
+        .map(|drone| sides.map(|side| drone.guard.hold_reason(side)));
+    let reasons: Vec<_> = reasons.collect();
+    report.told = reasons.iter().flatten().any(Option::is_some);
+    let along = |drone: &Drone| drone.line.along(drone.at)[0];
+    let off_m = 4.0 * error_m;
+    report.in_order = world
+        .drones
+        .windows(2)
+        .all(|pair| along(&pair[1]) - along(&pair[0]) > off_m);
+    report.end = format!(
+        "{reasons:?} {:?}",
+        world
+            .drones
+            .iter()
+            .map(|drone| drone.line.along(drone.at))
+            .collect::<Vec<_>>()
+    );
+    report
+}
+
+#[test]
+fn drones_that_begin_anywhere_come_no_nearer_than_they_may() {
+    let first = seed(1);
+    let count = crate::count();
+    let all: Vec<(u64, Report)> = (first..first + count)
+        .into_par_iter()
+        .map(|seed| (seed, fly(seed)))
+        .collect();
+    let least = all
+        .iter()
+        .map(|(_, report)| report.margin_m)
+        .fold(f64::INFINITY, f64::min);
+    let share = |of: fn(&Report) -> bool| all.iter().filter(|(_, report)| of(report)).count();
+    println!(
+        "{count} flights: nearest {least:.2} m above the bound; {} arrived, {} with a line that turned, {} drones given back",
+        share(|report| report.arrived),
+        share(|report| report.turned),
+        all.iter().map(|(_, report)| report.given_back).sum::<u64>(),
+    );
+    let near: Vec<_> = all
+        .iter()
+        .filter(|(_, report)| report.margin_m < -1e-3)
+        .collect();
+    let stuck: Vec<_> = all
+        .iter()
+        .filter(|(_, report)| !report.arrived && (report.in_order || !report.told))
+        .collect();
+    println!(
+        "{} too near, {} stuck in order or without a reason",
+        near.len(),
+        stuck.len()
+    );
+    for (seed, report) in near.iter().take(5) {
+        println!("near {seed}: {:?} {}", report.nearest, report.margin_m);
+    }
+    for (seed, report) in stuck.iter().take(5) {
+        println!("stuck {seed}: {report:?}");
+    }
+    assert!(near.is_empty() && stuck.is_empty());
+}

@@ -1,0 +1,371 @@
+//! What the ground is told of an upload: how many relays fly it, that a relay refuses it, and what two ground stations do to each other.
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
+use uav_relay::ground::Progress;
+use uav_relay::guard::config::GuardConfig;
+use uav_relay::{Band, Event, LineError, Profile, Settings};
+
+use super::wires::Wires;
+use super::*;
+
+const ENDS: [Side; 2] = [Side::Upstream, Side::Downstream];
+
+fn count() -> u64 {
+    std::env::var("COUNT").map_or(200, |count| count.parse().unwrap())
+}
+
+fn seed() -> u64 {
+    std::env::var("SEED").map_or(1, |seed| seed.parse().unwrap())
+}
+
+/// Eight relays, a ground at either end, frames lost: the ground says that all fly it only once all do, and it says so in the end.
+#[test]
+fn the_ground_says_flown_only_once_every_relay_flies_it() {
+    let told: Vec<bool> = (0..count())
+        .into_par_iter()
+        .map(|round| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed() + round);
+            let relays = rng.random_range(1..=12);
+            let base = mission(relays);
+            let mut wires = Wires::new(base, round, |_| Settings::default());
+            assert!(wires.until(60, |it| {
+                it.events
+                    .iter()
+                    .all(|told| told.contains(&Event::Converged))
+            }));
+            wires.loss = [0.0, 0.1, 0.3][rng.random_range(0..3)];
+            let end = ENDS[rng.random_range(0..2)];
+            let config = moved(&base, 700.0, -300.0);
+            wires.upload(&base, end, Upload::new(&base, 1, config).unwrap());
+            let mut was_partial = false;
+            let done = wires.until(300, |it| {
+                let flying = it.versions().iter().filter(|it| **it == 1).count();
+                match it.progress(end) {
+                    Progress::Flown { relays: told, .. } => {
+                        assert_eq!(
+                            flying,
+                            usize::from(relays),
+                            "round {round}: {:?}",
+                            it.versions()
+                        );
+                        // Losses may have had a relay left out of the view that was counted.
+                        assert!(told <= relays && told >= 1, "round {round}: {told}");
+                        true
+                    }
+                    Progress::Adopted { .. } => {
+                        was_partial = true;
+                        false
+                    }
+                    Progress::Offering | Progress::Held { .. } => false,
+                    other => panic!("round {round}: {other:?}"),
+                }
+            });
+            assert!(
+                done,
+                "round {round}: {:?}, {:?}",
+                wires.progress(end),
+                wires.versions()
+            );
+            if wires.loss == 0.0 {
+                let Progress::Flown { relays: told, .. } = wires.progress(end) else {
+                    unreachable!()
+                };
+                assert_eq!(told, relays, "round {round}");
+            }
+            was_partial
+        })
+        .collect();
+    let partial = told.iter().filter(|it| **it).count();
+    println!(
+        "{} uploads, {partial} of them told of while one relay flew them",
+        told.len()
+    );
+    assert!(partial > 0, "the model has to see it");
+}
+
+/// What relays have that fly with a guard.
+fn guarded(base: &Mission) -> Settings {
+    Settings {
+        guard: Some(GuardConfig::of(base, base.config().common)),
+        ..Settings::default()
+    }
+}
+
+fn at(base: &Mission, altitude_m: f32) -> MissionConfig {
+    let common = Profile {
+        altitude_m,
+        ..base.config().common
+    };
+    let band = base.config().band;
+    let is_in = (band.least_m..=band.most_m).contains(&altitude_m);
+    MissionConfig {
+        common,
+        band: if is_in { band } else { Band::at(altitude_m) },
+        ..*base.config()
+    }
+}
+
+/// A chain at 120 m; `band` is what it may choose from.
+fn at_120(relays: u16, band: Band) -> Mission {
+    let config = *mission(relays).config();
+    Mission::try_new(MissionConfig {
+        common: Profile {
+            altitude_m: 120.0,
+            ..config.common
+        },
+        band,
+        ..config
+    })
+    .unwrap()
+}
+
+/// Guarded relays at their places: a relay holds its own place until it knows where it is.
+fn tell_places(wires: &mut Wires, base: &Mission) {
+    let distance = base.config().distance_m;
+    let step = distance / f32::from(base.relays() + 1);
+    wires.stand(|index| {
+        uav_relay::Placement::on_line(step * f32::from(index), base.config().common.altitude_m)
+    });
+}
+
+#[test]
+fn an_upload_outside_the_geofence_is_refused_by_every_relay_and_the_ground_is_told() {
+    let wide = Band {
+        least_m: 50.0,
+        most_m: 150.0,
+    };
+    let aside = |base: &Mission| MissionConfig {
+        lateral: Band {
+            least_m: -20.0,
+            most_m: 0.0,
+        },
+        ..*base.config()
+    };
+    let longer = |base: &Mission| MissionConfig {
+        distance_m: base.config().distance_m + 200.0,
+        ..*base.config()
+    };
+    let narrow = at_120(3, Band::at(120.0));
+    let broad = at_120(3, wide);
+    for (base, config, why) in [
+        (narrow, at(&narrow, 100.0), Some(LineError::Altitude)),
+        (narrow, at(&narrow, 5_000.0), Some(LineError::Altitude)),
+        (broad, at(&broad, 49.0), Some(LineError::Altitude)),
+        (narrow, aside(&narrow), Some(LineError::Lateral)),
+        (narrow, longer(&narrow), Some(LineError::Length)),
+        (broad, at(&broad, 100.0), None),
+        (broad, at(&broad, 50.0), None),
+        (narrow, moved(&narrow, 700.0, -300.0), None),
+    ] {
+        for end in ENDS {
+            let mut wires = Wires::new(base, 1, |_| guarded(&base));
+            tell_places(&mut wires, &base);
+            assert!(wires.until(60, |it| {
+                it.events
+                    .iter()
+                    .all(|told| told.contains(&Event::Converged))
+            }));
+            wires.upload(&base, end, Upload::new(&base, 5, config).unwrap());
+            let over = |it: &Wires| {
+                matches!(
+                    it.progress(end),
+                    Progress::Flown { .. } | Progress::Refused { .. }
+                )
+            };
+            assert!(wires.until(20, over), "{:?}", wires.progress(end));
+            let nearest = if end == Side::Upstream { 1 } else { 3 };
+            if let Some(why) = why {
+                assert_eq!(wires.progress(end), Progress::Refused { by: nearest });
+                let told = &wires.events[usize::from(nearest) - 1];
+                assert!(told.contains(&Event::UploadRefused { why }), "{told:?}");
+                wires.until(10, |_| false);
+                assert_eq!(wires.versions(), [0; 3], "{config:?}");
+                // A newer one that fits is flown, whatever was refused before.
+                let fits = moved(&base, 700.0, -300.0);
+                wires.upload(&base, end, Upload::new(&base, 6, fits).unwrap());
+                assert!(wires.until(20, over), "{:?}", wires.progress(end));
+                assert_eq!(wires.versions(), [6; 3]);
+            } else {
+                assert_eq!(wires.versions(), [5; 3]);
+                // And it is flown to.
+                let there = |it: &Wires| {
+                    (1..=3).all(|index| {
+                        it.relay(index)
+                            .setpoint()
+                            .is_some_and(|place| place.altitude_m == config.common.altitude_m)
+                    })
+                };
+                assert!(wires.until(60, there), "{:?}", wires.relay(1).setpoint());
+            }
+        }
+    }
+}
+
+/// A relay that holds an altitude of its own decides as the others do: its box is wider for that altitude alone.
+#[test]
+fn a_relay_with_an_altitude_of_its_own_refuses_what_the_others_refuse() {
+    let base = at_120(3, Band::at(120.0));
+    let own = Profile {
+        altitude_m: 140.0,
+        ..base.config().common
+    };
+    let settings = |index| {
+        if index == 3 {
+            Settings {
+                profile: Some(own),
+                guard: Some(GuardConfig::of(&base, own)),
+                ..Settings::default()
+            }
+        } else {
+            guarded(&base)
+        }
+    };
+    for (end, nearest) in [(Side::Upstream, 1), (Side::Downstream, 3)] {
+        let mut wires = Wires::new(base, 1, settings);
+        wires.until(5, |_| false);
+        wires.upload(&base, end, Upload::new(&base, 1, at(&base, 130.0)).unwrap());
+        wires.until(10, |_| false);
+        assert_eq!(wires.progress(end), Progress::Refused { by: nearest });
+        assert_eq!(wires.versions(), [0; 3]);
+    }
+}
+
+/// Relays whose firmwares set other boxes: the ground is told though the nearest relay takes it, and a newer upload ends it.
+#[test]
+fn a_refusal_of_a_far_relay_is_told_at_the_ground() {
+    let base = at_120(5, Band::at(120.0));
+    for far in 1..=5 {
+        for end in ENDS {
+            let settings = |index| {
+                if index == far {
+                    guarded(&base)
+                } else {
+                    Settings::default()
+                }
+            };
+            let mut wires = Wires::new(base, 1, settings);
+            wires.until(5, |_| false);
+            wires.upload(&base, end, Upload::new(&base, 1, at(&base, 100.0)).unwrap());
+            let refused = |it: &Wires| matches!(it.progress(end), Progress::Refused { .. });
+            assert!(
+                wires.until(30, refused),
+                "{far} {end:?}: {:?}",
+                wires.progress(end)
+            );
+            assert_eq!(wires.versions(), [0; 5]);
+            let fits = moved(&base, 700.0, -300.0);
+            wires.upload(&base, end, Upload::new(&base, 2, fits).unwrap());
+            let flown = |it: &Wires| matches!(it.progress(end), Progress::Flown { .. });
+            assert!(
+                wires.until(60, flown),
+                "{far} {end:?}: {:?}",
+                wires.progress(end)
+            );
+            assert_eq!(wires.versions(), [2; 5]);
+        }
+    }
+}
+
+/// The same over wires that lose frames, from any relay of any chain.
+#[test]
+fn a_refusal_is_told_at_the_ground_whatever_is_lost() {
+    (0..count()).into_par_iter().for_each(|round| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed() + round);
+        let relays = rng.random_range(1..=10);
+        let base = at_120(relays, Band::at(120.0));
+        let far = rng.random_range(1..=relays);
+        let settings = |index| {
+            if index == far {
+                guarded(&base)
+            } else {
+                Settings::default()
+            }
+        };
+        let end = ENDS[rng.random_range(0..2)];
+        let mut wires = Wires::new(base, round, settings);
+        wires.until(rng.random_range(0..30), |_| false);
+        wires.loss = [0.0, 0.1, 0.3][rng.random_range(0..3)];
+        wires.upload(&base, end, Upload::new(&base, 1, at(&base, 100.0)).unwrap());
+        let refused = |it: &Wires| matches!(it.progress(end), Progress::Refused { .. });
+        let told = wires.until(120, refused);
+        assert!(
+            told,
+            "round {round}: {far} of {relays}, {:?}",
+            wires.progress(end)
+        );
+        assert_eq!(wires.versions(), vec![0; relays.into()], "round {round}");
+        let fits = moved(&base, 700.0, -300.0);
+        wires.upload(&base, end, Upload::new(&base, 2, fits).unwrap());
+        let flown = |it: &Wires| matches!(it.progress(end), Progress::Flown { .. });
+        let told = wires.until(300, flown);
+        assert!(
+            told,
+            "round {round}: {far} of {relays}, {:?}",
+            wires.progress(end)
+        );
+        assert_eq!(wires.versions(), vec![2; relays.into()], "round {round}");
+    });
+}
+
+/// Two ground stations at once, one at either end: of the same version, or of two. All relays fly the newer one in the end, by its version or
+/// by its digest; whoever offered the other one is told that it is outdated. Nobody is stuck.
+#[test]
+fn of_two_ground_stations_at_once_the_newer_upload_is_flown_by_all() {
+    let settled: Vec<u64> = (0..count())
+        .into_par_iter()
+        .map(|round| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed() + round);
+            let relays = rng.random_range(1..=8);
+            let base = mission(relays);
+            let mut wires = Wires::new(base, round, |_| Settings::default());
+            wires.until(rng.random_range(0..30), |_| false);
+            wires.loss = [0.0, 0.1, 0.3][rng.random_range(0..3)];
+            let version: u16 = rng.random_range(1..=2);
+            let versions = [1, version];
+            let uploads: Vec<Upload> = versions
+                .iter()
+                .zip([600.0, 700.0])
+                .map(|(version, x_m)| {
+                    Upload::new(&base, *version, moved(&base, x_m, -300.0)).unwrap()
+                })
+                .collect();
+            let first = rng.random_range(0..2);
+            wires.upload(&base, ENDS[first], uploads[first]);
+            for _ in 0..rng.random_range(0..200) {
+                wires.turn();
+            }
+            wires.upload(&base, ENDS[1 - first], uploads[1 - first]);
+            let newer = usize::from(uploads[1].id() > uploads[0].id());
+            let begun = wires.now;
+            let over = |it: &Wires| {
+                let flown = matches!(it.progress(ENDS[newer]), Progress::Flown { .. });
+                let other = it.progress(ENDS[1 - newer]);
+                flown && matches!(other, Progress::Outdated { .. } | Progress::Flown { .. })
+            };
+            assert!(
+                wires.until(300, over),
+                "round {round}: {:?}, {:?}",
+                ENDS.map(|end| wires.progress(end)),
+                wires.versions()
+            );
+            assert_eq!(
+                wires.versions(),
+                vec![versions[newer]; relays.into()],
+                "round {round}"
+            );
+            let flown = *uploads[newer].config();
+            assert!((1..=usize::from(relays)).all(|index| {
+                let mission = wires.relay(index).mission().config();
+                mission.interference == flown.interference
+            }));
+            wires.now.since(begun).as_micros() / 1_000
+        })
+        .collect();
+    let worst = settled.iter().max().unwrap();
+    println!(
+        "{} pairs of uploads, all flown; the slowest after {worst} ms",
+        settled.len()
+    );
+}

@@ -1,0 +1,276 @@
+//! Starts anywhere in the air, and the halt of a chain of which one relay is out of order.
+
+use super::*;
+
+fn aside(x_m: f32, y_m: f32, altitude_m: f32) -> Placement {
+    Placement {
+        x_m,
+        y_m,
+        altitude_m,
+    }
+}
+
+impl One {
+    /// Long after the last setpoint it is reported there.
+    fn is_at_place(&mut self, place: Placement) {
+        self.now = self.now + Duration::from_millis(1000);
+        self.guard.position(self.now, place);
+        let _ = self.guard.steer(self.now);
+    }
+}
+
+/// What the neighbour says once it knows this relay's association.
+fn answer(one: &mut One, side: Side, x_m: f32, number: u16) -> Fence {
+    let echo = one.says(side).association;
+    Fence {
+        echo,
+        number,
+        ..fence(9, x_m, x_m)
+    }
+}
+
+#[test]
+fn the_first_setpoint_is_the_place_in_space_until_the_order_is_known() {
+    let mut one = One {
+        guard: Guard::new(config(), [None, Some(2)], 7, Instant::ZERO),
+        now: Instant::ZERO,
+    };
+    one.guard.commit(at(60.0));
+    // Above its neighbour, to the side, and outside the box.
+    let high = aside(100.0, -80.0, 160.0);
+    one.is_at_place(high);
+    for _ in 0..20 {
+        one.is_at_place(high);
+        assert_eq!(one.guard.setpoint(), Some(high));
+    }
+    // The neighbour is found beyond, 3 m on: the two part along x before either moves across the line.
+    let told = answer(&mut one, Side::Downstream, 103.0, 0);
+    one.hears(Side::Downstream, 2, told);
+    let first = one.guard.setpoint().unwrap();
+    assert_eq!(first.cross_section(), high.cross_section());
+    assert!(first.x_m <= 100.0);
+    let fence = one.says(Side::Downstream);
+    let told = answer(&mut one, Side::Downstream, fence.x_m + 1.0, fence.number);
+    one.hears(Side::Downstream, 2, told);
+    assert_eq!(one.guard.setpoint(), Some(at(60.0)));
+}
+
+#[test]
+fn a_start_outside_the_box_goes_no_farther_out() {
+    let mut one = One {
+        guard: Guard::new(config(), [None, Some(2)], 7, Instant::ZERO),
+        now: Instant::ZERO,
+    };
+    one.guard.commit(at(40.0));
+    one.is_at_place(at(-30.0));
+    one.is_at_place(at(-30.0));
+    assert_eq!(one.guard.setpoint(), Some(at(-30.0)));
+    let told = answer(&mut one, Side::Downstream, 500.0, 0);
+    one.hears(Side::Downstream, 2, told);
+    assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
+}
+
+/// Reports that are off by 1 m each do not tell the order of two relays that are 1 m apart, unless they may pass each other.
+#[test]
+fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
+    for (up_m, is_ordered) in [(0.0, false), (9.9, false), (10.1, true)] {
+        for x_m in [99.0, 101.0] {
+            let config = GuardConfig {
+                hover_m: 1.0,
+                ..config()
+            };
+            let mut one = One {
+                guard: Guard::new(config, [None, Some(2)], 7, Instant::ZERO),
+                now: Instant::ZERO,
+            };
+            one.guard.commit(at(60.0));
+            one.is_at(100.0);
+            one.is_at(100.0);
+            let told = Fence {
+                across: at(0.0).cross_section(),
+                ..answer(&mut one, Side::Downstream, x_m, 0)
+            };
+            let told = Fence {
+                across: crate::place::CrossSection::on_line(50.0 + up_m),
+                ..told
+            };
+            one.hears(Side::Downstream, 2, told);
+            let reason = one.guard.hold_reason(Side::Downstream);
+            assert_eq!(
+                reason != Some(HoldReason::Order),
+                is_ordered,
+                "{up_m} {x_m}"
+            );
+            let moves = one.guard.setpoint().is_some_and(|place| place.x_m < 100.0);
+            assert_eq!(moves, is_ordered, "{up_m} {x_m}");
+        }
+    }
+}
+
+/// A relay on its way that is told to halt stops where it was reported last, and goes on when the halt is over or forgotten.
+#[test]
+fn a_relay_that_halts_on_its_way_stops_there() {
+    for forgotten in [false, true] {
+        let mut one = One::new([None, Some(2)], 100.0, 300.0);
+        let told = answer(&mut one, Side::Downstream, 500.0, 0);
+        one.hears(Side::Downstream, 2, told);
+        assert!(one.setpoint() > 200.0);
+        one.is_at(150.0);
+        let goal_m = one.setpoint();
+        let halts = Fence {
+            flags: Fence::HALTS,
+            ..told
+        };
+        one.hears(Side::Downstream, 2, halts);
+        assert_eq!(one.setpoint().to_bits(), 150.0_f32.to_bits());
+        assert_eq!(
+            one.guard.hold_reason(Side::Downstream),
+            Some(HoldReason::Halted)
+        );
+        one.is_at(160.0);
+        assert_eq!(
+            one.setpoint().to_bits(),
+            150.0_f32.to_bits(),
+            "it overshoots"
+        );
+        if forgotten {
+            for _ in 0..14 {
+                one.guard.remind();
+                assert_eq!(one.setpoint().to_bits(), 150.0_f32.to_bits());
+            }
+            one.guard.remind();
+        } else {
+            one.hears(Side::Downstream, 2, told);
+        }
+        assert_eq!(one.setpoint().to_bits(), goal_m.to_bits());
+    }
+}
+
+/// A relay that is not flown, or has just begun, passes a halt on all the same.
+#[test]
+fn a_halt_passes_a_relay_that_is_not_flown() {
+    let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
+    one.guard.control(one.now, false);
+    one.guard.position(one.now, at(100.0));
+    while one.guard.poll().is_some() {}
+    let halts = Fence {
+        flags: Fence::HALTS,
+        ..fence(9, 150.0, 150.0)
+    };
+    one.hears(Side::Downstream, 3, halts);
+    let (side, node, told) = one.guard.poll().unwrap();
+    assert_eq!((side, node), (Side::Upstream, 1));
+    let flags = Fence::RELEASED | Fence::UNPLACED | Fence::HALTS;
+    assert_eq!((told.flags, told.x_m), (flags, 100.0));
+    assert!(told.is_valid());
+    assert!(one.guard.poll().is_none());
+    // Its neighbour upstream, which is flown, halts by that and leaves no association for it.
+    let mut before = One::new([None, Some(2)], 50.0, 60.0);
+    let known = answer(&mut before, Side::Downstream, 100.0, 0);
+    before.hears(Side::Downstream, 2, known);
+    before.is_at(55.0);
+    before.hears(Side::Downstream, 2, told);
+    assert_eq!(before.setpoint().to_bits(), 55.0_f32.to_bits());
+}
+
+/// A relay in its pilot's hands knows of flown neighbours whether it is in order with them.
+#[test]
+fn a_relay_that_is_not_flown_says_that_it_is_out_of_order() {
+    let mut one = One {
+        guard: Guard::new(config(), [Some(1), Some(3)], 7, Instant::ZERO),
+        now: Instant::ZERO,
+    };
+    one.guard.control(one.now, false);
+    one.guard.position(one.now, at(100.0));
+    let reasons =
+        |one: &One| [Side::Upstream, Side::Downstream].map(|side| one.guard.hold_reason(side));
+    assert_eq!(reasons(&one), [None; 2]);
+    let placed = Fence {
+        number: 0,
+        ..fence(9, 120.0, 0.0)
+    };
+    one.hears(Side::Upstream, 1, placed);
+    assert_eq!(reasons(&one), [Some(HoldReason::Order), None]);
+    one.guard.position(one.now, at(130.0));
+    assert_eq!(reasons(&one), [None; 2]);
+    one.hears(Side::Downstream, 3, fence(9, 110.0, 0.0));
+    assert_eq!(reasons(&one), [None, Some(HoldReason::Order)]);
+}
+
+/// A relay that began beside a silent one goes off from it to the separation, then across, then to its place; meanwhile it says why.
+#[test]
+fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
+    let mut one = One {
+        guard: Guard::new(config(), [Some(1), None], 7, Instant::ZERO),
+        now: Instant::ZERO,
+    };
+    one.guard.commit(at(102.0));
+    let high = aside(100.0, 0.0, 80.0);
+    one.is_at_place(high);
+    one.is_at_place(high);
+    assert_eq!(one.guard.setpoint(), Some(high));
+    one.guard.link(Side::Upstream, None);
+    one.is_at_place(high);
+    assert_eq!(one.guard.setpoint(), Some(aside(110.0, 0.0, 80.0)));
+    assert_eq!(
+        one.guard.hold_reason(Side::Upstream),
+        Some(HoldReason::Lost)
+    );
+    one.is_at_place(aside(105.0, 0.0, 80.0));
+    assert_eq!(one.guard.setpoint(), Some(aside(110.0, 0.0, 80.0)));
+    for _ in 0..3 {
+        one.is_at_place(aside(110.0, 0.0, 80.0));
+    }
+    assert_eq!(one.guard.setpoint(), Some(at(102.0)));
+}
+
+/// A relay beside one that is not flown waits for it without a halt of the chain, where the places of the two show their order.
+#[test]
+fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
+    for (x_m, halts) in [(None, true), (Some(90.0), true), (Some(130.0), false)] {
+        let mut unflown = One {
+            guard: Guard::new(config(), [Some(1), None], 9, Instant::ZERO),
+            now: Instant::ZERO,
+        };
+        unflown.guard.control(unflown.now, false);
+        let told = x_m.map(|x_m| {
+            unflown.guard.position(unflown.now, at(x_m));
+            unflown.guard.poll().unwrap().2
+        });
+        let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
+        one.hears(Side::Upstream, 1, fence(9, 50.0, 50.0));
+        for _ in 0..5 {
+            if let Some(told) = told {
+                one.hears(Side::Downstream, 3, told);
+            }
+            one.is_at(100.0);
+            one.guard.remind();
+        }
+        let said = one.says(Side::Downstream);
+        assert_eq!(said.flags & Fence::HALTS != 0, halts, "{x_m:?}");
+        assert_eq!(one.setpoint().to_bits(), 100.0_f32.to_bits(), "{x_m:?}");
+    }
+}
+
+/// The fence of an association from before a reboot may be far beyond this relay: it is not where its owner is.
+#[test]
+fn an_old_fence_says_nothing_of_where_its_owner_is() {
+    for (number, is_wrong) in [(0, true), (7, false)] {
+        let mut one = One {
+            guard: Guard::new(config(), [Some(1), None], 7, Instant::ZERO),
+            now: Instant::ZERO,
+        };
+        one.guard.control(one.now, false);
+        one.is_at(163.0);
+        one.hears(
+            Side::Upstream,
+            1,
+            Fence {
+                number,
+                ..fence(9, 250.0, 150.0)
+            },
+        );
+        let reason = one.guard.hold_reason(Side::Upstream);
+        assert_eq!(reason == Some(HoldReason::Order), is_wrong, "{reason:?}");
+    }
+}
