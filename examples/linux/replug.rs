@@ -124,6 +124,21 @@ impl Replug {
         self.tty.is_some()
     }
 
+    /// Returns the name of the tty.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Returns the baud rate, bit/s.
+    pub const fn baud(&self) -> u32 {
+        self.baud
+    }
+
+    /// Returns the bytes received so far.
+    pub const fn bytes_in(&self) -> u64 {
+        self.counts.read
+    }
+
     /// What it has counted.
     pub fn status(&self) -> Value {
         json!({

@@ -1,8 +1,7 @@
 //! The drone's autopilot, over a tty or UDP: opened again whenever it vanishes.
 
 use std::fmt;
-use std::net::{ToSocketAddrs as _, UdpSocket};
-use std::os::fd::{AsFd as _, BorrowedFd};
+use std::os::fd::BorrowedFd;
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -11,14 +10,21 @@ use serde_json::{Value, json};
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::trust::Mistrust;
-use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
+use uav_relay::flight::autopilot::{
+    Autopilot, AutopilotEvent, FlightMode, Kind, ReleaseCause, WaitReason,
+};
 use uav_relay::flight::axis::Axis;
 use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Event, Instant, Relay, Sites};
 
+use crate::answers::{Answer, Answers};
+use crate::astray::{Astray, Off};
+use crate::datagrams::Datagrams;
+use crate::waits;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
+use uav_relay_scenario::endpoint::Endpoint;
 
 /// What waits for a tty that is slow, at most, bytes: some seconds of what is said.
 const WAITING: usize = 4_096;
@@ -29,20 +35,20 @@ const EVENT: &str = "autopilot";
 /// The number of this link in what is signed.
 const LINK: u8 = 0;
 
-/// Where it is.
+/// The port that leads to the autopilot.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Where {
-    /// On a tty, at that many bit/s.
+    /// A tty, and its bit/s.
     Tty(PathBuf, u32),
-    /// At a host and port, from where it answers.
-    Udp(String),
+    /// A UDP port.
+    Udp(Endpoint),
 }
 
 impl fmt::Display for Where {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Tty(path, _) => write!(f, "--autopilot {}", path.display()),
-            Self::Udp(address) => write!(f, "--autopilot udp:{address}"),
+            Self::Udp(endpoint) => write!(f, "--autopilot {endpoint}"),
         }
     }
 }
@@ -69,7 +75,7 @@ pub(crate) struct AutopilotPlan {
 #[derive(Debug)]
 enum Port {
     Tty(Replug),
-    Udp(UdpSocket),
+    Udp(Datagrams),
 }
 
 /// The link, and what it goes over.
@@ -82,6 +88,8 @@ pub(crate) struct Companion {
     port: Port,
     waiting: Vec<u8>,
     state: Option<&'static str>,
+    answers: Answers,
+    astray: Astray,
 }
 
 impl Companion {
@@ -103,17 +111,23 @@ impl Companion {
             port,
             waiting: Vec::new(),
             state: None,
+            answers: Answers::new(now),
+            astray: Astray::default(),
         })
     }
 
     /// Says what is flown by what.
     pub(crate) fn started(&self, log: &Log) {
         let (place, pace) = (&self.plan.place, self.plan.pace);
+        let from = match place {
+            Where::Tty(..) => String::new(),
+            Where::Udp(endpoint) => format!(" from local port {}", endpoint.local),
+        };
         log.tell(
             Instant::ZERO,
             EVENT,
             format_args!(
-                "by {place}, {} m/s at most; flies once its pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
+                "by {place}{from}, {} m/s at most; flies once its pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
                 pace.speed_m_s
             ),
         );
@@ -139,13 +153,15 @@ impl Companion {
     pub(crate) fn status(&self) -> Value {
         let port = match &self.port {
             Port::Tty(tty) => tty.status(),
-            Port::Udp(_) => json!({ "port": self.plan.place.to_string(), "open": true }),
+            Port::Udp(datagrams) => datagrams.status(),
         };
         json!({
             "port": port,
             "state": self.state,
             "flown": self.link.is_flown(),
             "frames_refused": self.link.refused(),
+            "unanswered": self.answers.missing().map(|missing| self.unanswered(missing)),
+            "position": self.astray.status(),
         })
     }
 
@@ -157,17 +173,20 @@ impl Companion {
         self.follow(now, relay);
         let mut bytes = [0; 1_024];
         while let Some(count) = self.read(&mut bytes) {
-            self.link
-                .handle_bytes(now, bytes.get(..count).unwrap_or_default());
+            let bytes = bytes.get(..count).unwrap_or_default();
+            self.link.handle_bytes(now, bytes);
         }
         self.link.handle_timeout(now);
         relay.handle_control(now, self.link.is_flown());
         while let Some(position) = self.link.poll_position() {
+            self.astray.handle_place(now, position.place);
             relay.handle_position(now, position.at, position.place);
         }
         while let Some(sample) = self.link.poll_sample() {
             relay.handle_sample(now, sample);
         }
+        self.link.handle_ready(now, relay.is_ready());
+        self.link.handle_hold(now, waits::reasons(relay));
         self.link.handle_setpoint(now, relay.setpoint());
         let sir_db = relay.target().map(|target| 10.0 * target.log10());
         self.link.handle_values(now, sir_db, relay.setpoint());
@@ -176,10 +195,96 @@ impl Companion {
         }
         self.flush();
         while let Some(event) = self.link.poll_event() {
-            if let AutopilotEvent::State(state) = event {
-                self.state = Some(word(state));
+            match event {
+                AutopilotEvent::OffLine(off_line) => {
+                    if let Some(off) = self.astray.is_off_line(self.between, off_line) {
+                        self.tell_off(now, log, off);
+                    }
+                    continue;
+                }
+                AutopilotEvent::State(state) => self.state = Some(word(state)),
+                _ => {}
             }
             said(now, log, event);
+        }
+        self.tell_unanswered(now, log);
+        self.tell_astray(now, log, relay);
+    }
+
+    /// Writes a line about a drone that is far from its line, and has the operator read it.
+    fn tell_astray(&mut self, now: Instant, log: &Log, relay: &Relay) {
+        let is_in_air = match self.link.state() {
+            State::Silent | State::Grounded => false,
+            State::Standby | State::Engaged | State::Blind => true,
+        };
+        let lateral = relay.mission().config().lateral;
+        let off_line = self.link.off_line(now);
+        let off = self
+            .astray
+            .look(now, self.between, lateral, off_line, is_in_air);
+        if let Some(off) = off {
+            self.tell_off(now, log, off);
+        }
+    }
+
+    fn tell_off(&mut self, now: Instant, log: &Log, off: Off) {
+        log.say(now, EVENT, off.fields(), format_args!("{off}"));
+        if let Some(text) = off.for_operator() {
+            self.link.say(&text);
+        }
+    }
+
+    /// Writes a line about an autopilot that has not answered since the start, once for each kind of answer in its place.
+    fn tell_unanswered(&mut self, now: Instant, log: &Log) {
+        let heard = self.heard();
+        if let Some(missing) = self.answers.look(now, heard) {
+            self.state = Some(word(State::Silent));
+            let fields = json!({ "state": self.state });
+            let text = self.unanswered(missing);
+            log.say(now, EVENT, fields, format_args!("{text}"));
+        }
+    }
+
+    /// Returns what has come so far in place of an autopilot's frames; `None` for those.
+    fn heard(&self) -> Option<Answer> {
+        // A frame that is refused for its signature is told in a line of its own.
+        if self.link.state() != State::Silent || self.link.refused() > 0 {
+            return None;
+        }
+        let bytes = match &self.port {
+            Port::Tty(tty) => tty.bytes_in(),
+            Port::Udp(datagrams) => datagrams.bytes_in(),
+        };
+        Some(match (bytes, self.link.counters().frames) {
+            (0, _) => Answer::Nothing,
+            (_, 0) => Answer::Noise,
+            _ => Answer::Others,
+        })
+    }
+
+    /// Returns a line about an answer that is not an autopilot's: where, and what to look at.
+    fn unanswered(&self, answer: Answer) -> String {
+        match (answer, &self.port) {
+            (Answer::Nothing, Port::Udp(datagrams)) => {
+                format!("nobody answers at {}", datagrams.silence())
+            }
+            (Answer::Nothing, Port::Tty(tty)) => format!(
+                "nobody answers at {}, {} bit/s: is the autopilot on, is its TX wired to this RX and its RX to this TX, and is that its baud rate?",
+                tty.path().display(),
+                tty.baud()
+            ),
+            (Answer::Noise, port) => format!(
+                "what comes by {} is no MAVLink 2: {}, and MAVLink 2 its protocol there?",
+                self.plan.place,
+                match port {
+                    Port::Udp(_) => "is that the autopilot's port".to_owned(),
+                    Port::Tty(tty) => format!("is {} bit/s the autopilot's baud rate", tty.baud()),
+                }
+            ),
+            (Answer::Others, _) => format!(
+                "frames come by {}, none of them from a PX4 or an ArduCopter: is that the port of the autopilot itself (component 1)?",
+                self.plan.place
+            ),
         }
     }
 
@@ -206,14 +311,15 @@ impl Companion {
             Port::Tty(tty) => tty.wake(),
             Port::Udp(_) => None,
         };
-        again.map_or(link, |again| link.min(again.max(now)))
+        let others = [again, self.answers.wake()].into_iter().flatten();
+        others.fold(link, |wake, again| wake.min(again.max(now)))
     }
 
     /// What to sleep on.
     pub(crate) fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
         match &self.port {
             Port::Tty(tty) => tty.interest(),
-            Port::Udp(socket) => Some((socket.as_fd(), PollFlags::IN)),
+            Port::Udp(datagrams) => Some((datagrams.fd(), PollFlags::IN)),
         }
     }
 
@@ -224,20 +330,18 @@ impl Companion {
         }
     }
 
-    /// How many bytes have come; none where there are none.
+    /// Reads bytes of the autopilot, and returns how many; `None` if there are none.
     fn read(&mut self, into: &mut [u8]) -> Option<usize> {
         let count = match &mut self.port {
             Port::Tty(tty) => tty.read(into).ok(),
-            // Nobody there yet is no reason to give up.
-            Port::Udp(socket) => socket.recv(into).ok(),
+            Port::Udp(datagrams) => Some(datagrams.read(into)),
         };
         count.filter(|count| *count > 0)
     }
 
     fn send(&mut self, frame: &[u8]) {
-        match &self.port {
-            // One that does not take it is too slow for the next one as well: the newest counts.
-            Port::Udp(socket) => drop(socket.send(frame)),
+        match &mut self.port {
+            Port::Udp(datagrams) => datagrams.send(frame),
             Port::Tty(_) if self.waiting.len() + frame.len() <= WAITING => {
                 self.waiting.extend_from_slice(frame);
             }
@@ -270,17 +374,78 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
             let what = match state {
                 State::Silent => "silent; look at the cable, the baud rate and MAVLink 2",
                 State::Grounded => "on the ground, or not armed",
-                State::Standby => "in the air, flown by its pilot",
+                State::Standby => "in the air, not flown by the relay",
                 State::Engaged => "flies to the relay's setpoints",
                 State::Blind => "no position; keeps its last target",
             };
             let fields = json!({ "state": word(state) });
             log.say(now, EVENT, fields, format_args!("{what}"));
         }
+        AutopilotEvent::Released(release) => {
+            let (cause, mode) = (cause(release.cause), mode(release.mode));
+            log.tell(
+                now,
+                EVENT,
+                format_args!("released: {cause}; the mode is {mode}"),
+            );
+        }
+        AutopilotEvent::Waits(reason) => {
+            log.tell(
+                now,
+                EVENT,
+                format_args!("cannot be engaged: {}", waits(reason)),
+            );
+        }
+        AutopilotEvent::Ready => {
+            log.tell(
+                now,
+                EVENT,
+                format_args!("ready: its pilot may choose OFFBOARD or GUIDED"),
+            );
+        }
+        AutopilotEvent::FenceBreached => {
+            log.tell(now, EVENT, format_args!("says that its fence is breached"));
+        }
         AutopilotEvent::Mistrusted(why) => {
             log.tell(now, EVENT, format_args!("{}", mistrusted(why)));
         }
         other => log.tell(now, EVENT, format_args!("{other:?}")),
+    }
+}
+
+const fn cause(cause: ReleaseCause) -> &'static str {
+    match cause {
+        ReleaseCause::Chosen => "another mode was chosen",
+        ReleaseCause::Failsafe => "the autopilot's failsafe",
+        ReleaseCause::Fence => "the autopilot's fence is breached",
+        ReleaseCause::Link => "the link was interrupted or late",
+        _ => "for a reason of the autopilot",
+    }
+}
+
+const fn mode(mode: FlightMode) -> &'static str {
+    match mode {
+        FlightMode::Companion => "OFFBOARD or GUIDED still",
+        FlightMode::Sticks => "one that is flown with the sticks",
+        FlightMode::Hold => "Hold or LOITER",
+        FlightMode::Brake => "BRAKE",
+        FlightMode::Return => "RTL",
+        FlightMode::Land => "LAND",
+        _ => "another one",
+    }
+}
+
+const fn waits(reason: WaitReason) -> &'static str {
+    match reason {
+        WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
+        WaitReason::Link => "what the autopilot says comes late",
+        WaitReason::Found => {
+            "it is in OFFBOARD or GUIDED, which nobody has chosen since the link is up; choose another mode first"
+        }
+        WaitReason::Unseen => "no mode that was chosen has been seen since the link is up",
+        WaitReason::Position => "there is no position near the line",
+        WaitReason::NotReady => "the relay is not in order with its neighbours",
+        _ => "for a reason of the autopilot",
     }
 }
 
@@ -298,7 +463,10 @@ const fn word(state: State) -> &'static str {
 const fn mistrusted(why: Mistrust) -> &'static str {
     match why {
         Mistrust::NoKey => {
-            "signs its frames, and ignores what is not signed: give --autopilot-key-file"
+            "signs its frames, and answers nothing that is not signed: give --autopilot-key-file"
+        }
+        Mistrust::SignsOnly => {
+            "signs its frames, and answers what is not signed: it flies without --autopilot-key-file"
         }
         Mistrust::Unsigned => {
             "does not sign, and is not heard: set its key, or leave out --autopilot-key-file"
@@ -328,22 +496,8 @@ const fn called(kind: Kind) -> &'static str {
 fn port(place: &Where) -> Result<Port, String> {
     match place {
         Where::Tty(path, baud) => Replug::open("--autopilot", path, *baud).map(Port::Tty),
-        Where::Udp(address) => socket(address)
+        Where::Udp(endpoint) => Datagrams::open(endpoint)
             .map(Port::Udp)
             .map_err(|error| format!("{place}: {error}")),
     }
-}
-
-fn socket(address: &str) -> std::io::Result<UdpSocket> {
-    let unknown = || std::io::Error::other("is no host and port");
-    let peer = address.to_socket_addrs()?.next().ok_or_else(unknown)?;
-    let any = if peer.is_ipv4() {
-        "0.0.0.0:0"
-    } else {
-        "[::]:0"
-    };
-    let socket = UdpSocket::bind(any)?;
-    socket.connect(peer)?;
-    socket.set_nonblocking(true)?;
-    Ok(socket)
 }

@@ -29,12 +29,16 @@
 //! | `listen.rs` | the part of it that is how the chain finds its interferer |
 //! | `ports.rs` | the ttys of either wiring |
 //! | `autopilot.rs` | the autopilot |
+//! | `datagrams.rs` | its UDP port |
+//! | `answers.rs` | an autopilot that does not answer |
+//! | `astray.rs` | a drone that is far from its line |
 //! | `positions.rs` | where the drone is, and what is heard there, from a FIFO |
 //! | `relay.rs` | the loop |
 //! | `report.rs` | the lines it says |
 //! | `status.rs` | how the relay is, as JSON |
 //! | `uploads.rs` | the newest mission that was uploaded, in a file |
 //! | `views.rs` | what it has said in the votes on views, in a file |
+//! | `waits.rs` | log lines for what keeps the drone from its place |
 //! | `kept.rs` | a file that is written in flight, by a thread of its own |
 //! | `gate.rs` | nothing is sent before it is in such a file |
 //!
@@ -44,7 +48,13 @@
 #![cfg_attr(unix, forbid(unsafe_code))]
 
 #[cfg(unix)]
+mod answers;
+#[cfg(unix)]
+mod astray;
+#[cfg(unix)]
 mod autopilot;
+#[cfg(unix)]
+mod datagrams;
 #[cfg(unix)]
 mod gate;
 #[cfg(unix)]
@@ -69,6 +79,8 @@ mod status;
 mod uploads;
 #[cfg(unix)]
 mod views;
+#[cfg(unix)]
+mod waits;
 
 #[cfg(unix)]
 fn main() -> std::process::ExitCode {

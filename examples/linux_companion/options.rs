@@ -22,6 +22,7 @@ use uav_relay_linux::config::{Beyond, Override};
 use uav_relay_linux::log::LogOptions;
 use uav_relay_linux::mission::{self, MissionOptions};
 use uav_relay_linux::site::SiteOptions;
+use uav_relay_scenario::endpoint::{Endpoint, FORM};
 use uav_relay_scenario::key;
 
 /// A frame's way through two kernels and two USB adapters, and the computing: an adapter alone may wait 16 ms.
@@ -84,10 +85,12 @@ struct Options {
     /// setpoints then keep drones apart on their way. With --listen a line may end with the interference that was heard there, W
     #[arg(long, value_name = "FIFO")]
     positions: Option<PathBuf>,
-    /// The drone's PX4 or ArduCopter: a tty, or `udp:HOST:PORT`. It is told where to fly, and tells where the drone is
+    /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It is told where to fly, and tells where the
+    /// drone is. LOCAL is the local port that datagrams are sent from and received at, the same at every start: 14540 to 14549 for PORT 14580 to
+    /// 14589, as in PX4's simulation, and else PORT + 1000
     #[arg(
         long,
-        value_name = "TTY|udp:HOST:PORT",
+        value_name = "TTY|udp:HOST:PORT[@LOCAL]",
         requires = "site_tx",
         conflicts_with = "positions"
     )]
@@ -221,6 +224,7 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
     }
     let guard = GuardConfig {
         hover_m: options.position_error,
+        lag: Pace::of_speed(options.speed).stopping_time(),
         ..GuardConfig::of(&mission, profile)
     };
     let settings = Settings {
@@ -265,17 +269,15 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     let (Some(name), Some(sites)) = (&options.autopilot, sites) else {
         return Ok(None);
     };
-    let place = match name.strip_prefix("udp:") {
-        Some(address) => Where::Udp(udp(address)?),
+    let place = match Endpoint::parse(name) {
+        Some(Ok(endpoint)) => Where::Udp(endpoint),
+        Some(Err(error)) => return Err(format!("--autopilot {name}: {error}; must be {FORM}")),
         None => Where::Tty(PathBuf::from(name), options.autopilot_baud),
     };
     Ok(Some(AutopilotPlan {
         place,
         sites,
-        pace: Pace {
-            speed_m_s: options.speed,
-            ..Pace::default()
-        },
+        pace: Pace::of_speed(options.speed),
         key: options
             .autopilot_key_file
             .as_deref()
@@ -285,38 +287,18 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     }))
 }
 
-/// A host and its port.
-fn udp(address: &str) -> Result<String, String> {
-    let port = address
-        .rsplit_once(':')
-        .filter(|(host, _)| !host.is_empty())
-        .and_then(|(_, port)| port.parse::<u16>().ok());
-    match port {
-        Some(1..) => Ok(address.to_owned()),
-        _ => Err(format!(
-            "--autopilot udp:{address}: must be udp:HOST:PORT, PORT within 1 to 65535"
-        )),
-    }
-}
-
 /// How long a frame takes on a channel that all relays share, which has to carry them.
 fn carried(options: &Options) -> Result<Duration, String> {
     let load = ChannelLoad {
         in_range: options.of,
         overhead: RADIO,
     };
-    let least = load.least_baud(Duration::from_millis(options.probe_after_ms));
-    if options.baud >= least {
-        return Ok(load.hop_time(options.baud, Duration::from_micros(0)));
-    }
-    let longer = load
-        .least_probe_after(options.baud)
-        .as_micros()
-        .div_ceil(1_000);
-    Err(format!(
-        "--baud {}: must be at least {least} where {} relays share a channel, or --probe-after-ms {longer}",
-        options.baud, options.of
-    ))
+    load.carried(options.baud, Duration::from_millis(options.probe_after_ms))
+        .map_err(|full| {
+            let (baud, least) = (options.baud, full.least_baud);
+            format!("--baud {baud}: must be within {least} to 4000000: {full}")
+        })?;
+    Ok(load.hop_time(options.baud, Duration::from_micros(0)))
 }
 
 fn secret(options: &Options) -> Result<Option<Secret>, String> {

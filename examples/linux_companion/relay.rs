@@ -16,6 +16,7 @@ use crate::positions::Positions;
 use crate::report::Report;
 use crate::uploads::Uploads;
 use crate::views::Views;
+use crate::waits::Waits;
 use crate::{positions, status, uploads, views};
 use uav_relay_linux::log::Log;
 use uav_relay_linux::refusals::Refusals;
@@ -33,6 +34,7 @@ struct Flight {
     views: Views,
     uploads: Option<Uploads>,
     refusals: Refusals,
+    waits: Waits,
     signs: bool,
 }
 
@@ -79,7 +81,12 @@ impl Flight {
                 .resume_view(service.now(), record)
                 .map_err(|error| views::refused(plan.view_file.as_deref(), &error.to_string()))?;
         }
-        let report = Report::new(log.clone(), plan.identity, &plan.mission);
+        let report = Report::new(
+            log.clone(),
+            plan.identity,
+            &plan.mission,
+            plan.settings.guard.map(|guard| guard.fence),
+        );
         report.started(&ports.names(), plan.baud);
         config::tell(&plan.overrides, &log);
         report.signs(auth.map(|auth| auth.epoch));
@@ -104,6 +111,7 @@ impl Flight {
             views,
             uploads: file.map(|file| Uploads::new(file)).transpose()?,
             refusals: Refusals::default(),
+            waits: Waits::default(),
             signs: auth.is_some(),
         })
     }
@@ -144,9 +152,14 @@ impl Flight {
         if let Some(why) = self.refusals.look(time, relay.stats(), self.signs) {
             log.tell(time, "not taken", format_args!("{why}"));
         }
+        let name = |node| self.report.name(node);
+        let waits = self.waits.tend(time, log, relay, name);
         let again = self.autopilot.as_ref().map(|it| it.wake(service.now()));
         let alive = self.tell(time);
-        let others = [again, reopen, alive].into_iter().chain(files).flatten();
+        let others = [again, reopen, alive, waits]
+            .into_iter()
+            .chain(files)
+            .flatten();
         let wake = wake.into_iter().chain(others).min();
         self.sleep(wake)
     }

@@ -4,9 +4,12 @@
 use std::fmt;
 
 use serde_json::json;
+use uav_relay::guard::config::Geofence;
 use uav_relay::sensing::belief::{Belief, Told};
 use uav_relay::wire::digest::digest;
-use uav_relay::{Event, Identity, Instant, Mission, Placement, Relay, Side, Stats, Upload};
+use uav_relay::{
+    Event, Identity, Instant, LineError, Mission, Placement, Relay, Side, Stats, Upload,
+};
 
 use crate::status::at;
 use uav_relay_linux::counters::counted;
@@ -31,13 +34,21 @@ pub(crate) struct Report {
     /// As many as were loaded: nodes keep their numbers when some are lost.
     relays: u16,
     digest: u16,
+    /// The box that no setpoint leaves, if there is a guard.
+    fence: Option<Geofence>,
 }
 
 impl Report {
-    pub(crate) fn new(log: Log, identity: Identity, mission: &Mission) -> Self {
+    pub(crate) fn new(
+        log: Log,
+        identity: Identity,
+        mission: &Mission,
+        fence: Option<Geofence>,
+    ) -> Self {
         Self {
             log,
             identity,
+            fence,
             relays: mission.relays(),
             digest: digest(mission),
         }
@@ -129,7 +140,7 @@ impl Report {
                     "too few relays can be reached; bring the missing ones into reach, or land these"
                 ),
             ),
-            Event::UploadRefused { why } => tell("refused", format_args!("an upload; {why}")),
+            Event::UploadRefused { why } => self.refused(now, why),
             Event::Uploaded => {
                 let version = relay.upload().map_or(0, Upload::version);
                 self.log.say(
@@ -147,6 +158,29 @@ impl Report {
             ),
             other => self.of_a_node(now, other, relay),
         }
+    }
+
+    /// Why an upload is refused; of the geofence its numbers.
+    fn refused(&self, now: Instant, why: LineError) {
+        let Some(fence) = self.fence else {
+            return self
+                .log
+                .tell(now, "refused", format_args!("an upload; {why}"));
+        };
+        let range = match why {
+            LineError::Altitude => [fence.least_altitude_m, fence.most_altitude_m],
+            LineError::Lateral => [fence.least_y_m, fence.most_y_m],
+            LineError::Length => [fence.least_x_m, fence.most_x_m],
+            _ => {
+                return self
+                    .log
+                    .tell(now, "refused", format_args!("an upload; {why}"));
+            }
+        };
+        let [least, most] = range;
+        let what = format_args!("an upload; {why}, {least} to {most} m");
+        self.log
+            .say(now, "refused", json!({ "range_m": range }), what);
     }
 
     /// Events about another node.
@@ -209,7 +243,7 @@ impl Report {
             _ if relay.stands_down() => say(
                 "index taken",
                 format_args!(
-                    "another relay flies as relay {node}, and this one stands down; land one and give it its own --index"
+                    "another relay flies as relay {node}, and this one is passive, without a setpoint; land one and give it its own --index"
                 ),
             ),
             _ => say(

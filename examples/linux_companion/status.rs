@@ -4,6 +4,8 @@ use serde_json::{Value, json};
 use uav_relay::{Placement, Relay, Side};
 use uav_relay_linux::counters::counted;
 
+use crate::waits;
+
 /// A place, m.
 pub(crate) fn at(place: Placement) -> Value {
     json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
@@ -24,6 +26,8 @@ pub(crate) fn of_relay(relay: &Relay, name: impl Fn(u16) -> String) -> Value {
         "transmitter_w": relay.level_w(Side::Upstream),
         "receiver_w": relay.level_w(Side::Downstream),
         "stands_down": relay.stands_down(),
+        "ready": relay.is_ready(),
+        "waits": waits::reasons(relay).map(|reason| reason.map(waits::word)),
         "has_lease": relay.lease().is_some(),
         "upstream": upstream,
         "downstream": downstream,

@@ -20,6 +20,7 @@ use crate::flight::axis::Axis;
 #[cfg(feature = "upload")]
 use crate::relay::Relay;
 use crate::serial::READ_LIMIT;
+use crate::side::Side;
 use crate::sites::Sites;
 use crate::time::{Duration, Instant};
 
@@ -188,6 +189,9 @@ impl AsyncAutopilot {
                 handed = true;
             }
             let setpoint = relay.setpoint();
+            link.handle_ready(now, relay.is_ready());
+            let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
+            link.handle_hold(now, holds);
             link.handle_setpoint(now, setpoint);
             let sir_db = relay.target().map(|target| 10.0 * libm::log10f(target));
             link.handle_values(now, sir_db, setpoint);

@@ -49,15 +49,7 @@ impl Course {
         if !axis.is_of(mission.config().distance_m) {
             return Err(CourseError::Distance(axis.distance_m()));
         }
-        let default = Pace::default();
-        let pace = Pace {
-            speed_m_s: if speed_m_s > 0.0 {
-                speed_m_s
-            } else {
-                default.speed_m_s
-            },
-            ..default
-        };
+        let pace = Pace::of_speed(speed_m_s);
         Ok(Self { axis, pace })
     }
 }

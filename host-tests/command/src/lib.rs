@@ -130,16 +130,12 @@ pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
 /// Whether a channel of `baud` carries relays that share it and ask a silent neighbour after `probe_after`.
 ///
 /// # Errors
-/// The least that does, and how many relays share the channel.
+/// The least that does, how many relays share the channel, and what else would fit.
 pub fn carries(baud: u32, load: ChannelLoad, probe_after: Duration) -> Result<(), String> {
-    let least = load.least_baud(probe_after);
-    if baud >= least {
-        return Ok(());
-    }
-    Err(format!(
-        "--baud {baud}: must be within {least} to {MOST_BAUD}: {} relays share the channel at one place",
-        load.in_range
-    ))
+    load.carried(baud, probe_after).map_err(|full| {
+        let least = full.least_baud;
+        format!("--baud {baud}: must be within {least} to {MOST_BAUD}: {full}")
+    })
 }
 
 /// A number of the command line, within `least` to `most`.

@@ -4,6 +4,7 @@ use serde_path_to_error::Segment;
 use toml::{Table, Value};
 
 use crate::deployment_keys::SECTIONS;
+use crate::endpoint::Endpoint;
 use crate::error::{Problem, ScenarioError, cut, quote};
 use crate::keys::Rule::{LinkOrNumber, Number, Whole};
 use crate::keys::{FILE, Key, Rule, names};
@@ -135,11 +136,17 @@ impl Check<'_> {
             (Whole(range), Value::Integer(whole)) if !range.holds(*whole as f64) => {
                 fail(Problem::OutOfRange)
             }
-            (Rule::Text, Value::String(text)) if text.is_empty() => fail(Problem::OutOfRange),
+            (Rule::Text | Rule::TtyOrUdp, Value::String(text)) if text.is_empty() => {
+                fail(Problem::OutOfRange)
+            }
+            (Rule::TtyOrUdp, Value::String(text)) => match Endpoint::parse(text) {
+                Some(Err(error)) => fail(Problem::NoEndpoint(error)),
+                None | Some(Ok(_)) => Ok(()),
+            },
             (Rule::Choice(texts), Value::String(text)) if !texts.contains(&text.as_str()) => {
                 fail(Problem::UnknownChoice)
             }
-            (Whole(_) | Rule::Flag | Rule::Text | Rule::Choice(_), _) => Ok(()),
+            (Whole(_) | Rule::Flag | Rule::Text | Rule::TtyOrUdp | Rule::Choice(_), _) => Ok(()),
             (Rule::Table(keys), Value::Table(table)) => self.table(path, table, *keys),
             (Rule::Tables(_, least), Value::Array(list)) if list.len() < *least => {
                 fail(Problem::EmptyList)

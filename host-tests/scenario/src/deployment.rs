@@ -63,7 +63,7 @@ pub struct Companion {
     pub upload_file: Option<PathBuf>,
     /// Where its votes are kept.
     pub view_file: Option<PathBuf>,
-    /// The autopilot: a tty, or `udp:HOST:PORT`.
+    /// The autopilot: a tty, or a UDP address as [`Endpoint`](crate::endpoint::Endpoint) reads it.
     pub autopilot: Option<String>,
     /// Bit/s on its tty, 1200 to 4000000.
     pub autopilot_baud: Option<u32>,

@@ -31,7 +31,7 @@ const COMPANION: Keys = &[
     optional("epoch_file", Text),
     optional("upload_file", Text),
     optional("view_file", Text),
-    optional("autopilot", Text),
+    optional("autopilot", Rule::TtyOrUdp),
     optional("autopilot_baud", Whole(BAUD)),
     optional("autopilot_key_file", Text),
     optional("speed_m_s", Number(range(0.1, 20.0, "m/s"))),

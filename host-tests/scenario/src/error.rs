@@ -4,6 +4,8 @@ use core::fmt;
 
 use toml::Value;
 
+use crate::endpoint::EndpointError;
+
 /// Longest piece of a value that is quoted, in characters: enough to recognise it by.
 const QUOTED: usize = 60;
 
@@ -50,6 +52,8 @@ pub enum Problem {
     NoSite,
     /// The text is none of those that are known.
     UnknownChoice,
+    /// The text begins like a UDP address and is none.
+    NoEndpoint(EndpointError),
     /// There are more or fewer entries than another key says.
     OtherNumber,
     /// A table stands where a list of tables does.
@@ -91,6 +95,7 @@ impl fmt::Display for Problem {
             Self::SaidTwice => "says the same twice",
             Self::NoSite => "needs [site]",
             Self::UnknownChoice => "is not known",
+            Self::NoEndpoint(error) => return error.fmt(f),
             Self::OtherNumber => "contradicts plan.uavs",
             Self::NoList => "is one table, and may be several",
             Self::NoTable => "is a list, and there is only one",

@@ -5,6 +5,7 @@ use core::fmt;
 
 use toml::Table;
 
+use crate::endpoint::FORM;
 use crate::plan::PlannedMethod;
 
 /// A range of numbers; both ends belong to it, except a low end that is `open`.
@@ -27,6 +28,8 @@ pub(super) enum Rule {
     Choice(&'static [&'static str]),
     /// A text that is not empty.
     Text,
+    /// The name of a tty, or the UDP address of an autopilot.
+    TtyOrUdp,
     Table(Keys),
     /// An array of tables with at least so many entries.
     Tables(Keys, usize),
@@ -306,6 +309,7 @@ impl fmt::Display for Rule {
             LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
             Rule::Flag => f.write_str("true or false"),
             Rule::Text => f.write_str("a text that is not empty"),
+            Rule::TtyOrUdp => write!(f, "a tty, or {FORM}"),
             Rule::Choice(texts) => write!(f, "\"{}\"", texts.join("\" or \"")),
             Rule::Table(keys) => write!(f, "a table with the keys {}", names(*keys)),
             Rule::Tables(keys, 0) => write!(f, "a list of tables with the keys {}", names(*keys)),

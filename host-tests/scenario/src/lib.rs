@@ -6,6 +6,7 @@
 //! | [`mission`] | from a scenario to the mission that relays fly |
 //! | [`scene`], [`hypothetical`] | several interferers whose powers add up, and the one that stands for them |
 //! | [`deployment`] | what the programs of a chain need beside the scenario, in sections of the same file |
+//! | [`endpoint`] | the UDP address of an autopilot |
 //! | [`key`] | the network's key, or an autopilot's, from a file |
 //! | [`number`] | from the f64 of files to the f32 of relays |
 //!
@@ -17,6 +18,7 @@
 mod check;
 pub mod deployment;
 mod deployment_keys;
+pub mod endpoint;
 mod error;
 mod file;
 pub mod hypothetical;

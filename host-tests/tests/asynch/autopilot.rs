@@ -14,13 +14,16 @@ use futures_util::task::LocalSpawnExt as _;
 use host_tests::fixtures;
 use mavlink::dialects::common::{
     EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot,
-    MavLandedState, MavMessage, MavModeFlag, MavType, SET_POSITION_TARGET_GLOBAL_INT_DATA,
+    MavLandedState, MavMessage, MavModeFlag, MavState, MavType,
+    SET_POSITION_TARGET_GLOBAL_INT_DATA, TIMESYNC_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 use uav_relay::asynch::{AsyncAutopilot, AsyncLink, AsyncPair, AsyncRelay, Clock};
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
-use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
+use uav_relay::flight::autopilot::{
+    Autopilot, AutopilotEvent, FlightMode, Kind, Release, ReleaseCause,
+};
 use uav_relay::flight::axis::Axis;
 use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Duration, Geodetic, Instant, Mission, Placement, Relay, Settings, Sites};
@@ -81,9 +84,10 @@ impl Write for Uart {
     }
 }
 
-/// A PX4 in its companion's mode that flies where it is told, at once.
+/// A PX4 that flies where it is told, at once. Its pilot has it until `given_at`, and gives it to its companion then.
 struct Vehicle {
     mute: Cell<bool>,
+    given_at: Cell<Instant>,
     place: Cell<Placement>,
     told: RefCell<Vec<(Instant, Placement)>>,
 }
@@ -125,23 +129,36 @@ async fn fly(vehicle: &Vehicle, time: &Time, mut to: Uart, from: Uart) -> Infall
             let frame: Vec<u8> = waiting.drain(..end).collect();
             let mut reader = mavlink::MavlinkReader::new(&frame[..]);
             let read = reader.read_message::<MavMessage>(mavlink::MavlinkVersion::V2);
-            if let MavMessage::SET_POSITION_TARGET_GLOBAL_INT(target) = read.unwrap().1 {
-                let place = axis().place(point(&target)).unwrap();
-                vehicle.told.borrow_mut().push((time.now(), place));
-                vehicle.place.set(place);
+            match read.unwrap().1 {
+                MavMessage::SET_POSITION_TARGET_GLOBAL_INT(target) => {
+                    let place = axis().place(point(&target)).unwrap();
+                    vehicle.told.borrow_mut().push((time.now(), place));
+                    vehicle.place.set(place);
+                }
+                MavMessage::TIMESYNC(sync) if !vehicle.mute.get() => {
+                    let answer = MavMessage::TIMESYNC(TIMESYNC_DATA {
+                        tc1: 1,
+                        ts1: sync.ts1,
+                    });
+                    let Ok(_) = to.write(&raw(number, &answer)).await;
+                    number = number.wrapping_add(1);
+                }
+                _ => {}
             }
         }
         if vehicle.mute.get() {
             continue;
         }
         let at = axis().point(vehicle.place.get()).unwrap();
+        let is_given = time.now() >= vehicle.given_at.get();
         for message in [
             MavMessage::HEARTBEAT(HEARTBEAT_DATA {
                 mavtype: MavType::MAV_TYPE_QUADROTOR,
                 autopilot: MavAutopilot::MAV_AUTOPILOT_PX4,
                 base_mode: MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
                     | MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED,
-                custom_mode: 6 << 16,
+                custom_mode: if is_given { 6 << 16 } else { 3 << 16 },
+                system_status: MavState::MAV_STATE_ACTIVE,
                 ..HEARTBEAT_DATA::DEFAULT
             }),
             MavMessage::EXTENDED_SYS_STATE(EXTENDED_SYS_STATE_DATA {
@@ -211,6 +228,7 @@ impl Scene {
         let [to_link, from_link] = [Uart::default(), Uart::default()];
         let vehicle = Rc::new(Vehicle {
             mute: Cell::new(false),
+            given_at: Cell::new(Instant::from_millis(3_000)),
             place: Cell::new(START),
             told: RefCell::default(),
         });
@@ -275,11 +293,13 @@ fn it_is_engaged_and_led_to_its_place() {
         let mut scene = Scene::new(tells);
         scene.run(120_000);
         let seen = scene.seen.borrow();
-        // In between it was on the ground and in its pilot's hands: of several states the last is told.
         let expected = [
             AutopilotEvent::Found(Kind::Px4),
+            AutopilotEvent::State(State::Standby),
+            AutopilotEvent::Ready,
             AutopilotEvent::State(State::Engaged),
         ];
+        // Between two polls it was on the ground: of several states the last is told.
         assert_eq!(seen.events, expected);
         assert!(seen.flown);
         let (place, setpoint) = (scene.vehicle.place.get(), seen.setpoint.unwrap());
@@ -314,6 +334,15 @@ fn it_falls_silent_and_comes_back() {
     scene.run(5_000);
     assert_eq!(scene.vehicle.told.borrow().len(), before, "nobody is told");
     scene.vehicle.mute.set(false);
+    scene.run(5_000);
+    // It is in OFFBOARD, and nobody has chosen that since.
+    assert!(!scene.seen.borrow().flown);
+    assert_eq!(scene.vehicle.told.borrow().len(), before, "nobody is told");
+    let now = scene.time.now();
+    scene
+        .vehicle
+        .given_at
+        .set(now + Duration::from_millis(3_000));
     scene.run(10_000);
     assert!(scene.seen.borrow().flown);
     assert!(scene.vehicle.told.borrow().len() > before + 20);
@@ -326,10 +355,21 @@ fn a_stuck_writer_keeps_nobody_from_hearing() {
     scene.run(10_000);
     scene.from_link.0.stuck.set(true);
     scene.run(10_000);
-    let before = scene.seen.borrow().events.len();
+    // No target leaves, so that the autopilot is in its failsafe before long: the drone is not flown any more.
+    let seen = scene.seen.borrow();
+    let release = Release {
+        cause: ReleaseCause::Link,
+        mode: FlightMode::Companion,
+    };
+    assert!(seen.events.contains(&AutopilotEvent::Released(release)));
+    assert!(!seen.flown);
+    let before = seen.events.len();
+    drop(seen);
     scene.vehicle.mute.set(true);
     scene.run(10_000);
     let seen = scene.seen.borrow();
-    let expected = [State::Blind, State::Silent].map(AutopilotEvent::State);
-    assert_eq!(seen.events[before..], expected);
+    assert_eq!(
+        seen.events[before..],
+        [AutopilotEvent::State(State::Silent)]
+    );
 }

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::vehicle::Mode;
 use super::*;
 
-const RUNS: u64 = 200;
+const RUNS: u64 = 300;
 
 /// Any number that a relay or a fault may hand in.
 fn number(rng: &mut ChaCha8Rng) -> f32 {

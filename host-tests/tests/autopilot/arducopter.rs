@@ -43,6 +43,7 @@ fn a_target_that_is_not_taken_is_told_again_and_then_an_event() {
     vehicle.takes_targets = false;
     vehicle.setpoint = Some(place(100.0));
     vehicle.engage();
+    vehicle.place = place(90.0);
     let from = vehicle.now;
     vehicle.run(4_000);
     assert!(
@@ -52,6 +53,36 @@ fn a_target_that_is_not_taken_is_told_again_and_then_an_event() {
     assert!(!vehicle.events.contains(&AutopilotEvent::Refused));
     vehicle.run(4_000);
     assert!(vehicle.events.contains(&AutopilotEvent::Refused));
+}
+
+/// Whoever says nothing of what it flies to has refused nothing.
+#[test]
+fn an_autopilot_whose_streams_were_stopped_has_refused_nothing() {
+    let mut vehicle = flying();
+    vehicle.says_targets = false;
+    vehicle.setpoint = Some(place(130.0));
+    vehicle.engage();
+    vehicle.run(60_000);
+    assert!((vehicle.place.x_m - 130.0).abs() < 0.05);
+    assert!(!vehicle.events.contains(&AutopilotEvent::Refused));
+    let from = vehicle.now;
+    vehicle.run(30_000);
+    assert_eq!(vehicle.targets_since(from), [], "told often enough");
+}
+
+/// The companion is told at once, and not when its target stands.
+#[test]
+fn a_moving_target_that_is_not_taken_is_an_event() {
+    let mut vehicle = flying();
+    vehicle.setpoint = Some(place(500.0));
+    vehicle.engage();
+    vehicle.run(10_000);
+    assert!(!vehicle.events.contains(&AutopilotEvent::Refused));
+    vehicle.takes_targets = false;
+    vehicle.run(12_000);
+    assert!(vehicle.events.contains(&AutopilotEvent::Refused));
+    let last = vehicle.targets().last().unwrap().1;
+    assert!(last.has_velocity(), "it still moves");
 }
 
 #[test]

@@ -2,8 +2,11 @@
 
 mod any;
 mod arducopter;
+mod flights;
+mod motion;
 mod px4;
 mod radio;
+mod real;
 mod signed;
 mod vehicle;
 
@@ -19,12 +22,19 @@ fn an_autopilot_is_found_and_asked_for_its_messages() {
         vehicle.run(2_000);
         assert_eq!(vehicle.events[0], AutopilotEvent::Found(kind));
         assert_eq!(vehicle.link.state(), State::Grounded);
-        for id in [33, 245, 87] {
+        // What a PX4 does not send it is not asked for.
+        let is_px4 = kind == Kind::Px4;
+        for (id, times) in [
+            (33, 1),
+            (245, 1),
+            (87, usize::from(!is_px4)),
+            (162, usize::from(!is_px4)),
+        ] {
             let asked = vehicle
                 .said
                 .iter()
                 .filter(|(_, said)| matches!(said, Said::Interval { id: of, .. } if *of == id));
-            assert_eq!(asked.count(), 1, "{id}");
+            assert_eq!(asked.count(), times, "{id}");
         }
         assert!(
             vehicle
@@ -40,6 +50,24 @@ fn an_autopilot_is_found_and_asked_for_its_messages() {
                 .all(|system| *system == vehicle::SYSTEM),
             "as a part of the vehicle"
         );
+    }
+}
+
+/// Found by an attacker with a clock of its own: the heartbeat stayed due.
+#[test]
+fn the_frames_of_one_instant_end_at_the_last_instant_too() {
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        for before_us in [0, 1, 1_000_000] {
+            let mut vehicle = Vehicle::new(kind);
+            vehicle.run(2_000);
+            let now = Instant::from_micros(u64::MAX - before_us);
+            vehicle.link.handle_timeout(now);
+            let sent = core::iter::from_fn(|| vehicle.link.poll_transmit(now));
+            assert!(
+                sent.take(100).count() < 10,
+                "{kind:?}, {before_us} us before it"
+            );
+        }
     }
 }
 
@@ -126,7 +154,13 @@ fn nothing_is_flown_without_a_position_and_the_last_target_is_kept() {
         }
         assert!(vehicle.heard("relay: no position, keeps its last target"));
         vehicle.position_every_ms = 200;
-        vehicle.run(500);
+        vehicle.run(800);
+        assert_eq!(
+            vehicle.link.state(),
+            State::Blind,
+            "one position is not enough"
+        );
+        vehicle.run(600);
         assert_eq!(vehicle.link.state(), State::Engaged);
     }
 }
@@ -234,7 +268,7 @@ fn the_setpoint_of_before_is_forgotten_on_none() {
     vehicle.engage();
     vehicle.run(6_000);
     vehicle.setpoint = None;
-    vehicle.run(1_000);
+    vehicle.run(12_000);
     let stopped = *vehicle.targets().last().unwrap();
     vehicle.run(5_000);
     let last = *vehicle.targets().last().unwrap();
@@ -257,11 +291,11 @@ fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
             vehicle.setpoint = Some(place(wrong));
             vehicle.run(3_000);
             vehicle.setpoint = Some(place(120.0));
-            vehicle.run(10_000);
+            vehicle.run(15_000);
             let at = vehicle.targets().last().unwrap().1.place();
             assert!((at.x_m - 120.0).abs() < 0.1, "{kind:?} {wrong}: {at:?}");
             vehicle.setpoint = Some(place(110.0));
-            vehicle.run(10_000);
+            vehicle.run(15_000);
         }
     }
 }
@@ -292,4 +326,50 @@ fn a_bearing_that_is_none_is_left_out() {
                 .all(|out| out == leaves_out)
         );
     }
+}
+
+/// OFFBOARD is refused by a PX4 that hears no stream.
+#[test]
+fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.fly_off();
+    vehicle.setpoint = Some(place(120.0));
+    let from = vehicle.now;
+    vehicle.link.handle_ready(vehicle.now, false);
+    vehicle.run(5_000);
+    assert_eq!(vehicle.targets_since(from), []);
+    vehicle.link.handle_ready(vehicle.now, true);
+    vehicle.run(2_000);
+    assert!(vehicle.targets_since(from).len() >= 8);
+    vehicle.engage();
+    assert_eq!(vehicle.link.state(), State::Engaged);
+    let from = vehicle.now;
+    vehicle.link.handle_ready(vehicle.now, false);
+    vehicle.run(5_000);
+    assert_eq!(vehicle.link.state(), State::Engaged);
+    assert!(vehicle.targets_since(from).len() > 20, "it stays engaged");
+}
+
+#[test]
+fn the_operator_reads_why_the_guard_holds_the_relay_back() {
+    use uav_relay::guard::HoldReason::{Order, Unheard};
+
+    let mut vehicle = Vehicle::new(Kind::ArduCopter);
+    let order = "relay: waits, wrong order with the next drone";
+    vehicle.run(2_000);
+    vehicle.link.handle_hold(vehicle.now, [None, Some(Order)]);
+    vehicle.run(1_000);
+    assert!(!vehicle.heard(order), "on the ground nobody asks");
+    vehicle.fly_off();
+    for i in 0..3_000 {
+        let reason = if i % 7 == 0 { Unheard } else { Order };
+        vehicle.link.handle_hold(vehicle.now, [None, Some(reason)]);
+        vehicle.run(20);
+    }
+    let told = vehicle.said.iter().filter_map(|(at, said)| match said {
+        Said::Text(text) if text == order => Some(*at),
+        _ => None,
+    });
+    let told: Vec<Instant> = told.collect();
+    assert!((5..=7).contains(&told.len()), "once in 10 s: {told:?}");
 }

@@ -99,7 +99,7 @@ fn the_pilot_takes_it_and_nothing_is_taken_back() {
     vehicle.mode = Mode::Position;
     vehicle.run(1_100);
     assert_eq!(vehicle.link.state(), State::Standby);
-    assert!(vehicle.heard("relay: released"));
+    assert!(vehicle.heard("relay: released to the sticks"));
     let from = vehicle.now;
     vehicle.place = place(140.0);
     vehicle.run(10_000);
@@ -122,13 +122,13 @@ fn a_failsafe_is_not_ended_by_the_link() {
     // The cable breaks: the autopilot returns by itself, and the cable holds again.
     vehicle.mute = true;
     vehicle.run(5_000);
-    vehicle.mode = Mode::Hold;
+    (vehicle.mode, vehicle.status) = (Mode::Hold, 5);
     vehicle.mute = false;
     let from = vehicle.now;
     vehicle.run(10_000);
     assert_eq!(vehicle.targets_since(from), [], "a stream would end it");
     // The pilot takes the sticks, and gives it back.
-    vehicle.mode = Mode::Position;
+    (vehicle.mode, vehicle.status) = (Mode::Position, 4);
     vehicle.run(2_000);
     assert!(vehicle.targets_since(from).len() > 4);
     vehicle.engage();

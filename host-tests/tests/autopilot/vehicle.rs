@@ -1,8 +1,9 @@
 //! A vehicle with an autopilot of one of the two kinds: it hovers, or flies to the last target in its mode.
 
 use mavlink::dialects::common::{
-    EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, MavLandedState, MavMessage,
-    POSITION_TARGET_GLOBAL_INT_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA,
+    COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, MavLandedState,
+    MavMessage, POSITION_TARGET_GLOBAL_INT_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA,
+    TIMESYNC_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkReader, MavlinkVersion};
 use uav_relay::Geodetic;
@@ -77,6 +78,10 @@ pub(crate) enum Mode {
     Companion,
 }
 
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "faults that are independent of each other"
+)]
 pub(crate) struct Vehicle {
     kind: Kind,
     pub(crate) link: Autopilot,
@@ -91,6 +96,12 @@ pub(crate) struct Vehicle {
     goal: Option<Target>,
     pub(crate) mute: bool,
     pub(crate) takes_targets: bool,
+    /// It says what it flies to.
+    pub(crate) says_targets: bool,
+    /// It answers TIMESYNC.
+    pub(crate) echoes: bool,
+    /// `MAV_STATE`: 4 is active, 5 a failsafe.
+    pub(crate) status: u8,
     pub(crate) position_every_ms: u64,
     pub(crate) late_ms: u64,
     number: u8,
@@ -118,6 +129,9 @@ impl Vehicle {
             goal: None,
             mute: false,
             takes_targets: true,
+            says_targets: true,
+            echoes: true,
+            status: 4,
             position_every_ms: 200,
             late_ms: 0,
             number: 0,
@@ -248,7 +262,7 @@ impl Vehicle {
     ) {
         let base_mode = 1 | if self.armed { 128 } else { 0 };
         let mut payload = mode.to_le_bytes().to_vec();
-        payload.extend([kind, autopilot, base_mode, 4, 3]);
+        payload.extend([kind, autopilot, base_mode, self.status, 3]);
         let mut covered = vec![
             payload.len() as u8,
             0,
@@ -283,10 +297,10 @@ impl Vehicle {
 
     /// An ArduCopter says in its mode what it flies to; a PX4 does not.
     fn say_target(&mut self) {
-        if self.kind == Kind::Px4 || self.mode != Mode::Companion {
+        if self.kind == Kind::Px4 || self.mode != Mode::Companion || !self.says_targets {
             return;
         }
-        if let Some(goal) = self.goal {
+        if let Some(goal) = self.goal.or_else(|| self.own_goal()) {
             self.say(&MavMessage::POSITION_TARGET_GLOBAL_INT(
                 POSITION_TARGET_GLOBAL_INT_DATA {
                     lat_int: goal.lat_e7,
@@ -296,6 +310,22 @@ impl Vehicle {
                 },
             ));
         }
+    }
+
+    /// Told nothing, it holds its place.
+    fn own_goal(&self) -> Option<Target> {
+        let Geodetic {
+            lat_e7,
+            lon_e7,
+            amsl_mm,
+        } = axis().point(self.place)?;
+        Some(Target {
+            lat_e7,
+            lon_e7,
+            alt_m: amsl_mm as f32 / 1e3,
+            velocity_m_s: [0.0; 3],
+            type_mask: 0xDF8,
+        })
     }
 
     fn say(&mut self, message: &MavMessage) {
@@ -332,6 +362,13 @@ impl Vehicle {
             MavMessage::HEARTBEAT(_) => Said::Heartbeat,
             MavMessage::COMMAND_LONG(command) => {
                 assert_eq!(command.command as u32, 511);
+                if !self.mute {
+                    let command = command.command;
+                    self.say(&MavMessage::COMMAND_ACK(COMMAND_ACK_DATA {
+                        command,
+                        ..COMMAND_ACK_DATA::DEFAULT
+                    }));
+                }
                 Said::Interval {
                     id: command.param1 as u32,
                 }
@@ -342,6 +379,16 @@ impl Vehicle {
                 name: value.name.to_str().unwrap().to_owned(),
                 value: value.value,
             },
+            MavMessage::TIMESYNC(sync) => {
+                assert_eq!(sync.tc1, 0, "a question");
+                if !self.mute && self.echoes {
+                    self.say(&MavMessage::TIMESYNC(TIMESYNC_DATA {
+                        tc1: self.now.as_micros().cast_signed() * 1_000,
+                        ts1: sync.ts1,
+                    }));
+                }
+                return;
+            }
             other => panic!("it does not say {other:?}"),
         };
         self.said.push((self.now, said));

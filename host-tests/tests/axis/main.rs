@@ -222,3 +222,97 @@ fn there_and_back_is_within_one_unit() {
         }
     }
 }
+
+/// Returns the distance from a point to the nearest point of the line, m, by geodesics.
+fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
+    let apart = |x: f64| -> f64 {
+        let [at_lat, at_lon, _] = line.at(x);
+        line.earth.inverse(at_lat, at_lon, lat, lon)
+    };
+    // The distance has one valley along the line, or one hill, at whose foot an end is the nearest.
+    let (mut low, mut high) = (0.0, length);
+    for _ in 0..60 {
+        let third = (high - low) / 3.0;
+        if apart(low + third) < apart(high - third) {
+            high -= third;
+        } else {
+            low += third;
+        }
+    }
+    [0.0, length, low]
+        .map(apart)
+        .into_iter()
+        .fold(f64::MAX, f64::min)
+}
+
+/// Largest relative error of a distance, for points up to so far from the middle of the line, m.
+const ALLOWED_AWAY: [(f64, f64); 3] = [(1e5, 1e-6), (1e6, 2e-5), (2.0004e7, 2e-3)];
+
+#[test]
+fn distances_agree_with_geodesics() {
+    for (length, _) in ALLOWED {
+        for (most, allowed) in ALLOWED_AWAY {
+            let mut rng = ChaCha8Rng::seed_from_u64(3);
+            let mut worst = 0.0_f64;
+            for _ in 0..LINES / 10 {
+                let beside = beside(&mut rng, length);
+                let degrees = |unit: i32| f64::from(unit) / 1e7;
+                let earth = Geodesic::wgs84();
+                let [tx_lat, tx_lon, rx_lat, rx_lon] =
+                    [beside.tx_lat, beside.tx_lon, beside.rx_lat, beside.rx_lon].map(degrees);
+                let (length, azimuth, _, _): (f64, f64, f64, f64) =
+                    earth.inverse(tx_lat, tx_lon, rx_lat, rx_lon);
+                let line = Line {
+                    earth,
+                    tx: [tx_lat, tx_lon],
+                    azimuth,
+                };
+                let [lat, lon, _] = line.at(length / 2.0);
+                // Of every order of magnitude from 10 m on.
+                let away = 10.0 * (rng.random_range(0.0..1.0) * (most / 10.0).ln()).exp();
+                let heading = rng.random_range(0.0..360.0);
+                let (lat, lon): (f64, f64) = line.earth.direct(lat, lon, heading, away);
+                let point = ground(unit(lat), unit(around(lon)));
+                let expected =
+                    away_by_geodesics(&line, length, degrees(point.lat_e7), degrees(point.lon_e7));
+                let is = beside.axis().away_m(point).unwrap();
+                // Two units of the point, on the line.
+                let off = ((is - expected).abs() - 0.03).max(0.0) / expected.max(1.0);
+                worst = worst.max(off);
+            }
+            println!(
+                "{:>3} km, up to {:>5.0} km away: within {:.5} %",
+                length / 1e3,
+                most / 1e3,
+                worst * 1e2
+            );
+            assert!(worst <= allowed, "{length} m, {most} m: {worst}");
+        }
+    }
+}
+
+/// Both sites with latitude and longitude swapped, and the other side of the earth.
+#[test]
+fn a_point_that_has_no_place_has_a_distance() {
+    let site = |lat, lon| Geodetic::from_degrees(lat, lon, 420.0).unwrap();
+    let (tx, rx) = (site(8.54, 47.40), site(8.55, 47.41));
+    let axis = Axis::try_new(tx, rx).unwrap();
+    let earth = Geodesic::wgs84();
+    for (lat, lon) in [(47.405, 8.545), (-8.545, -132.595), (90.0, 0.0), (0.0, 0.0)] {
+        let drone = site(lat, lon);
+        assert_eq!(axis.place(drone), None);
+        let ends = [(8.54, 47.40), (8.55, 47.41)]
+            .map(|(end_lat, end_lon)| -> f64 { earth.inverse(lat, lon, end_lat, end_lon) });
+        let expected = ends[0].min(ends[1]);
+        let is = axis.away_m(drone).unwrap();
+        assert!(
+            (is / expected - 1.0).abs() < 3e-3,
+            "{is} m, said are {expected}"
+        );
+    }
+    let nowhere = Geodetic {
+        lat_e7: 900_000_001,
+        ..tx
+    };
+    assert_eq!(axis.away_m(nowhere), None);
+}

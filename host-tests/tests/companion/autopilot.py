@@ -1,17 +1,20 @@
-"""pymavlink as the autopilot of a drone, an ArduCopter or a PX4, on a pseudo-terminal.
+"""pymavlink as the autopilot of a drone, an ArduCopter or a PX4, on a pseudo-terminal or a UDP port.
 
     autopilot.py arducopter|px4 LINK LAT LON AMSL [KEY]
 
-LINK becomes a symbolic link to the tty. With KEY, a file with 64 hexadecimal digits, it signs, and ignores what is not signed. The drone stands at LAT, LON, AMSL, on the ground. What it hears goes to standard output, a
+LINK becomes a symbolic link to the tty, or is `udp:PORT@PARTNER`: a UDP port of this computer, used as a PX4 uses its own. It receives from
+anybody. It sends to port PARTNER of this computer until it receives a first datagram, and from then on to the sender of that one, address and
+port, until it is rebooted. With KEY, a file with 64 hexadecimal digits, it signs, and ignores what is not signed. The drone stands at LAT, LON, AMSL, on the ground. What it hears goes to standard output, a
 JSON object a line, with the drone's own place and mode; standard input has an order a line:
 
     arm, takeoff                 armed; off the ground, and in the air a second later
     mode pilot|hold|rtl|companion
     sticks NORTH EAST            m/s, in the mode `pilot`
-    refuse, accept               targets, as outside a fence
+    refuse, accept               targets, as outside a fence: in silence
     reboot, mute, speak          begins anew on the ground; says nothing; says something
+    stranger, vehicle            heartbeats of no known autopilot; of its own kind again
     noise 150                    a SiK radio hears so much between frames
-    unplug, plug                 the tty vanishes; another one is there
+    unplug, plug                 the tty or the UDP port vanishes; another one is there
 """
 
 import collections
@@ -20,6 +23,7 @@ import math
 import os
 import pty
 import select
+import socket
 import sys
 import time
 import tty
@@ -39,18 +43,103 @@ DEGREE_M = 111_200.0
 STAMPS_BEGIN = 1_420_070_400
 
 
+class Tty:
+    """A pseudo-terminal, and the symbolic link to it."""
+
+    def __init__(self, link):
+        self.link, self.master = link, None
+
+    def open(self):
+        self.master, self.side = pty.openpty()
+        tty.setraw(self.side)
+        os.set_blocking(self.master, False)
+        os.symlink(os.ttyname(self.side), self.link)
+
+    def close(self):
+        os.remove(self.link)
+        os.close(self.master)
+        os.close(self.side)
+        self.master = None
+
+    def restart(self):
+        """The autopilot restarts: a tty has nothing to forget."""
+
+    def is_open(self):
+        return self.master is not None
+
+    def fileno(self):
+        return self.master
+
+    def read(self):
+        return os.read(self.master, 4096)
+
+    def write(self, data):
+        os.write(self.master, data)
+
+    def partner(self):
+        return None
+
+
+class Udp:
+    """A UDP port as a PX4 uses it: the first sender is its partner, address and port, until it restarts."""
+
+    def __init__(self, port, partner):
+        self.port, self.default, self.socket = port, ("127.0.0.1", partner), None
+        self.restart()
+
+    def open(self):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", self.port))
+        self.socket.setblocking(False)
+
+    def close(self):
+        self.socket.close()
+        self.socket = None
+
+    def restart(self):
+        self.first = None
+
+    def is_open(self):
+        return self.socket is not None
+
+    def fileno(self):
+        return self.socket.fileno()
+
+    def read(self):
+        data, sender = self.socket.recvfrom(4096)
+        self.first = self.first or sender
+        return data
+
+    def write(self, data):
+        self.socket.sendto(data, self.partner())
+
+    def partner(self):
+        return self.first or self.default
+
+
+def port_of(link):
+    if not link.startswith("udp:"):
+        return Tty(link)
+    port, partner = link.removeprefix("udp:").split("@")
+    return Udp(int(port), int(partner))
+
+
 class Drone:
     def __init__(self, kind, link, at, key):
-        self.kind, self.link, self.home, self.key = kind, link, at, key
+        self.kind, self.home, self.key = kind, at, key
         self.at, self.sticks, self.silent, self.refuses = list(at), (0.0, 0.0), False, False
-        self.tty = None
+        self.is_stranger = False
+        self.port = port_of(link)
         self.start()
         self.plug()
 
     def start(self):
+        self.port.restart()
         self.began = time.monotonic()
         self.armed, self.landed, self.mode, self.by_itself = False, ON_GROUND, "pilot", False
         self.goal, self.told_at, self.took_off_at = None, -math.inf, 0.0
+        # Since when targets have come without a gap of a second, and where it holds its place.
+        self.streamed_at, self.hold = -math.inf, tuple(self.at)
         # Where it has said to be, the last few seconds.
         self.said = collections.deque(maxlen=20)
         self.at[2] = self.home[2]
@@ -60,10 +149,7 @@ class Drone:
             self.streams[245] = [0.2, 0.0]
 
     def plug(self):
-        self.tty, self.side = pty.openpty()
-        tty.setraw(self.side)
-        os.set_blocking(self.tty, False)
-        os.symlink(os.ttyname(self.side), self.link)
+        self.port.open()
         self.codec, self.reader = common.MAVLink(None, SYSTEM, 1), common.MAVLink(None)
         self.reader.robust_parsing = True
         for end in [self.codec, self.reader] if self.key else []:
@@ -72,12 +158,6 @@ class Drone:
 
     def stamp(self, end):
         end.signing.timestamp = max(end.signing.timestamp, int((time.time() - STAMPS_BEGIN) * 1e5))
-
-    def unplug(self):
-        os.remove(self.link)
-        os.close(self.tty)
-        os.close(self.side)
-        self.tty = None
 
     def order(self, words):
         match words:
@@ -88,7 +168,7 @@ class Drone:
             case ["mode", mode]:
                 # A PX4 refuses its mode to a companion that does not stream.
                 if not (self.kind == "px4" and mode == "companion" and time.monotonic() - self.told_at > 1.0):
-                    self.mode, self.by_itself, self.goal = mode, False, None
+                    self.mode, self.by_itself, self.goal, self.hold = mode, False, None, tuple(self.at)
             case ["sticks", north, east]:
                 self.sticks = float(north), float(east)
             case ["refuse" | "accept" as word]:
@@ -97,10 +177,12 @@ class Drone:
                 self.start()
             case ["mute" | "speak" as word]:
                 self.silent = word == "mute"
+            case ["stranger" | "vehicle" as word]:
+                self.is_stranger = word == "stranger"
             case ["noise", noise]:
                 self.noise(int(noise))
             case ["unplug"]:
-                self.unplug()
+                self.port.close()
             case ["plug"]:
                 self.plug()
             case _:
@@ -109,7 +191,7 @@ class Drone:
     def noise(self, noise):
         """What a SiK radio says on the same link: it cannot sign."""
         radio = common.MAVLink(None, ord("3"), ord("D"))
-        os.write(self.tty, common.MAVLink_radio_status_message(200, 190, 100, noise, 60, 0, 0).pack(radio))
+        self.port.write(common.MAVLink_radio_status_message(200, 190, 100, noise, 60, 0, 0).pack(radio))
 
     def step(self):
         now = time.monotonic()
@@ -122,6 +204,10 @@ class Drone:
         lost = self.kind == "px4" and self.mode == "companion" and now - self.told_at > 1.0
         if lost:
             self.mode, self.by_itself, self.goal = "hold", True, None
+        # It goes back to the companion by itself once that has streamed again for a while.
+        streams = now - self.told_at < 1.0 and now - self.streamed_at > 1.2
+        if self.kind == "px4" and self.mode == "hold" and self.by_itself and streams:
+            self.mode, self.by_itself = "companion", False
         if self.mode == "companion" and self.goal:
             self.fly(self.goal)
         elif self.mode == "rtl":
@@ -142,7 +228,7 @@ class Drone:
 
     def hear(self):
         try:
-            data = os.read(self.tty, 4096)
+            data = self.port.read()
         except (BlockingIOError, OSError):
             return
         self.stamp(self.reader)
@@ -152,13 +238,18 @@ class Drone:
             if name == "BAD_DATA":
                 continue
             if name == "COMMAND_LONG" and message.command == 511:
-                self.streams[int(message.param1)] = [message.param2 / 1e6, 0.0]
-                self.say(common.MAVLink_command_ack_message(511, 0))
+                # What it does not send, it says so of.
+                has = self.has(int(message.param1))
+                if has:
+                    self.streams[int(message.param1)] = [message.param2 / 1e6, 0.0]
+                self.say(common.MAVLink_command_ack_message(511, 0 if has else 2))
+            elif name == "TIMESYNC" and message.tc1 == 0:
+                self.say(common.MAVLink_timesync_message(int(time.monotonic() * 1e9), message.ts1))
             elif name == "SET_POSITION_TARGET_GLOBAL_INT":
                 self.take(message)
             fields = message.to_dict()
             fields["from"] = [message.get_srcSystem(), message.get_srcComponent()]
-            fields["own"] = {"at": self.at, "mode": self.mode, "landed": self.landed, "by_itself": self.by_itself, "said": list(self.said)}
+            fields["own"] = {"at": self.at, "mode": self.mode, "landed": self.landed, "by_itself": self.by_itself, "said": list(self.said), "partner": self.port.partner()}
             print(json.dumps(fields), flush=True)
 
     def take(self, message):
@@ -166,18 +257,21 @@ class Drone:
         is_mine = (message.target_system, message.target_component) == (SYSTEM, 1)
         if not is_position or message.type_mask & ACCELERATION != ACCELERATION or not is_mine or self.refuses:
             return
-        self.told_at = time.monotonic()
-        # A PX4 goes back to the companion by itself once it streams again.
-        if self.kind == "px4" and self.mode == "hold" and self.by_itself:
-            self.mode, self.by_itself = "companion", False
+        now = time.monotonic()
+        if now - self.told_at > 1.0:
+            self.streamed_at = now
+        self.told_at = now
         if self.mode == "companion":
             self.goal = message.lat_int / 1e7, message.lon_int / 1e7, message.alt
+
+    def has(self, number):
+        return number in (33, 245) or self.kind == "arducopter" and number in (87, 162)
 
     def say(self, message):
         if not self.silent:
             self.stamp(self.codec)
             try:
-                os.write(self.tty, message.pack(self.codec))
+                self.port.write(message.pack(self.codec))
             except BlockingIOError:
                 pass
 
@@ -193,8 +287,8 @@ class Drone:
         lat, lon = (round(degrees * 1e7) for degrees in self.at[:2])
         if number == 0:
             base = 1 | (128 if self.armed else 0)
-            autopilot = 12 if self.kind == "px4" else 3
-            return common.MAVLink_heartbeat_message(2, autopilot, base, MODES[self.kind][self.mode], 4, 3)
+            autopilot = 0 if self.is_stranger else 12 if self.kind == "px4" else 3
+            return common.MAVLink_heartbeat_message(2, autopilot, base, MODES[self.kind][self.mode], 5 if self.by_itself else 4, 3)
         if number == 33:
             self.said.append(list(self.at))
             above = self.at[2] - self.home[2]
@@ -204,8 +298,10 @@ class Drone:
         if number == 245:
             return common.MAVLink_extended_sys_state_message(0, self.landed)
         # A PX4 does not say it in its mode.
-        if number == 87 and self.kind == "arducopter" and self.mode == "companion" and self.goal:
-            lat, lon, amsl = self.goal
+        if number == 162:
+            return common.MAVLink_fence_status_message(0, 0, 0, 0)
+        if number == 87 and self.mode == "companion":
+            lat, lon, amsl = self.goal or self.hold
             return common.MAVLink_position_target_global_int_message(
                 boot_ms, AMSL, 0xDF8, round(lat * 1e7), round(lon * 1e7), amsl, 0, 0, 0, 0, 0, 0, 0, 0
             )
@@ -219,7 +315,7 @@ os.set_blocking(0, False)
 orders = b""
 next_step = time.monotonic()
 while True:
-    wait = [0] if drone.tty is None else [0, drone.tty]
+    wait = [0, drone.port] if drone.port.is_open() else [0]
     ready, _, _ = select.select(wait, [], [], max(0.0, next_step - time.monotonic()))
     if 0 in ready:
         data = os.read(0, 4096)
@@ -228,10 +324,10 @@ while True:
         *lines, orders = (orders + data).split(b"\n")
         for line in lines:
             drone.order(line.decode().split())
-    if drone.tty is not None:
+    if drone.port.is_open():
         drone.hear()
     if time.monotonic() >= next_step:
         next_step += STEP
         drone.step()
-        if drone.tty is not None:
+        if drone.port.is_open():
             drone.say_what_is_due()

@@ -133,6 +133,13 @@ fn what_is_wrong_with_the_file_is_named() {
             &["companion.speed_m_s = 21", "0.1 to 20 m/s"],
         ),
         (
+            "[companion]\nautopilot = \"udp:localhost:64536\"",
+            &[
+                "companion.autopilot = \"udp:localhost:64536\" needs @LOCAL",
+                "PORT within 1 to 64535",
+            ],
+        ),
+        (
             "[ground]\nend = \"top\"",
             &["ground.end", "\"tx\" or \"rx\""],
         ),

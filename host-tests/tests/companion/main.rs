@@ -1,8 +1,10 @@
 //! `examples/linux_companion` and `examples/linux_ground` as processes on pseudo-terminals, against the simulated chain.
 #![cfg(target_os = "linux")]
 
+mod astray;
 mod binary;
 mod captured;
+mod datagrams;
 mod ending;
 mod file;
 mod flying;
@@ -23,6 +25,7 @@ mod soak;
 mod stand;
 mod stays;
 mod systemd;
+mod unanswered;
 mod unplugged;
 mod upload;
 mod views;

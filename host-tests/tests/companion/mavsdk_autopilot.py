@@ -53,6 +53,8 @@ while not mavsdk.get_systems():
 (system,) = mavsdk.get_systems()
 direct = MavlinkDirect(system)
 targets = []
+# While there is one, it says in a heartbeat of its own that it is active, in a mode of its pilot.
+active = []
 
 
 def hear(message, _):
@@ -78,11 +80,14 @@ def order(words):
         case ["px4"]:
             says = {"type": 2, "autopilot": 12, "base_mode": 1, "custom_mode": 0, "system_status": 4}
             direct.send_message(MavlinkMessage("HEARTBEAT", 1, 1, 0, 0, json.dumps(says)))
+        case ["active"]:
+            active.append(time.monotonic())
         case ["arm"]:
             action.set_armed_state(True)
         case ["air"]:
             landed = LandedState.IN_AIR
         case ["mode", mode]:
+            active.clear()
             action.set_flight_mode({"hold": FlightMode.HOLD, "offboard": FlightMode.OFFBOARD}[mode])
         case _:
             raise ValueError(words)
@@ -97,6 +102,10 @@ while True:
         *lines, orders = (orders + data).split(b"\n")
         for line in lines:
             order(line.decode().split())
+    if active and time.monotonic() - active[0] > 0.5:
+        active[0] = time.monotonic()
+        says = {"type": 2, "autopilot": 12, "base_mode": 129, "custom_mode": 4 << 16 | 3 << 24, "system_status": 4}
+        direct.send_message(MavlinkMessage("HEARTBEAT", 1, 1, 0, 0, json.dumps(says)))
     if targets:
         at = targets.pop()
         targets.clear()

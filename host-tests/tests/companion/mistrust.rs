@@ -27,8 +27,7 @@ fn has(ended: &Ended, part: &str) -> bool {
 
 #[test]
 fn an_autopilot_that_signs_to_a_relay_without_a_key_is_told_of() {
-    let line =
-        "autopilot: signs its frames, and ignores what is not signed: give --autopilot-key-file";
+    let line = "autopilot: signs its frames, and answers nothing that is not signed: give --autopilot-key-file";
     let (ended, believed) = tells(Some(ONE), None, line);
     assert!(!believed);
     assert!(has(&ended, "autopilot: found"), "{ended:?}");

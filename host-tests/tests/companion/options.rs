@@ -226,6 +226,34 @@ const WRONG_AUTOPILOT: &[(&[&str], &[&str])] = &[
         &["udp:localhost:65536:", "1 to 65535"],
     ),
     (
+        &["--autopilot", "udp:localhost:64536"],
+        &[
+            "--autopilot udp:localhost:64536: needs @LOCAL",
+            "PORT + 1000 = 65536",
+            "PORT within 1 to 64535",
+        ],
+    ),
+    (
+        &["--autopilot", "udp:localhost:14580@0"],
+        &[
+            "--autopilot udp:localhost:14580@0: has a LOCAL",
+            "udp:HOST:PORT@LOCAL",
+            "1 to 65535",
+        ],
+    ),
+    (
+        &["--autopilot", "udp:localhost:14580@x"],
+        &["udp:localhost:14580@x: has a LOCAL", "1 to 65535"],
+    ),
+    (
+        &["--autopilot", "udp:localhost@14540"],
+        &["udp:localhost@14540: has no PORT", "1 to 65535"],
+    ),
+    (
+        &["--autopilot", "udp::14580@14540"],
+        &["udp::14580@14540: has no HOST", "udp:HOST:PORT@LOCAL"],
+    ),
+    (
         &["--autopilot-key-file", "a"],
         &["--autopilot <TTY", "not provided"],
     ),
@@ -277,7 +305,7 @@ fn an_autopilot_that_is_not_there_at_the_start_is_a_mistake() {
         ("/dev/null", "--autopilot /dev/null: is no tty"),
         (
             "udp:nowhere.invalid:14540",
-            "--autopilot udp:nowhere.invalid:14540: ",
+            "--autopilot udp:nowhere.invalid:14540: HOST nowhere.invalid is not found: ",
         ),
     ] {
         let alone = ["--index", "1", "--of", "1", "--autopilot", autopilot];

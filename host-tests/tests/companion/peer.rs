@@ -111,6 +111,17 @@ impl Heard {
         self.0["mavpackettype"] == name
     }
 
+    /// True for every message of the companion.
+    pub(crate) fn is_any(&self) -> bool {
+        self.0["own"].is_object()
+    }
+
+    /// Returns the UDP port that the drone sends to.
+    pub(crate) fn partner(&self) -> Option<u16> {
+        let port = self.0["own"]["partner"][1].as_u64()?;
+        u16::try_from(port).ok()
+    }
+
     pub(crate) fn is_target(&self) -> bool {
         self.is("SET_POSITION_TARGET_GLOBAL_INT")
     }

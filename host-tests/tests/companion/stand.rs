@@ -294,7 +294,7 @@ fn a_station_that_stands_uploads_and_stands_on() {
         (Relay::ground(&options), level, capture)
     };
     let (mut first, level, capture) = station("2", "first");
-    first.line("flown: relay 1 flies version 2");
+    first.line("flown: 1 of 1 relays fly version 2, as relay 1 says");
     relay.line("adopted: flies version 2");
     write(&level, "1e-9\n");
     first.line("measurement: 1.000e-9 W by ");

@@ -24,9 +24,10 @@ fn a_port_that_vanishes_is_opened_again() {
         assert!(flight.relay.lines_with("is back").is_empty(), "it is not");
         flight.drone.order("plug");
         flight.relay.line("is back");
-        flight
-            .relay
-            .line("autopilot: flies to the relay's setpoints");
+        // It is in GUIDED still, and its pilot has to choose that again.
+        flight.relay.line("autopilot: cannot be engaged");
+        flight.drone.order("mode pilot");
+        flight.is_engaged();
         flight.drone.hears(Heard::is_target);
     }
     flight.arrives(place);

@@ -7,6 +7,7 @@ use uav_relay_scenario::mission;
 use uav_relay_scenario::{Interference, Scenario, Source};
 
 use crate::medium::{Medium, Noise, QUIET};
+use crate::positions::{fifo, write};
 use crate::process::{Ended, Relay};
 use crate::pty::make_raw;
 use crate::signed::Files;
@@ -75,7 +76,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
         assert_eq!(ended.status, Some(0), "{ended:?}");
         let last = ended.stdout.last().unwrap();
         assert!(
-            last.contains("flown: relay 1 flies version 3, view "),
+            last.contains("flown: 2 of 2 relays fly version 3, as relay 1 says, view "),
             "{last}"
         );
         for (relay, place) in relays.iter_mut().zip(&uploaded) {
@@ -123,7 +124,10 @@ fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
     .end();
     assert_eq!(ended.status, Some(0), "{ended:?}");
     let last = ended.stdout.last().unwrap();
-    assert!(last.contains("flown: relay 2 flies version 1"), "{last}");
+    assert!(
+        last.contains("flown: 2 of 2 relays fly version 1, as relay 2 says"),
+        "{last}"
+    );
     for (relay, place) in relays.iter_mut().zip(&uploaded) {
         relay.settles_at(*place);
     }
@@ -220,7 +224,74 @@ fn the_ground_gives_up_in_time_where_nobody_answers() {
     assert!(stderr[0].ends_with("; 0 frames refused"), "{stderr:?}");
 }
 
+/// Relays that fly with a guard, at 20 m: an altitude outside of their geofence is refused by name, one inside of it is flown.
+#[test]
+fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
+    for (band, altitude, range) in [
+        (None, "30", Some("20 to 20 m")),
+        (Some("15,60"), "5000", Some("15 to 60 m")),
+        (Some("15,60"), "30", None),
+    ] {
+        let files = Files::new();
+        let folder = tempfile::tempdir().unwrap();
+        let (tx, wire) = (Medium::new(2, QUIET), Medium::new(2, QUIET));
+        let places = [1, 2].map(|index: usize| fifo(folder.path(), &index.to_string()));
+        let band = band.map(|band| ["--band", band]);
+        let band = band.as_ref().map_or(&[][..], |band| &band[..]);
+        let mut relays = [1, 2].map(|index: usize| {
+            let mut ttys = if index == 1 {
+                vec!["--upstream", tx.tty(1), "--downstream", wire.tty(0)]
+            } else {
+                vec!["--upstream", wire.tty(1)]
+            };
+            ttys.extend(["--positions", places[index - 1].to_str().unwrap()]);
+            ttys.extend(band);
+            relay(&files, index, &ttys)
+        });
+        let told = [("300 0 20\n", 0), ("700 0 20\n", 1)];
+        let tell = || {
+            for (line, at) in told {
+                write(&places[at], line);
+            }
+        };
+        tell();
+        for relay in &mut relays {
+            relay.line("converged: ");
+        }
+        let mut more = vec![
+            "--end",
+            "tx",
+            "--tty",
+            tx.tty(0),
+            "--new-altitude",
+            altitude,
+        ];
+        more.extend(band);
+        let own = format!("{altitude},{altitude}");
+        if range.is_some() {
+            more.extend(["--new-band", &own]);
+        }
+        let ended = ground(&files, "5", &more).end();
+        let Some(range) = range else {
+            assert_eq!(ended.status, Some(0), "{ended:?}");
+            for relay in &mut relays {
+                relay.line("adopted: flies version 5");
+            }
+            continue;
+        };
+        assert_eq!(ended.status, Some(1), "{ended:?}");
+        let line = format!(
+            "--version 5: relay 1, or one beyond it, refuses it: altitude {altitude} m: must be within {range}, the geofence of relays that were loaded with this --altitude and --band"
+        );
+        assert_eq!(ended.stderr, [line]);
+        let own = "refused: an upload; its altitudes must be within the relay's own geofence, ";
+        relays[0].line(&format!("{own}{range}"));
+        assert!(!relays[0].has_said("adopted: ") && !relays[1].has_said("adopted: "));
+    }
+}
+
 /// Options of the ground, and what the line must have in it.
+#[expect(clippy::too_many_lines, reason = "a table")]
 fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
     let wrong: &[(&[&str], &[&str])] = &[
         (&["--version", "0"], &["--version", "'0'", "1 to 65535"]),
@@ -287,6 +358,29 @@ fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
         (
             &[SITED, &["--new-site-rx", "47.4,8.54,420"]].concat(),
             &["--new-site-rx", "0.00 m apart", "10 to 100000 m"],
+        ),
+        (
+            &[SITED, &["--new-site-rx", "47.39,8.55,431"]].concat(),
+            &["--new-site-rx", "turns the line by 111.", "0 to 60.0"],
+        ),
+        // Both ends with latitude and longitude swapped are places on earth.
+        (
+            &[
+                SITED,
+                &[
+                    "--new-site-tx",
+                    "8.54,47.4,420",
+                    "--new-site-rx",
+                    "8.55,47.41,431",
+                ],
+            ]
+            .concat(),
+            &[
+                "--new-site-rx",
+                "km from the one of --site-tx and --site-rx",
+                "must be within 102 km",
+                "are latitude and longitude swapped?",
+            ],
         ),
         (
             &[SITED, &["--new-site-tx", "48.9,8.54,420"]].concat(),

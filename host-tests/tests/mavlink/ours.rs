@@ -32,6 +32,9 @@ fn messages() -> Vec<Outgoing<'static>> {
                 .then(|| [0; 3].map(|_| rng.random_range(-20.0..20.0))),
             yaw_rad: rng.random_bool(0.5).then(|| rng.random_range(-3.2..3.2)),
         });
+        all.push(Outgoing::TimeSync {
+            asked: rng.random_range(0..1 << 62),
+        });
         all.push(Outgoing::NamedValue {
             boot_ms: rng.random(),
             name: ["sir", "x", "exactlyten", "more than ten"][rng.random_range(0..4)],
@@ -160,6 +163,10 @@ fn pymavlink_reads_every_field_of_what_is_said() {
                 assert_eq!(["afx", "afy", "afz", "yaw_rate"].map(float), [0.0; 4]);
                 assert_eq!(float("yaw"), yaw_rad.unwrap_or_default());
             }
+            Outgoing::TimeSync { asked } => {
+                assert_eq!(kind, "TIMESYNC");
+                assert_eq!((integer("tc1"), integer("ts1")), (0, asked.cast_signed()));
+            }
             Outgoing::StatusText { severity, text } => {
                 assert_eq!(kind, "STATUSTEXT");
                 assert_eq!(integer("severity"), i64::from(severity));
@@ -223,6 +230,9 @@ fn the_mavlink_crate_reads_every_field_of_what_is_said() {
                 assert_eq!(said.type_mask.bits(), mask);
                 assert_eq!(said.coordinate_frame as u32, 5);
                 assert_eq!((said.target_system, said.target_component), (7, 1));
+            }
+            (Outgoing::TimeSync { asked }, MavMessage::TIMESYNC(said)) => {
+                assert_eq!((said.tc1, said.ts1), (0, asked.cast_signed()));
             }
             (Outgoing::StatusText { severity, text }, MavMessage::STATUSTEXT(said)) => {
                 assert_eq!(said.severity as u32, u32::from(severity));

@@ -51,6 +51,17 @@ pub(super) fn written() -> Vec<(String, Option<Incoming>)> {
                 velocity_cm_s,
             }),
         ));
+        let [answered, asked]: [u64; 2] = [0; 2].map(|_| rng.random_range(0..1 << 62));
+        all.push((
+            json!({"name": "TIMESYNC", "tc1": answered, "ts1": asked}),
+            Some(Incoming::TimeSync { answered, asked }),
+        ));
+        let is_breached: bool = rng.random();
+        all.push((
+            json!({"name": "FENCE_STATUS", "breach_status": u8::from(is_breached), "breach_count": 5, "breach_type": 2,
+                "breach_time": 77}),
+            Some(Incoming::FenceStatus { is_breached }),
+        ));
         let [vtol, landed_state, rssi, noise] = bytes(&mut rng);
         all.push((
             json!({"name": "EXTENDED_SYS_STATE", "vtol_state": vtol, "landed_state": landed_state}),

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use uav_relay_scenario::endpoint::EndpointError;
+
 use super::*;
 
 #[test]
@@ -372,5 +374,53 @@ fn noise_out_of_range_is_refused_with_its_range() {
             Problem::OutOfRange,
             &["noise.power_dbm = ", "-200 to 0 dBm"],
         );
+    }
+}
+
+/// Tools that fly nothing check the address, too: it is found before the flight.
+#[test]
+fn an_autopilot_at_no_udp_port_is_refused() {
+    let file = |autopilot: &str| small(&format!("[companion]\nautopilot = {autopilot}\n"));
+    for (autopilot, error, said) in [
+        ("'udp:'", EndpointError::NoHost, "has no HOST"),
+        ("'udp::14580'", EndpointError::NoHost, "has no HOST"),
+        ("'udp:fc'", EndpointError::NoPort, "has no PORT"),
+        ("'udp:fc:0'", EndpointError::NoPort, "has no PORT"),
+        ("'udp:fc:65536'", EndpointError::NoPort, "has no PORT"),
+        ("'udp:fc:1@'", EndpointError::NoLocal, "has a LOCAL"),
+        ("'udp:fc:1@65536'", EndpointError::NoLocal, "has a LOCAL"),
+        (
+            "'udp:fc:65000'",
+            EndpointError::NoDefault { port: 65_000 },
+            "needs @LOCAL, because the default, PORT + 1000 = 66000, is no port",
+        ),
+    ] {
+        let text = autopilot.replace('\'', "\"");
+        let key = format!("companion.autopilot = {text} {said}");
+        let allowed = "udp:HOST:PORT@LOCAL, PORT and LOCAL within 1 to 65535";
+        refused(
+            &file(autopilot),
+            Problem::NoEndpoint(error),
+            &[&key, "a tty, or udp:HOST:PORT", allowed],
+        );
+    }
+    refused(
+        &file("''"),
+        Problem::OutOfRange,
+        &["companion.autopilot = \"\"", "a tty, or"],
+    );
+    refused(
+        &file("14580"),
+        Problem::WrongType,
+        &["companion.autopilot = 14580", "a tty, or"],
+    );
+    for good in [
+        "'/dev/ttyAMA0'",
+        "'fc1'",
+        "'udp:localhost:14580'",
+        "'udp:[::1]:65535@1'",
+        "'udp:10.0.0.2:5760@9000'",
+    ] {
+        assert!(parse(&file(good)).is_ok(), "{good}");
     }
 }

@@ -1,13 +1,52 @@
-//! The target that the autopilot is given: on its way from where the drone is to the setpoint, no faster than allowed.
+//! The carrot: the target that the autopilot is given, on its way from where the drone is to the setpoint, no faster than allowed.
 //!
-//! It starts with the drone's own position, gains speed and loses it again by the same acceleration a: at the distance s from the
-//! setpoint it is no faster than sqrt(2 a s), from which it stops there.
+//! It starts at the drone's own position and gains speed by the acceleration a. At the distance s from the setpoint it is no faster than
+//! k s near the setpoint and sqrt(2 a (s - a / 2 k^2)) farther away, where it loses speed by a. Near its end it loses less and less: a PX4
+//! that follows a target which stops by a constant a flies past it.
+//!
+//! An autopilot that is behind its target catches up: it flies faster than the target by its lag times its gain, which is about 1 /s, and by more while it gains speed. So the
+//! carrot is slower than allowed by that much, and the drone is not faster than allowed.
 
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
 /// Nearer than this to the setpoint it is there, m.
 const THERE_M: f32 = 0.01;
+
+/// How fast it slows down near the setpoint, 1/s, and the least speed there, m/s.
+const END_PER_S: f32 = 0.5;
+const END_SPEED_M_S: f32 = 0.2;
+
+/// How fast autopilots catch up with a target that they lag behind, 1/s.
+const CATCH_UP_PER_S: f32 = 1.25;
+
+/// The part of the speed that the carrot has at most: the rest is for a drone that gains speed and overshoots.
+const CARROT_PART: f32 = 0.96;
+
+/// How fast it gets near its greatest speed, 1/s: without a corner, since a drone that gains speed goes on doing so for a moment.
+const TOP_PER_S: f32 = 0.5;
+
+/// The least part of the speed that is left to a carrot whose drone lags behind: it is never stuck.
+const LEAST_PART: f32 = 0.1;
+
+/// How fast it loses speed that leads elsewhere than to a new setpoint, as a multiple of its acceleration. It has lost it within
+/// [`Pace::stopping_time`], where the drone would fly past a carrot that turns at once and come back.
+const TURN_PART: f32 = 2.0;
+
+/// The way that may be left of a target that counts as stopped, m. Its drone, which is behind, has up to 0.5 m left.
+const SETTLED_M: f32 = 0.25;
+
+/// The time from a new setpoint until the drone acts on it: 0.2 s to the flight controller, and 1 s by which it is behind its target.
+const BEHIND_MS: u64 = 1_200;
+
+/// The time in which the speed near the end halves, ms: ln 2 / k.
+const HALVES_MS: u64 = 1_387;
+
+/// The most times that the speed halves before the drone has stopped: from 20 m to go at the greatest acceleration.
+const MOST_HALVES: u32 = 8;
+
+/// A position older than this is none.
+const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
 /// The longest step: after a gap it goes on from where it is.
 const LONGEST_STEP: Duration = Duration::from_millis(500);
@@ -33,7 +72,65 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Whether both are in their ranges.
+    /// Returns the default acceleration with that greatest speed, m/s: 0.1 to 20, or 0 for the default's.
+    pub fn of_speed(speed_m_s: f32) -> Self {
+        let mut pace = Self::default();
+        if speed_m_s > 0.0 {
+            pace.speed_m_s = speed_m_s;
+        }
+        pace
+    }
+
+    /// Returns the greatest speed at that distance from the place where it stops.
+    fn speed_before_m_s(self, left_m: f32) -> f32 {
+        let a = self.acceleration_m_s2;
+        // Here the two parts meet, both at the speed a / k.
+        let near_m = a / (END_PER_S * END_PER_S);
+        if left_m > near_m {
+            libm::sqrtf(2.0 * a * (left_m - near_m / 2.0))
+        } else {
+            (END_PER_S * left_m).max(END_SPEED_M_S)
+        }
+    }
+
+    /// Returns the distance in which it stops from that speed, m.
+    fn stopping_m(self, speed_m_s: f32) -> f32 {
+        let a = self.acceleration_m_s2;
+        if speed_m_s > a / END_PER_S {
+            speed_m_s * speed_m_s / (2.0 * a) + a / (END_PER_S * END_PER_S) / 2.0
+        } else {
+            speed_m_s / END_PER_S
+        }
+    }
+
+    /// Returns the time from a new setpoint until a drone has stopped that flew elsewhere at the greatest speed: for
+    /// [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag). 9.8 s for the default.
+    ///
+    /// The target loses speed by the acceleration a down to a / k, and from there with its way to go, of which at most 0.25 m is left
+    /// after this time. At most 8 steps.
+    ///
+    /// Asserted by `host-tests/tests/autopilot/motion.rs`: after this time a drone moves no farther than 0.5 m.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "0 to 200 000 ms within the ranges; a cast saturates outside"
+    )]
+    pub fn stopping_time(self) -> Duration {
+        let a = self.acceleration_m_s2;
+        let near = (a / END_PER_S).min(self.speed_m_s);
+        let mut time_ms = ((self.speed_m_s - near) / a * 1e3) as u64 + BEHIND_MS;
+        let mut left_m = near / END_PER_S;
+        for _ in 0..MOST_HALVES {
+            if left_m <= SETTLED_M {
+                break;
+            }
+            left_m /= 2.0;
+            time_ms += HALVES_MS;
+        }
+        Duration::from_millis(time_ms)
+    }
+
+    /// Returns true if both are in their ranges.
     pub fn is_valid(self) -> bool {
         (0.1..=20.0).contains(&self.speed_m_s) && (0.1..=5.0).contains(&self.acceleration_m_s2)
     }
@@ -65,42 +162,112 @@ impl Carrot {
         self.stands
     }
 
-    /// Moves on toward `setpoint` until `now`.
-    pub(super) fn advance(&mut self, now: Instant, setpoint: Placement, pace: Pace) {
+    /// Returns where it would be `ago` before it moved last, at its velocity.
+    fn before(&self, ago: Duration) -> Placement {
+        let t = seconds(ago.min(LONGEST_LAG));
+        let [x, y, up] = self.velocity_m_s;
+        Placement {
+            x_m: self.place.x_m - x * t,
+            y_m: self.place.y_m - y * t,
+            altitude_m: self.place.altitude_m - up * t,
+        }
+    }
+
+    /// Returns where it stops when it loses speed from now on, which is not beyond `setpoint`.
+    pub(super) fn stop(&self, setpoint: Placement, pace: Pace) -> Placement {
+        let to = self.way_to(setpoint);
+        let left = length(to);
+        let speed = length(self.velocity_m_s);
+        let needs = pace.stopping_m(speed);
+        if self.stands || left <= THERE_M || dot(self.velocity_m_s, to) <= 0.0 {
+            return self.place;
+        }
+        let part = (needs / left).min(1.0);
+        Placement {
+            x_m: self.place.x_m + to[0] * part,
+            y_m: self.place.y_m + to[1] * part,
+            altitude_m: self.place.altitude_m + to[2] * part,
+        }
+    }
+
+    fn way_to(&self, setpoint: Placement) -> [f32; 3] {
+        way(self.place, setpoint)
+    }
+
+    /// Moves on toward `setpoint` until `now`. The drone was at `drone`, so long ago, if that is known.
+    pub(super) fn advance(
+        &mut self,
+        now: Instant,
+        setpoint: Placement,
+        pace: Pace,
+        drone: Option<(Placement, Duration)>,
+    ) {
         let passed = now.since(self.moved_at).min(LONGEST_STEP);
         self.moved_at = now;
-        #[expect(clippy::cast_precision_loss, reason = "half a second at most")]
-        let dt = passed.as_micros() as f32 * 1e-6;
-        let to = [
-            setpoint.x_m - self.place.x_m,
-            setpoint.y_m - self.place.y_m,
-            setpoint.altitude_m - self.place.altitude_m,
-        ];
+        let dt = seconds(passed);
+        let to = self.way_to(setpoint);
         let left = length(to);
-        if left <= THERE_M {
+        let a = pace.acceleration_m_s2;
+        let turn = TURN_PART * a * dt;
+        // A new setpoint may be to the side of where it goes, or behind: it loses the speed that leads elsewhere first.
+        let ahead = to.map(|part| part / left.max(THERE_M));
+        let toward = dot(self.velocity_m_s, ahead);
+        let [x, y, up] = self.velocity_m_s;
+        let aside = [
+            x - toward * ahead[0],
+            y - toward * ahead[1],
+            up - toward * ahead[2],
+        ];
+        let slip = length(aside);
+        let keeps = if slip > turn { 1.0 - turn / slip } else { 0.0 };
+        if left <= THERE_M && keeps <= 0.0 {
             *self = Self::at(setpoint, now);
             return;
         }
-        let a = pace.acceleration_m_s2;
-        // A new setpoint may be to the side of where it goes: only what goes toward it counts.
-        let toward = dot(self.velocity_m_s, to) / left;
-        let speed = (toward.max(0.0) + a * dt)
-            .min(pace.speed_m_s)
-            .min(libm::sqrtf(2.0 * a * left));
-        let step = speed * dt;
-        if step >= left {
+        // A drone that is ahead of the carrot does not catch up: the carrot would swing with it.
+        let behind = |(place, ago)| dot(way(place, self.before(ago)), to) / left;
+        let lag_m = drone.map_or(0.0, behind).max(0.0);
+        let most = (CARROT_PART * pace.speed_m_s - CATCH_UP_PER_S * lag_m)
+            .max(LEAST_PART * pace.speed_m_s);
+        let speed = if toward < 0.0 {
+            (toward + turn).min(0.0)
+        } else {
+            let gain = a.min((TOP_PER_S * (most - toward)).max(0.0));
+            (toward + gain * dt)
+                .min(most)
+                .min(pace.speed_before_m_s(left))
+        };
+        if speed * dt >= left && keeps <= 0.0 {
             *self = Self::at(setpoint, now);
             return;
         }
         self.stands = false;
-        let part = step / left;
+        let velocity = |ahead: f32, aside: f32| ahead * speed + aside * keeps;
+        let [x, y, up] = [
+            velocity(ahead[0], aside[0]),
+            velocity(ahead[1], aside[1]),
+            velocity(ahead[2], aside[2]),
+        ];
+        self.velocity_m_s = [x, y, up];
         self.place = Placement {
-            x_m: self.place.x_m + to[0] * part,
-            y_m: self.place.y_m + to[1] * part,
-            altitude_m: self.place.altitude_m + to[2] * part,
+            x_m: self.place.x_m + x * dt,
+            y_m: self.place.y_m + y * dt,
+            altitude_m: self.place.altitude_m + up * dt,
         };
-        self.velocity_m_s = to.map(|to| to / left * speed);
     }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a second at most")]
+fn seconds(duration: Duration) -> f32 {
+    duration.as_micros() as f32 * 1e-6
+}
+
+fn way(from: Placement, to: Placement) -> [f32; 3] {
+    [
+        to.x_m - from.x_m,
+        to.y_m - from.y_m,
+        to.altitude_m - from.altitude_m,
+    ]
 }
 
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -116,15 +283,18 @@ mod tests {
     use heapless::Vec;
 
     use super::{Carrot, Pace, length};
+    use crate::guard::config::GuardConfig;
+    use crate::mission::Mission;
+    use crate::mission::tests::paper;
     use crate::place::Placement;
-    use crate::time::Instant;
+    use crate::time::{Duration, Instant};
 
     /// The way of a carrot, every 100 ms, until it stands: places and speeds.
     fn fly(from: Placement, to: Placement, pace: Pace) -> Vec<(Placement, f32), 512> {
         let mut carrot = Carrot::at(from, Instant::ZERO);
         let mut way = Vec::new();
         for i in 1..5_000 {
-            carrot.advance(Instant::from_millis(100 * i), to, pace);
+            carrot.advance(Instant::from_millis(100 * i), to, pace, None);
             way.push((carrot.place, length(carrot.velocity_m_s)))
                 .expect("room");
             if carrot.stands() {
@@ -153,37 +323,141 @@ mod tests {
             before = *speed;
         }
         let fastest = way.iter().map(|(_, speed)| *speed).fold(0.0, f32::max);
-        assert!(fastest > 4.9, "51 m are enough to reach 5 m/s: {fastest}");
-        // 5 m/s² · 10 s in all: 51 m take 5 s up, 5 s down, and 5 s in between.
-        assert!((140..175).contains(&way.len()), "{}", way.len());
+        assert!(fastest > 4.4, "51 m are enough to reach 5 m/s: {fastest}");
+        // 51 m take 5 s up, 3 s down to 2 m/s, and 7 s more from there; 5 s in between.
+        assert!((170..210).contains(&way.len()), "{}", way.len());
         let last_moving = way[way.len() - 2].1;
-        assert!(last_moving < 0.5, "{last_moving}");
+        assert!(last_moving < 0.25, "{last_moving}");
+    }
+
+    #[test]
+    fn a_default_guard_counts_on_the_stopping_time() {
+        let time = Pace::default().stopping_time();
+        assert_eq!(time, Duration::from_millis(9_748));
+        let mission = Mission::try_new(paper(3)).unwrap();
+        let guard = GuardConfig::of(&mission, mission.config().common);
+        assert!(time <= guard.lag);
+        // 158 s from 20 m/s to 0.25 m/s, and 0.5 m left.
+        let slow = Pace {
+            speed_m_s: 20.0,
+            acceleration_m_s2: 0.125,
+        };
+        let expected = Duration::from_millis(158_000 + 1_200 + 1_387);
+        assert_eq!(slow.stopping_time(), expected);
+    }
+
+    #[test]
+    fn a_carrot_whose_drone_lags_behind_waits_for_it() {
+        let mut carrot = Carrot::at(Placement::on_line(0.0, 20.0), Instant::ZERO);
+        let to = Placement::on_line(1000.0, 20.0);
+        for (lag_m, expected) in [
+            (-3.0, 4.8),
+            (0.0, 4.8),
+            (1.0, 3.55),
+            (3.0, 1.05),
+            (9.0, 0.5),
+        ] {
+            for i in 0..300 {
+                let now = Instant::from_millis(100 * i);
+                let drone = Placement {
+                    x_m: carrot.place.x_m - lag_m,
+                    ..carrot.place
+                };
+                carrot.moved_at = Instant::from_millis((100 * i).saturating_sub(100));
+                carrot.advance(
+                    now,
+                    to,
+                    Pace::default(),
+                    Some((drone, Duration::from_micros(0))),
+                );
+            }
+            let speed = length(carrot.velocity_m_s);
+            assert!((speed - expected).abs() < 1e-2, "{lag_m} m: {speed}");
+        }
+    }
+
+    /// At every moment of a flight: by its own acceleration, and never past the setpoint.
+    #[test]
+    fn it_stops_gently_wherever_it_is_withdrawn() {
+        let to = Placement::on_line(60.0, 20.0);
+        let pace = Pace::default();
+        for after in 1..200 {
+            let mut carrot = Carrot::at(Placement::on_line(0.0, 20.0), Instant::ZERO);
+            let at = |i: u64, carrot: &mut Carrot, to| {
+                carrot.advance(Instant::from_millis(100 * i), to, pace, None);
+            };
+            for i in 1..=after {
+                at(i, &mut carrot, to);
+            }
+            let stop = carrot.stop(to, pace);
+            assert!(stop.x_m <= to.x_m && stop.x_m >= carrot.place.x_m);
+            let mut before = length(carrot.velocity_m_s);
+            for i in after + 1..after + 200 {
+                at(i, &mut carrot, stop);
+                let speed = length(carrot.velocity_m_s);
+                assert!(before - speed < 0.23, "{after}: {before}, then {speed}");
+                assert!(carrot.place.x_m <= stop.x_m);
+                before = speed;
+            }
+            assert!(carrot.stands(), "{after}");
+        }
     }
 
     #[test]
     fn a_gap_is_no_jump() {
         let mut carrot = Carrot::at(Placement::on_line(0.0, 20.0), Instant::ZERO);
         let to = Placement::on_line(1000.0, 20.0);
-        carrot.advance(Instant::from_millis(60_000), to, Pace::default());
+        carrot.advance(Instant::from_millis(60_000), to, Pace::default(), None);
         assert!(
             carrot.place.x_m <= 2.5,
             "half a second at the greatest speed"
         );
     }
 
+    /// A setpoint in any other direction is reached without a jump of the velocity, and the old direction is left within 3 s.
     #[test]
-    fn a_setpoint_behind_turns_it_around() {
-        let mut carrot = Carrot::at(Placement::on_line(0.0, 20.0), Instant::ZERO);
-        for i in 1..50 {
-            carrot.advance(
-                Instant::from_millis(100 * i),
-                Placement::on_line(1000.0, 20.0),
-                Pace::default(),
+    fn a_setpoint_elsewhere_turns_it_by_its_acceleration() {
+        for (x_m, y_m) in [
+            (-50.0, 0.0),
+            (24.0, 60.0),
+            (0.0, 60.0),
+            (60.0, -5.0),
+            (30.0, 0.5),
+        ] {
+            let mut carrot = Carrot::at(Placement::on_line(0.0, 20.0), Instant::ZERO);
+            let to = Placement {
+                y_m,
+                ..Placement::on_line(x_m, 20.0)
+            };
+            let (mut farthest_m, mut turned) = (0.0_f32, None);
+            for i in 1..500 {
+                let now = Instant::from_millis(100 * i);
+                let goal = if i < 60 {
+                    Placement::on_line(1000.0, 20.0)
+                } else {
+                    to
+                };
+                let before = carrot.velocity_m_s;
+                carrot.advance(now, goal, Pace::default(), None);
+                let after = carrot.velocity_m_s;
+                let change = length([after[0] - before[0], after[1] - before[1], 0.0]);
+                assert!(
+                    change < 0.35,
+                    "({x_m}, {y_m}) {i}: {before:?}, then {after:?}"
+                );
+                farthest_m = farthest_m.max(carrot.place.x_m);
+                if i > 60 && turned.is_none() && after[0] * (x_m - 24.0) >= 0.0 {
+                    turned = Some(i);
+                }
+            }
+            assert!(carrot.stands(), "({x_m}, {y_m}): {carrot:?}");
+            assert_eq!(carrot.place, to);
+            // It stops from 4.8 m/s within 5.8 m.
+            assert!(
+                farthest_m < x_m.max(24.0) + 6.5,
+                "({x_m}, {y_m}): {farthest_m}"
             );
+            assert!(turned.is_some_and(|i| i < 90), "({x_m}, {y_m}): {turned:?}");
         }
-        let turned = carrot.place.x_m;
-        let back = Placement::on_line(-50.0, 20.0);
-        carrot.advance(Instant::from_millis(5_000), back, Pace::default());
-        assert!(carrot.place.x_m < turned && carrot.velocity_m_s[0] < 0.0);
     }
 }

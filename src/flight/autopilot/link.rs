@@ -1,11 +1,13 @@
 //! The link to one autopilot: what it says, who flies by that, and what it is told.
 
+use super::astray::{Astray, OffLine};
 use super::carrot::{Carrot, Pace};
 use super::clock::millis;
 use super::event::{AutopilotEvent, Events};
+use super::mode::{FlightMode, Release, ReleaseCause, WaitReason};
 use super::noise::RadioNoise;
-use super::report::{Report, line_of};
-use super::state::State;
+use super::report::{Line, Report, Topic};
+use super::state::{Observed, State};
 use super::streams::Streams;
 use super::target::Target;
 use super::trust::Trust;
@@ -13,14 +15,16 @@ use super::vehicle::{Kind, Position, Vehicle, VehicleUpdate};
 use crate::event::Event;
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
-use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing, severity};
+use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing};
 use crate::flight::mavlink::parser::{Counters, Parser};
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::Signing;
 use crate::geodetic::Geodetic;
+use crate::guard::HoldReason;
 use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::pointing::Bearing;
+use crate::side::Side;
 use crate::time::{Duration, Instant};
 
 /// An onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
@@ -30,6 +34,21 @@ const COMPONENT: u8 = 191;
 const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
+
+/// A target is sent this much too late: a PX4 may be in its failsafe meanwhile.
+const OVERDUE: Duration = Duration::from_millis(600);
+
+/// How long positions have to come before the link is blind no more; longer where it was blind a short time ago.
+const RECOVERY: Duration = Duration::from_millis(1_000);
+const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
+const SHORT_TIME: Duration = Duration::from_millis(60_000);
+
+/// An ArduCopter that changes its mode since its fence was breached says so of the fence within this time.
+const FENCE_TOLD: Duration = Duration::from_millis(1_300);
+
+/// A reason to wait is told once it has held for so long, and so long after another one.
+const SETTLED: Duration = Duration::from_millis(1_000);
+const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
 /// The link to one autopilot.
 ///
@@ -52,10 +71,25 @@ pub struct Autopilot {
     setpoint: Option<Placement>,
     look: Option<Bearing>,
     target: Option<Target>,
-    /// Whether it was engaged when it fell silent: a PX4 may be in its failsafe, which a stream of targets ends.
-    fell: bool,
+    /// Where the carrot stops after the setpoint was withdrawn.
+    stop: Option<Placement>,
+    /// When the link became blind, and since when positions come again.
+    blind_at: Option<Instant>,
+    located_at: Option<Instant>,
+    /// How long positions have to come.
+    recovery: Duration,
+    /// A release that is not told yet, and when it is.
+    release: Option<(Release, Instant)>,
+    /// Why the drone cannot be engaged, and since when; the reason that was told last, and when.
+    wait: (Option<WaitReason>, Instant),
+    told_wait: Option<(Option<WaitReason>, Instant)>,
+    /// False while the relay is not to be engaged.
+    ready: bool,
+    /// The guard's reasons to hold the relay back that the operator has been told, upstream and downstream.
+    hold: [Option<HoldReason>; 2],
     report: Report,
     position: Option<Position>,
+    astray: Astray,
     /// What a radio has heard where the drone was, W.
     noise: RadioNoise,
     events: Events,
@@ -78,9 +112,18 @@ impl Autopilot {
             setpoint: None,
             look: None,
             target: None,
-            fell: false,
+            stop: None,
+            blind_at: None,
+            located_at: None,
+            recovery: RECOVERY,
+            release: None,
+            wait: (None, now),
+            told_wait: None,
+            ready: true,
+            hold: [None; 2],
             report: Report::default(),
             position: None,
+            astray: Astray::default(),
             noise: RadioNoise::NONE,
             events: Events::default(),
             sequence: 0,
@@ -94,7 +137,13 @@ impl Autopilot {
             self.parser.push(*byte);
             while let Some(received) = self.trust.next_received(now, &mut self.parser) {
                 self.noise.hear(now, &received, &self.vehicle);
+                let was_breached = self.vehicle.is_breached;
                 let heard = self.vehicle.hear(now, &received, &self.axis);
+                if self.vehicle.is_breached && !was_breached {
+                    self.events.breached = true;
+                    let text = ["relay: the autopilot's fence is breached", ""];
+                    self.report.tell(Line::warning(Topic::Fence, text));
+                }
                 if heard != VehicleUpdate::Nothing {
                     self.streams.hear(received.id);
                 }
@@ -114,10 +163,22 @@ impl Autopilot {
                 self.events.restarted = true;
                 self.streams = Streams::new(now);
             }
-            VehicleUpdate::Position(position) => self.position = Some(position),
+            VehicleUpdate::Position(position) => {
+                self.position = Some(position);
+                self.astray.returned();
+            }
+            VehicleUpdate::OffLine(at) => {
+                let is_in_air = !matches!(self.state, State::Silent | State::Grounded);
+                if self.astray.hear(now, at, is_in_air) {
+                    self.events.off_line = OffLine::new(at, &self.axis);
+                }
+            }
+            VehicleUpdate::Answer(result) => self.streams.answer(result),
             VehicleUpdate::Target(lat_e7, lon_e7) => {
-                if let Some(target) = &mut self.target {
-                    target.compare(&self.axis, lat_e7, lon_e7);
+                if self.state == State::Engaged
+                    && let Some(target) = &mut self.target
+                {
+                    self.events.refused |= target.compare(now, &self.axis, lat_e7, lon_e7);
                 }
             }
         }
@@ -134,9 +195,10 @@ impl Autopilot {
         let before = core::mem::replace(&mut self.axis, axis);
         let moved = |place| before.point(place).and_then(|point| axis.place(point));
         self.vehicle.move_places(moved);
-        (self.setpoint, self.look) = (None, None);
+        (self.setpoint, self.look, self.stop) = (None, None, None);
         // It was measured before the relay knew of the line.
         self.position = None;
+        self.astray = Astray::default();
         self.target = self.target.and_then(|target| {
             let at = moved(target.carrot.place);
             at.map(|place| Target::at(place, now))
@@ -150,7 +212,12 @@ impl Autopilot {
     pub fn handle_setpoint(&mut self, now: Instant, setpoint: Option<Placement>) {
         let setpoint = setpoint.filter(|place| self.axis.is_around(*place));
         if self.setpoint != setpoint {
-            self.setpoint = setpoint;
+            let before = core::mem::replace(&mut self.setpoint, setpoint);
+            let stops = |target: Target| Some(target.carrot.stop(before?, self.pace));
+            self.stop = match setpoint {
+                Some(_) => None,
+                None => self.target.and_then(stops),
+            };
             if let Some(target) = &mut self.target {
                 target.renew(now);
             }
@@ -167,15 +234,43 @@ impl Autopilot {
         self.report.values(now, sir_db, place);
     }
 
-    /// A line for the operator to read, of at most 50 bytes; whether there was room for it, which there is for three.
-    pub fn say(&mut self, text: &str) -> bool {
-        self.report.say(severity::INFO, text)
+    /// Sets whether the relay is ready to be engaged; true at the start. While it is false, a PX4 in [`State::Standby`] is streamed nothing,
+    /// so that it refuses OFFBOARD. Nothing else changes: an engaged drone stays engaged, and an ArduCopter takes GUIDED all the same.
+    pub fn handle_ready(&mut self, now: Instant, ready: bool) {
+        let before = core::mem::replace(&mut self.ready, ready);
+        if before != ready && self.state == State::Standby {
+            // Streamed anew, if at all.
+            self.target = None;
+        }
+        self.review(now);
     }
 
-    /// An event of the relay: the operator reads of those that matter in flight.
+    /// Tells the operator why the guard holds the relay back, upstream and downstream, when that changes while the drone is engaged or in
+    /// [`State::Standby`]. Equal lines are at least 10 s apart.
+    pub fn handle_hold(&mut self, _now: Instant, reasons: [Option<HoldReason>; 2]) {
+        if matches!(self.state, State::Silent | State::Grounded) {
+            self.hold = [None; 2];
+            return;
+        }
+        let before = core::mem::replace(&mut self.hold, reasons);
+        let sides = [Side::Upstream, Side::Downstream];
+        for ((side, reason), before) in sides.into_iter().zip(reasons).zip(before) {
+            if reason != before {
+                self.report.tell(Line::hold(side, reason));
+            }
+        }
+    }
+
+    /// Queues a line for the operator to read, of at most 50 bytes; returns true if there was room for it, which there is for three. Equal
+    /// lines are sent at least 10 s apart.
+    pub fn say(&mut self, text: &str) -> bool {
+        self.report.say(text)
+    }
+
+    /// Takes an event of the relay: the operator reads of those that matter in flight.
     pub fn handle_event(&mut self, event: Event) {
-        if let Some(text) = line_of(event) {
-            self.report.say(severity::INFO, text);
+        if let Some(line) = Line::of(event) {
+            self.report.tell(line);
         }
     }
 
@@ -185,42 +280,167 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Who flies, by what is known at `now`.
+    /// Updates the state by what is known at `now`.
     fn review(&mut self, now: Instant) {
+        self.vehicle.review_choice(now);
         let before = self.state;
-        let observed = self.vehicle.observed(now);
+        let mut observed = self.vehicle.observed(now);
+        self.recover(now, &mut observed);
         self.state = before.next(observed);
-        match self.state {
-            State::Engaged | State::Blind => {}
-            State::Standby => self.fell &= !self.vehicle.is_by_hand(),
-            State::Grounded => self.fell &= observed.flying,
-            State::Silent => self.fell |= matches!(before, State::Engaged | State::Blind),
-        }
+        self.review_wait(now);
+        self.review_release(now);
         if self.state == before {
             return;
         }
         self.events.state = Some(self.state);
-        let begins = matches!(before, State::Silent | State::Grounded | State::Standby);
+        self.located_at = None;
         self.target = match self.state {
-            // It begins where the drone is.
-            State::Engaged if begins => self.at_own_place(now),
-            State::Engaged | State::Blind => self.target,
+            // It begins where the drone is, which may have drifted while it was blind.
+            State::Engaged => self.at_own_place(now),
+            State::Blind => self.target,
             State::Silent | State::Grounded | State::Standby => None,
         };
+        self.stop = None;
         let line = match (before, self.state) {
-            (State::Blind, State::Engaged) => Some((severity::INFO, "relay: position is back")),
-            (_, State::Engaged) => Some((severity::INFO, "relay: flies to its place")),
-            (_, State::Blind) => Some((
-                severity::WARNING,
-                "relay: no position, keeps its last target",
-            )),
-            (State::Engaged | State::Blind, State::Standby) => {
-                Some((severity::INFO, "relay: released"))
+            (State::Blind, State::Engaged) => "relay: position is back",
+            (_, State::Engaged) => {
+                self.streams.renew();
+                "relay: flies to its place"
             }
-            _ => None,
+            (_, State::Blind) => {
+                self.blind_at = Some(now);
+                if self.vehicle.echo.is_late(now) {
+                    "relay: link is late, keeps its last target"
+                } else {
+                    "relay: no position, keeps its last target"
+                }
+            }
+            (State::Engaged | State::Blind, State::Standby) => {
+                let release = self.release();
+                let is_unclear = release.cause == ReleaseCause::Chosen
+                    && self.vehicle.kind() == Some(Kind::ArduCopter)
+                    && !matches!(release.mode, FlightMode::Sticks | FlightMode::Hold);
+                let until = if is_unclear { now + FENCE_TOLD } else { now };
+                self.release = Some((release, until));
+                return self.review_release(now);
+            }
+            _ => return,
         };
-        if let Some((severity, text)) = line {
-            self.report.say(severity, text);
+        self.release = None;
+        self.report.tell(Line::info(Topic::Control, line));
+    }
+
+    /// Tells a release once its cause is clear.
+    fn review_release(&mut self, now: Instant) {
+        let Some((mut release, until)) = self.release else {
+            return;
+        };
+        let is_fence = self.vehicle.is_breached && release.cause == ReleaseCause::Chosen;
+        if until > now && !is_fence {
+            return;
+        }
+        if is_fence {
+            release.cause = ReleaseCause::Fence;
+        }
+        self.release = None;
+        self.events.released = Some(release);
+        let line = Line::warning(Topic::Control, release.text());
+        self.report.tell(line);
+    }
+
+    /// Keeps a blind link blind until positions have come for a while, so that it does not change its mind with every other position.
+    fn recover(&mut self, now: Instant, observed: &mut Observed) {
+        if self.state != State::Blind {
+            self.located_at = None;
+            if self.state == State::Engaged && !observed.located {
+                let is_again = self.blind_at.is_some_and(|at| now.since(at) < SHORT_TIME);
+                self.recovery = if is_again { LONG_RECOVERY } else { RECOVERY };
+            }
+            return;
+        }
+        self.located_at = self.located_at.or(Some(now)).filter(|_| observed.located);
+        observed.located = self
+            .located_at
+            .is_some_and(|at| now.since(at) >= self.recovery);
+    }
+
+    /// The release that has just happened.
+    fn release(&self) -> Release {
+        let vehicle = &self.vehicle;
+        let mode = vehicle.mode().unwrap_or(FlightMode::Other);
+        let cause = if vehicle.is_breached {
+            ReleaseCause::Fence
+        } else if vehicle.is_critical() {
+            ReleaseCause::Failsafe
+        } else if vehicle.is_granted() {
+            ReleaseCause::Link
+        } else {
+            ReleaseCause::Chosen
+        };
+        Release { cause, mode }
+    }
+
+    /// Why the pilot cannot engage the drone now.
+    fn wait_reason(&self, now: Instant) -> Option<WaitReason> {
+        let vehicle = &self.vehicle;
+        let is_px4 = vehicle.kind() == Some(Kind::Px4);
+        if is_px4 && vehicle.is_critical() {
+            Some(WaitReason::Failsafe)
+        } else if vehicle.is_late(now) && vehicle.is_told() {
+            Some(WaitReason::Link)
+        } else if vehicle.is_granted() && !vehicle.is_chosen() {
+            Some(WaitReason::Found)
+        } else if !vehicle.is_chosen() {
+            Some(WaitReason::Unseen)
+        } else if vehicle.position(now).is_none() {
+            Some(WaitReason::Position)
+        } else if is_px4 && !self.ready {
+            Some(WaitReason::NotReady)
+        } else {
+            None
+        }
+    }
+
+    /// Tells the firmware and the operator why the drone cannot be engaged, once that has held for a moment.
+    fn review_wait(&mut self, now: Instant) {
+        if self.state != State::Standby {
+            self.told_wait = None;
+            self.wait = (None, now);
+            return;
+        }
+        let reason = self.wait_reason(now);
+        if self.wait.0 != reason {
+            self.wait = (reason, now);
+        }
+        if self.wait_told_at().is_none_or(|at| at > now) {
+            return;
+        }
+        self.told_wait = Some((reason, now));
+        let (event, line) = match reason {
+            Some(reason) => (
+                AutopilotEvent::Waits(reason),
+                Line::warning(Topic::Wait, [reason.text(), ""]),
+            ),
+            None => (
+                AutopilotEvent::Ready,
+                Line::info(Topic::Wait, "relay: ready, its mode may be chosen"),
+            ),
+        };
+        self.events.waits = Some(event);
+        self.report.tell(line);
+    }
+
+    /// When the reason to wait is to be told, if it has not been.
+    fn wait_told_at(&self) -> Option<Instant> {
+        let (reason, since) = self.wait;
+        if self.state != State::Standby {
+            return None;
+        }
+        let settled = since + SETTLED;
+        match self.told_wait {
+            None => Some(settled),
+            Some((told, _)) if told == reason => None,
+            Some((_, at)) => Some(settled.max(at + NEXT_REASON)),
         }
     }
 
@@ -231,6 +451,10 @@ impl Autopilot {
 
     /// The next frame to send. Call until there is none.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<FrameBytes> {
+        if now == Instant::from_micros(u64::MAX) {
+            // The clock stands still there, and what is due then stays due.
+            return None;
+        }
         let frame = self.next_frame(now)?;
         Some(self.trust.sign(now, frame))
     }
@@ -242,9 +466,14 @@ impl Autopilot {
             return Some(self.frame(Outgoing::Heartbeat));
         }
         if self.state != State::Silent
-            && let Some((id, interval_us)) = self.streams.take()
+            && let Some(kind) = self.vehicle.kind()
         {
-            return Some(self.frame(Outgoing::SetMessageInterval { id, interval_us }));
+            if let Some((id, interval_us)) = self.streams.take(now, kind) {
+                return Some(self.frame(Outgoing::SetMessageInterval { id, interval_us }));
+            }
+            if let Some(asked) = self.vehicle.echo.take(now) {
+                return Some(self.frame(Outgoing::TimeSync { asked }));
+            }
         }
         if let Some(frame) = self.next_target(now) {
             return Some(frame);
@@ -261,24 +490,36 @@ impl Autopilot {
         Some(frame)
     }
 
-    /// The target that is due.
+    /// Returns the target that is due.
     fn next_target(&mut self, now: Instant) -> Option<FrameBytes> {
         let kind = self.vehicle.kind()?;
-        if self.state == State::Standby && kind == Kind::Px4 && !self.fell {
+        let is_overdue = |target: Target| now.since(target.due) > OVERDUE;
+        if kind == Kind::Px4 && self.target.is_some_and(is_overdue) {
+            self.vehicle.unchoose();
+            self.target = None;
+            self.review(now);
+            return None;
+        }
+        if self.state == State::Standby && kind == Kind::Px4 {
             // The present place, so that the mode can be taken.
             let due = self.target.map_or(now, |target| target.due);
             if due > now {
                 return None;
             }
-            self.target = self.at_own_place(now);
+            let is_streamed = self.ready && self.vehicle.is_chosen();
+            self.target = self.at_own_place(now).filter(|_| is_streamed);
             let target = self.target.as_mut()?;
             target.tell_own_place(now);
             let carrot = target.carrot;
             return self.told(now, &carrot);
         }
         let mut target = self.target.filter(|target| target.due <= now)?;
-        match (self.state, self.setpoint) {
-            (State::Engaged, Some(setpoint)) => target.carrot.advance(now, setpoint, self.pace),
+        match (self.state, self.setpoint.or(self.stop)) {
+            (State::Engaged, Some(setpoint)) => {
+                let position = self.vehicle.position(now);
+                let drone = position.map(|it| (it.place, now.since(it.at)));
+                target.carrot.advance(now, setpoint, self.pace, drone);
+            }
             (State::Engaged, None) | (State::Blind, _) => {
                 target.carrot = Carrot::at(target.carrot.place, now);
             }
@@ -289,7 +530,6 @@ impl Autopilot {
         if !is_told {
             return None;
         }
-        self.events.refused |= target.is_refused();
         self.told(now, &target.carrot)
     }
 
@@ -339,6 +579,13 @@ impl Autopilot {
         self.position.take()
     }
 
+    /// How far from its line the drone is, while it is too far to have a place along it; `None` where it has one, or none was heard of for 3 s.
+    /// Constant work.
+    pub fn off_line(&self, now: Instant) -> Option<OffLine> {
+        let at = self.astray.newest(now)?;
+        OffLine::new(at, &self.axis)
+    }
+
     /// What a SiK radio has heard between frames, by its RADIO_STATUS, and where the drone was in the air: for `Relay::handle_sample`. Of
     /// several since the last call the newest; without the feature `sensing` none.
     pub fn poll_sample(&mut self) -> Option<Sample> {
@@ -347,7 +594,11 @@ impl Autopilot {
 
     /// The next event.
     pub fn poll_event(&mut self) -> Option<AutopilotEvent> {
-        let mistrusted = || self.trust.take_event().map(AutopilotEvent::Mistrusted);
+        let hears = self.streams.hears();
+        let mistrusted = || {
+            let mistrust = self.trust.take_event(hears)?;
+            Some(AutopilotEvent::Mistrusted(mistrust))
+        };
         self.events.take().or_else(mistrusted)
     }
 
@@ -356,15 +607,16 @@ impl Autopilot {
         let target = self.target.map(|target| target.due);
         let report = self
             .report
-            .next_timeout()
+            .next_timeout(now)
             .filter(|_| self.state != State::Silent);
+        let recovered = self.located_at.map(|at| at + self.recovery);
+        let streams = self.streams.next_timeout(now);
         [target, report, self.vehicle.next_timeout(now)]
             .into_iter()
+            .chain([recovered, self.wait_told_at()])
+            .chain([self.release.map(|(_, until)| until)])
             .flatten()
-            .fold(
-                self.heartbeat_at.min(self.streams.next_timeout()),
-                Instant::min,
-            )
+            .fold(self.heartbeat_at.min(streams), Instant::min)
     }
 
     /// Who flies.

@@ -6,9 +6,12 @@
 //! | [`state`] | who flies: the table of states |
 //! | `vehicle` | what the autopilot has said of itself |
 //! | `clock` | the autopilot's clock, on the relay's; the relay's own |
+//! | `echo` | how late the link is |
+//! | `mode` | flight modes, why the drone was released, why it cannot be engaged |
 //! | `streams` | the messages that it is asked for |
 //! | `target` | what it is told to fly to, and how often |
 //! | [`carrot`] | the target on its way to the setpoint |
+//! | `astray` | a drone that is far from its line |
 //! | `event` | what the firmware is told |
 //! | `noise` | what a radio hears between frames |
 //! | `report` | what the operator reads |
@@ -16,10 +19,13 @@
 //!
 //! It never arms, takes off, lands or changes the mode. What it sends as a target is finite and near the mission's line.
 
+mod astray;
 pub mod carrot;
 mod clock;
+mod echo;
 mod event;
 mod link;
+mod mode;
 mod noise;
 mod report;
 pub mod state;
@@ -28,6 +34,8 @@ mod target;
 pub mod trust;
 mod vehicle;
 
+pub use astray::OffLine;
 pub use event::AutopilotEvent;
 pub use link::Autopilot;
+pub use mode::{FlightMode, Release, ReleaseCause, WaitReason};
 pub use vehicle::{Kind, Position};

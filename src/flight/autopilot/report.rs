@@ -1,42 +1,134 @@
-//! What the operator reads on a ground station: lines, and numbers to plot.
+//! Lines and numbers that an operator reads on a ground station.
+//!
+//! A line is sent at most once in [`SPACING`], and at most [`RECENT`] different lines are. A line that has to wait is replaced by a newer
+//! line of the same [`Topic`], so the last line that an operator reads on a topic is true.
 
-use heapless::{Deque, String};
+use heapless::{Deque, String, Vec};
 
 use crate::event::Event;
-use crate::flight::mavlink::outgoing::Outgoing;
+use crate::flight::mavlink::outgoing::{Outgoing, severity};
+use crate::guard::HoldReason;
 use crate::place::Placement;
+use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// A line, and how much it matters.
-type Line = (u8, String<50>);
+/// Least time between two equal lines.
+const SPACING: Duration = Duration::from_millis(10_000);
 
-/// Lines that wait.
-const LINES: usize = 3;
+/// Different lines that are sent within [`SPACING`] at most.
+const RECENT: usize = 16;
+
+/// Capacity of the queue of the link's own lines, and of the queue of the firmware's lines.
+const LINES: usize = 6;
+const TEXTS: usize = 3;
 
 /// From one round of numbers to the next.
 const PERIOD: Duration = Duration::from_millis(1_000);
 
 const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 
-/// What the operator reads of an event of the relay.
-pub(super) const fn line_of(event: Event) -> Option<&'static str> {
-    Some(match event {
-        Event::Converged => "relay: the chain has agreed on places",
-        Event::Infeasible => "relay: no places meet any target",
-        Event::NeighbourLost { .. } => "relay: a neighbour is lost",
-        Event::Reformed => "relay: the chain formed anew",
-        Event::NoQuorum => "relay: too few others, holds its place",
-        Event::LeaseLapsed => "relay: not certain of the others, holds",
-        Event::UploadRefused { .. } => "relay: refused a mission without a line",
-        Event::IndexTaken { .. } => "relay: its number is used twice",
-        _ => return None,
+/// What a line is about. A newer line replaces a waiting one of its topic.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Topic {
+    /// Who flies the drone.
+    Control,
+    /// Why the mode cannot be taken.
+    Wait,
+    /// Why the drone does not go toward the neighbour upstream.
+    Upstream,
+    /// Why the drone does not go toward the neighbour downstream.
+    Downstream,
+    /// An event of the relay.
+    Relay,
+    /// The autopilot's fence.
+    Fence,
+}
+
+impl Topic {
+    const COUNT: usize = 6;
+}
+
+/// A line, in two parts.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Line {
+    topic: Topic,
+    severity: u8,
+    text: [&'static str; 2],
+}
+
+impl Line {
+    pub(super) const fn info(topic: Topic, text: &'static str) -> Self {
+        Self {
+            topic,
+            severity: severity::INFO,
+            text: [text, ""],
+        }
+    }
+
+    pub(super) const fn warning(topic: Topic, text: [&'static str; 2]) -> Self {
+        Self {
+            topic,
+            severity: severity::WARNING,
+            text,
+        }
+    }
+
+    /// Returns the line for a change of the reason why the guard holds the relay back on that side.
+    pub(super) const fn hold(side: Side, reason: Option<HoldReason>) -> Self {
+        let (topic, whom) = match side {
+            Side::Upstream => (Topic::Upstream, " the drone before"),
+            Side::Downstream => (Topic::Downstream, " the next drone"),
+        };
+        let what = match reason {
+            Some(HoldReason::Unheard) => "relay: waits, has not heard",
+            Some(HoldReason::Order) => "relay: waits, wrong order with",
+            Some(HoldReason::Close) => "relay: waits, may not yet near",
+            Some(HoldReason::Lost) => "relay: waits, has lost",
+            Some(HoldReason::Halted) => "relay: halts, wrong order beyond",
+            None => "relay: no longer waits for",
+        };
+        Self::warning(topic, [what, whom])
+    }
+
+    /// Returns the line for an event of the relay, if operators are told of it.
+    pub(super) const fn of(event: Event) -> Option<Self> {
+        let text = match event {
+            Event::Converged => "relay: the chain has agreed on places",
+            Event::Infeasible => "relay: no places meet any target",
+            Event::NeighbourLost { .. } => "relay: a neighbour is lost",
+            Event::Reformed => "relay: the chain formed anew",
+            Event::NoQuorum => "relay: too few others, holds its place",
+            Event::LeaseLapsed => "relay: not certain of the others, holds",
+            Event::UploadRefused { .. } => "relay: refused a mission: line or geofence",
+            Event::IndexTaken { .. } => "relay: its number is used twice",
+            _ => return None,
+        };
+        Some(Self::info(Topic::Relay, text))
+    }
+
+    /// FNV-1a.
+    fn hash(&self) -> u32 {
+        hash(self.text)
+    }
+}
+
+/// FNV-1a over both parts.
+fn hash(text: [&str; 2]) -> u32 {
+    let bytes = text.into_iter().flat_map(str::bytes);
+    bytes.fold(0x811C_9DC5, |hash, byte| {
+        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
     })
 }
 
 /// Lines and numbers that have not been sent yet.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Report {
-    lines: Deque<Line, LINES>,
+    lines: Vec<Line, LINES>,
+    texts: Deque<String<50>, TEXTS>,
+    /// Hashes of the lines that were sent, and the earliest time at which each may be sent again.
+    recent: Vec<(u32, Instant), RECENT>,
+    /// The newest line that was sent on each topic.
+    told: [Option<Line>; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
     /// How many of the values have been sent in this round.
     sent: usize,
@@ -44,18 +136,84 @@ pub(super) struct Report {
 }
 
 impl Report {
-    /// Has a line sent; whether there was room for it.
-    pub(super) fn say(&mut self, severity: u8, text: &str) -> bool {
+    /// Queues a line. A full queue loses its oldest line.
+    pub(super) fn tell(&mut self, line: Line) {
+        let newest = self.lines.iter().rfind(|other| other.topic == line.topic);
+        if newest == Some(&line) {
+            return;
+        }
+        if self.lines.is_full() {
+            self.lines.remove(0);
+        }
+        // There is room for it.
+        let _ = self.lines.push(line);
+    }
+
+    /// Queues a line of the firmware; returns true if there was room for it or it waits already.
+    pub(super) fn say(&mut self, text: &str) -> bool {
         let mut line = String::new();
         for character in text.chars() {
             if line.push(character).is_err() {
                 break;
             }
         }
-        self.lines.push_back((severity, line)).is_ok()
+        self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// The numbers from now on.
+    /// Returns true if a line of that hash may be sent at `now`, and marks it as sent.
+    fn passes(&mut self, now: Instant, hash: u32) -> bool {
+        self.recent.retain(|(_, until)| *until > now);
+        self.recent.iter().all(|(of, _)| *of != hash)
+            && self.recent.push((hash, now + SPACING)).is_ok()
+    }
+
+    /// Removes a line; unlike `Vec::remove`, without a panic where there is none.
+    fn remove_line(&mut self, at: usize) {
+        let mut index = 0;
+        self.lines.retain(|_| {
+            index += 1;
+            index != at + 1
+        });
+    }
+
+    /// Removes the next line that may be sent at `now`.
+    fn next_line(&mut self, now: Instant) -> Option<(u8, String<50>)> {
+        let mut at = 0;
+        while let Some(line) = self.lines.get(at).copied() {
+            let told = self.told.get_mut(line.topic as usize);
+            let is_known = told.as_deref() == Some(&Some(line));
+            let rest = self.lines.get(at + 1..).unwrap_or_default();
+            let is_overtaken = rest.iter().any(|other| other.topic == line.topic);
+            if self.passes(now, line.hash()) {
+                self.remove_line(at);
+                if let Some(told) = self.told.get_mut(line.topic as usize) {
+                    *told = Some(line);
+                }
+                let mut text = String::new();
+                for part in line.text {
+                    // No line is longer than 50 bytes.
+                    let _ = text.push_str(part);
+                }
+                return Some((line.severity, text));
+            }
+            if is_overtaken || is_known {
+                self.remove_line(at);
+            } else {
+                at += 1;
+            }
+        }
+        for _ in 0..self.texts.len() {
+            let text = self.texts.pop_front()?;
+            if self.passes(now, hash([&text, ""])) {
+                return Some((severity::INFO, text));
+            }
+            // There is room for it.
+            let _ = self.texts.push_back(text);
+        }
+        None
+    }
+
+    /// Sets the numbers that are sent from now on.
     pub(super) fn values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         let [x, y, h] = match place {
             Some(place) => [place.x_m, place.y_m, place.altitude_m].map(Some),
@@ -67,14 +225,14 @@ impl Report {
         }
     }
 
-    /// The next of them, encoded by `encode`.
+    /// Returns the next of them, encoded by `encode`.
     pub(super) fn take<T>(
         &mut self,
         now: Instant,
         boot_ms: u32,
         encode: impl FnOnce(Outgoing<'_>) -> T,
     ) -> Option<T> {
-        if let Some((severity, text)) = self.lines.pop_front() {
+        if let Some((severity, text)) = self.next_line(now) {
             return Some(encode(Outgoing::StatusText {
                 severity,
                 text: &text,
@@ -99,7 +257,77 @@ impl Report {
         None
     }
 
-    pub(super) const fn next_timeout(&self) -> Option<Instant> {
-        self.again_at
+    /// Returns the time of the next line or number.
+    pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
+        let waits = !(self.lines.is_empty() && self.texts.is_empty());
+        let lines = self.recent.iter().map(|(_, until)| *until);
+        let lines = lines.filter(|until| waits && *until > now);
+        lines.chain(self.again_at).min()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HoldReason, Line, Outgoing, Report, Side, Topic};
+    use crate::time::Instant;
+    use heapless::{String, Vec};
+
+    const fn at(ms: u64) -> Instant {
+        Instant::from_millis(ms)
+    }
+
+    fn texts(report: &mut Report, now: Instant) -> Vec<String<50>, 32> {
+        let mut all = Vec::new();
+        while let Some(text) = report.take(now, 0, |message| match message {
+            Outgoing::StatusText { text, .. } => String::try_from(text),
+            other => panic!("{other:?}"),
+        }) {
+            all.push(text.expect("50 bytes")).expect("room");
+        }
+        all
+    }
+
+    const ON: Line = Line::info(Topic::Control, "on");
+    const OFF: Line = Line::info(Topic::Control, "off");
+
+    #[test]
+    fn a_line_is_sent_once_in_ten_seconds_and_the_last_one_is_true() {
+        let mut report = Report::default();
+        for i in 0..50_u64 {
+            report.tell(if i % 2 == 0 { ON } else { OFF });
+            let said = texts(&mut report, at(200 * i));
+            assert_eq!(said.is_empty(), i >= 2, "{i}: {said:?}");
+        }
+        // The last one was `off`, as was the last that an operator read: nothing is left to say.
+        assert_eq!(texts(&mut report, at(30_000)).len(), 0);
+        report.tell(ON);
+        assert_eq!(texts(&mut report, at(31_000)).as_slice(), ["on"]);
+        report.tell(OFF);
+        assert_eq!(texts(&mut report, at(32_000)).as_slice(), ["off"]);
+        report.tell(ON);
+        assert_eq!(texts(&mut report, at(33_000)).len(), 0);
+        assert_eq!(report.next_timeout(at(33_000)), Some(at(41_000)));
+        assert_eq!(texts(&mut report, at(41_000)).as_slice(), ["on"]);
+    }
+
+    #[test]
+    fn lines_of_the_firmware_are_limited_too() {
+        let mut report = Report::default();
+        assert!(report.say("a") && report.say("b") && report.say("a"));
+        assert_eq!(texts(&mut report, at(0)).as_slice(), ["a", "b"]);
+        assert!(report.say("a"));
+        assert!(texts(&mut report, at(9_000)).is_empty());
+        assert_eq!(texts(&mut report, at(10_000)).as_slice(), ["a"]);
+    }
+
+    #[test]
+    fn every_reason_of_the_guard_fits_into_a_line() {
+        use HoldReason::{Close, Lost, Order, Unheard};
+        for side in [Side::Upstream, Side::Downstream] {
+            for reason in [Some(Unheard), Some(Order), Some(Close), Some(Lost), None] {
+                let line = Line::hold(side, reason);
+                assert!(line.text.map(str::len).into_iter().sum::<usize>() <= 50);
+            }
+        }
     }
 }

@@ -1,15 +1,22 @@
-//! Who flies: the states of the link to an autopilot.
+//! States of the link to an autopilot.
 //!
 //! | state | what is sent | leaves it |
 //! | --- | --- | --- |
 //! | `Silent` | HEARTBEAT | the autopilot is heard: `Grounded` |
-//! | `Grounded` | and requests for messages | silent 3 s: `Silent`; armed and in the air: `Standby` |
-//! | `Standby` | and, to a PX4, the present position as a target: the pilot can take the mode without a jump | silent: `Silent`; on the ground or disarmed: `Grounded`; mode granted and position known: `Engaged` |
-//! | `Engaged` | and the target, on its way to the setpoint | silent: `Silent`; on the ground or disarmed: `Grounded`; another mode: `Standby`; no position for 1 s: `Blind` |
-//! | `Blind` | and the last target, frozen | as `Engaged`; position known again: `Engaged` |
+//! | `Grounded` | and requests for messages, TIMESYNC | silent 3 s: `Silent`; armed and in the air: `Standby` |
+//! | `Standby` | and, to a PX4 once a mode was chosen and the relay is ready, the present position as a target | silent: `Silent`; on the ground or disarmed: `Grounded`; mode granted after a mode was chosen, position known: `Engaged` |
+//! | `Engaged` | and the target, on its way to the setpoint | silent: `Silent`; on the ground or disarmed: `Grounded`; another mode, or the choice is forgotten: `Standby`; no position for 1 s, or the link of an ArduCopter late: `Blind` |
+//! | `Blind` | and the last target, frozen | as `Engaged`; position known for 1 s, or for 10 s after it was blind in the last minute: `Engaged`, from the drone's own place |
 //!
-//! Nothing else changes a state: no setpoint, no message of a neighbour. The pilot engages by choosing the mode, and any other mode
-//! releases.
+//! *A mode was chosen* is an observation of this link, which no memory of an earlier one replaces:
+//!
+//! | autopilot | it is set by a heartbeat that is not late, in a mode | it is forgotten at |
+//! | --- | --- | --- |
+//! | PX4 | other than OFFBOARD, `system_status` ACTIVE (4) | start, restart, disarming; `system_status` CRITICAL (5) or above; nothing heard for 0.8 s; no echo of the last 1.5 s; a position that comes 1 s late; a target that is sent 0.6 s late |
+//! | ArduCopter | other than GUIDED, not CRITICAL | start, restart, disarming; no heartbeat for 3 s |
+//!
+//! So a link that finds OFFBOARD or GUIDED granted engages nothing and streams nothing: the pilot chooses another mode first, and is told so.
+//! A PX4's failsafe is ended by the pilot's choice of a mode alone. Nothing else changes a state: no setpoint, no message of a neighbour.
 
 /// Who flies.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -39,7 +46,7 @@ pub(super) struct Observed {
     pub(super) there: bool,
     /// Armed, and in the air.
     pub(super) flying: bool,
-    /// The mode lets a companion say where to fly.
+    /// The mode lets a companion say where to fly, and the pilot has chosen it before this link.
     pub(super) granted: bool,
     /// The position is known.
     pub(super) located: bool,

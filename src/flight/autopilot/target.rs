@@ -3,6 +3,7 @@
 use super::carrot::Carrot;
 use super::vehicle::Kind;
 use crate::flight::axis::Axis;
+use crate::geodetic::Geodetic;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
@@ -13,20 +14,33 @@ const STANDING: Duration = Duration::from_millis(200);
 /// An ArduCopter is told a place again until it has said that it flies there: repetition makes it wobble.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// So often it is told before that is an event.
-const REFUSED_AFTER: u8 = 5;
+/// An ArduCopter says twice a second what it flies to. As many times in a row elsewhere, and it was told for as long: that is an event.
+const REFUSED_AFTER: u8 = 6;
+const TOLD_FOR: Duration = Duration::from_millis(3_000);
 
-/// How far what an ArduCopter says it flies to may be from what it was told, 1e-7 degrees.
+/// How far what an ArduCopter says it flies to may be from the carrot: standing, 1e-7 degrees; moving, m, and s at the carrot's speed.
 const TAKEN_WITHIN: u32 = 20;
+const NEAR_M: f32 = 3.0;
+const NEAR_S: f32 = 1.0;
+
+/// A place is told so often to an autopilot that never says what it flies to.
+const UNCONFIRMED: u8 = 10;
 
 /// What the autopilot is given to fly to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Target {
     pub(super) carrot: Carrot,
     pub(super) due: Instant,
-    /// How often it has been told the place where it ends, and whether it has said that it flies there.
+    /// How often it has been told the place where it ends.
     told: u8,
+    /// True once the autopilot has said that it flies there.
     is_taken: bool,
+    /// Since when targets are told.
+    since: Instant,
+    /// How often in a row the autopilot has said that it flies elsewhere.
+    elsewhere: u8,
+    /// True once the autopilot has said where it flies to.
+    is_said: bool,
 }
 
 impl Target {
@@ -37,6 +51,9 @@ impl Target {
             due: now,
             told: 0,
             is_taken: false,
+            since: now,
+            elsewhere: 0,
+            is_said: false,
         }
     }
 
@@ -47,15 +64,42 @@ impl Target {
         self.is_taken = false;
     }
 
-    /// The autopilot says that it flies to that latitude and longitude. While the target moves that says nothing: it still has to be
-    /// told to stop.
-    pub(super) fn compare(&mut self, axis: &Axis, lat_e7: i32, lon_e7: i32) {
-        if self.told > 0
-            && let Some(point) = axis.point(self.carrot.place)
-        {
-            let near = |a: i32, b: i32| a.abs_diff(b) <= TAKEN_WITHIN;
-            self.is_taken = near(point.lat_e7, lat_e7) && near(point.lon_e7, lon_e7);
+    /// Takes what the autopilot says it flies to. Returns true where it has been told long enough and flies elsewhere, once.
+    ///
+    /// While the target moves, what the autopilot flies to may be behind it by the time between two messages.
+    pub(super) fn compare(&mut self, now: Instant, axis: &Axis, lat_e7: i32, lon_e7: i32) -> bool {
+        self.is_said = true;
+        let Some(point) = axis.point(self.carrot.place) else {
+            return false;
+        };
+        let near = |a: i32, b: i32| a.abs_diff(b) <= TAKEN_WITHIN;
+        let is_there = near(point.lat_e7, lat_e7) && near(point.lon_e7, lon_e7);
+        if self.told > 0 {
+            self.is_taken = is_there;
         }
+        let amsl_mm = point.amsl_mm;
+        let said = axis.place(Geodetic {
+            lat_e7,
+            lon_e7,
+            amsl_mm,
+        });
+        let is_near = said.is_some_and(|said| {
+            let [x, y, _] = self.carrot.velocity_m_s;
+            let within = NEAR_M + NEAR_S * (x.abs() + y.abs());
+            let off = |a: f32, b: f32| (a - b).abs() <= within;
+            off(said.x_m, self.carrot.place.x_m) && off(said.y_m, self.carrot.place.y_m)
+        });
+        // A standing target is taken exactly, or not.
+        if is_there || is_near && self.told == 0 {
+            self.elsewhere = 0;
+            return false;
+        }
+        if now.since(self.since) < TOLD_FOR {
+            return false;
+        }
+        let before = self.elsewhere;
+        self.elsewhere = before.saturating_add(1);
+        before < REFUSED_AFTER && self.elsewhere >= REFUSED_AFTER
     }
 
     /// It is told, as the drone's own place.
@@ -72,17 +116,13 @@ impl Target {
                 Kind::Px4 => STANDING,
                 Kind::ArduCopter => AGAIN,
             };
-        let is_told = !stands || kind == Kind::Px4 || !self.is_taken;
+        let is_known = self.is_taken || !self.is_said && self.told >= UNCONFIRMED;
+        let is_told = !stands || kind == Kind::Px4 || !is_known;
         if !stands {
             (self.told, self.is_taken) = (0, false);
         } else if is_told && kind == Kind::ArduCopter {
             self.told = self.told.saturating_add(1);
         }
         is_told
-    }
-
-    /// Whether it was just told once more than an autopilot needs.
-    pub(super) const fn is_refused(&self) -> bool {
-        self.told == REFUSED_AFTER + 1
     }
 }

@@ -20,8 +20,10 @@ const IN_A_ROW: u8 = 3;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Mistrust {
-    /// The autopilot signs, and the link has no key: it is believed, and believes nothing that is said to it.
+    /// The autopilot signs, the link has no key, and no request of the link was answered: the autopilot seems to ignore what is not signed.
     NoKey,
+    /// The autopilot signs, the link has no key, and the autopilot answers the link's requests all the same.
+    SignsOnly,
     /// The link has a key, and the autopilot does not sign: it is not heard.
     Unsigned,
     /// They have different keys.
@@ -143,13 +145,17 @@ impl Trust {
         frame
     }
 
-    /// What the firmware is to be told next.
-    pub(super) fn take_event(&mut self) -> Option<Mistrust> {
+    /// Returns what the firmware is to be told next. `hears` says whether the autopilot answers requests, once that is known.
+    pub(super) fn take_event(&mut self, hears: Option<bool>) -> Option<Mistrust> {
+        let is_known = |it: &Mistrust| *it != Mistrust::NoKey || hears.is_some();
         let mistrust = Mistrust::ALL
             .into_iter()
-            .find(|it| self.due & it.bit() != 0)?;
+            .find(|it| self.due & it.bit() != 0 && is_known(it))?;
         self.due &= !mistrust.bit();
-        Some(mistrust)
+        Some(match mistrust {
+            Mistrust::NoKey if hears == Some(true) => Mistrust::SignsOnly,
+            other => other,
+        })
     }
 }
 

@@ -1,10 +1,13 @@
 //! What the autopilot has said of itself.
 
 use super::clock::RemoteClock;
+use super::echo::Echo;
+use super::mode::FlightMode;
 use super::state::Observed;
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::incoming::Incoming;
+use crate::flight::mavlink::outgoing::SET_MESSAGE_INTERVAL;
 use crate::flight::mavlink::parser::Received;
 use crate::geodetic::Geodetic;
 use crate::place::Placement;
@@ -16,6 +19,13 @@ pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 /// A position older than this is none.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
+/// A PX4 that hears no target for a second is in its failsafe. A target is sent every 0.2 s, so a link that was interrupted for longer than
+/// this may have been the cause of one.
+const GAP: Duration = Duration::from_millis(800);
+
+/// A position is said within this time after it was measured.
+const MEASURED: Duration = Duration::from_millis(300);
+
 /// The component that is the autopilot.
 pub(super) const AUTOPILOT: u8 = 1;
 
@@ -26,6 +36,10 @@ const ARMED: u8 = 128;
 /// `MAV_LANDED_STATE`.
 const IN_AIR: u8 = 2;
 const LANDING: u8 = 4;
+
+/// `MAV_STATE`: what a PX4 says outside of a failsafe, and in one.
+const ACTIVE: u8 = 4;
+const CRITICAL: u8 = 5;
 
 /// `MAV_TYPE` of what can hover and is flown by ArduCopter: with other vehicles the same number is another mode.
 const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
@@ -47,14 +61,6 @@ impl Kind {
             12 => Some(Self::Px4),
             3 if COPTERS.contains(&vehicle) => Some(Self::ArduCopter),
             _ => None,
-        }
-    }
-
-    /// Whether that mode has the companion say where to fly.
-    const fn is_granted(self, custom_mode: u32) -> bool {
-        match self {
-            Self::Px4 => custom_mode >> 16 & 0xFF == 6,
-            Self::ArduCopter => custom_mode == 4,
         }
     }
 }
@@ -84,20 +90,40 @@ pub(super) enum VehicleUpdate {
     News,
     /// Where the drone is.
     Position(Position),
+    /// Where the drone is, too far from the line to have a place along it.
+    OffLine(Geodetic),
     /// Where the drone flies to.
     Target(i32, i32),
+    /// It has answered a request to send a message: with its `MAV_RESULT`.
+    Answer(u8),
 }
 
 /// The autopilot, as far as it is known.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "observations that are independent of each other"
+)]
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vehicle {
     known: Option<(Address, Kind)>,
     heard_at: Option<Instant>,
+    /// When its last message of any kind came.
+    frame_at: Option<Instant>,
     mode: u32,
+    /// True while the mode is OFFBOARD or GUIDED.
     granted: bool,
+    /// `MAV_STATE`.
+    status: u8,
+    /// True once the mode may be granted: see [`Self::review_choice`].
+    chosen: bool,
     armed: bool,
     in_air: bool,
+    /// True while it is outside of its fence.
+    pub(super) is_breached: bool,
     clock: RemoteClock,
+    pub(super) echo: Echo,
+    /// When the last position was measured, wherever it was.
+    told_at: Option<Instant>,
     position: Option<Position>,
 }
 
@@ -125,6 +151,9 @@ impl Vehicle {
         if self.address() != Some(from) {
             return VehicleUpdate::Nothing;
         }
+        // A gap counts though nobody looked meanwhile.
+        self.review_choice(now);
+        self.frame_at = Some(now);
         let heard = self.take(now, message, axis);
         if found { VehicleUpdate::Found } else { heard }
     }
@@ -134,14 +163,25 @@ impl Vehicle {
             Incoming::Heartbeat {
                 base_mode,
                 custom_mode,
+                status,
                 ..
             } => {
                 self.heard_at = Some(now);
                 self.mode = custom_mode;
+                self.status = status;
                 let says_mode = base_mode & CUSTOM_MODE != 0;
-                self.granted =
-                    says_mode && self.kind().is_some_and(|kind| kind.is_granted(custom_mode));
-                self.armed = base_mode & ARMED != 0;
+                self.granted = says_mode && self.mode() == Some(FlightMode::Companion);
+                let is_armed = base_mode & ARMED != 0;
+                // A flight has ended, and a PX4 that landed by itself is in OFFBOARD again.
+                self.chosen &= is_armed || !self.armed;
+                self.armed = is_armed;
+                if says_mode && !self.granted && !self.is_late(now) {
+                    self.chosen |= match self.kind() {
+                        Some(Kind::Px4) => status == ACTIVE,
+                        _ => status < CRITICAL,
+                    };
+                }
+                self.review_choice(now);
                 // Whether it is in the air is said anew after each take-off.
                 self.in_air &= self.armed;
                 VehicleUpdate::News
@@ -165,14 +205,27 @@ impl Vehicle {
                     self.restart();
                     return VehicleUpdate::Restarted;
                 };
+                // It was said after the question of the last echo, and measured shortly before it was said.
+                let floor = self.echo.floor().map(|at| {
+                    Instant::from_micros(at.as_micros().saturating_sub(MEASURED.as_micros()))
+                });
+                let at = at.max(floor.unwrap_or(at)).min(now);
+                self.told_at = Some(at);
+                if self.kind() == Some(Kind::Px4) {
+                    self.chosen &= now.since(at) < STALE;
+                }
                 let point = Geodetic {
                     lat_e7,
                     lon_e7,
                     amsl_mm,
                 };
-                // Before it has a fix it says 0, 0, which is near no line worth flying.
                 let Some(place) = axis.place(point) else {
-                    return VehicleUpdate::Nothing;
+                    // Before it has a fix it says 0, 0, which is near no line worth flying.
+                    return if (lat_e7, lon_e7) != (0, 0) && point.is_valid() {
+                        VehicleUpdate::OffLine(point)
+                    } else {
+                        VehicleUpdate::Nothing
+                    };
                 };
                 let position = Position {
                     at,
@@ -185,14 +238,86 @@ impl Vehicle {
             Incoming::PositionTargetGlobal { lat_e7, lon_e7, .. } => {
                 VehicleUpdate::Target(lat_e7, lon_e7)
             }
+            Incoming::FenceStatus { is_breached } => {
+                self.is_breached = is_breached;
+                VehicleUpdate::News
+            }
+            // A question of its own has no time of its own in it.
+            Incoming::TimeSync {
+                answered: 1..,
+                asked,
+            } => {
+                self.echo.hear(now, asked);
+                VehicleUpdate::News
+            }
+            Incoming::CommandAck {
+                command: SET_MESSAGE_INTERVAL,
+                result,
+            } => VehicleUpdate::Answer(result),
             _ => VehicleUpdate::Nothing,
         }
+    }
+
+    /// Forgets the pilot's choice of a mode where the autopilot may have changed the mode by itself since, or may do so.
+    ///
+    /// A PX4 in its failsafe resumes OFFBOARD by itself once it hears targets. In OFFBOARD it is in its failsafe after a second without one.
+    /// So a PX4 is streamed targets only after it has shown a mode other than OFFBOARD outside of a failsafe, since the link began, since
+    /// the last failsafe, and since the last time that the link was interrupted or late. An ArduCopter changes into no GUIDED by itself:
+    /// it is enough that another mode was seen since the link began and since the last silence.
+    pub(super) fn review_choice(&mut self, now: Instant) {
+        let before = |at: Option<Instant>, limit| at.is_some_and(|at| now.since(at) < limit);
+        self.chosen &= match self.kind() {
+            Some(Kind::Px4) => {
+                before(self.heard_at, SILENT)
+                    && before(self.frame_at, GAP)
+                    && !self.echo.is_late(now)
+                    && !self.is_critical()
+            }
+            Some(Kind::ArduCopter) => before(self.heard_at, SILENT),
+            None => false,
+        };
+    }
+
+    /// Forgets the pilot's choice: targets were not sent when they should have been.
+    pub(super) const fn unchoose(&mut self) {
+        self.chosen = false;
+    }
+
+    /// Returns true if what the autopilot says may be older than it seems.
+    pub(super) fn is_late(&self, now: Instant) -> bool {
+        self.echo.is_late(now) || self.told_at.is_none_or(|at| now.since(at) >= STALE)
+    }
+
+    /// Returns true once a time stamp of the autopilot was heard.
+    pub(super) const fn is_told(&self) -> bool {
+        self.told_at.is_some()
+    }
+
+    /// Returns true while the autopilot is in a failsafe.
+    pub(super) const fn is_critical(&self) -> bool {
+        self.status >= CRITICAL
+    }
+
+    pub(super) const fn is_granted(&self) -> bool {
+        self.granted
+    }
+
+    pub(super) const fn is_chosen(&self) -> bool {
+        self.chosen
+    }
+
+    pub(super) fn mode(&self) -> Option<FlightMode> {
+        Some(FlightMode::of(self.kind()?, self.mode))
     }
 
     /// It was switched off and on: what it said before is void.
     fn restart(&mut self) {
         self.heard_at = None;
         self.granted = false;
+        self.chosen = false;
+        self.is_breached = false;
+        self.echo = Echo::default();
+        self.told_at = None;
         self.armed = false;
         self.in_air = false;
         self.position = None;
@@ -217,12 +342,7 @@ impl Vehicle {
     /// Where the drone is, if that is known by now.
     pub(super) fn position(&self, now: Instant) -> Option<Position> {
         self.position
-            .filter(|position| now.since(position.at) < STALE)
-    }
-
-    /// Whether a PX4 is flown with the sticks: its modes are by hand (1, 2, 3, 5, 7), by itself (4) or by a companion (6).
-    pub(super) const fn is_by_hand(&self) -> bool {
-        !matches!(self.mode >> 16 & 0xFF, 4 | 6)
+            .filter(|position| now.since(position.at) < STALE && !self.echo.is_late(now))
     }
 
     /// What the state follows from.
@@ -230,7 +350,7 @@ impl Vehicle {
         Observed {
             there: self.heard_at.is_some_and(|at| now.since(at) < SILENT),
             flying: self.armed && self.in_air,
-            granted: self.granted,
+            granted: self.granted && self.chosen,
             located: self.position(now).is_some(),
         }
     }
@@ -244,7 +364,12 @@ impl Vehicle {
     /// When what is known is too old, unless it is said again.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);
+        let gap = self.frame_at.map(|at| at + GAP);
         let stale = self.position.map(|position| position.at + STALE);
-        silent.into_iter().chain(stale).filter(|at| *at > now).min()
+        let told = self.told_at.map(|at| at + STALE);
+        let all = [silent, gap, stale, told].into_iter().flatten();
+        all.chain(self.echo.next_timeout(now))
+            .filter(|at| *at > now)
+            .min()
     }
 }

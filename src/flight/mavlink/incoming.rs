@@ -33,6 +33,10 @@ impl Payload<'_> {
         u32::from_le_bytes(self.bytes(at))
     }
 
+    fn u64(self, at: usize) -> u64 {
+        u64::from_le_bytes(self.bytes(at))
+    }
+
     fn f32(self, at: usize) -> f32 {
         f32::from_le_bytes(self.bytes(at))
     }
@@ -101,6 +105,18 @@ pub enum Incoming {
         /// `MAV_RESULT`: 0 accepted.
         result: u8,
     },
+    /// TIMESYNC: a question, or the answer to one.
+    TimeSync {
+        /// The clock of who answers, ns; 0 in a question.
+        answered: u64,
+        /// The clock of who asked.
+        asked: u64,
+    },
+    /// FENCE_STATUS.
+    FenceStatus {
+        /// True while the vehicle is outside of its fence.
+        is_breached: bool,
+    },
     /// RADIO_STATUS, of a SiK radio, in the units of [`sik`](super::sik): 255 is unknown.
     RadioStatus {
         /// What was heard at the last frame.
@@ -144,6 +160,13 @@ impl Incoming {
             id::COMMAND_ACK => Self::CommandAck {
                 command: payload.u16(0),
                 result: payload.u8(2),
+            },
+            id::TIMESYNC => Self::TimeSync {
+                answered: payload.u64(0),
+                asked: payload.u64(8),
+            },
+            id::FENCE_STATUS => Self::FenceStatus {
+                is_breached: payload.u8(6) != 0,
             },
             id::RADIO_STATUS => Self::RadioStatus {
                 rssi: payload.u8(4),

@@ -50,6 +50,11 @@ pub enum Outgoing<'a> {
         /// Which way to look, radians clockwise from north.
         yaw_rad: Option<f32>,
     },
+    /// TIMESYNC: a question, which the autopilot sends back.
+    TimeSync {
+        /// What is sent back.
+        asked: u64,
+    },
     /// STATUSTEXT of at most 50 bytes; what is longer is cut.
     StatusText {
         /// See [`severity`].
@@ -80,7 +85,7 @@ mod mask {
 const FRAME_AMSL: u8 = 5;
 
 /// MAV_CMD_SET_MESSAGE_INTERVAL.
-const SET_MESSAGE_INTERVAL: u16 = 511;
+pub(in crate::flight) const SET_MESSAGE_INTERVAL: u16 = 511;
 
 impl Outgoing<'_> {
     const fn id(&self) -> u32 {
@@ -88,6 +93,7 @@ impl Outgoing<'_> {
             Self::Heartbeat => id::HEARTBEAT,
             Self::SetMessageInterval { .. } => id::COMMAND_LONG,
             Self::SetPosition { .. } => id::SET_POSITION_TARGET_GLOBAL_INT,
+            Self::TimeSync { .. } => id::TIMESYNC,
             Self::StatusText { .. } => id::STATUSTEXT,
             Self::NamedValue { .. } => id::NAMED_VALUE_FLOAT,
         }
@@ -166,6 +172,10 @@ impl Outgoing<'_> {
                 }
                 to_frame.bytes(&left_out.to_le_bytes());
                 to_frame.bytes(&[to.system, to.component, FRAME_AMSL]);
+            }
+            Self::TimeSync { asked } => {
+                to_frame.bytes(&[0; 8]);
+                to_frame.bytes(&asked.to_le_bytes());
             }
             Self::StatusText { severity, text } => {
                 to_frame.bytes(&[severity]);

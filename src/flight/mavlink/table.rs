@@ -30,6 +30,10 @@ pub mod id {
     pub const POSITION_TARGET_GLOBAL_INT: u32 = 87;
     /// What a radio has heard.
     pub const RADIO_STATUS: u32 = 109;
+    /// A clock that is sent back.
+    pub const TIMESYNC: u32 = 111;
+    /// The state of the vehicle's fence.
+    pub const FENCE_STATUS: u32 = 162;
     /// Whether it is on the ground.
     pub const EXTENDED_SYS_STATE: u32 = 245;
     /// A number with a name, for an operator to plot.
@@ -57,7 +61,7 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
 }
 
 /// First what is read or written; then what carries bytes of others, which may look like frames: it has to be known to be passed over whole.
-const TABLE: [Known; 24] = [
+const TABLE: [Known; 26] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::GLOBAL_POSITION_INT, 104, 28),
     known(id::COMMAND_LONG, 152, 33),
@@ -66,6 +70,8 @@ const TABLE: [Known; 24] = [
     known(id::SET_POSITION_TARGET_GLOBAL_INT, 5, 53),
     known(id::POSITION_TARGET_GLOBAL_INT, 150, 51),
     known(id::RADIO_STATUS, 185, 9),
+    known(id::TIMESYNC, 34, 16),
+    known(id::FENCE_STATUS, 189, 8),
     known(id::EXTENDED_SYS_STATE, 130, 2),
     known(id::NAMED_VALUE_FLOAT, 170, 18),
     known(id::STATUSTEXT, 83, 54),

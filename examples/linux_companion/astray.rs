@@ -1,0 +1,326 @@
+//! A drone that is far from its line: sites with latitude and longitude swapped are places on earth like any other, and nothing else looks wrong.
+//!
+//! | kind | position | told |
+//! | --- | --- | --- |
+//! | off the line | more than 5 km from the line, so that the relay has no position | on the ground once, in the air every 10 s, and to the operator |
+//! | off the fence | more than [`FENCE_M`] outside the mission's geofence, horizontally | in the air every 10 s |
+
+use std::fmt;
+
+use serde_json::{Value, json};
+use uav_relay::flight::autopilot::OffLine;
+use uav_relay::flight::axis::Axis;
+use uav_relay::{Band, Duration, Geodetic, Instant, Placement, Sites};
+
+/// Least time from one line of a kind to the next.
+const AGAIN: Duration = Duration::from_millis(10_000);
+
+/// A position older than this is none.
+const STALE: Duration = Duration::from_millis(3_000);
+
+/// How far outside the geofence a pilot may fly without a word, m.
+const FENCE_M: f64 = 100.0;
+
+/// Sites that are so many times nearer with latitude and longitude swapped are asked about.
+const NEARER: f64 = 10.0;
+
+/// The ways in which a drone is off.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Kind {
+    Line,
+    Fence,
+}
+
+/// A drone that is off.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Off {
+    kind: Kind,
+    away_m: f64,
+    /// How far outside the geofence, m.
+    outside_m: f64,
+    /// True where swapping latitude and longitude of both sites brings the line to the drone.
+    is_swapped: bool,
+}
+
+/// Judges where the drone is: by its place near the line, and by what the link tells of a drone that has none.
+#[derive(Debug, Default)]
+pub(crate) struct Astray {
+    newest: Option<(Instant, Placement)>,
+    lines: Option<Lines>,
+    away_m: Option<f64>,
+    off: Option<Off>,
+    fence_told_at: Option<Instant>,
+}
+
+impl Astray {
+    /// Takes a place along the line.
+    pub(crate) const fn handle_place(&mut self, now: Instant, place: Placement) {
+        self.newest = Some((now, place));
+    }
+
+    /// Returns what to tell of a drone that the link says is off the line between `sites`.
+    pub(crate) fn is_off_line(&mut self, sites: Sites, off_line: OffLine) -> Option<Off> {
+        self.lines(sites).map(|lines| lines.off_line(off_line))
+    }
+
+    /// Compares where the drone is now, off the line or at its newest place, with the line between `sites` and the mission's room beside it;
+    /// returns what to tell of the geofence, if anything.
+    pub(crate) fn look(
+        &mut self,
+        now: Instant,
+        sites: Sites,
+        lateral: Band,
+        off_line: Option<OffLine>,
+        is_in_air: bool,
+    ) -> Option<Off> {
+        let fresh = self.newest.filter(|(at, _)| now.since(*at) < STALE);
+        let lines = self.lines(sites)?;
+        let (away_m, off) = match (off_line, fresh) {
+            (Some(off_line), _) => {
+                let off = lines.off_line(off_line);
+                (Some(off.away_m), Some(off))
+            }
+            (None, Some((_, place))) => {
+                (Some(lines.away_m(place)), lines.off_fence(place, lateral))
+            }
+            (None, None) => (None, None),
+        };
+        (self.away_m, self.off) = (away_m, off);
+        let off = off.filter(|off| off.kind == Kind::Fence)?;
+        // A drone waits on the ground, wherever that is; it is flown to its line from beside it.
+        let is_due = self.fence_told_at.is_none_or(|at| now.since(at) >= AGAIN);
+        if !is_in_air || !is_due {
+            return None;
+        }
+        self.fence_told_at = Some(now);
+        Some(off)
+    }
+
+    fn lines(&mut self, sites: Sites) -> Option<&Lines> {
+        if self.lines.as_ref().is_none_or(|lines| lines.sites != sites) {
+            self.lines = Lines::between(sites);
+        }
+        self.lines.as_ref()
+    }
+
+    /// Returns the distance from the line, and how the drone is off, as JSON.
+    pub(crate) fn status(&self) -> Value {
+        json!({
+            "from_line_m": self.away_m,
+            "outside": self.off.map(|off| match off.kind {
+                Kind::Line => "line",
+                Kind::Fence => "geofence",
+            }),
+            "sites_look_swapped": self.off.is_some_and(|off| off.is_swapped),
+        })
+    }
+}
+
+/// The line between two sites, and the one with latitude and longitude of both swapped, where there is one.
+#[derive(Debug)]
+struct Lines {
+    sites: Sites,
+    is: Axis,
+    swapped: Option<Axis>,
+}
+
+impl Lines {
+    fn between(sites: Sites) -> Option<Self> {
+        let turned = |site: Geodetic| Geodetic {
+            lat_e7: site.lon_e7,
+            lon_e7: site.lat_e7,
+            ..site
+        };
+        Some(Self {
+            sites,
+            is: Axis::between(sites).ok()?,
+            swapped: Axis::try_new(turned(sites.tx), turned(sites.rx)).ok(),
+        })
+    }
+
+    /// Judges a drone that has no place along the line.
+    fn off_line(&self, OffLine { at, away_m }: OffLine) -> Off {
+        let away_m = f64::from(away_m);
+        let swapped = self.swapped.as_ref().and_then(|axis| axis.away_m(at));
+        Off {
+            kind: Kind::Line,
+            away_m,
+            outside_m: away_m,
+            is_swapped: swapped.is_some_and(|swapped_m| swapped_m * NEARER < away_m),
+        }
+    }
+
+    /// Returns the distance from a place to the line, m.
+    fn away_m(&self, place: Placement) -> f64 {
+        let along_m = beyond(place.x_m.into(), 0.0, self.is.distance_m());
+        along_m.hypot(place.y_m.into())
+    }
+
+    /// Judges a drone at `place`, with the mission's room beside the line.
+    fn off_fence(&self, place: Placement, lateral: Band) -> Option<Off> {
+        let along_m = beyond(place.x_m.into(), 0.0, self.is.distance_m());
+        let aside_m = beyond(
+            place.y_m.into(),
+            lateral.least_m.into(),
+            lateral.most_m.into(),
+        );
+        let outside_m = along_m.hypot(aside_m);
+        (outside_m > FENCE_M).then_some(Off {
+            kind: Kind::Fence,
+            away_m: self.away_m(place),
+            outside_m,
+            is_swapped: false,
+        })
+    }
+}
+
+/// Returns how far a number is outside of a range.
+fn beyond(value: f64, least: f64, most: f64) -> f64 {
+    (least - value).max(value - most).max(0.0)
+}
+
+impl Off {
+    /// Returns what the operator reads on a ground station, of at most 50 bytes; `None` for what the log alone has.
+    pub(crate) fn for_operator(&self) -> Option<String> {
+        (self.kind == Kind::Line)
+            .then(|| format!("relay: the drone is {} from its line", Far(self.away_m)))
+    }
+
+    /// Returns the distances, for programs.
+    pub(crate) fn fields(&self) -> Value {
+        json!({ "from_line_m": self.away_m, "outside_m": self.outside_m })
+    }
+}
+
+impl fmt::Display for Off {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let away = Far(self.away_m);
+        write!(
+            f,
+            "the drone is {away} from the line between transmitter and receiver"
+        )?;
+        match (self.kind, self.is_swapped) {
+            (Kind::Line, true) => f.write_str(": are latitude and longitude swapped?"),
+            (Kind::Line, false) => {
+                f.write_str(": are these the sites of this flight, and is its position right?")
+            }
+            (Kind::Fence, _) => {
+                write!(
+                    f,
+                    ", {} outside the mission's geofence",
+                    Far(self.outside_m)
+                )
+            }
+        }
+    }
+}
+
+/// A distance, m, as a person would write it.
+struct Far(f64);
+
+impl fmt::Display for Far {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let km = self.0 / 1e3;
+        match km {
+            ..0.999_5 => write!(f, "{:.0} m", self.0),
+            ..9.95 => write!(f, "{km:.1} km"),
+            ..999.5 => write!(f, "{km:.0} km"),
+            _ => {
+                // No distance on earth has more digits.
+                let (thousands, rest) = ((km.round() / 1e3).floor(), km.round() % 1e3);
+                write!(f, "{thousands:.0} {rest:03.0} km")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Far, Kind, Lines, Off, OffLine};
+    use uav_relay::{Band, Geodetic, Sites};
+
+    fn site(lat_deg: f64, lon_deg: f64) -> Geodetic {
+        Geodetic::from_degrees(lat_deg, lon_deg, 420.0).expect("on earth")
+    }
+
+    fn off(tx: Geodetic, rx: Geodetic, drone: Geodetic) -> Option<Off> {
+        let lateral = Band {
+            least_m: -50.0,
+            most_m: 0.0,
+        };
+        let lines = Lines::between(Sites { tx, rx })?;
+        let Some(place) = lines.is.place(drone) else {
+            return Some(lines.off_line(OffLine::new(drone, &lines.is)?));
+        };
+        lines.off_fence(place, lateral)
+    }
+
+    #[test]
+    fn a_distance_is_written_as_people_do() {
+        for (m, text) in [
+            (0.4, "0 m"),
+            (312.4, "312 m"),
+            (999.4, "999 m"),
+            (999.6, "1.0 km"),
+            (9_949.0, "9.9 km"),
+            (9_951.0, "10 km"),
+            (999_400.0, "999 km"),
+            (999_600.0, "1 000 km"),
+            (5_012_345.0, "5 012 km"),
+            (20_003_900.0, "20 004 km"),
+        ] {
+            assert_eq!(Far(m).to_string(), text);
+        }
+    }
+
+    #[test]
+    fn swapped_sites_are_asked_about_and_others_are_not() {
+        let drone = site(47.405, 8.545);
+        let swapped = off(site(8.54, 47.40), site(8.55, 47.41), drone).expect("off");
+        assert!(swapped.kind == Kind::Line && swapped.is_swapped);
+        let text = swapped.to_string();
+        assert!(text.ends_with("km from the line between transmitter and receiver: are latitude and longitude swapped?"), "{text}");
+        // Another valley.
+        let other = off(site(46.54, 7.40), site(46.55, 7.41), drone).expect("off");
+        assert!(other.kind == Kind::Line && !other.is_swapped);
+        assert!(
+            other
+                .to_string()
+                .ends_with("sites of this flight, and is its position right?")
+        );
+        // Longitudes that are no latitude cannot be swapped.
+        let far = off(site(47.40, 138.54), site(47.41, 138.55), drone).expect("off");
+        assert!(!far.is_swapped);
+        for off in [swapped, other, far] {
+            let text = off.for_operator().expect("the operator reads it");
+            assert!(text.len() <= 50, "{text}");
+        }
+    }
+
+    #[test]
+    fn the_geofence_has_room_around_it() {
+        let (tx, rx) = (site(47.40, 8.54), site(47.40, 8.55));
+        // Eastward, the room is on the left, in the north: 50 m, and 100 m more. A hundredth of a degree is 1112 m.
+        for (lat, lon, outside) in [
+            (47.400, 8.545, None),
+            (47.4013, 8.545, None),
+            (47.4015, 8.545, Some(117.0)),
+            (47.3992, 8.545, None),
+            (47.3990, 8.545, Some(111.0)),
+            (47.400, 8.5512, None),
+            (47.400, 8.5515, Some(113.0)),
+            (47.400, 8.5385, Some(113.0)),
+        ] {
+            let off = off(tx, rx, site(lat, lon));
+            let is = off.map(|off| off.outside_m);
+            match (is, outside) {
+                (None, None) => {}
+                (Some(is), Some(outside)) => {
+                    assert!((is - outside).abs() < 1.0, "{lat} {lon}: {is}");
+                }
+                _ => panic!("{lat} {lon}: {is:?}"),
+            }
+            assert!(off.is_none_or(|off| off.for_operator().is_none()));
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! A UDP port of an autopilot, from a local port that stays the same from one start to the next.
+
+use std::io::ErrorKind;
+use std::net::{SocketAddr, ToSocketAddrs as _, UdpSocket};
+use std::os::fd::{AsFd as _, BorrowedFd};
+
+use serde_json::{Value, json};
+use uav_relay_scenario::endpoint::Endpoint;
+
+/// How often a call is repeated that only reports an earlier refusal.
+const ATTEMPTS: usize = 4;
+
+/// The socket, and its counters.
+#[derive(Debug)]
+pub(crate) struct Datagrams {
+    socket: UdpSocket,
+    peer: SocketAddr,
+    endpoint: Endpoint,
+    read: u64,
+    written: u64,
+    /// How often the other computer has said that no program listens at that port.
+    refused: u64,
+}
+
+impl Datagrams {
+    /// Binds the local port, and takes datagrams from the autopilot's address and port alone.
+    ///
+    /// # Errors
+    /// One line without the address: what is wrong, and what else may be stated.
+    pub(crate) fn open(endpoint: &Endpoint) -> Result<Self, String> {
+        let Endpoint {
+            host, port, local, ..
+        } = endpoint;
+        let resolved = format!("{host}:{port}").to_socket_addrs();
+        let peer = resolved
+            .map_err(|error| format!("HOST {host} is not found: {error}"))?
+            .next()
+            .ok_or_else(|| format!("HOST {host} is not found: it has no address"))?;
+        let any = if peer.is_ipv4() { "0.0.0.0" } else { "::" };
+        let socket = UdpSocket::bind((any, *local)).map_err(|error| unbound(*local, &error))?;
+        socket
+            .connect(peer)
+            .map_err(|error| format!("{peer} cannot be reached: {error}"))?;
+        if socket.local_addr().is_ok_and(|own| own == peer) {
+            return Err(format!(
+                "{peer} is this program's own port; LOCAL must be another one than PORT, within 1 to 65535"
+            ));
+        }
+        let ready = socket.set_nonblocking(true);
+        ready.map_err(|error| format!("{peer} cannot be used: {error}"))?;
+        Ok(Self {
+            socket,
+            peer,
+            endpoint: endpoint.clone(),
+            read: 0,
+            written: 0,
+            refused: 0,
+        })
+    }
+
+    /// Reads one datagram; returns its length, 0 where there is none.
+    pub(crate) fn read(&mut self, into: &mut [u8]) -> usize {
+        for _ in 0..ATTEMPTS {
+            match self.socket.recv(into) {
+                // An empty datagram says nothing; the next one may.
+                Ok(0) => {}
+                Ok(count) => {
+                    self.read += count as u64;
+                    return count;
+                }
+                // The answer to an earlier datagram of ours. It hides what has come since.
+                Err(error) if error.kind() == ErrorKind::ConnectionRefused => self.refused += 1,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => return 0,
+            }
+        }
+        0
+    }
+
+    /// Sends a frame. One that does not fit is dropped: the next one is newer.
+    pub(crate) fn send(&mut self, frame: &[u8]) {
+        for _ in 0..ATTEMPTS {
+            match self.socket.send(frame) {
+                Ok(count) => {
+                    self.written += count as u64;
+                    return;
+                }
+                // The answer to an earlier datagram of ours: this one has not been sent yet.
+                Err(error) if error.kind() == ErrorKind::ConnectionRefused => self.refused += 1,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => return,
+            }
+        }
+    }
+
+    /// Returns the bytes received so far.
+    pub(crate) const fn bytes_in(&self) -> u64 {
+        self.read
+    }
+
+    /// Returns where nobody answers, and what to look at.
+    pub(crate) fn silence(&self) -> String {
+        let (peer, local) = (self.peer, self.endpoint.local);
+        if self.refused > 0 {
+            return format!(
+                "{peer} (from local port {local}): connection refused, so no program listens there; is the autopilot on, and is that its port?"
+            );
+        }
+        format!(
+            "{peer} (from local port {local}): is the autopilot on, and does it send to this port? A PX4 keeps the first address and port it has received from until it restarts; state that port by udp:HOST:PORT@LOCAL"
+        )
+    }
+
+    /// Returns the address and the counters.
+    pub(crate) fn status(&self) -> Value {
+        json!({
+            "option": "--autopilot",
+            "port": self.endpoint.to_string(),
+            "open": true,
+            "local_port": self.endpoint.local,
+            "bytes_in": self.read,
+            "bytes_out": self.written,
+            "times_refused": self.refused,
+        })
+    }
+
+    /// Returns what to sleep on.
+    pub(crate) fn fd(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+}
+
+fn unbound(local: u16, error: &std::io::Error) -> String {
+    match error.kind() {
+        ErrorKind::AddrInUse => format!(
+            "local port {local} is in use by another program; end that one, or state another as udp:HOST:PORT@LOCAL, within 1 to 65535"
+        ),
+        ErrorKind::PermissionDenied => format!(
+            "local port {local} may not be used by this user; state another as udp:HOST:PORT@LOCAL, within 1024 to 65535"
+        ),
+        _ => format!("local port {local} cannot be used: {error}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::UdpSocket;
+
+    use super::Datagrams;
+    use uav_relay_scenario::endpoint::Endpoint;
+
+    /// A refusal is the answer to an earlier datagram: it takes the place of neither the next one sent nor the next one received.
+    #[test]
+    fn a_refusal_loses_no_datagram() {
+        let free = || {
+            let socket = UdpSocket::bind("127.0.0.1:0").expect("a port");
+            socket.local_addr().expect("bound").port()
+        };
+        let (port, local) = (free(), free());
+        let listen = || {
+            let socket = UdpSocket::bind(("127.0.0.1", port)).expect("the port is free");
+            let limit = std::time::Duration::from_secs(10);
+            socket.set_read_timeout(Some(limit)).expect("a limit");
+            socket
+        };
+        let text = format!("udp:127.0.0.1:{port}@{local}");
+        let endpoint = Endpoint::parse(&text).expect("UDP").expect("an address");
+        let mut datagrams = Datagrams::open(&endpoint).expect("free ports");
+        let mut bytes = [0; 16];
+        datagrams.send(b"nobody listens");
+        let peer = listen();
+        datagrams.send(b"one");
+        assert_eq!(peer.recv(&mut bytes).ok(), Some(3));
+        drop(peer);
+        datagrams.send(b"nobody listens");
+        let peer = listen();
+        peer.send_to(b"", ("127.0.0.1", local)).expect("sent");
+        peer.send_to(b"four", ("127.0.0.1", local)).expect("sent");
+        assert_eq!(datagrams.read(&mut bytes), 4);
+        assert_eq!(datagrams.read(&mut bytes), 0);
+        assert_eq!((datagrams.refused, datagrams.bytes_in()), (2, 4));
+    }
+}

@@ -1,0 +1,93 @@
+//! Log lines for what keeps the drone from its place.
+
+use serde_json::json;
+use uav_relay::guard::HoldReason;
+use uav_relay::{Duration, Instant, Relay, Side};
+
+use uav_relay_linux::log::Log;
+
+/// A reason is logged once it has held for this time: others come and go while an agreement spreads.
+const SETTLES: Duration = Duration::from_millis(3_000);
+
+const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];
+
+/// Returns what keeps the drone from its place toward the transmitter and toward the receiver.
+pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
+    SIDES.map(|side| relay.hold_reason(side))
+}
+
+/// Reasons that were logged, and newer ones that have not held for long.
+#[derive(Debug, Default)]
+pub(crate) struct Waits {
+    logged: [Option<HoldReason>; 2],
+    newest: [Option<HoldReason>; 2],
+    since: Instant,
+}
+
+impl Waits {
+    /// Logs reasons that have changed, and returns the time at which a change is to be looked at again.
+    pub(crate) fn tend(
+        &mut self,
+        now: Instant,
+        log: &Log,
+        relay: &Relay,
+        name: impl Fn(u16) -> String,
+    ) -> Option<Instant> {
+        let reasons = reasons(relay);
+        if reasons != self.newest {
+            (self.newest, self.since) = (reasons, now);
+        }
+        if reasons == self.logged {
+            return None;
+        }
+        let due = self.since + SETTLES;
+        if now < due {
+            return Some(due);
+        }
+        let neighbours = relay.neighbours();
+        for (at, (reason, logged)) in reasons.into_iter().zip(self.logged).enumerate() {
+            if reason == logged {
+                continue;
+            }
+            let node = neighbours.get(at).copied().flatten();
+            let whom = node.map_or_else(|| "its neighbour".to_owned(), &name);
+            let fields = json!({ "node": node, "reason": reason.map(word) });
+            let text = match reason {
+                Some(reason) => format!("stays where it is: {}", said(reason, &whom)),
+                None => format!("no longer waits for {whom}"),
+            };
+            log.say(now, "waits", fields, format_args!("{text}"));
+        }
+        self.logged = reasons;
+        None
+    }
+}
+
+/// A reason in one word, for programs.
+pub(crate) const fn word(reason: HoldReason) -> &'static str {
+    match reason {
+        HoldReason::Unheard => "unheard",
+        HoldReason::Order => "order",
+        HoldReason::Close => "close",
+        HoldReason::Lost => "lost",
+        HoldReason::Halted => "halted",
+    }
+}
+
+fn said(reason: HoldReason, whom: &str) -> String {
+    match reason {
+        HoldReason::Unheard => format!("{whom} is not flown, or has told no place yet"),
+        HoldReason::Order => format!(
+            "it is on the wrong side of {whom} along the line, or too near to be certain; fly one of the two to its own side by hand"
+        ),
+        HoldReason::Close => {
+            format!("the places agreed on are nearer to {whom} than the drones may come yet")
+        }
+        HoldReason::Lost => {
+            format!("a relay beyond that fell silent may still hover there, between it and {whom}")
+        }
+        HoldReason::Halted => {
+            format!("a relay beyond {whom} is not in order; its own log says why")
+        }
+    }
+}

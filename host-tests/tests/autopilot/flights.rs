@@ -1,0 +1,345 @@
+//! Random flights of autopilots that do what the real ones do: failsafes, restarts of either, cables that keep bytes, silences, a
+//! companion that is paused, and a pilot who chooses modes. No drone is engaged that its pilot has not given.
+
+use std::collections::VecDeque;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use uav_relay::Duration;
+use uav_relay::flight::autopilot::Autopilot;
+use uav_relay::flight::autopilot::carrot::Pace;
+
+use super::real::{Mode, Real};
+use super::vehicle::axis;
+use super::*;
+
+const STEP: Duration = Duration::from_millis(20);
+
+/// One flight, s.
+const FLIGHT_S: u64 = 240;
+
+/// A mode is known within a second, and a link that is later than 2 s is not believed.
+const KNOWN_WITHIN: Duration = Duration::from_millis(3_100);
+
+/// What a cable does to bytes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Fault {
+    None,
+    /// It keeps them, and delivers all at once.
+    Keeps,
+    Cut,
+    /// It delivers them so much later, µs.
+    Delay(u64),
+}
+
+/// One direction of a cable: bytes stay in order.
+struct Cable {
+    /// When they come, when they were sent, and the bytes.
+    waiting: VecDeque<(Instant, Instant, Vec<u8>)>,
+    kept: Vec<(Instant, Vec<u8>)>,
+    fault: Fault,
+}
+
+impl Cable {
+    const fn new() -> Self {
+        Self {
+            waiting: VecDeque::new(),
+            kept: Vec::new(),
+            fault: Fault::None,
+        }
+    }
+
+    fn put(&mut self, now: Instant, bytes: Vec<u8>) {
+        if bytes.is_empty() {
+            return;
+        }
+        match self.fault {
+            Fault::Cut => {}
+            Fault::Keeps => self.kept.push((now, bytes)),
+            Fault::None => self.push(now, now, bytes),
+            Fault::Delay(us) => self.push(now + Duration::from_micros(us), now, bytes),
+        }
+    }
+
+    fn push(&mut self, at: Instant, sent: Instant, bytes: Vec<u8>) {
+        let last = self.waiting.back().map_or(at, |(at, ..)| *at);
+        self.waiting.push_back((at.max(last), sent, bytes));
+    }
+
+    fn set(&mut self, now: Instant, fault: Fault) {
+        self.fault = fault;
+        for (sent, bytes) in core::mem::take(&mut self.kept) {
+            self.push(now, sent, bytes);
+        }
+    }
+
+    fn take(&mut self, now: Instant) -> Option<(Instant, Vec<u8>)> {
+        let (at, ..) = self.waiting.front()?;
+        let is_due = *at <= now;
+        let (_, sent, bytes) = is_due.then(|| self.waiting.pop_front())??;
+        Some((sent, bytes))
+    }
+}
+
+struct Flight {
+    rng: ChaCha8Rng,
+    now: Instant,
+    real: Real,
+    to: Cable,
+    from: Cable,
+    link: Option<Autopilot>,
+    /// When the companion was started; when it is started again, or goes on.
+    started: Instant,
+    starts_at: Option<Instant>,
+    paused_until: Instant,
+    mends_at: Instant,
+    gps_until: Instant,
+    setpoint: Option<Placement>,
+    /// When the pilot chose OFFBOARD or GUIDED last, and when it was last flown.
+    given_at: Option<Instant>,
+    flown_at: Instant,
+    texts: Vec<(Instant, String)>,
+    engaged: u32,
+    wrong: Vec<String>,
+    log: Vec<String>,
+}
+
+impl Flight {
+    fn new(seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let now = Instant::from_millis(1_000_000);
+        let kind = [Kind::Px4, Kind::ArduCopter][rng.random_range(0..2)];
+        let mut real = Real::new(kind, axis(), [300.0, 0.0, 20.0], now);
+        if rng.random_bool(0.3) {
+            real.slow = 0.01;
+        }
+        // Both real ones do.
+        real.echoes = rng.random_bool(0.9);
+        Self {
+            rng,
+            now,
+            real,
+            to: Cable::new(),
+            from: Cable::new(),
+            link: Some(Autopilot::new(axis(), Pace::default(), now)),
+            started: now,
+            starts_at: None,
+            paused_until: now,
+            mends_at: now,
+            gps_until: now,
+            setpoint: None,
+            given_at: None,
+            flown_at: now,
+            texts: Vec::new(),
+            engaged: 0,
+            wrong: Vec::new(),
+            log: Vec::new(),
+        }
+    }
+
+    fn note(&mut self, what: &str) {
+        let at = self.now.as_micros() as f64 / 1e6 - 1_000.0;
+        self.log.push(format!("{at:.2} {what}"));
+    }
+
+    fn soon(&mut self, least_ms: u64, most_ms: u64) -> Instant {
+        self.now + Duration::from_millis(self.rng.random_range(least_ms..=most_ms))
+    }
+
+    fn happen(&mut self) {
+        match self.rng.random_range(0..12) {
+            0..=3 => self.choose(Mode::Companion),
+            4 => self.choose(Mode::Hold),
+            5 => self.choose(Mode::Sticks),
+            6 if self.now >= self.mends_at => {
+                // Without echoes nothing tells a link that is late for good from a clock that is behind.
+                let kinds = if self.real.echoes { 3 } else { 2 };
+                let fault = match self.rng.random_range(0..kinds) {
+                    0 => Fault::Keeps,
+                    1 => Fault::Cut,
+                    _ => Fault::Delay(self.rng.random_range(100_000..8_000_000)),
+                };
+                let ways = self.rng.random_range(1..=3_u8);
+                self.mends_at = self.soon(300, 9_000);
+                self.note(&format!("cable {fault:?} {ways} until {:?}", self.mends_at));
+                if ways & 1 != 0 {
+                    self.to.set(self.now, fault);
+                }
+                if ways & 2 != 0 {
+                    self.from.set(self.now, fault);
+                }
+            }
+            7 => {
+                self.link = None;
+                let at = self.soon(20, 15_000);
+                self.starts_at = Some(at);
+                self.note(&format!("companion killed until {at:?}"));
+            }
+            8 => {
+                self.paused_until = self.soon(50, 4_000);
+                self.note(&format!("companion paused until {:?}", self.paused_until));
+            }
+            9 => {
+                self.real.lose_gps(self.now);
+                self.gps_until = self.soon(1_000, 20_000);
+                self.note(&format!("gps lost until {:?}", self.gps_until));
+            }
+            10 if self.rng.random_bool(0.5) => {
+                let until = self.soon(500, 6_000);
+                self.real.restart(until);
+                self.note(&format!("autopilot restarts until {until:?}"));
+            }
+            _ => {
+                self.real.lost_us += self.rng.random_range(-1_500_000..=1_500_000_i64);
+                self.note(&format!("clock {}", self.real.lost_us));
+            }
+        }
+    }
+
+    fn choose(&mut self, mode: Mode) {
+        let taken = self.real.choose(self.now, mode);
+        if taken && mode == Mode::Companion {
+            self.given_at = Some(self.now);
+        }
+        self.note(&format!("pilot {mode:?} {taken}"));
+    }
+
+    fn step(&mut self) {
+        self.now = self.now + STEP;
+        let now = self.now;
+        if now >= self.gps_until {
+            self.real.gps = true;
+        }
+        if now >= self.mends_at {
+            self.to.set(now, Fault::None);
+            self.from.set(now, Fault::None);
+        }
+        let said = self.real.step(now);
+        self.from.put(now, said);
+        if self.real.mode == Mode::Companion {
+            self.flown_at = now;
+        }
+        while let Some((sent, frame)) = self.to.take(now) {
+            let answer = self.real.hear(now, sent, &frame);
+            self.from.put(now, answer);
+        }
+        if self.starts_at.is_some_and(|at| at <= now) {
+            self.starts_at = None;
+            self.link = Some(Autopilot::new(axis(), Pace::default(), now));
+            self.started = now;
+            self.texts.clear();
+            // What came meanwhile is flushed when the port is opened.
+            while self.from.take(now).is_some() {}
+        }
+        self.drive();
+        if self.real.resumed > 0 {
+            self.wrong
+                .push(format!("OFFBOARD resumed without a pilot at {now:?}"));
+            self.real.resumed = 0;
+        }
+    }
+
+    fn drive(&mut self) {
+        let now = self.now;
+        let Some(link) = self.link.as_mut().filter(|_| now >= self.paused_until) else {
+            return;
+        };
+        let before = link.state();
+        let mut became = before;
+        let mut engages = false;
+        let mut see = |state| {
+            engages |= state == State::Engaged && !matches!(became, State::Engaged | State::Blind);
+            became = state;
+        };
+        while let Some((_, bytes)) = self.from.take(now) {
+            link.handle_bytes(now, &bytes);
+            see(link.state());
+        }
+        link.handle_timeout(now);
+        see(link.state());
+        link.handle_setpoint(now, self.setpoint);
+        let mut wrong = Vec::new();
+        while let Some(frame) = link.poll_transmit(now) {
+            if frame[7] == 253 {
+                let end = frame.len() - 2;
+                let text = String::from_utf8_lossy(&frame[11..end])
+                    .trim_end_matches('\0')
+                    .to_owned();
+                let again = self.texts.iter().rev().find(|(_, other)| *other == text);
+                if again.is_some_and(|(at, _)| now.since(*at) < Duration::from_millis(10_000)) {
+                    wrong.push(format!("{text} again at {now:?}"));
+                }
+                self.texts.push((now, text));
+            }
+            self.to.put(now, frame.to_vec());
+        }
+        while link.poll_position().is_some() {}
+        while link.poll_event().is_some() {}
+        assert!(link.poll_timeout(now) > now, "it would spin");
+        if engages {
+            self.engaged += 1;
+            if now.since(self.flown_at) > KNOWN_WITHIN {
+                wrong.push(format!("engaged by what was long ago at {now:?}"));
+            }
+            // It was given since the companion was started, but for what is known late.
+            if self.given_at.is_none_or(|at| at < self.started) {
+                wrong.push(format!("engaged without a pilot at {now:?}"));
+            }
+        }
+        if became != before {
+            self.note(&format!("link {became:?}, {:?}", self.real.mode));
+        }
+        self.wrong.extend(wrong);
+    }
+
+    fn setpoint(&mut self) {
+        let place = |rng: &mut ChaCha8Rng| Placement {
+            x_m: rng.random_range(200.0..400.0),
+            y_m: rng.random_range(-20.0..20.0),
+            altitude_m: rng.random_range(20.0..40.0),
+        };
+        self.setpoint = self.rng.random_bool(0.8).then(|| place(&mut self.rng));
+    }
+}
+
+/// What went wrong in a flight; how often it was engaged, and how many texts there were.
+fn fly(seed: u64) -> (Vec<String>, u32) {
+    let mut flight = Flight::new(seed);
+    for i in 0..FLIGHT_S * 50 {
+        if i == 150 {
+            flight.real.take_off();
+        }
+        if i > 400 && flight.rng.random_bool(0.004) {
+            flight.happen();
+        }
+        if flight.rng.random_bool(0.002) {
+            flight.setpoint();
+        }
+        flight.step();
+    }
+    let kind = flight.real.kind;
+    let wrong = flight.wrong.into_iter();
+    let log = flight.log.join("\n  ");
+    let wrong = wrong.map(|what| format!("SEED={seed} {kind:?}: {what}\n  {log}"));
+    (wrong.take(1).collect(), flight.engaged)
+}
+
+#[test]
+fn nothing_is_engaged_without_a_pilots_choice() {
+    let first = uav_relay_oracle::random::seed(1);
+    let count = std::env::var("COUNT").ok();
+    let count: u64 = count.and_then(|text| text.parse().ok()).unwrap_or(1_000);
+    let all: Vec<_> = (first..first + count).into_par_iter().map(fly).collect();
+    let engaged: u32 = all.iter().map(|(_, engaged)| engaged).sum();
+    let wrong: Vec<&String> = all.iter().flat_map(|(wrong, _)| wrong).collect();
+    println!(
+        "{count} flights, engaged {engaged} times, {} wrong",
+        wrong.len()
+    );
+    assert!(
+        u64::from(engaged) > count,
+        "too few were engaged: {engaged}"
+    );
+    assert!(wrong.is_empty(), "{} of {count}: {}", wrong.len(), wrong[0]);
+}

@@ -1,0 +1,187 @@
+//! A drone that is far from its line is told of, with the distance: sites with latitude and longitude swapped are accepted as any others.
+
+use std::time::Duration;
+
+use tempfile::TempDir;
+use uav_relay::Geodetic;
+use uav_relay::flight::axis::Axis;
+
+use crate::flying::Flight;
+use crate::peer::{Heard, Peer, RX, Site, TX, apart_m, on_earth};
+use crate::process::Relay;
+use crate::stays::{asked, until};
+
+/// The question, and the line that it is in.
+const SWAPPED: &str = "are latitude and longitude swapped?";
+
+/// A drone at the place where it belongs, and a relay that was given sites of its own.
+struct Apart {
+    drone: Peer,
+    relay: Relay,
+    folder: TempDir,
+}
+
+impl Apart {
+    fn start(kind: &str, tx: Site, rx: Site) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+        let (link, socket) = (path("tty"), path("status"));
+        let at = on_earth(380.0, 0.0).map(|number| number.to_string());
+        let drone = Peer::start("autopilot.py", &[kind, &link, &at[0], &at[1], &at[2]]);
+        let site = |site: Site| site.map(|number| number.to_string()).join(",");
+        let ends = [tx, rx]
+            .map(|[lat, lon, amsl]| Geodetic::from_degrees(lat, lon, amsl).expect("on earth"));
+        let axis = Axis::try_new(ends[0], ends[1]).unwrap();
+        let distance = axis.distance_m().to_string();
+        let (tx, rx) = (site(tx), site(rx));
+        let mut options = vec!["--index", "1", "--of", "1", "--autopilot", &link];
+        options.extend(["--site-tx", &tx, "--site-rx", &rx, "--distance", &distance]);
+        options.extend(["--status-socket", &socket]);
+        let relay = Relay::start(&options);
+        Self {
+            drone,
+            relay,
+            folder,
+        }
+    }
+
+    fn position(&self) -> serde_json::Value {
+        asked(&self.folder.path().join("status"))["autopilot"]["position"].clone()
+    }
+}
+
+const fn swapped([lat, lon, amsl]: Site) -> Site {
+    [lon, lat, amsl]
+}
+
+fn is_off_a_swapped_line(kind: &str) {
+    let mut apart = Apart::start(kind, swapped(TX), swapped(RX));
+    let line = apart.relay.line(SWAPPED);
+    let drone = on_earth(380.0, 0.0);
+    let ends =
+        [TX, RX].map(|end| apart_m([drone[0], drone[1], 0.0], with_height(swapped(end), 0.0)));
+    let away_m = ends[0].min(ends[1]);
+    let km = (away_m / 1e3).round() as u32;
+    let said = format!(
+        "autopilot: the drone is {} {:03} km from the line between transmitter and receiver: {SWAPPED}",
+        km / 1_000,
+        km % 1_000
+    );
+    // The library's distance is within 0.2 %.
+    let digits = |text: &str| -> f64 {
+        let words = text.split("the drone is ").nth(1).unwrap();
+        let words = words.split(" km").next().unwrap();
+        words.replace(' ', "").parse().unwrap()
+    };
+    let off = digits(&line) / digits(&said) - 1.0;
+    assert!(off.abs() < 2e-3, "{line}, and not {said}");
+    assert!(line.ends_with(said.split(" km").nth(1).unwrap()), "{line}");
+    let operator = |heard: &Heard| {
+        let text = heard.0["text"].as_str().unwrap_or_default();
+        text.starts_with("relay: the drone is ") && text.ends_with(" km from its line")
+    };
+    apart.drone.hears(operator);
+    let position = apart.position();
+    assert_eq!(position["outside"], "line", "{position}");
+    assert_eq!(position["sites_look_swapped"], true, "{position}");
+    let from_m = position["from_line_m"].as_f64().unwrap();
+    assert!((from_m / away_m - 1.0).abs() < 2e-3, "{position}");
+
+    // On the ground that is all.
+    std::thread::sleep(Duration::from_secs(12));
+    assert!(apart.relay.lines_with(SWAPPED).is_empty(), "it was told");
+    // In the air it is told again, once in ten seconds, to the operator as well.
+    apart.drone.order("arm");
+    apart.drone.order("takeoff");
+    apart.relay.line("autopilot: in the air");
+    apart.relay.line(SWAPPED);
+    apart.drone.forget();
+    std::thread::sleep(Duration::from_secs(25));
+    let again = apart.relay.lines_with(SWAPPED);
+    assert!((1..=3).contains(&again.len()), "{again:?}");
+    let texts = apart.drone.so_far().into_iter().filter(operator).count();
+    assert!((1..=3).contains(&texts), "{texts} texts");
+    // Nothing is flown: the relay has no position, and nothing is streamed.
+    apart.drone.order("mode companion");
+    let heard = apart.drone.hears_for(Duration::from_secs(3));
+    assert!(!heard.iter().any(Heard::is_target), "{heard:?}");
+    assert!(!apart.relay.has_said("flies to the relay's setpoints"));
+}
+
+const fn with_height([lat, lon, _]: Site, amsl: f64) -> Site {
+    [lat, lon, amsl]
+}
+
+#[test]
+fn a_px4_far_from_a_swapped_line_is_told_of() {
+    is_off_a_swapped_line("px4");
+}
+
+#[test]
+fn an_arducopter_far_from_a_swapped_line_is_told_of() {
+    is_off_a_swapped_line("arducopter");
+}
+
+/// Sites of another valley: not swapped, and not the drone's.
+#[test]
+fn a_drone_far_from_its_line_is_told_of_without_a_guess() {
+    let moved = |[lat, lon, amsl]: Site| [lat - 0.1, lon, amsl];
+    let mut apart = Apart::start("px4", moved(TX), moved(RX));
+    let line = apart
+        .relay
+        .line("from the line between transmitter and receiver");
+    let [rx, drone] = [moved(RX), on_earth(380.0, 0.0)];
+    let away_m = apart_m(with_height(rx, 0.0), with_height(drone, 0.0));
+    let said = format!("the drone is {:.0} km from", away_m / 1e3);
+    assert!(line.contains(&said), "{said} is not in {line}");
+    assert!(
+        line.contains("are these the sites of this flight"),
+        "{line}"
+    );
+    assert_eq!(apart.position()["sites_look_swapped"], false);
+}
+
+/// Beside its line, and outside the geofence: the relay has a position, and the pilot may fly there.
+#[test]
+fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
+    // 380 m along a line that begins 500 m farther on.
+    let shifted = |site: Site| {
+        let [lat, lon, amsl] = on_earth(500.0, 0.0);
+        [
+            site[0] + lat - TX[0],
+            site[1] + lon - TX[1],
+            site[2] + amsl - TX[2],
+        ]
+    };
+    let mut apart = Apart::start("arducopter", shifted(TX), shifted(RX));
+    apart.relay.line("autopilot: on the ground");
+    let status = apart.folder.path().join("status");
+    let said = until(&status, |said| {
+        said["autopilot"]["position"]["outside"] == "geofence"
+    });
+    let from_m = said["autopilot"]["position"]["from_line_m"]
+        .as_f64()
+        .unwrap();
+    assert!((from_m - 120.0).abs() < 1.0, "{from_m}");
+    assert!(!apart.relay.has_said("geofence"), "it is on the ground");
+    apart.drone.order("arm");
+    apart.drone.order("takeoff");
+    let line = apart.relay.line("geofence");
+    assert!(
+        line.ends_with("the drone is 120 m from the line between transmitter and receiver, 120 m outside the mission's geofence"),
+        "{line}"
+    );
+    std::thread::sleep(Duration::from_secs(8));
+    assert!(apart.relay.lines_with("geofence").is_empty(), "10 s");
+    apart.relay.line("geofence");
+}
+
+/// At its line nothing is told.
+#[test]
+fn a_drone_at_its_line_is_not_told_of() {
+    let mut flight = Flight::found("arducopter", 380.0);
+    flight.takes_off();
+    flight.is_engaged();
+    std::thread::sleep(Duration::from_secs(3));
+    assert!(!flight.relay.has_said("from the line between"));
+}

@@ -1,0 +1,218 @@
+//! An autopilot over UDP that answers the first address and port it hears from, and no other: a companion that restarts is heard again.
+
+use std::net::UdpSocket;
+
+use rustix::process::Signal;
+use tempfile::TempDir;
+
+use crate::peer::{Heard, Peer, on_earth, options, relay};
+use crate::process::{Ended, Relay};
+
+/// UDP ports of this computer that no other program uses.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ports {
+    /// The autopilot's.
+    pub(crate) port: u16,
+    /// The companion's.
+    pub(crate) local: u16,
+}
+
+impl Ports {
+    /// A pair as PX4's simulation has it: 14580 + i and 14540 + i.
+    fn of_px4() -> Self {
+        let first = std::process::id() as u16;
+        let pairs = (0..10).map(|i| (first.wrapping_add(i)) % 10);
+        let mut pairs = pairs.map(|i| Self {
+            port: 14_580 + i,
+            local: 14_540 + i,
+        });
+        pairs
+            .find(|pair| pair.are_free())
+            .expect("one of ten pairs is free")
+    }
+
+    /// Any pair whose second port is `apart` above the first.
+    pub(crate) fn apart(apart: u16) -> Self {
+        let mut pairs = (0..100).filter_map(|_| {
+            let port = UdpSocket::bind("127.0.0.1:0").unwrap();
+            let port = port.local_addr().unwrap().port();
+            Some(Self {
+                port,
+                local: port.checked_add(apart)?,
+            })
+        });
+        pairs
+            .find(|pair| pair.are_free())
+            .expect("one of a hundred pairs is free")
+    }
+
+    fn are_free(self) -> bool {
+        let bound = [self.port, self.local].map(|port| UdpSocket::bind(("0.0.0.0", port)));
+        bound.iter().all(Result::is_ok)
+    }
+
+    /// A drone on the ground behind the first port, that sends to `partner` before it has heard from anybody.
+    pub(crate) fn drone(self, partner: u16) -> Peer {
+        let at = on_earth(380.0, 0.0).map(|number| number.to_string());
+        let link = format!("udp:{}@{partner}", self.port);
+        Peer::start("autopilot.py", &["px4", &link, &at[0], &at[1], &at[2]])
+    }
+}
+
+/// The companion finds the autopilot, and the autopilot hears the companion and answers it.
+fn they_hear_each_other(relay: &mut Relay, drone: &mut Peer) {
+    relay.line("autopilot: found a PX4");
+    relay.line("autopilot: on the ground, or not armed");
+    drone.forget();
+    drone.hears(|heard| heard.is("HEARTBEAT") && heard.0["from"] == serde_json::json!([7, 191]));
+}
+
+/// Starts a companion three times: the first one is killed, the second one ends by itself. The autopilot restarts never.
+fn is_heard_again(address: &str, ports: Ports) {
+    let mut drone = ports.drone(ports.local);
+    let mut first = relay(address, &[]);
+    they_hear_each_other(&mut first, &mut drone);
+    // Dropped, it is killed with SIGKILL.
+    drop(first);
+    let mut second = relay(address, &[]);
+    they_hear_each_other(&mut second, &mut drone);
+    second.signal(Signal::TERM);
+    assert_eq!(second.end().status, Some(0));
+    let mut third = relay(address, &[]);
+    they_hear_each_other(&mut third, &mut drone);
+    let heard = drone.hears(Heard::is_any);
+    assert_eq!(heard.partner(), Some(ports.local), "{address}");
+}
+
+#[test]
+fn a_companion_that_restarts_is_heard_at_the_ports_of_px4() {
+    let ports = Ports::of_px4();
+    is_heard_again(&format!("udp:127.0.0.1:{}", ports.port), ports);
+}
+
+#[test]
+fn a_companion_that_restarts_is_heard_at_any_other_port() {
+    let ports = Ports::apart(1_000);
+    is_heard_again(&format!("udp:127.0.0.1:{}", ports.port), ports);
+}
+
+#[test]
+fn a_companion_that_restarts_is_heard_at_the_local_port_that_was_stated() {
+    let ports = Ports::apart(7);
+    let address = format!("udp:localhost:{}@{}", ports.port, ports.local);
+    is_heard_again(&address, ports);
+}
+
+/// It restarts in the air: it finds the autopilot, and who flies.
+#[test]
+fn a_companion_that_restarts_in_the_air_is_heard() {
+    let ports = Ports::apart(1_000);
+    let address = format!("udp:127.0.0.1:{}", ports.port);
+    let mut drone = ports.drone(ports.local);
+    let mut first = relay(&address, &[]);
+    they_hear_each_other(&mut first, &mut drone);
+    drone.order("arm");
+    drone.order("takeoff");
+    first.line("autopilot: in the air");
+    drop(first);
+    let mut second = relay(&address, &[]);
+    second.line("autopilot: found a PX4");
+    second.line("autopilot: in the air");
+}
+
+/// An autopilot that vanishes closes its port: what is sent there is refused, and that ends nothing.
+#[test]
+fn an_autopilot_that_restarts_is_found_again() {
+    let ports = Ports::apart(1_000);
+    // It sends to nobody before it is spoken to.
+    let mut drone = ports.drone(9);
+    let mut relay = relay(&format!("udp:127.0.0.1:{}", ports.port), &[]);
+    they_hear_each_other(&mut relay, &mut drone);
+    for _ in 0..2 {
+        drone.order("unplug");
+        relay.line("autopilot: silent");
+        drone.order("reboot");
+        drone.forget();
+        drone.order("plug");
+        relay.line("autopilot: on the ground, or not armed");
+        let heard = drone.hears(Heard::is_any);
+        assert_eq!(heard.partner(), Some(ports.local));
+    }
+    relay.signal(Signal::TERM);
+    assert_eq!(relay.end().status, Some(0));
+}
+
+/// One line, with the port that is in the way and what else may be stated.
+#[test]
+fn a_local_port_that_cannot_be_had_is_named() {
+    let ports = Ports::apart(1_000);
+    let Ports { port, local } = ports;
+    let taken = UdpSocket::bind(("0.0.0.0", local)).unwrap();
+    let whole = format!("udp:127.0.0.1:{port}@{local}");
+    let short = format!("udp:127.0.0.1:{port}");
+    let own = format!("udp:127.0.0.1:{port}@{port}");
+    let in_use = format!("local port {local} is in use by another program");
+    for (address, parts) in [
+        (&whole, [&*in_use, "udp:HOST:PORT@LOCAL, within 1 to 65535"]),
+        (&short, [&*in_use, "udp:HOST:PORT@LOCAL, within 1 to 65535"]),
+        (
+            &own,
+            ["is this program's own port", "LOCAL must be another"],
+        ),
+    ] {
+        let options = options(address);
+        let options: Vec<&str> = options.iter().map(String::as_str).collect();
+        let Ended { status, stderr, .. } = Relay::start(&options).end();
+        assert_eq!((status, stderr.len()), (Some(1), 1), "{stderr:?}");
+        let begin = format!("--autopilot {address}: ");
+        assert!(stderr[0].starts_with(&begin), "{stderr:?}");
+        for part in parts {
+            assert!(stderr[0].contains(part), "{part} not in {stderr:?}");
+        }
+    }
+    drop(taken);
+}
+
+/// The same address in the file of all drones.
+#[test]
+fn the_file_states_a_local_port() {
+    let ports = Ports::apart(11);
+    let drone = ports.drone(9);
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("drone.toml");
+    let text = include_str!("../../../examples/drone.toml");
+    let autopilot = format!(
+        "autopilot = \"udp:127.0.0.1:{}@{}\"\n",
+        ports.port, ports.local
+    );
+    let kept = |line: &&str| {
+        ![
+            "autopilot",
+            "epoch_file",
+            "upload_file",
+            "view_file",
+            "key_file",
+            "shared =",
+        ]
+        .iter()
+        .any(|key| line.starts_with(key))
+    };
+    let mut lines: Vec<&str> = text.lines().filter(kept).collect();
+    let at = lines
+        .iter()
+        .position(|line| *line == "[companion]")
+        .unwrap();
+    lines.insert(at + 1, &autopilot);
+    std::fs::write(&file, lines.join("\n")).unwrap();
+    let mut relay = Relay::start(&[
+        "--config",
+        file.to_str().unwrap(),
+        "--index",
+        "1",
+        "--of",
+        "1",
+    ]);
+    relay.line("autopilot: found a PX4");
+    let heard = drone.hears(Heard::is_any);
+    assert_eq!(heard.partner(), Some(ports.local));
+}

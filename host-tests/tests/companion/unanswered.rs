@@ -1,0 +1,175 @@
+//! An autopilot that does not answer is said: after 3 s, once, with what to look at, and in the status.
+
+use std::net::UdpSocket;
+use std::path::Path;
+use std::time::Duration;
+
+use rustix::process::Signal;
+use tempfile::TempDir;
+
+use crate::datagrams::Ports;
+use crate::peer::relay;
+use crate::process::Relay;
+use crate::pty::Pty;
+use crate::stays::{asked, until};
+
+/// How late a line may be on a busy machine.
+const LATE_S: f64 = 1.5;
+
+struct Unanswered {
+    relay: Relay,
+    socket: std::path::PathBuf,
+    _folder: TempDir,
+}
+
+impl Unanswered {
+    fn start(autopilot: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let socket = folder.path().join("status");
+        let mut relay = relay(autopilot, &["--status-socket", socket.to_str().unwrap()]);
+        relay.line("autopilot: by --autopilot");
+        Self {
+            relay,
+            socket,
+            _folder: folder,
+        }
+    }
+
+    fn status(&self) -> &Path {
+        &self.socket
+    }
+
+    /// The line with `part` in it comes after 3 s, has those parts, and is in the status.
+    fn is_said(&mut self, parts: &[&str]) {
+        let line = self.relay.line(parts[0]);
+        let seconds = seconds(&line);
+        assert!((3.0..3.0 + LATE_S).contains(&seconds), "{line}");
+        for part in parts {
+            assert!(line.contains(part), "{part} not in {line}");
+        }
+        let said = asked(self.status());
+        let autopilot = &said["autopilot"];
+        let why = autopilot["unanswered"].as_str().unwrap();
+        assert!(line.ends_with(why), "{why} is not the end of {line}");
+        assert_eq!(autopilot["state"], "silent", "{autopilot}");
+    }
+
+    /// Nothing more is said of it for 7 s, in which it sleeps.
+    fn is_said_once(&mut self) {
+        let (time, sleeps) = self.relay.cost();
+        std::thread::sleep(Duration::from_secs(7));
+        let (time_now, sleeps_now) = self.relay.cost();
+        let (used, woken) = (time_now.saturating_sub(time), sleeps_now - sleeps);
+        println!(
+            "{} ms of processor time, {woken} wake-ups in 7 s",
+            used.as_millis()
+        );
+        assert!(used < Duration::from_millis(300), "{used:?}");
+        assert!(woken < 300, "woken {woken} times");
+        let again = self.relay.lines_with("autopilot: ");
+        assert!(again.is_empty(), "{again:?}");
+        let said = asked(self.status());
+        assert!(said["autopilot"]["unanswered"].is_string(), "{said}");
+    }
+}
+
+/// The time since the start that a line begins with.
+fn seconds(line: &str) -> f64 {
+    line.split_whitespace().nth(1).unwrap().parse().unwrap()
+}
+
+#[test]
+fn a_udp_port_at_which_nobody_listens_is_said_once() {
+    let ports = Ports::apart(1_000);
+    let mut unanswered = Unanswered::start(&format!("udp:127.0.0.1:{}", ports.port));
+    let (at, local) = (
+        format!("127.0.0.1:{}", ports.port),
+        format!("from local port {}", ports.local),
+    );
+    unanswered.is_said(&[
+        "autopilot: nobody answers at ",
+        &at,
+        &local,
+        "connection refused",
+    ]);
+    unanswered.is_said_once();
+    // Once it is there it is found.
+    let drone = ports.drone(9);
+    unanswered.relay.line("autopilot: found a PX4");
+    unanswered.relay.line("autopilot: on the ground");
+    let said = until(unanswered.status(), |said| {
+        said["autopilot"]["state"] == "grounded"
+    });
+    let autopilot = &said["autopilot"];
+    assert!(autopilot["unanswered"].is_null(), "{autopilot}");
+    assert_eq!(autopilot["port"]["local_port"], ports.local, "{autopilot}");
+    assert!(
+        autopilot["port"]["times_refused"].as_u64() > Some(2),
+        "{autopilot}"
+    );
+    drop(drone);
+    unanswered.relay.line("autopilot: silent");
+    unanswered.relay.signal(Signal::TERM);
+    assert_eq!(unanswered.relay.end().status, Some(0));
+}
+
+/// As a PX4 that answers somebody else.
+#[test]
+fn a_udp_port_that_does_not_answer_is_said_once() {
+    let ports = Ports::apart(1_000);
+    let silent = UdpSocket::bind(("127.0.0.1", ports.port)).unwrap();
+    let mut unanswered = Unanswered::start(&format!("udp:127.0.0.1:{}", ports.port));
+    let local = format!("from local port {}", ports.local);
+    unanswered.is_said(&[
+        "autopilot: nobody answers at ",
+        &local,
+        "keeps the first address and port",
+        "udp:HOST:PORT@LOCAL",
+    ]);
+    unanswered.is_said_once();
+    let mut frame = [0; 300];
+    assert!(silent.recv(&mut frame).unwrap() > 0, "it was spoken to");
+}
+
+#[test]
+fn a_tty_that_does_not_answer_is_said_once() {
+    let pty = Pty::new();
+    let path = pty.path().to_str().unwrap();
+    let mut unanswered = Unanswered::start(path);
+    unanswered.is_said(&["autopilot: nobody answers at ", path, "115200 bit/s", "TX"]);
+    unanswered.is_said_once();
+}
+
+/// What comes is no MAVLink 2, as with a wrong baud rate.
+#[test]
+fn noise_is_told_from_silence() {
+    let ports = Ports::apart(1_000);
+    let noisy = UdpSocket::bind(("127.0.0.1", ports.port)).unwrap();
+    let mut unanswered = Unanswered::start(&format!("udp:127.0.0.1:{}", ports.port));
+    for _ in 0..30 {
+        noisy
+            .send_to(&[0x55; 50], ("127.0.0.1", ports.local))
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(150));
+    }
+    let line = unanswered.relay.line("no MAVLink 2");
+    assert!(line.contains("autopilot: "), "{line}");
+    assert!(!unanswered.relay.has_said("nobody answers"), "bytes came");
+}
+
+/// A ground station, a radio, a plane: they speak, and are no autopilot that grants control.
+#[test]
+fn others_are_told_from_an_autopilot() {
+    let ports = Ports::apart(1_000);
+    let mut drone = ports.drone(ports.local);
+    drone.order("stranger");
+    let mut unanswered = Unanswered::start(&format!("udp:127.0.0.1:{}", ports.port));
+    let line = unanswered
+        .relay
+        .line("none of them from a PX4 or an ArduCopter");
+    assert!(line.contains("autopilot: frames come by "), "{line}");
+    assert!(!unanswered.relay.has_said("nobody answers"), "frames came");
+    drone.order("vehicle");
+    unanswered.relay.line("autopilot: found a PX4");
+    assert!(asked(unanswered.status())["autopilot"]["unanswered"].is_null());
+}

@@ -1,0 +1,76 @@
+//! Echoes (TIMESYNC): how old what the autopilot says may be, by the link itself and not by anybody's clock.
+//!
+//! A cable, a radio or a router may keep bytes for seconds. A heartbeat has no time stamp, and the autopilot's clock may lose time. So the
+//! link sends its own time twice a second and the autopilot sends it back. Bytes stay in order: whatever comes after an answer was said
+//! after the question, and is no older than the question.
+//!
+//! An autopilot that has answered no question within [`GIVES_UP`] of the first has no echoes; the ages of its positions are all that is known
+//! then. Until then a link that has just begun is taken for late. An autopilot that has answered once is late whenever it does not.
+
+use crate::time::{Duration, Instant};
+
+const PERIOD: Duration = Duration::from_millis(500);
+
+/// The link is late when the newest question that was answered is older than this.
+const LATE: Duration = Duration::from_millis(1_500);
+
+const GIVES_UP: Duration = Duration::from_millis(10_000);
+
+/// An answer to a question older than this is not of this link.
+const OLDEST: Duration = Duration::from_millis(60_000);
+
+/// The lowest bits of a question. It holds µs in the higher bits: nearly nanoseconds, and the autopilot only sends them back.
+const SHIFT: u32 = 10;
+const TAG: u64 = 0x2A5;
+
+/// Questions and answers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Echo {
+    due: Option<Instant>,
+    /// When the first question was asked.
+    begun_at: Option<Instant>,
+    /// When the newest question that was answered was asked.
+    asked_at: Option<Instant>,
+}
+
+impl Echo {
+    /// Returns the question to ask at `now`.
+    pub(super) fn take(&mut self, now: Instant) -> Option<u64> {
+        if self.due.is_some_and(|due| due > now) {
+            return None;
+        }
+        self.due = Some(now + PERIOD);
+        self.begun_at = self.begun_at.or(Some(now));
+        Some(now.as_micros() << SHIFT | TAG)
+    }
+
+    /// Takes an answer.
+    pub(super) fn hear(&mut self, now: Instant, question: u64) {
+        let asked_at = Instant::from_micros(question >> SHIFT);
+        let is_own = question & ((1 << SHIFT) - 1) == TAG && asked_at <= now;
+        if is_own && now.since(asked_at) < OLDEST {
+            self.asked_at = self.asked_at.max(Some(asked_at));
+        }
+    }
+
+    /// Returns the earliest time at which what comes now was said, if that is known.
+    pub(super) const fn floor(&self) -> Option<Instant> {
+        self.asked_at
+    }
+
+    /// Returns true while what comes may be too old to rely on.
+    pub(super) fn is_late(&self, now: Instant) -> bool {
+        match (self.asked_at, self.begun_at) {
+            (Some(at), _) => now.since(at) >= LATE,
+            (None, Some(at)) => now.since(at) < GIVES_UP,
+            (None, None) => true,
+        }
+    }
+
+    /// Returns the next time at which there is something to ask or to notice.
+    pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
+        let late = self.asked_at.map(|at| at + LATE).filter(|at| *at > now);
+        let all = [self.due, late, self.begun_at.map(|at| at + GIVES_UP)];
+        all.into_iter().flatten().filter(|at| *at > now).min()
+    }
+}
