@@ -58,6 +58,15 @@ pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     ..*mission(3).config()
 });
 
+/// The same, with room to the side as well.
+pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
+    lateral: Band {
+        least_m: -280.0,
+        most_m: 280.0,
+    },
+    ..*HIGH.config()
+});
+
 pub(crate) const POINTS: [FieldPoint; 4] = [
     FieldPoint {
         x_m: 0.0,

@@ -2,12 +2,13 @@
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
+use uav_relay::Mission;
 use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::planning::fleet;
 use uav_relay::planning::single::{free, given_altitude, given_x};
 
 use super::counter::instructions;
-use super::missions::{HIGH, MISSION};
+use super::missions::{HIGH, MISSION, WIDE};
 
 /// The theorems in the scenario with a band of altitudes, and the fewest relays for a target.
 pub(crate) fn planning() {
@@ -28,10 +29,10 @@ pub(crate) fn planning() {
     hprintln!("fewest_relays {}", relays);
 }
 
-/// A chain of so many by the joint method in the scenario with a band of altitudes: instructions in all, of the costliest portion, and
+/// A chain of so many by the joint method in the scenario `of`: instructions in all, of the costliest portion, and
 /// how many portions.
-fn solved(relays: u16) -> (u32, u32, u32) {
-    let Ok(mission) = HIGH.with_relays(relays) else {
+fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
+    let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);
     };
     let Some(mut solver) = Solver::<100, 10>::new(&mission) else {
@@ -53,13 +54,17 @@ fn solved(relays: u16) -> (u32, u32, u32) {
 
 /// The joint method without a message.
 pub(crate) fn joint() {
-    let (all, most, portions) = solved(8);
+    let (all, most, portions) = solved(&HIGH, 8);
     hprintln!("solved_8 {}", all);
     hprintln!("portion_8 {}", most);
     hprintln!("portions_8 {}", portions);
-    let (all, most, portions) = solved(50);
+    let (all, most, portions) = solved(&HIGH, 50);
     hprintln!("solved_50 {}", all);
     hprintln!("portion_50 {}", most);
     hprintln!("portions_50 {}", portions);
+    let (all, most, portions) = solved(&WIDE, 50);
+    hprintln!("solved_50_wide {}", all);
+    hprintln!("portion_50_wide {}", most);
+    hprintln!("portions_50_wide {}", portions);
     hprintln!("size_of_solver {}", size_of::<Solver<100, 10>>());
 }

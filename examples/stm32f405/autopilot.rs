@@ -11,21 +11,26 @@ use stm32f4xx_hal::pac::{Interrupt, USART1, interrupt};
 use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::Serial;
 use uav_relay::flight::autopilot::Autopilot as Link;
+use uav_relay::flight::autopilot::carrot::Pace;
 #[cfg(feature = "upload")]
 use uav_relay::flight::axis::Axis;
 use uav_relay::flight::course::Course;
 use uav_relay::flight::mavlink::outgoing::FrameBytes;
 #[cfg(feature = "mavlink-signing")]
 use uav_relay::flight::mavlink::signing::{Signing, Stamp};
+use uav_relay::guard::config::GuardConfig;
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Duration, Event, Instant, Mission, Relay};
+use uav_relay::{Duration, Event, Instant, Mission, Relay, Side};
 
 use super::config::{self, Sites};
 use super::port::{self, OUTGOING, Port, Queues, Slot};
-use super::{board, log};
+use super::{board, chip, log};
 
 /// Received bytes that can wait for the main loop: 44 ms of them. An autopilot sends bursts, and the main loop may be in a sweep.
 const RECEIVED: usize = 512;
+
+/// How far off its place a hovering drone may be reported, m.
+const POSITION_ERROR_M: f32 = 1.5;
 
 /// The longest frame that is sent.
 const LONGEST: usize = size_of::<FrameBytes>();
@@ -39,8 +44,8 @@ static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
 pub(crate) type Uart = Serial<USART1>;
 
 /// Sets the port up.
-pub(crate) fn uart(usart: USART1, tx: PA9, rx: PA10, rcc: &mut Rcc) -> Option<Uart> {
-    Serial::new(usart, (tx, rx), port::config(), rcc).ok()
+pub(crate) fn uart(usart: USART1, tx: PA9, rx: PA10, apb2_hz: u32, rcc: &mut Rcc) -> Option<Uart> {
+    Serial::new(usart, (tx, rx), port::config(apb2_hz), rcc).ok()
 }
 
 /// The link, and what it goes over.
@@ -59,11 +64,18 @@ pub(crate) struct Autopilot {
 }
 
 impl Autopilot {
-    /// Whether this image can tell it where to fly.
-    pub(crate) const FLIES: bool = true;
-
-    /// How far off its place a hovering drone may be reported, m.
-    pub(crate) const POSITION_ERROR_M: f32 = 1.5;
+    /// Returns the rest of a guard: how far off its place a hovering drone may be reported, m, and how long it takes to stop.
+    #[expect(
+        clippy::unnecessary_wraps,
+        reason = "an image that does not fly has none"
+    )]
+    pub(crate) fn guard(sites: &Sites, of: GuardConfig) -> Option<GuardConfig> {
+        Some(GuardConfig {
+            hover_m: POSITION_ERROR_M,
+            lag: Pace::of_speed(sites.speed_m_s).stopping_time(),
+            ..of
+        })
+    }
 
     /// The link along the line between `sites`, in a place of its own in RAM; `None` where the mission is not flown there.
     #[inline(never)] // its stack is given back
@@ -105,6 +117,10 @@ impl Autopilot {
             target: None,
         })?;
         sign(&mut autopilot.link, now).ok()?;
+        if chip::was_hung() {
+            // There is room for the first line.
+            let _ = autopilot.link.say("relay: restarted by its watchdog");
+        }
         Some(autopilot)
     }
 
@@ -165,6 +181,9 @@ impl Autopilot {
         #[cfg(feature = "upload")]
         self.follow(now, relay);
         let setpoint = relay.setpoint();
+        self.link.handle_ready(now, relay.is_ready());
+        let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
+        self.link.handle_hold(now, holds);
         self.link.handle_setpoint(now, setpoint);
         let sir_db = relay.target().map(|target| self.decibels(target));
         self.link.handle_values(now, sir_db, setpoint);

@@ -6,6 +6,7 @@ use cortex_m::asm;
 use cortex_m::peripheral::NVIC;
 use stm32f4xx_hal::pac::Interrupt;
 
+use super::chip;
 use super::config::{self, Block};
 
 /// The configuration block, where it stands in the flash.
@@ -21,8 +22,9 @@ pub(crate) fn unmask(interrupt: Interrupt) {
     unsafe { NVIC::unmask(interrupt) };
 }
 
-/// A number that differs from one start to the next: what the RAM holds after power-up is noise, and after a reset it is
-/// what this function left there.
+/// Returns a number that differs from board to board and from one start to the next: after power-up the RAM holds noise, which is the
+/// chip's own and not copied with an image; after a reset it holds what this function left there. The chip's unique number would do as well, but
+/// the emulator has none at its address.
 pub(crate) fn seed() -> u32 {
     const WORDS: usize = 64;
     #[unsafe(link_section = ".uninit.leftover")]
@@ -38,9 +40,10 @@ pub(crate) fn seed() -> u32 {
     seed
 }
 
-/// For a drone that cannot take part: sleeps for good.
+/// For a drone that cannot take part: sleeps for good, once it has a clock to wake by. Without one the watchdog restarts it.
 pub(crate) fn stop() -> ! {
     loop {
+        chip::feed();
         asm::wfi();
     }
 }

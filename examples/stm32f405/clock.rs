@@ -1,7 +1,7 @@
 //! Time since the start, and sleep until it is time or something has come in.
 
 use core::cell::Cell;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::asm;
 use cortex_m::interrupt::{Mutex, free};
@@ -10,9 +10,8 @@ use cortex_m::peripheral::{SCB, SYST};
 use cortex_m_rt::exception;
 use uav_relay::Instant;
 
-/// `SysTick` cycles in a microsecond at 16 MHz, and in the millisecond of its period.
-const MICRO: u32 = 16;
-const TICK: u32 = 1_000 * MICRO;
+/// `SysTick` cycles in a microsecond; a thousand times as many are its period.
+static MICRO: AtomicU32 = AtomicU32::new(1);
 
 /// Milliseconds since the start: 64 bits, so they do not overflow.
 static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
@@ -25,10 +24,12 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Starts the millisecond interrupt.
-    pub(crate) fn start(mut tick: SYST) -> Self {
+    /// Starts the millisecond interrupt of a core that runs at `core_hz`, a multiple of 1 MHz.
+    pub(crate) fn start(mut tick: SYST, core_hz: u32) -> Self {
+        let micro = core_hz / 1_000_000;
+        MICRO.store(micro, Ordering::Relaxed);
         tick.set_clock_source(SystClkSource::Core);
-        tick.set_reload(TICK - 1);
+        tick.set_reload(1_000 * micro - 1);
         tick.clear_current();
         tick.enable_counter();
         tick.enable_interrupt();
@@ -78,11 +79,13 @@ pub(crate) fn micros() -> u64 {
             (ticks, count)
         }
     });
-    // The counter runs down from TICK - 1 and begins a period at 0.
-    let cycles = TICK.wrapping_sub(count) % TICK;
+    let micro = MICRO.load(Ordering::Relaxed).max(1);
+    // The counter runs down from the period - 1 and begins a period at 0.
+    let tick = micro.saturating_mul(1_000);
+    let cycles = tick.wrapping_sub(count) % tick;
     ticks
         .wrapping_mul(1_000)
-        .wrapping_add(u64::from(cycles / MICRO))
+        .wrapping_add(u64::from(cycles / micro))
 }
 
 #[exception]

@@ -66,6 +66,7 @@ fn switch_on(
     now: Instant,
 ) -> Option<&'static mut Relay> {
     let common = config.mission.config().common;
+    let [probe_after, dead_after] = config.silence();
     let settings = Settings {
         auth,
         // What it has in common with the others may change with an upload.
@@ -76,11 +77,12 @@ fn switch_on(
         measure: config.measure,
         listen: config.listen,
         wiring,
-        guard: (Autopilot::FLIES && config.sites.is_some()).then(|| GuardConfig {
-            hover_m: Autopilot::POSITION_ERROR_M,
-            ..GuardConfig::of(&config.mission, config.profile)
+        guard: config.sites.as_ref().and_then(|sites| {
+            Autopilot::guard(sites, GuardConfig::of(&config.mission, config.profile))
         }),
         sited: config.sites.is_some(),
+        probe_after,
+        dead_after,
         ..Settings::default()
     };
     // All else has been checked with the configuration.

@@ -3,6 +3,7 @@
 use stm32f4xx_hal::gpio::{PA9, PA10};
 use stm32f4xx_hal::pac::USART1;
 use stm32f4xx_hal::rcc::Rcc;
+use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Event, Instant, Mission, Relay};
 
 use super::config::Sites;
@@ -15,7 +16,7 @@ pub(crate) struct Uart;
     clippy::unnecessary_wraps,
     reason = "as the port of an autopilot is set up"
 )]
-pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: &mut Rcc) -> Option<Uart> {
+pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: u32, _: &mut Rcc) -> Option<Uart> {
     Some(Uart)
 }
 
@@ -23,9 +24,10 @@ pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: &mut Rcc) -> Option<Uart> {
 pub(crate) enum Autopilot {}
 
 impl Autopilot {
-    pub(crate) const FLIES: bool = false;
-
-    pub(crate) const POSITION_ERROR_M: f32 = 0.0;
+    /// Returns none: this image does not fly.
+    pub(crate) const fn guard(_: &Sites, _: GuardConfig) -> Option<GuardConfig> {
+        None
+    }
 
     pub(crate) fn begin(_: Uart, _: &Sites, _: &Mission, _: Instant) -> Option<&'static mut Self> {
         log::no_flight();

@@ -13,7 +13,10 @@ use uav_relay::flight::course::{Course, CourseError};
 use uav_relay::sensing::belief::Belief;
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
+use uav_relay_chip::clock::Source;
+use uav_relay_chip::reset::Reset;
 
+use super::chip::Begun;
 use super::clock;
 use super::config::{Config, ConfigError};
 
@@ -32,6 +35,22 @@ pub(crate) fn begins(config: &Config) {
         config.mission.relays(),
         config.identity.network,
     );
+}
+
+/// The cause of the last reset, and the clocks that were reached.
+pub(crate) fn started(begun: &Begun) {
+    match begun.reset {
+        Reset::Watchdog => {
+            defmt::error!("started by the watchdog: the loop hung, or the clock stopped");
+        }
+        reset => defmt::info!("started: {=str}", reset.text()),
+    }
+    let mhz = begun.clocks.core_hz / 1_000_000;
+    match begun.clocks.pll {
+        Some(Source::Crystal) => defmt::info!("clock {=u32} MHz, from the crystal", mhz),
+        Some(Source::Internal) => defmt::warn!("clock {=u32} MHz, no crystal of 8 MHz", mhz),
+        None => defmt::warn!("clock {=u32} MHz, no PLL", mhz),
+    }
 }
 
 pub(crate) fn unguarded() {
@@ -88,6 +107,11 @@ pub(crate) fn autopilot(event: AutopilotEvent) {
         AutopilotEvent::Refused => defmt::warn!(
             "autopilot: does not fly where it is told to; is the place outside its fence?"
         ),
+        AutopilotEvent::Released(release) => defmt::warn!("autopilot: released, {}", release),
+        AutopilotEvent::Waits(reason) => {
+            defmt::warn!("autopilot: cannot be engaged, {}", reason);
+        }
+        AutopilotEvent::FenceBreached => defmt::warn!("autopilot: its fence is breached"),
         AutopilotEvent::State(State::Silent) => {
             defmt::warn!("autopilot: silent; look at the cable, the baud rate and MAVLink 2");
         }
@@ -95,7 +119,7 @@ pub(crate) fn autopilot(event: AutopilotEvent) {
             defmt::info!("autopilot: on the ground, or not armed");
         }
         AutopilotEvent::State(State::Standby) => {
-            defmt::info!("autopilot: in the air, flown by its pilot");
+            defmt::info!("autopilot: in the air, not flown by the relay");
         }
         AutopilotEvent::State(State::Engaged) => {
             defmt::info!("autopilot: flies to the relay's setpoints");
@@ -104,7 +128,12 @@ pub(crate) fn autopilot(event: AutopilotEvent) {
             defmt::warn!("autopilot: no position; keeps its last target");
         }
         AutopilotEvent::Mistrusted(Mistrust::NoKey) => {
-            defmt::error!("autopilot: signs, and ignores what is not signed; no key in the block");
+            defmt::error!(
+                "autopilot: signs, and answers nothing that is not signed; no key in the block"
+            );
+        }
+        AutopilotEvent::Mistrusted(Mistrust::SignsOnly) => {
+            defmt::info!("autopilot: signs, and answers what is not signed; no key in the block");
         }
         AutopilotEvent::Mistrusted(Mistrust::Unsigned) => {
             defmt::error!("autopilot: does not sign, and is not heard; a key in the block");
@@ -155,6 +184,9 @@ pub(crate) fn refused(error: ConfigError) {
         }
         ConfigError::AutopilotKey => {
             defmt::error!("configuration refused: an autopilot's key without sites");
+        }
+        ConfigError::Silence => {
+            defmt::error!("configuration refused: silence before a question, over 1200000 ms");
         }
         ConfigError::Field(error) => defmt::error!("configuration refused: field, {}", error),
         ConfigError::Channel(error) => defmt::error!("configuration refused: channel, {}", error),

@@ -23,6 +23,7 @@
 //! | `kept.rs` | when they, and what the relay has said in votes, are written and read |
 //! | `flash.rs` | the sectors of the logs of the crate `uav-relay-kept`, and everything unsafe about them |
 //! | `port.rs` | a serial port that an interrupt serves |
+//! | `chip.rs` | clocks, watchdog, cause of the last reset |
 //! | `clock.rs` | time and sleep |
 //! | `log.rs`, `silent.rs` | the log with `--features defmt`, and without |
 //! | `sink_uart.rs`, `sink_rtt.rs` | where it goes: a spare UART, or the debug probe with `--features rtt` |
@@ -34,6 +35,8 @@
 mod autopilot;
 #[cfg(target_os = "none")]
 mod board;
+#[cfg(target_os = "none")]
+mod chip;
 #[cfg(target_os = "none")]
 mod clock;
 #[cfg(target_os = "none")]

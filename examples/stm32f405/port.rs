@@ -9,6 +9,7 @@ use stm32f4xx_hal::pac::Interrupt;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::serial::{Config, Error, Event, Instance, Serial};
 use uav_relay::serial::{ByteQueues, Fault, InterruptEnd, Pend, QueuedPort};
+use uav_relay_chip::baud::believed;
 
 use super::{board, clock};
 
@@ -66,9 +67,9 @@ impl<U: Instance> Served<U> {
     }
 }
 
-/// What every port is set to.
-pub(crate) fn config() -> Config {
-    Config::default().baudrate(BAUD.bps())
+/// What a port is set to whose UART has a clock of `apb_hz`. The HAL did not set the clocks up and takes them for those of the reset.
+pub(crate) fn config(apb_hz: u32) -> Config {
+    Config::default().baudrate(believed(BAUD, apb_hz).bps())
 }
 
 /// Gives the UART to its interrupt, and the other end of the queues to the caller.

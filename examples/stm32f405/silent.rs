@@ -8,11 +8,14 @@ use uav_relay::flight::course::{Course, CourseError};
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
 
+use super::chip::Begun;
 use super::config::{Config, ConfigError};
 
 pub(crate) const fn asked() -> bool {
     false
 }
+
+pub(crate) const fn started(_: &Begun) {}
 
 pub(crate) const fn begins(_: &Config) {}
 

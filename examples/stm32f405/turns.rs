@@ -6,6 +6,7 @@ use uav_relay::Event;
 use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
 use uav_relay::{Instant, Sample};
 
+use super::chip;
 use super::clock::Clock;
 use super::drone::Drone;
 #[cfg(feature = "upload")]
@@ -81,7 +82,10 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
         // With what the neighbours have just changed.
         let soon = drone.autopilot.as_mut();
         let soon = soon.map(|autopilot| autopilot.fly(now, relay));
-        clock.sleep(wake.into_iter().chain(soon).min());
+        let now = clock.now();
+        chip::end_turn(relay, now);
+        let wake = wake.into_iter().chain(soon).min();
+        clock.sleep(Some(chip::latest(now, wake)));
     }
 }
 

@@ -7,6 +7,7 @@ use core::task::{Context, Poll, RawWaker, RawWakerVTable, Waker};
 
 use uav_relay::Instant;
 
+use super::chip;
 use super::clock::{self, Clock};
 
 /// The board's clock, and when the task wants to be polled at the latest.
@@ -54,7 +55,8 @@ pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl 
         let _ = task.as_mut().poll(&mut cx);
         also();
         if let Ok(mut clock) = time.clock.try_borrow_mut() {
-            clock.sleep(time.next.get());
+            let now = clock.now();
+            clock.sleep(Some(chip::latest(now, time.next.get())));
         }
     }
 }

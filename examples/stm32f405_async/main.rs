@@ -19,6 +19,9 @@ mod autopilot;
 #[path = "../stm32f405/board.rs"]
 mod board;
 #[cfg(target_os = "none")]
+#[path = "../stm32f405/chip.rs"]
+mod chip;
+#[cfg(target_os = "none")]
 #[path = "../stm32f405/clock.rs"]
 mod clock;
 #[cfg(target_os = "none")]
@@ -102,6 +105,8 @@ fn fly(
     let mut keep = |relay: &uav_relay::Relay| views.keep(relay);
     let runs = ports.run_keeping(&relay, &time, &mut keep);
     executor::run(pin!(select(runs, tell(&relay))), &time, || {
+        let now = uav_relay::asynch::Clock::now(&time);
+        relay.look(|relay| chip::end_turn(relay, now));
         if log::asked() {
             relay.look(log::counters);
             for port in [uav_relay::Port::Upstream, uav_relay::Port::Downstream] {

@@ -14,6 +14,9 @@ mod autopilot;
 #[path = "../stm32f405/board.rs"]
 mod board;
 #[cfg(target_os = "none")]
+#[path = "../stm32f405/chip.rs"]
+mod chip;
+#[cfg(target_os = "none")]
 #[path = "../stm32f405/clock.rs"]
 mod clock;
 #[cfg(target_os = "none")]

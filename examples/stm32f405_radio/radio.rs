@@ -6,7 +6,7 @@
 //! | its driver-enable pin, if it has one | PA1: high while this relay sends |
 //! | the autopilot, of a drone with sites | USART1: TX PA9, RX PA10 |
 //! | log, with `--features defmt` | UART4: TX PC10, RX PC11 |
-//! | clock | HSI, 16 MHz, no PLL; `SysTick` every millisecond |
+//! | clock | PLL, 168 MHz, from a crystal of 8 MHz or from the HSI; `SysTick` every millisecond |
 
 use core::cell::RefCell;
 
@@ -15,7 +15,6 @@ use cortex_m::singleton;
 use stm32f4xx_hal::gpio::{Output, PA1};
 use stm32f4xx_hal::pac::{self, Interrupt, USART2, interrupt};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::serial::Serial;
 
 use super::autopilot::{self, Uart};
@@ -31,17 +30,27 @@ pub(crate) type DriverEnable = PA1<Output>;
 pub(crate) fn start() -> Option<(Clock, Port, DriverEnable, Uart)> {
     let chip = pac::Peripherals::take()?;
     let core = cortex_m::Peripherals::take()?;
-    let mut rcc = chip.RCC.freeze(Config::hsi());
+    let begun = super::chip::begin();
+    let clocks = begun.clocks;
+    let mut rcc = chip.RCC.constrain();
     let a = chip.GPIOA.split(&mut rcc);
-    let clock = Clock::start(core.SYST);
+    let clock = Clock::start(core.SYST, clocks.core_hz);
     #[cfg(all(feature = "defmt", not(feature = "rtt")))]
     {
         let c = chip.GPIOC.split(&mut rcc);
-        let uart = Serial::new(chip.UART4, (c.pc10, c.pc11), port::config(), &mut rcc);
+        let config = port::config(clocks.apb1_hz);
+        let uart = Serial::new(chip.UART4, (c.pc10, c.pc11), config, &mut rcc);
         super::log::start(uart.ok()?);
     }
-    let autopilot = autopilot::uart(chip.USART1, a.pa9, a.pa10, &mut rcc)?;
-    let radio = Serial::new(chip.USART2, (a.pa2, a.pa3), port::config(), &mut rcc).ok()?;
+    super::log::started(&begun);
+    let autopilot = autopilot::uart(chip.USART1, a.pa9, a.pa10, clocks.apb2_hz, &mut rcc)?;
+    let radio = Serial::new(
+        chip.USART2,
+        (a.pa2, a.pa3),
+        port::config(clocks.apb1_hz),
+        &mut rcc,
+    )
+    .ok()?;
     let radio = port::open(
         radio,
         Interrupt::USART2,

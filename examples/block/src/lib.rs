@@ -53,7 +53,8 @@
 //! | 352 | u64 | how long after an agreement the leader asks what is heard, us; this and the next two are 0 where the relays do not listen |
 //! | 360 | u64 | half-life of what was heard, us |
 //! | 368 | f32 | relative error of one measurement, 1e-3 to 1 |
-//! | 372 | u32 | CRC-32C of bytes 0 to 371 |
+//! | 372 | u32 | milliseconds of silence after which a neighbour is asked for a sign of life, to 1200000; three times as many and it counts as lost. 0: 5000 |
+//! | 376 | u32 | CRC-32C of bytes 0 to 375 |
 //!
 //! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Listen`, `Field` and, by `course.rs`, `Axis`.
 //!
@@ -90,10 +91,10 @@ pub const BAUD: u32 = 115_200;
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// The version of the table above.
-pub const VERSION: u16 = 8;
+pub const VERSION: u16 = 9;
 
 /// Bytes of a block.
-pub const LEN: usize = 376;
+pub const LEN: usize = 380;
 
 /// Points of a field that a block has room for.
 pub const MAX_POINTS: usize = 16;
@@ -116,8 +117,14 @@ const NOISE: usize = AUTOPILOT_KEY + 32;
 /// Where what is said of listening begins.
 const LISTEN: usize = NOISE + 4;
 
+/// Where the silence is.
+const SILENCE: usize = LISTEN + 20;
+
+/// The longest silence before a question, ms.
+pub const MOST_PROBE_AFTER_MS: u32 = 1_200_000;
+
 /// [`LEN`] as the block states it.
-const LEN_FIELD: u16 = 376;
+const LEN_FIELD: u16 = 380;
 
 /// A block as it is stored.
 pub type Block = [u8; LEN];
@@ -192,6 +199,11 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     }
     let (_, noise) = block.split_at(NOISE);
     let noise_w = Reader(noise).f32();
+    let (_, silence) = block.split_at(SILENCE);
+    let probe_after_ms = Reader(silence).u32();
+    if probe_after_ms > MOST_PROBE_AFTER_MS {
+        return Err(ConfigError::Silence);
+    }
     let channel = numbers.channel().map_err(ConfigError::Channel)?;
     let mission = Mission::try_new(MissionConfig {
         relays,
@@ -228,6 +240,7 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
         measure,
         listen,
         sites,
+        probe_after_ms,
     })
 }
 

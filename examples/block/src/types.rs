@@ -3,7 +3,7 @@
 use uav_relay::channel::{AirGround, Channel, ChannelError};
 use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
-use uav_relay::{Geodetic, Identity, Listen, Measure, Method, Mission, Profile};
+use uav_relay::{Duration, Geodetic, Identity, Listen, Measure, Method, Mission, Profile};
 
 /// What the block says, checked.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -24,6 +24,19 @@ pub struct Config {
     pub listen: Option<Listen>,
     /// Where the ends of the line are on earth. `uav_relay::flight::course` checks whether they make one.
     pub sites: Option<Sites>,
+    /// Milliseconds of silence after which a neighbour is asked for a sign of life; 0 for the usual ones.
+    pub probe_after_ms: u32,
+}
+
+impl Config {
+    /// After which silence a neighbour is asked for a sign of life, and after which it counts as lost.
+    pub const fn silence(&self) -> [Duration; 2] {
+        let ms = match self.probe_after_ms {
+            0 => 5_000,
+            ms => ms as u64,
+        };
+        [Duration::from_millis(ms), Duration::from_millis(3 * ms)]
+    }
 }
 
 /// Where a drone with an autopilot flies.
@@ -128,6 +141,8 @@ pub enum ConfigError {
     Speed,
     /// There is a key for an autopilot, and no sites.
     AutopilotKey,
+    /// The silence after which a neighbour is asked is out of range.
+    Silence,
     /// This number of the field is out of range.
     Field(FieldError),
     /// This number of the channel is out of range.

@@ -3,7 +3,7 @@
 use uav_relay::{Interference, Interferer, Method};
 
 use super::{
-    AUTOPILOT_KEY, Block, CHECKED, ChannelNumbers, Config, LEN, LEN_FIELD, MAGIC, SECRET, SITES,
+    AUTOPILOT_KEY, Block, ChannelNumbers, Config, LEN, LEN_FIELD, MAGIC, SECRET, SILENCE, SITES,
     Secret, Sites, VERSION, crc,
 };
 
@@ -107,7 +107,8 @@ pub fn write(
         bytes.extend(listen.half_life.as_micros().to_le_bytes());
         bytes.extend(listen.relative_error.to_le_bytes());
     }
-    bytes.resize(CHECKED, 0);
+    bytes.resize(SILENCE, 0);
+    bytes.extend(config.probe_after_ms.to_le_bytes());
     let check = crc(&bytes);
     bytes.extend(check.to_le_bytes());
     let mut block = [0; LEN];

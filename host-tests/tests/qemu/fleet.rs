@@ -34,7 +34,7 @@ pub(crate) enum Image {
 }
 
 impl Image {
-    const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Wires => "stm32f405",
             Self::Radio => "stm32f405_radio",

@@ -10,13 +10,12 @@ use uav_relay::{Interference, Placement, Sample};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::simulator::sky::Sky;
 use uav_relay_tools::provision::block::Flight;
 
-use crate::fleet::{Fleet, Image};
+use crate::fleet::Fleet;
 use crate::log::Line;
 use crate::vehicle::{Vehicle, apart};
 
@@ -107,12 +106,13 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
     assert!((0.5..2.0).contains(&(source.power_w / 80.0)));
 
     let axis = unknown().line.unwrap().axis;
-    let mut fleet = Fleet::of(Image::Wires, &flight, Faults::default(), 1);
+    // Three autopilots are stepped in turn: in a life ten times as fast a position comes late whenever this process is kept waiting for 0.1 s.
+    let mut fleet = Fleet::in_real_time(&flight);
     let mut vehicles: Vec<Vehicle> = (1..)
         .zip(fleet.autopilots.drain(..))
         .map(|(drone, socket)| {
             let [first, ..] = places(drone);
-            let mut vehicle = Vehicle::new(Kind::ArduCopter, socket, axis, first, Life::Fast);
+            let mut vehicle = Vehicle::new(Kind::ArduCopter, socket, axis, first, Life::Real);
             vehicle.armed = true;
             vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
             vehicle
@@ -120,7 +120,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
         .collect();
 
     // Flown by their pilots, the drones hear; nothing is known yet.
-    let in_air = "autopilot: in the air, flown by its pilot";
+    let in_air = "autopilot: in the air, not flown by the relay";
     together(&mut fleet, &mut vehicles, "flight by the pilots", |lines| {
         (1..=RELAYS).all(|drone| {
             let mut lines = lines.iter().filter(|line| line.drone == drone);

@@ -20,3 +20,4 @@ mod three;
 mod upload;
 mod vehicle;
 mod views;
+mod watchdog;

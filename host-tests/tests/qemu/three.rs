@@ -100,19 +100,21 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
     });
     three.until("requests for messages", |three| {
         [33, 245].iter().all(|id| three.mavsdk.is_asked_for(*id))
-            && three.others.iter().all(|vehicle| vehicle.asked.len() == 3)
+            && three.others.iter().all(|vehicle| vehicle.asked.len() >= 2)
     });
     assert_eq!(three.mavsdk.target(), None);
 
     // Their pilots take off.
     three.mavsdk.order("arm");
     three.mavsdk.order("air");
+    three.mavsdk.order("active");
     for vehicle in &mut three.others {
         vehicle.armed = true;
         vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
     }
     three.until("flight by the pilots", |three| {
-        (1..=3).all(|drone| three.has_logged(drone, "autopilot: in the air, flown by its pilot"))
+        (1..=3)
+            .all(|drone| three.has_logged(drone, "autopilot: in the air, not flown by the relay"))
             && three.mavsdk.target().is_some()
     });
     assert!(three.others.iter().all(|vehicle| vehicle.told.is_empty()));
@@ -138,10 +140,10 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
     // One pilot takes over: that drone is released, and the others stay.
     three.others[0].granted = false;
     three.until("release", |three| {
-        let released = |text: &String| text == "relay: released";
+        let released = |text: &String| text.starts_with("relay: released");
         three.others[0].texts.iter().any(released)
     });
-    assert!(!three.mavsdk.reads("relay: released"));
+    assert!(!three.mavsdk.reads("relay: released, holds its place"));
     let places = three.places().unwrap();
     for (at, to) in [(places[0], to[0]), (places[2], to[2])] {
         assert!(apart(at, to) < 1.0, "{at:?}, {to:?}");

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use host_tests::firmware::emulator::Life;
 use mavlink::dialects::common::{
     EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot,
-    MavLandedState, MavMessage, MavModeFlag, MavType, POSITION_TARGET_GLOBAL_INT_DATA,
-    RADIO_STATUS_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA,
+    MavLandedState, MavMessage, MavModeFlag, MavState, MavType, POSITION_TARGET_GLOBAL_INT_DATA,
+    RADIO_STATUS_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA, TIMESYNC_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkReader, MavlinkVersion};
 use uav_relay::Geodetic;
@@ -23,6 +23,9 @@ const SYSTEM: u8 = 7;
 
 /// How fast it flies, m/s.
 const FASTEST_M_S: f32 = 8.0;
+
+/// So long the pilot shows another mode, ms: six heartbeats.
+const ELSEWHERE: u64 = 1_500;
 
 /// What it says, by itself or when asked, and how often, ms. A heartbeat more often than others have it, since this process may be kept
 /// waiting, and its drones' clock goes on.
@@ -58,8 +61,10 @@ pub(crate) struct Vehicle {
     goal: Option<(Placement, Geodetic)>,
     pub(crate) armed: bool,
     pub(crate) landed: MavLandedState,
-    /// OFFBOARD or GUIDED; else the pilot has the sticks.
+    /// The pilot wants the relay to fly: OFFBOARD or GUIDED, chosen anew where the relay asks for it. Otherwise the pilot has the sticks.
     pub(crate) granted: bool,
+    /// Until then the pilot shows another mode, ms.
+    elsewhere_until: u64,
     pub(crate) place: Placement,
     /// Messages that it was asked for.
     pub(crate) asked: BTreeSet<u32>,
@@ -98,6 +103,7 @@ impl Vehicle {
             armed: false,
             landed: MavLandedState::MAV_LANDED_STATE_ON_GROUND,
             granted: false,
+            elsewhere_until: 0,
             place,
             asked: BTreeSet::new(),
             told: Vec::new(),
@@ -171,10 +177,23 @@ impl Vehicle {
         std::thread::sleep(Duration::from_millis(1));
     }
 
+    /// The mode is OFFBOARD or GUIDED.
+    fn is_handed_over(&self, now: u64) -> bool {
+        self.granted && now >= self.elsewhere_until
+    }
+
+    /// The pilot reads the ground station: a relay that found the mode chosen, or has forgotten since that another one was, asks for another mode first.
+    fn reads(&mut self, text: String) {
+        if self.granted && text == "relay: waits, take another mode first" {
+            self.elsewhere_until = self.now() + ELSEWHERE;
+        }
+        self.texts.push(text);
+    }
+
     fn fly(&mut self, now: u64) {
         let step = FASTEST_M_S * (now - self.moved_at) as f32 / 1e3;
         self.moved_at = now;
-        let Some((to, _)) = self.goal.filter(|_| self.granted) else {
+        let Some((to, _)) = self.goal.filter(|_| self.is_handed_over(now)) else {
             return;
         };
         let part = (step / apart(self.place, to)).min(1.0);
@@ -189,7 +208,7 @@ impl Vehicle {
         let boot = u32::try_from(now).unwrap();
         let message = match id {
             HEARTBEAT => {
-                let (autopilot, mode) = match (self.kind, self.granted) {
+                let (autopilot, mode) = match (self.kind, self.is_handed_over(now)) {
                     (Kind::Px4, false) => (MavAutopilot::MAV_AUTOPILOT_PX4, 3 << 16),
                     (Kind::Px4, true) => (MavAutopilot::MAV_AUTOPILOT_PX4, 6 << 16),
                     (Kind::ArduCopter, false) => (MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA, 16),
@@ -204,6 +223,7 @@ impl Vehicle {
                     autopilot,
                     base_mode,
                     custom_mode: mode,
+                    system_status: MavState::MAV_STATE_ACTIVE,
                     ..HEARTBEAT_DATA::DEFAULT
                 })
             }
@@ -219,7 +239,7 @@ impl Vehicle {
             }
             TARGET => {
                 // A PX4 does not say it.
-                let is_said = self.kind == Kind::ArduCopter && self.granted;
+                let is_said = self.kind == Kind::ArduCopter && self.is_handed_over(now);
                 let Some((_, goal)) = self.goal.filter(|_| is_said) else {
                     return;
                 };
@@ -247,7 +267,19 @@ impl Vehicle {
     fn send(&mut self, header: MavHeader, message: &MavMessage) {
         let mut raw = MAVLinkV2MessageRaw::new();
         raw.serialize_message(header, message);
-        self.socket.write_all(raw.raw_bytes()).unwrap();
+        let mut left = raw.raw_bytes();
+        let begun = Instant::now();
+        // What the emulator does not read for so long is lost, as on a UART.
+        while !left.is_empty() && begun.elapsed() < Duration::from_millis(100) {
+            match self.socket.write(left) {
+                Ok(count) => left = &left[count..],
+                // The emulator reads as fast as its UART.
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
     }
 
     fn hear(&mut self) {
@@ -280,8 +312,21 @@ impl Vehicle {
                 self.asked.insert(command.param1 as u32);
             }
             MavMessage::SET_POSITION_TARGET_GLOBAL_INT(target) => self.target(target),
-            MavMessage::STATUSTEXT(text) => self.texts.push(text.text.to_str().unwrap().to_owned()),
+            MavMessage::STATUSTEXT(text) => self.reads(text.text.to_str().unwrap().to_owned()),
             MavMessage::NAMED_VALUE_FLOAT(_) => {}
+            MavMessage::TIMESYNC(sync) => {
+                let header = MavHeader {
+                    system_id: SYSTEM.into(),
+                    component_id: 1,
+                    sequence: self.number,
+                };
+                self.number = self.number.wrapping_add(1);
+                let answer = MavMessage::TIMESYNC(TIMESYNC_DATA {
+                    tc1: 1,
+                    ts1: sync.ts1,
+                });
+                self.send(header, &answer);
+            }
             other => panic!("it does not say {other:?}"),
         }
     }
@@ -297,7 +342,7 @@ impl Vehicle {
         let place = self.axis.place(point).unwrap();
         let at = self.now();
         self.told.push(Told { at, place });
-        if self.granted {
+        if self.is_handed_over(at) {
             self.goal = Some((place, point));
         }
     }

@@ -250,6 +250,21 @@ fn wrong_input_is_named_in_one_line_with_status_2() {
     assert!(status == 2 && line.contains("[[interferer]]"), "{line}");
 }
 
+/// It flies nothing, and finds the mistake before whoever does.
+#[test]
+fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
+    let drone = include_str!("../../../examples/drone.toml");
+    let begin = "autopilot = \"/dev/ttyAMA0\"";
+    assert!(drone.contains(begin));
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let wrong = drone.replace(begin, "autopilot = \"udp:localhost:65000\"");
+    std::fs::write(&file, wrong).unwrap();
+    let name = file.path().to_str().unwrap();
+    let (status, line) = refusal(&["--uavs", "1", "--scenario", name]);
+    let named = "companion.autopilot = \"udp:localhost:65000\" needs @LOCAL, because the default, PORT + 1000 = 66000, is no port";
+    assert!(status == 2 && line.contains(named), "{line}");
+}
+
 #[test]
 fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
     let output = plan(&["--target-sir-db", "60", "--json"]);

@@ -4,6 +4,7 @@ use core::ops::Range;
 
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay_block::{Block, LEN};
+use uav_relay_chip::reset::Reset;
 
 /// The block, a seed, and a flash to keep things in.
 #[derive(Debug)]
@@ -12,6 +13,8 @@ pub struct Board<F> {
     pub block: Block,
     /// Differs from one board to the next, and better from one start to the next.
     pub seed: u32,
+    /// The cause of the last reset.
+    pub reset: Reset,
     /// Where it keeps what has to survive a reboot. Without it a block with a key is refused, and what was said in votes forgotten.
     pub storage: Option<Storage<F>>,
 }
@@ -39,7 +42,14 @@ impl<F: NorFlash> Board<F> {
         Self {
             block,
             seed,
+            reset: Reset::Unknown,
             storage: Some(storage),
         }
+    }
+
+    /// The same, with the cause of the last reset.
+    #[must_use]
+    pub fn reset_by(self, reset: Reset) -> Self {
+        Self { reset, ..self }
     }
 }

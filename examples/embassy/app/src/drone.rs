@@ -3,12 +3,14 @@
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay::asynch::AsyncAutopilot;
 use uav_relay::flight::autopilot::Autopilot;
+use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::course::{Course, CourseError};
 use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Auth, Instant, Key, Relay, Settings, SetupError, Wiring};
 use uav_relay_block as config;
 use uav_relay_block::ConfigError;
+use uav_relay_chip::reset::Reset;
 use uav_relay_kept::epoch;
 use uav_relay_kept::journal::Journal;
 use uav_relay_kept::nor::Nor;
@@ -80,6 +82,7 @@ pub(crate) fn begin<F: NorFlash>(
     flies: bool,
     now: Instant,
 ) -> Result<Drone<F>, Refused> {
+    log::started(board.reset);
     let said = config::read(&board.block, &mut room.field).map_err(Refused::Block)?;
     log::begins(&said);
     let auth = sign(&mut board)?;
@@ -96,6 +99,10 @@ pub(crate) fn begin<F: NorFlash>(
                 link.sign(Signing::new(key, 0, Stamp::UNKNOWN, now));
                 log::signs_to_autopilot();
             }
+            if board.reset == Reset::Watchdog {
+                // There is room for the first line.
+                let _ = link.say("relay: restarted by its watchdog");
+            }
             Some(AsyncAutopilot::new(link, ends))
         }
         None => {
@@ -104,6 +111,7 @@ pub(crate) fn begin<F: NorFlash>(
         }
     };
     let common = said.mission.config().common;
+    let [probe_after, dead_after] = said.silence();
     let settings = Settings {
         auth,
         // What it has in common with the others may change with an upload.
@@ -113,11 +121,14 @@ pub(crate) fn begin<F: NorFlash>(
         measure: said.measure,
         listen: said.listen,
         wiring,
-        guard: said.sites.map(|_| GuardConfig {
+        guard: said.sites.map(|sites| GuardConfig {
             hover_m: POSITION_ERROR_M,
+            lag: Pace::of_speed(sites.speed_m_s).stopping_time(),
             ..GuardConfig::of(&said.mission, said.profile)
         }),
         sited: said.sites.is_some(),
+        probe_after,
+        dead_after,
         ..Settings::default()
     };
     let (slot, identity) = (&mut room.relay, said.identity);

@@ -22,14 +22,15 @@ mod votes;
 use core::convert::Infallible;
 use core::future::Future;
 
-use embassy_futures::join::{join, join3};
-use embassy_time::Timer;
+use embassy_futures::join::join3;
+use embassy_time::{Duration, Timer};
 use embedded_hal::digital::OutputPin;
 use embedded_io_async::{Read, Write};
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay::asynch::{AsyncAutopilot, AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
 use uav_relay::serial::byte_time;
 use uav_relay::{Instant, Relay, Wiring};
+use uav_relay_chip::watchdog;
 
 use board::Board;
 use drone::{Drone, Refused, Room};
@@ -57,8 +58,35 @@ impl Clock for EmbassyClock {
 /// Bytes that the driver of an autopilot's UART holds of what comes in: it sends bursts.
 pub const BURST: usize = 512;
 
+/// Longest time between two feedings of the watchdog while the relay makes progress.
+pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
+
+/// A timer of the relay may be overdue for so long.
+const LATE: uav_relay::Duration = uav_relay::Duration::from_millis(watchdog::LATE_MS);
+
+/// Calls `feed` every [`TURN`], for a board that takes no part: the watchdog restarts nobody whose configuration is refused.
+pub async fn rest(mut feed: impl FnMut()) -> Infallible {
+    loop {
+        feed();
+        Timer::after(TURN).await;
+    }
+}
+
+/// Calls `feed` every [`TURN`] while the relay's timers are served. It is a part of the task that serves ports and timers, so a turn of that task that
+/// does not end, a panic and a fault feed nobody.
+async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
+    loop {
+        let now = EmbassyClock.now();
+        let served = |relay: &Relay| relay.poll_timeout().is_none_or(|due| now < due + LATE);
+        if relay.look(served) == Some(true) {
+            feed();
+        }
+        Timer::after(TURN).await;
+    }
+}
+
 /// Flies the relay of `board` with a UART to each neighbour, given as reader and writer, and one to the autopilot if the board has one to
-/// spare. It never completes where it takes part.
+/// spare. It never completes where it takes part, and calls `feed`, the watchdog's, every [`TURN`] while the relay makes progress.
 ///
 /// # Errors
 /// Why it takes no part, which is logged.
@@ -68,6 +96,7 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
     (up_rx, up_tx): (UR, UW),
     (down_rx, down_tx): (DR, DW),
     autopilot: Option<(AR, AW)>,
+    feed: &mut dyn FnMut(),
 ) -> Result<Infallible, Refused> {
     let Drone {
         relay,
@@ -82,7 +111,7 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
     let beside = beside(&relay, link.as_ref(), autopilot);
     let mut keep = |relay: &Relay| votes.iter_mut().for_each(|votes| votes.keep(relay));
     let runs = ports.run_keeping(&relay, &EmbassyClock, &mut keep);
-    Ok(join(runs, beside).await.0)
+    Ok(join3(runs, beside, watch(&relay, feed)).await.0)
 }
 
 /// The same with one UART to a radio that all relays share; `pin` is high while this one sends.
@@ -95,6 +124,7 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     (rx, tx): (R, W),
     pin: D,
     autopilot: Option<(AR, AW)>,
+    feed: &mut dyn FnMut(),
 ) -> Result<Infallible, Refused> {
     let Drone {
         relay,
@@ -106,7 +136,7 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     let beside = beside(&relay, link.as_ref(), autopilot);
     let mut keep = |relay: &Relay| votes.iter_mut().for_each(|votes| votes.keep(relay));
     let runs = ports.run_keeping(&relay, &EmbassyClock, &mut keep);
-    Ok(join(runs, beside).await.0)
+    Ok(join3(runs, beside, watch(&relay, feed)).await.0)
 }
 
 fn begin<F: NorFlash>(

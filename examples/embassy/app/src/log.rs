@@ -8,8 +8,17 @@ use uav_relay::flight::autopilot::AutopilotEvent;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::{Event, Relay};
 use uav_relay_block::Config;
+use uav_relay_chip::reset::Reset;
 
 use crate::drone::Refused;
+
+/// The cause of the last reset.
+pub(crate) fn started(reset: Reset) {
+    match reset {
+        Reset::Watchdog => error!("started by the watchdog: the loop hung, or the clock stopped"),
+        reset => info!("started: {}", reset.text()),
+    }
+}
 
 pub(crate) fn begins(config: &Config) {
     info!(
@@ -129,6 +138,9 @@ pub(crate) async fn autopilot(link: &AsyncAutopilot) -> Infallible {
             AutopilotEvent::State(State::Blind) => {
                 warn!("autopilot: no position; keeps its last target");
             }
+            AutopilotEvent::Released(release) => warn!("autopilot: released, {}", release),
+            AutopilotEvent::Waits(reason) => warn!("autopilot: cannot be engaged, {}", reason),
+            AutopilotEvent::FenceBreached => warn!("autopilot: its fence is breached"),
             AutopilotEvent::Refused => warn!(
                 "autopilot: does not fly where it is told to; is the place outside its fence?"
             ),

@@ -7,7 +7,7 @@
 //! | the autopilot, of a drone with sites | USART6: TX PC6 (CN10 pin 4), RX PC7 (D9, CN10 pin 19) |
 //! | the radio's driver enable | PA8 (D7, CN10 pin 23): high while this relay sends |
 //! | log | the ST-LINK on the board (RTT) |
-//! | clock | HSI, 16 MHz, no PLL |
+//! | clock | PLL, 180 MHz, from the 8 MHz of the ST-LINK or from the HSI |
 //! | votes | sectors 1 and 2, of 16 KiB each |
 //! | epochs | sectors 3 and 4 of the flash, of 16 and 64 KiB |
 //! | image | sector 0, the vectors alone; sectors 5 and 6 |
@@ -22,15 +22,21 @@ use defmt_rtt as _;
 use embassy_stm32::flash::{Blocking, Flash};
 use embassy_stm32::interrupt::typelevel::Binding;
 use embassy_stm32::peripherals::{FLASH, PA9, PA10, PC6, PC7, PC10, PC11, USART1, USART3, USART6};
+use embassy_stm32::rcc;
+use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{
     BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config, ConfigError,
     Instance, RxPin, TxPin,
 };
-use embassy_stm32::{Peri, bind_interrupts};
+use embassy_stm32::{Peri, Peripherals, bind_interrupts};
 use panic_probe as _;
 use relay_app::board::{Board, Storage};
 use relay_app::{BAUD, BUFFER, BURST};
 use static_cell::StaticCell;
+use uav_relay_chip::clock::{self, Clocks, NUCLEO_F446RE as PLAN, Source};
+use uav_relay_chip::registers::Chip;
+use uav_relay_chip::reset::Reset;
+use uav_relay_chip::watchdog;
 
 bind_interrupts!(
     /// Who handles which interrupt.
@@ -40,6 +46,60 @@ bind_interrupts!(
         USART6 => BufferedInterruptHandler<USART6>;
     }
 );
+
+/// The chip with its watchdog started and its clocks set up, and the cause of the last reset. What the clock tree reaches is found out first, with
+/// bounded waits, since Embassy waits for good; should a clock stop in between, the watchdog restarts the chip.
+pub fn init() -> (Peripherals, Reset) {
+    let reset = Reset::take(&mut Chip);
+    watchdog::start(&mut Chip);
+    let clocks = clock::probe(&mut Chip, &PLAN);
+    let mut config = embassy_stm32::Config::default();
+    config.rcc = tree(clocks);
+    let peripherals = embassy_stm32::init(config);
+    clock::cache_flash(&mut Chip);
+    defmt::info!("clock {} MHz", clocks.core_hz / 1_000_000);
+    (peripherals, reset)
+}
+
+/// Feeds the watchdog.
+pub fn feed() {
+    watchdog::feed(&mut Chip);
+}
+
+/// The same clocks for Embassy.
+fn tree(clocks: Clocks) -> rcc::Config {
+    let mut config = rcc::Config::new();
+    let (Some(source), Some(crystal)) = (clocks.pll, PLAN.crystal) else {
+        return config;
+    };
+    let prediv = match source {
+        Source::Crystal => {
+            config.hse = Some(rcc::Hse {
+                freq: Hertz(crystal.hz),
+                mode: rcc::HseMode::Bypass,
+            });
+            config.pll_src = rcc::PllSource::HSE;
+            rcc::PllPreDiv::DIV4
+        }
+        Source::Internal => rcc::PllPreDiv::DIV8,
+    };
+    let mul = if clocks.core_hz == 180_000_000 {
+        rcc::PllMul::MUL180
+    } else {
+        rcc::PllMul::MUL168
+    };
+    config.pll = Some(rcc::Pll {
+        prediv,
+        mul,
+        divp: Some(rcc::PllPDiv::DIV2),
+        divq: None,
+        divr: None,
+    });
+    config.sys = rcc::Sysclk::PLL1_P;
+    config.apb1_pre = rcc::APBPrescaler::DIV4;
+    config.apb2_pre = rcc::APBPrescaler::DIV2;
+    config
+}
 
 /// The board. An erase stops its CPU: 0.25 s for 16 KiB, 0.55 s for 64 KiB, twice that at most.
 pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {

@@ -14,16 +14,19 @@
 
 use defmt_rtt as _;
 use embassy_rp::flash::{Blocking, Flash};
-use embassy_rp::peripherals::{FLASH, TRNG, UART0, UART1};
+use embassy_rp::peripherals::{FLASH, TRNG, UART0, UART1, WATCHDOG};
 use embassy_rp::trng::Trng;
 use embassy_rp::uart::{
     BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config,
 };
+use embassy_rp::watchdog::{ResetReason, Watchdog};
 use embassy_rp::{Peri, bind_interrupts};
+use embassy_time::Duration;
 use panic_probe as _;
 use relay_app::board::{Board, Storage};
 use relay_app::{BAUD, BUFFER, BURST};
 use static_cell::StaticCell;
+use uav_relay_chip::reset::Reset;
 
 bind_interrupts!(
     /// Who handles which interrupt.
@@ -39,6 +42,32 @@ const FLASH_SIZE: usize = 4 * 1024 * 1024;
 
 /// Its flash.
 pub type BoardFlash = Flash<'static, FLASH, Blocking, FLASH_SIZE>;
+
+/// The watchdog, which was started: it waits as long as those of the other boards, and stands still while a debugger has stopped the core.
+pub struct Guard(Watchdog);
+
+impl Guard {
+    /// Starts it; returns the cause of the last reset, too.
+    pub fn start(watchdog: Peri<'static, WATCHDOG>) -> (Self, Reset) {
+        let mut watchdog = Watchdog::new(watchdog);
+        let reset = match watchdog.reset_reason() {
+            Some(ResetReason::TimedOut) => Reset::Watchdog,
+            Some(ResetReason::Forced) => Reset::Software,
+            None => Reset::Unknown,
+        };
+        watchdog.pause_on_debug(true);
+        watchdog.start(TIMEOUT);
+        (Self(watchdog), reset)
+    }
+
+    /// Feeds it.
+    pub fn feed(&mut self) {
+        self.0.feed(TIMEOUT);
+    }
+}
+
+/// Time from the last feeding to the reset.
+const TIMEOUT: Duration = Duration::from_millis(6_000);
 
 /// The board, with a seed from its random number generator.
 pub fn board(flash: Peri<'static, FLASH>, trng: Peri<'static, TRNG>) -> Board<BoardFlash> {

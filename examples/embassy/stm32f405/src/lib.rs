@@ -7,7 +7,7 @@
 //! | the autopilot, of a drone with sites | USART1: TX PA9, RX PA10 |
 //! | the radio's driver enable | PA1: high while this relay sends |
 //! | log | the debug probe (RTT) |
-//! | clock | HSI, 16 MHz, no PLL |
+//! | clock | PLL, 168 MHz, from a crystal of 8 MHz or from the HSI |
 //! | votes, epochs, configuration block | the sectors of the other firmware |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -18,16 +18,22 @@ use defmt_rtt as _;
 use embassy_stm32::flash::{Blocking, Flash};
 use embassy_stm32::interrupt::typelevel::Binding;
 use embassy_stm32::peripherals::{FLASH, PA2, PA3, PA9, PA10, PB10, PB11, USART1, USART2, USART3};
+use embassy_stm32::rcc;
+use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{
     BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config, ConfigError,
     Instance, RxPin, TxPin,
 };
-use embassy_stm32::{Peri, bind_interrupts};
+use embassy_stm32::{Peri, Peripherals, bind_interrupts};
 use panic_probe as _;
 use relay_app::board::{Board, Storage};
 use relay_app::{BAUD, BUFFER, BURST};
 use static_cell::StaticCell;
 use uav_relay_block::ADDRESS;
+use uav_relay_chip::clock::{self, Clocks, STM32F405 as PLAN, Source};
+use uav_relay_chip::registers::Chip;
+use uav_relay_chip::reset::Reset;
+use uav_relay_chip::watchdog;
 use uav_relay_kept::{epoch, views};
 
 bind_interrupts!(
@@ -43,6 +49,55 @@ bind_interrupts!(
 const FLASH_START: u32 = 0x0800_0000;
 
 const KIB: u32 = 1024;
+
+/// The chip with its watchdog started and its clocks set up, and the cause of the last reset. What the clock tree reaches is found out first, with
+/// bounded waits, since Embassy waits for good; should a clock stop in between, the watchdog restarts the chip.
+pub fn init() -> (Peripherals, Reset) {
+    let reset = Reset::take(&mut Chip);
+    watchdog::start(&mut Chip);
+    let clocks = clock::probe(&mut Chip, &PLAN);
+    let mut config = embassy_stm32::Config::default();
+    config.rcc = tree(clocks);
+    let peripherals = embassy_stm32::init(config);
+    clock::cache_flash(&mut Chip);
+    defmt::info!("clock {} MHz", clocks.core_hz / 1_000_000);
+    (peripherals, reset)
+}
+
+/// Feeds the watchdog.
+pub fn feed() {
+    watchdog::feed(&mut Chip);
+}
+
+/// The same clocks for Embassy.
+fn tree(clocks: Clocks) -> rcc::Config {
+    let mut config = rcc::Config::new();
+    let (Some(source), Some(crystal)) = (clocks.pll, PLAN.crystal) else {
+        return config;
+    };
+    let prediv = match source {
+        Source::Crystal => {
+            config.hse = Some(rcc::Hse {
+                freq: Hertz(crystal.hz),
+                mode: rcc::HseMode::Oscillator,
+            });
+            config.pll_src = rcc::PllSource::HSE;
+            rcc::PllPreDiv::DIV4
+        }
+        Source::Internal => rcc::PllPreDiv::DIV8,
+    };
+    config.pll = Some(rcc::Pll {
+        prediv,
+        mul: rcc::PllMul::MUL168,
+        divp: Some(rcc::PllPDiv::DIV2),
+        divq: None,
+        divr: None,
+    });
+    config.sys = rcc::Sysclk::PLL1_P;
+    config.apb1_pre = rcc::APBPrescaler::DIV4;
+    config.apb2_pre = rcc::APBPrescaler::DIV2;
+    config
+}
 
 /// The board. An erase of a sector of the epoch stops its CPU for 1 s, for 2 s at most.
 pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {

@@ -92,6 +92,8 @@ pub struct Flight {
     sites: Option<Sites>,
     autopilot_key: Option<[u8; 32]>,
     network: u16,
+    /// 0 for the usual ones.
+    probe_after_ms: u32,
 }
 
 impl Flight {
@@ -127,6 +129,7 @@ impl Flight {
             }),
             autopilot_key: None,
             network,
+            probe_after_ms: 0,
         })
     }
 
@@ -138,6 +141,14 @@ impl Flight {
     /// The same, with relays that measure the interference.
     pub fn measuring(self, measure: Option<Measure>) -> Self {
         Self { measure, ..self }
+    }
+
+    /// The same, with relays that ask a neighbour for a sign of life after that many milliseconds of silence; 0 for the usual ones.
+    pub fn asking_after(self, probe_after_ms: u32) -> Self {
+        Self {
+            probe_after_ms,
+            ..self
+        }
     }
 
     /// The same, with frames that are signed.
@@ -209,6 +220,7 @@ impl Flight {
             measure: self.measure,
             listen: self.listen,
             sites: self.sites,
+            probe_after_ms: self.probe_after_ms,
         };
         let block = write(&config, &self.numbers, self.secret, self.autopilot_key);
         let read = read(&block, Box::leak(Box::new(EMPTY))).map_err(BlockError::Config)?;

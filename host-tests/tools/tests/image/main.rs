@@ -152,7 +152,7 @@ fn a_block_becomes_files_for_its_place_and_what_is_none_is_refused() {
     for (arguments, says) in [
         (
             vec!["--board", "pico2", "--block", &path("short.bin")],
-            "7 bytes; a block has 376",
+            "7 bytes; a block has 380",
         ),
         (vec!["--board", "pico3"], "one of stm32f405"),
         (

@@ -11,7 +11,7 @@ use super::{example, field, in_a_field, paper, reads};
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;
-    let mut bytes: Vec<u8> = b"UAVR\x08\0\x78\x01\x03\0\x07\0\x05\0".to_vec();
+    let mut bytes: Vec<u8> = b"UAVR\x09\0\x7c\x01\x03\0\x07\0\x05\0".to_vec();
     bytes.extend([method, u8::from(hold)]);
     for number in [1000.0_f32, 4.0, 80.0, 20.0, 1.0, 20.0, 1.0] {
         bytes.extend(number.to_le_bytes());
@@ -27,7 +27,7 @@ fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8]
     }
     bytes.extend(rounds.to_le_bytes());
     bytes.extend(rest);
-    bytes.resize(372, 0);
+    bytes.resize(376, 0);
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
     bytes.extend(crc.to_le_bytes());
     bytes
@@ -75,6 +75,26 @@ fn a_block_is_what_the_table_says() {
         by_hand((0, false, 0.0, 0), [20.0; 2], ([0.0; 3], &rest)),
         block
     );
+}
+
+/// Relays that ask a silent neighbour less often than usual.
+#[test]
+fn the_silence_is_in_the_block_and_in_the_settings_of_the_drone() {
+    let flight = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
+    let usual = flight.block(3).unwrap();
+    let block = flight.asking_after(0x0102).block(3).unwrap();
+    assert_eq!(block[..372], usual[..372]);
+    assert_eq!(block[372..376], [2, 1, 0, 0]);
+    let ms = |block| {
+        reads(&block)
+            .unwrap()
+            .silence()
+            .map(uav_relay::Duration::as_micros)
+    };
+    assert_eq!(ms(block), [258_000, 774_000]);
+    let settings = uav_relay::Settings::default();
+    let times = [settings.probe_after, settings.dead_after];
+    assert_eq!(ms(usual), times.map(uav_relay::Duration::as_micros));
 }
 
 /// What is set, and whatever else a block can say, comes back as it was.

@@ -204,16 +204,23 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
     let out = folder.path().join("block.bin");
     let out = out.to_str().unwrap();
     let plain = ["--index", "1", "--out", out, "--uavs"];
-    for (arguments, least, in_range) in [
-        (&["26"][..], 117_334, 26),
-        (&["9", "--baud", "37546"], 37_547, 9),
-        (&["100", "--in-range", "40"], 183_040, 40),
-        (&["5", "--in-range", "9", "--baud", "9600"], 18_774, 5),
+    for (arguments, least, in_range, ms, most) in [
+        (&["26"][..], 117_334, 26, 5_093, 25),
+        (&["9", "--baud", "37546"], 37_547, 9, 5_001, 8),
+        (&["100", "--in-range", "40"], 183_040, 40, 7_945, 25),
+        (
+            &["5", "--in-range", "9", "--baud", "9600"],
+            18_774,
+            5,
+            9_778,
+            3,
+        ),
+        (&["50", "--baud", "57600"], 229_974, 50, 19_963, 13),
     ] {
         let baud = arguments.iter().skip_while(|it| **it != "--baud").nth(1);
         let baud = baud.unwrap_or(&"115200");
         let line = format!(
-            "--baud {baud}: must be within {least} to 10000000: {in_range} relays share the channel at one place; fewer with --in-range, none with --wires\n"
+            "--baud {baud}: must be within {least} to 10000000: {in_range} relays share the channel at one place: it needs {least} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {most} relays in range; fewer with --in-range, none with --wires\n"
         );
         assert_eq!(refusal(&[&plain[..], arguments].concat()), line);
     }
@@ -224,10 +231,15 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
         &["26", "--in-range", "9"],
         &["26", "--baud", "117334"],
         &["9", "--baud", "37547"],
+        &["50", "--baud", "57600", "--probe-after-ms", "19963"],
     ] {
         let output = provision(&[&plain[..], arguments].concat());
         assert!(output.status.success(), "{output:?}");
     }
+    let slow: Block = std::fs::read(out).unwrap().try_into().unwrap();
+    assert_eq!(reads(&slow).unwrap().probe_after_ms, 19_963);
+    let too_fast = ["50", "--baud", "57600", "--probe-after-ms", "19962"];
+    refusal(&[&plain[..], &too_fast].concat());
     let both = [&plain[..], &["9", "--wires", "--baud", "9600"]].concat();
     assert!(refusal(&both).contains("--wires"));
 }
@@ -301,8 +313,12 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
             "network.baud = 57600: must be 115200, or left out: the firmware's ports run at that",
         ),
         (
-            network("probe_after_ms = 30000"),
-            "network.probe_after_ms = 30000: must be 5000, or left out: ",
+            network("probe_after_ms = 1200001"),
+            "network.probe_after_ms = 1200001: must be within 1 to 1200000",
+        ),
+        (
+            network("probe_after_ms = 20000\ndead_after_ms = 15000"),
+            "network.dead_after_ms = 15000: must be 60000, or left out: ",
         ),
         (
             network("dead_after_ms = 90000"),
@@ -319,4 +335,22 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
         assert_eq!(line.trim_end().lines().count(), 1, "{line}");
         assert!(line.contains(words), "{words} not in {line}");
     }
+}
+
+/// The firmware has no UDP; the mistake in the file of all drones is one all the same.
+#[test]
+fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("relay.bin");
+    let file = folder.path().join("drone.toml");
+    let text = format!(
+        "{}[companion]\nautopilot = \"udp:localhost:0\"\n",
+        uav_relay_scenario::DEFAULT
+    );
+    std::fs::write(&file, text).unwrap();
+    let scenario = ["--scenario", file.to_str().unwrap()];
+    let line = refusal(&[&of_paper(out.to_str().unwrap())[..], &scenario].concat());
+    let named = "companion.autopilot = \"udp:localhost:0\" has no PORT within 1 to 65535; allowed: a tty, or udp:HOST:PORT";
+    assert!(line.contains(named), "{line}");
+    assert!(!out.exists(), "nothing is written");
 }

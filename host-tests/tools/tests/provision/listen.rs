@@ -36,7 +36,7 @@ fn listening_stands_where_the_table_says() {
     bytes.extend(250_000_u64.to_le_bytes());
     bytes.extend(1_000_000_000_000_000_000_u64.to_le_bytes());
     bytes.extend(0.5_f32.to_le_bytes());
-    assert_eq!(block[352..LEN - 4], bytes);
+    assert_eq!(block[352..LEN - 8], bytes);
     let without = flight(SOURCE).block(3).unwrap();
     assert_eq!(changed(without, 352, &bytes), block, "nothing else changes");
     assert_eq!(reads(&without).unwrap().listen, None);

@@ -172,6 +172,7 @@ fn a_field_out_of_range_is_named() {
         (144, &[0; 4], ConfigError::Field(FieldError::Upsilon)),
         (148, &one, ConfigError::Unused),
         (248, &one, ConfigError::Unused),
+        (372, &1_200_001_u32.to_le_bytes(), ConfigError::Silence),
     ] {
         assert_eq!(
             reads(&changed(field(3), at, bytes)),

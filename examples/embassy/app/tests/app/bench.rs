@@ -146,6 +146,7 @@ fn config(relays: u16, index: u16, sites: Option<Sites>) -> Config {
         method: Method::Align,
         measure: None,
         listen: None,
+        probe_after_ms: 0,
         sites,
     }
 }
@@ -210,10 +211,23 @@ fn why(board: Board<Ram>, autopilot: Option<(Pipe, Pipe)>) -> Refused {
     }
 }
 
+thread_local! {
+    /// When the watchdog was fed.
+    pub(crate) static FED: RefCell<Vec<Instant>> = const { RefCell::new(Vec::new()) };
+}
+
+/// The watchdog's.
+fn feed() -> impl FnMut() {
+    || FED.with_borrow_mut(|fed| fed.push(EmbassyClock.now()))
+}
+
 fn running(board: Board<Ram>, rx: Pipe, tx: Pipe, autopilot: Option<(Pipe, Pipe)>) -> Running {
     let room = Box::leak(Box::new(Room::new()));
     let nobody = (Pipe::default(), Pipe::default());
-    Box::pin(relay_app::fly(room, board, nobody, (rx, tx), autopilot))
+    Box::pin(async move {
+        let mut feed = feed();
+        relay_app::fly(room, board, nobody, (rx, tx), autopilot, &mut feed).await
+    })
 }
 
 impl Bench {
@@ -265,7 +279,10 @@ impl Bench {
             Wiring::Shared => {
                 let room = Box::leak(Box::new(Room::new()));
                 let radio = (back, there);
-                Box::pin(relay_app::fly_shared(room, board, radio, Enable, autopilot))
+                Box::pin(async move {
+                    let mut feed = feed();
+                    relay_app::fly_shared(room, board, radio, Enable, autopilot, &mut feed).await
+                })
             }
         });
     }
@@ -302,6 +319,14 @@ impl Bench {
             }
         }
         self.events.clone()
+    }
+
+    /// So many milliseconds pass in which its task does not come to the end of a turn.
+    pub(crate) fn hang(&mut self, millis: u32) {
+        for _ in 0..millis {
+            MockDriver::get().advance(embassy_time::Duration::from_millis(1));
+            self.listen();
+        }
     }
 
     fn listen(&mut self) {

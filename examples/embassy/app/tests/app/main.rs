@@ -13,3 +13,4 @@ mod logger;
 mod ram;
 mod vehicle;
 mod votes;
+mod watchdog;

@@ -23,6 +23,8 @@ pub(crate) struct Vehicle {
     pub(crate) flies: bool,
     /// In OFFBOARD; otherwise the pilot has the sticks.
     pub(crate) granted: bool,
+    /// Lines for the operator.
+    pub(crate) texts: Vec<String>,
     /// Targets that it was told since somebody looked.
     pub(crate) told: Vec<Placement>,
 }
@@ -38,6 +40,7 @@ impl Vehicle {
             place,
             flies: false,
             granted: false,
+            texts: Vec::new(),
             told: Vec::new(),
         }
     }
@@ -114,6 +117,19 @@ impl Vehicle {
                     amsl_mm: (f32::from_le_bytes(word(12)) * 1e3) as i32,
                 };
                 self.told.push(self.axis.place(point).unwrap());
+            }
+            if frame[7..HEADER] == id::STATUSTEXT.to_le_bytes()[..3] {
+                let text = &frame[HEADER + 1..end - CHECKSUM];
+                let text = text.split(|byte| *byte == 0).next().unwrap();
+                self.texts.push(String::from_utf8(text.to_vec()).unwrap());
+            }
+            if frame[7..HEADER] == id::TIMESYNC.to_le_bytes()[..3] {
+                // The question goes back, with a time of its own.
+                let mut answer = vec![0; 16];
+                answer[0] = 1;
+                let asked = &frame[HEADER + 8..end - CHECKSUM];
+                answer[8..8 + asked.len()].copy_from_slice(asked);
+                self.say(id::TIMESYNC, &answer);
             }
         }
     }

@@ -5,19 +5,20 @@
 use embassy_executor::Spawner;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use relay_app::drone::Room;
-use relay_nucleo_f446re::{board, usart1, usart6};
+use relay_nucleo_f446re::{board, feed, init, usart1, usart6};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
-    let chip = embassy_stm32::init(embassy_stm32::Config::default());
-    let board = board(chip.FLASH);
+    let (chip, reset) = init();
+    let board = board(chip.FLASH).reset_by(reset);
     let enable = Output::new(chip.PA8, Level::Low, Speed::Low);
     let autopilot = usart6(chip.USART6, chip.PC6, chip.PC7).ok();
     if let Ok(radio) = usart1(chip.USART1, chip.PA9, chip.PA10) {
         let room = ROOM.init_with(Room::new);
-        let _ = relay_app::fly_shared(room, board, radio, enable, autopilot).await;
+        let _ = relay_app::fly_shared(room, board, radio, enable, autopilot, &mut feed).await;
     }
+    relay_app::rest(feed).await;
 }

@@ -4,7 +4,7 @@
 
 use embassy_executor::Spawner;
 use relay_app::drone::Room;
-use relay_pico2::{NO_AUTOPILOT, board, uart0, uart1};
+use relay_pico2::{Guard, NO_AUTOPILOT, board, uart0, uart1};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
@@ -12,9 +12,14 @@ static ROOM: StaticCell<Room> = StaticCell::new();
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let chip = embassy_rp::init(embassy_rp::config::Config::default());
-    let board = board(chip.FLASH, chip.TRNG);
+    let (mut guard, reset) = Guard::start(chip.WATCHDOG);
+    let board = board(chip.FLASH, chip.TRNG).reset_by(reset);
     let upstream = uart0(chip.UART0, chip.PIN_0, chip.PIN_1);
     let downstream = uart1(chip.UART1, chip.PIN_4, chip.PIN_5);
     let room = ROOM.init_with(Room::new);
-    let _ = relay_app::fly(room, board, upstream, downstream, NO_AUTOPILOT).await;
+    let _ = relay_app::fly(room, board, upstream, downstream, NO_AUTOPILOT, &mut || {
+        guard.feed();
+    })
+    .await;
+    relay_app::rest(|| guard.feed()).await;
 }

@@ -77,8 +77,13 @@ impl Browser {
         browser.call("Emulation.setDeviceMetricsOverride", &metrics);
         let touch = json!({"enabled": width < 600, "maxTouchPoints": 1});
         browser.call("Emulation.setTouchEmulationEnabled", &touch);
-        browser.call("Page.navigate", &json!({"url": url}));
+        browser.open(url);
         browser
+    }
+
+    /// Opens `url` in the same window.
+    pub(crate) fn open(&mut self, url: &str) {
+        self.call("Page.navigate", &json!({"url": url}));
     }
 
     fn call(&mut self, method: &str, parameters: &Value) -> Value {

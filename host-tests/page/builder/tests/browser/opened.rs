@@ -23,8 +23,13 @@ pub(crate) fn page() -> &'static PathBuf {
     })
 }
 
+/// Where it is.
+pub(crate) fn address() -> String {
+    format!("file://{}", page().display())
+}
+
 pub(crate) fn opened(width: u32, height: u32) -> Browser {
-    let mut browser = Browser::start(&format!("file://{}", page().display()), width, height);
+    let mut browser = Browser::start(&address(), width, height);
     browser.until("window.ready === true");
     settled(&mut browser);
     browser

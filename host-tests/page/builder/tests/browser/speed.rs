@@ -2,10 +2,10 @@
 //!
 //! Times here are noisy: what is asserted is far above what is printed, but for ratios within one run.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::chromium::Browser;
-use crate::opened::{choose, number, opened};
+use crate::opened::{address, choose, number, opened};
 
 fn median(mut all: Vec<f64>) -> f64 {
     all.sort_by(f64::total_cmp);
@@ -25,8 +25,15 @@ fn took(browser: &mut Browser, times: u32) -> f64 {
 
 #[test]
 fn it_is_there_at_once_and_follows_a_hand() {
-    let first = "performance.getEntriesByName('first-contentful-paint')[0].startTime";
-    let paints = (0..3).map(|_| number(&mut opened(1280, 900), first));
+    let first = "performance.getEntriesByName('first-contentful-paint')[0]";
+    let paints = (0..5).map(|_| {
+        // A browser that was there before the page: what it does at its own start is not counted.
+        let mut browser = Browser::start("about:blank", 1280, 900);
+        std::thread::sleep(Duration::from_secs(1));
+        browser.open(&address());
+        browser.until(first);
+        number(&mut browser, &format!("{first}.startTime"))
+    });
     let paint = median(paints.collect());
     println!("first paint after {paint:.0} ms");
     assert!(paint < 1_000.0);

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Parser as _;
-use uav_relay::{Adjust, ChannelLoad, Local, Measure, Settings};
+use uav_relay::{Adjust, ChannelLoad, Duration, Local, Measure};
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
 use uav_relay_sim::command::{self, Failure};
@@ -33,6 +33,8 @@ struct Asked<'a> {
     uavs: u16,
     method: Method,
     tolerance: f64,
+    /// 0 for the usual ones.
+    probe_after_ms: u32,
 }
 
 fn main() -> ExitCode {
@@ -146,7 +148,7 @@ impl<'a> Asked<'a> {
             (method, planned) => method.or(planned),
         };
         let method = network::method(method, of_section, &name, planned.is_some())?;
-        network::of_the_firmware(&section, &name)?;
+        let probe_after_ms = network::of_the_firmware(&section, options.probe_after_ms, &name)?;
         let tolerance = match (options.tolerance, plan) {
             (Some(tolerance), Some(plan)) if tolerance.total_cmp(&plan.tolerance).is_ne() => {
                 return Err(other(
@@ -175,6 +177,7 @@ impl<'a> Asked<'a> {
             uavs,
             method,
             tolerance,
+            probe_after_ms,
         })
     }
 
@@ -192,7 +195,8 @@ impl<'a> Asked<'a> {
         };
         let flight = Flight::new(&self.scenario, self.uavs, self.tolerance, self.network)
             .map_err(|error| format!("{}: {error}", self.name))?;
-        carried(options, self.uavs)?;
+        let [probe_after, _] = network::silence(self.probe_after_ms);
+        carried(options, self.uavs, probe_after)?;
         let flight = match options.speed {
             Some(_) if !flight.has_sites() => {
                 return Err("--speed: is for a scenario with a [site]".to_owned());
@@ -211,7 +215,8 @@ impl<'a> Asked<'a> {
             .by(method)
             .signed(secret)
             .signed_to_autopilots(autopilot_key)
-            .measuring(measure(options, &self.scenario)?))
+            .measuring(measure(options, &self.scenario)?)
+            .asking_after(self.probe_after_ms))
     }
 
     /// Where the relays settle by themselves, where that is known before and needed; refuses a stand-in that loses too much.
@@ -307,8 +312,8 @@ impl<'a> Asked<'a> {
     }
 }
 
-/// Refuses a channel that cannot carry the relays, by the timing that the firmware has.
-fn carried(options: &Options, uavs: u16) -> Result<(), String> {
+/// Refuses a channel that cannot carry the relays where they ask a silent neighbour after `probe_after`.
+fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), String> {
     if options.wires {
         return Ok(());
     }
@@ -317,7 +322,6 @@ fn carried(options: &Options, uavs: u16) -> Result<(), String> {
         in_range,
         overhead: u16::try_from(OVERHEAD).unwrap_or(u16::MAX),
     };
-    let Settings { probe_after, .. } = Settings::default();
     command::carries(options.baud, load, probe_after)
         .map_err(|error| format!("{error}; fewer with --in-range, none with --wires"))
 }

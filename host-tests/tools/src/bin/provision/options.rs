@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, ValueEnum};
 use uav_relay_sim::command::{MOST_BAUD, number, whole};
+use uav_relay_tools::provision::config::MOST_PROBE_AFTER_MS;
 
 /// Writes the configuration block of one relay, or of all: which one it is, and the mission it flies.
 #[derive(Parser, Debug)]
@@ -51,6 +52,10 @@ pub(crate) struct Options {
     /// Bits per second on the radio channel that the relays share, 300 to 10000000; refused where that cannot carry them
     #[arg(long, value_name = "B", default_value_t = 115_200, value_parser = whole(300, MOST_BAUD))]
     pub(crate) baud: u32,
+    /// Milliseconds of silence after which a relay asks a neighbour for a sign of life, 1 to 1200000; after three times as many that counts as
+    /// lost. Without it those of the scenario's section `network`, or 5000. A slow channel carries more relays with more
+    #[arg(long, value_name = "MS", value_parser = whole(1, MOST_PROBE_AFTER_MS))]
+    pub(crate) probe_after_ms: Option<u32>,
     /// Relays that share the channel at one place, 1 to 1000; without it all of them
     #[arg(long, value_name = "K", value_parser = whole::<u16>(1, 1000))]
     pub(crate) in_range: Option<u16>,

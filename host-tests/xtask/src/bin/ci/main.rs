@@ -15,16 +15,24 @@ struct Options {
     /// Only what every edit needs: formatting, lints of the host, the library's tests and those that are done in seconds.
     #[arg(long)]
     quick: bool,
+    /// Only the steps whose names contain this.
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    only: String,
 }
 
 fn main() -> ExitCode {
-    let Options { quick } = Options::parse();
+    let Options { quick, only } = Options::parse();
     let started = Instant::now();
     if let Err(missing) = prepare::prepare(quick) {
         println!("ci: {missing}");
         return ExitCode::FAILURE;
     }
-    let steps = if quick { steps::quick() } else { steps::all() };
+    let mut steps = if quick { steps::quick() } else { steps::all() };
+    steps.retain(|step| step.name.contains(&only));
+    if steps.is_empty() {
+        println!("ci: no step's name contains {only:?}");
+        return ExitCode::FAILURE;
+    }
     let mut failed = Vec::new();
     for (number, step) in (1..).zip(&steps) {
         println!(

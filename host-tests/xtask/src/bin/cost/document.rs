@@ -6,7 +6,11 @@ use uav_relay_xtask::number::spaced;
 
 use crate::row::Row;
 
-const HEAD: &str = "| | measured | budget |\n| --- | --- | --- |\n";
+const HEAD: &str =
+    "| | measured | at 168 MHz, an instruction a cycle | budget |\n| --- | --- | --- | --- |\n";
+
+/// Instructions in a microsecond at the clock of the STM32F405, were each one cycle.
+const CLOCK_MHZ: u64 = 168;
 
 /// A document as it stands, and as it should be.
 pub(crate) struct Document {
@@ -44,9 +48,20 @@ pub(crate) fn table(rows: &[Row]) -> String {
         let budget = row
             .budget
             .map_or_else(String::new, |budget| format!("{budget} {unit}"));
-        format!("| {what} | {value} {unit} | {budget} |\n")
+        let time = if unit == "instructions" {
+            milliseconds(value)
+        } else {
+            String::new()
+        };
+        format!("| {what} | {value} {unit} | {time} | {budget} |\n")
     });
     std::iter::once(HEAD.to_owned()).chain(lines).collect()
+}
+
+/// The time of so many instructions, with three digits behind the point.
+fn milliseconds(instructions: u64) -> String {
+    let micros = (instructions + CLOCK_MHZ / 2) / CLOCK_MHZ;
+    format!("{}.{:03} ms", micros / 1_000, micros % 1_000)
 }
 
 /// Both documents of the checkout at `root`.

@@ -1,0 +1,372 @@
+//! The clock tree: the PLL from the crystal, or from the HSI; the HSI alone where neither comes up.
+//!
+//! | tried in this order | core | APB1 | APB2 |
+//! | --- | --- | --- | --- |
+//! | PLL from the crystal, over-drive (STM32F446 alone) | 180 MHz | 45 MHz | 90 MHz |
+//! | PLL from the crystal | 168 MHz | 42 MHz | 84 MHz |
+//! | PLL from the HSI, over-drive (STM32F446 alone) | 180 MHz | 45 MHz | 90 MHz |
+//! | PLL from the HSI | 168 MHz | 42 MHz | 84 MHz |
+//! | HSI | 16 MHz | 16 MHz | 16 MHz |
+//!
+//! Every wait is bounded. What was begun for an attempt that fails is taken back before the next one. The PLL's input is 2 MHz, as RM0090 6.3.2
+//! recommends; both cores have five wait states of flash above 150 MHz at 2.7 to 3.6 V (RM0090 table 10, RM0390 table 5).
+
+use crate::crystal::{self, Crystal, HSI_HZ};
+use crate::registers::{Register, Registers};
+
+/// What a board has.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Plan {
+    /// Its crystal, if it has one.
+    pub crystal: Option<Crystal>,
+    /// True for a chip with over-drive, the STM32F446.
+    pub over_drive: bool,
+}
+
+/// An STM32F405 with a crystal of 8 MHz; with another one, or none, it runs from the HSI.
+pub const STM32F405: Plan = Plan {
+    crystal: Some(Crystal {
+        hz: 8_000_000,
+        bypass: false,
+    }),
+    over_drive: false,
+};
+
+/// The NUCLEO-F446RE: the ST-LINK's 8 MHz come in at OSC_IN.
+pub const NUCLEO_F446RE: Plan = Plan {
+    crystal: Some(Crystal {
+        hz: 8_000_000,
+        bypass: true,
+    }),
+    over_drive: true,
+};
+
+/// Where the PLL's input comes from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Source {
+    /// The crystal.
+    Crystal,
+    /// The HSI.
+    Internal,
+}
+
+/// The clocks that were reached.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Clocks {
+    /// Of the core and `SysTick`, Hz.
+    pub core_hz: u32,
+    /// Of USART2, USART3, UART4 and so on, Hz.
+    pub apb1_hz: u32,
+    /// Of USART1 and USART6, Hz.
+    pub apb2_hz: u32,
+    /// The PLL's source; `None` for the HSI alone.
+    pub pll: Option<Source>,
+}
+
+impl Clocks {
+    /// Those of the HSI alone.
+    pub const HSI: Self = Self {
+        core_hz: HSI_HZ,
+        apb1_hz: HSI_HZ,
+        apb2_hz: HSI_HZ,
+        pll: None,
+    };
+
+    const fn of(speed: Speed, source: Source) -> Self {
+        let core_hz = speed.factor * PLL_INPUT_HZ / 2;
+        Self {
+            core_hz,
+            apb1_hz: core_hz / 4,
+            apb2_hz: core_hz / 2,
+            pll: Some(source),
+        }
+    }
+}
+
+/// The PLL's input, Hz.
+const PLL_INPUT_HZ: u32 = 2_000_000;
+
+/// How fast the core is to run.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Speed {
+    over_drive: bool,
+    /// PLLN.
+    factor: u32,
+    /// PLLQ, for 48 MHz or less.
+    usb: u32,
+}
+
+const FASTEST: Speed = Speed {
+    over_drive: true,
+    factor: 180,
+    usb: 8,
+};
+const FAST: Speed = Speed {
+    over_drive: false,
+    factor: 168,
+    usb: 7,
+};
+
+/// Bits of RCC_CR.
+const HSI_ON: u32 = 1;
+const HSI_READY: u32 = 1 << 1;
+const PLL_ON: u32 = 1 << 24;
+const PLL_READY: u32 = 1 << 25;
+
+/// Bits of RCC_PLLCFGR: PLLM, PLLN, PLLP, PLLSRC and PLLQ.
+const PLL_FIELDS: u32 = 0x3F | 0x1FF << 6 | 0b11 << 16 | PLL_FROM_CRYSTAL | 0xF << 24;
+const PLL_FROM_CRYSTAL: u32 = 1 << 22;
+
+/// Bits of RCC_CFGR: SW and SWS; HPRE, PPRE1 and PPRE2.
+const SWITCH: u32 = 0b11;
+const SWITCH_PLL: u32 = 0b10;
+const SWITCHED: u32 = 0b11 << 2;
+const SWITCHED_PLL: u32 = 0b10 << 2;
+const PRESCALERS: u32 = 0xF << 4 | 0b111 << 10 | 0b111 << 13;
+/// APB1 by 4, APB2 by 2.
+const APB_BY_4_AND_2: u32 = 0b101 << 10 | 0b100 << 13;
+
+/// RCC_APB1ENR, PWREN.
+const POWER_ON: u32 = 1 << 28;
+
+/// PWR_CR: the voltage scale 1 (one bit on the STM32F405, two on the STM32F446), ODEN and ODSWEN; their states in PWR_CSR.
+const SCALE_1: u32 = 1 << 14;
+const SCALE_1_OF_TWO_BITS: u32 = 0b11 << 14;
+const SCALE_READY: u32 = 1 << 14;
+const OVER_DRIVE: u32 = 1 << 16;
+const OVER_DRIVE_SWITCH: u32 = 1 << 17;
+
+/// Bits of FLASH_ACR.
+const LATENCY: u32 = 0xF;
+const WAIT_STATES: u32 = 5;
+const PREFETCH: u32 = 1 << 8;
+const CACHES: u32 = 0b11 << 9;
+
+/// The STM32F405 whose prefetch is broken: revision A (ES0182).
+const NO_PREFETCH: u32 = 0x1000_0413;
+
+/// Reads of a register until a PLL, a voltage or a switch is ready: some 10 ms at 16 MHz, where 0.3 ms are the most of the data sheets.
+const POLLS: u32 = 20_000;
+
+/// Sets the clock tree up; returns what was reached. To be called once after a reset, with interrupts off. Bounded work: 0.2 s at most.
+pub fn start(chip: &mut impl Registers, plan: &Plan) -> Clocks {
+    if !back_to_hsi(chip) {
+        // An emulator without a clock tree.
+        return Clocks::HSI;
+    }
+    cache(chip, 0);
+    let crystal = plan.crystal.filter(|of| crystal::start(chip, *of));
+    let from_crystal = crystal.map(|of| (Source::Crystal, of.hz / PLL_INPUT_HZ));
+    let from_hsi = Some((Source::Internal, HSI_HZ / PLL_INPUT_HZ));
+    for (source, divisor) in [from_crystal, from_hsi].into_iter().flatten() {
+        for speed in [FASTEST, FAST] {
+            if (speed.over_drive && !plan.over_drive) || !off(chip) {
+                continue;
+            }
+            let scale = if plan.over_drive {
+                SCALE_1_OF_TWO_BITS
+            } else {
+                SCALE_1
+            };
+            if pll(chip, source, divisor, speed, scale) && switch(chip) {
+                return Clocks::of(speed, source);
+            }
+            let _ = back_to_hsi(chip) && off(chip);
+        }
+    }
+    if crystal.is_some() {
+        crystal::stop(chip);
+    }
+    cache(chip, 0);
+    Clocks::HSI
+}
+
+/// Finds out what [`start`] reaches, and goes back to the HSI: for a HAL that sets the clock tree up by itself and waits for good.
+pub fn probe(chip: &mut impl Registers, plan: &Plan) -> Clocks {
+    let clocks = start(chip, plan);
+    if clocks.pll.is_some() && back_to_hsi(chip) {
+        cache(chip, 0);
+        let _ = off(chip);
+    }
+    clocks
+}
+
+/// Has the flash answer after `wait_states`, from its caches where it can; returns true once it does.
+fn cache(chip: &mut impl Registers, wait_states: u32) -> bool {
+    let prefetch = if chip.read(Register::ChipId) & 0xFFFF_0FFF == NO_PREFETCH {
+        0
+    } else {
+        PREFETCH
+    };
+    chip.modify(
+        Register::FlashAccess,
+        LATENCY,
+        wait_states | prefetch | CACHES,
+    );
+    chip.wait(Register::FlashAccess, LATENCY, wait_states, POLLS)
+}
+
+/// Switches the flash's caches on, which a HAL has left off; the wait states stay.
+pub fn cache_flash(chip: &mut impl Registers) {
+    let wait_states = chip.read(Register::FlashAccess) & LATENCY;
+    cache(chip, wait_states);
+}
+
+/// The core runs from the HSI, undivided; false where that cannot be had.
+fn back_to_hsi(chip: &mut impl Registers) -> bool {
+    chip.modify(Register::ClockControl, 0, HSI_ON);
+    if !chip.wait(Register::ClockControl, HSI_READY, HSI_READY, POLLS) {
+        return false;
+    }
+    chip.modify(Register::ClockConfig, SWITCH, 0);
+    let switched = chip.wait(Register::ClockConfig, SWITCHED, 0, POLLS);
+    if switched {
+        chip.modify(Register::ClockConfig, PRESCALERS, 0);
+    }
+    switched
+}
+
+/// Over-drive and PLL are off; false where the PLL is not.
+fn off(chip: &mut impl Registers) -> bool {
+    chip.modify(Register::Apb1Enable, 0, POWER_ON);
+    if chip.read(Register::PowerControl) & (OVER_DRIVE | OVER_DRIVE_SWITCH) != 0 {
+        chip.modify(Register::PowerControl, OVER_DRIVE_SWITCH, 0);
+        let _ = chip.wait(Register::PowerStatus, OVER_DRIVE_SWITCH, 0, POLLS);
+        chip.modify(Register::PowerControl, OVER_DRIVE, 0);
+    }
+    chip.modify(Register::ClockControl, PLL_ON, 0);
+    chip.wait(Register::ClockControl, PLL_READY, 0, POLLS)
+}
+
+/// Has the PLL, which is off, and the voltage ready for `speed`; false where that does not come about.
+fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Speed, scale: u32) -> bool {
+    chip.modify(Register::PowerControl, scale, scale);
+    let from = match source {
+        Source::Crystal => PLL_FROM_CRYSTAL,
+        Source::Internal => 0,
+    };
+    let fields = divisor | speed.factor << 6 | from | speed.usb << 24;
+    chip.modify(Register::PllConfig, PLL_FIELDS, fields);
+    chip.modify(Register::ClockControl, 0, PLL_ON);
+    if !chip.wait(Register::ClockControl, PLL_READY, PLL_READY, POLLS)
+        || !chip.wait(Register::PowerStatus, SCALE_READY, SCALE_READY, POLLS)
+    {
+        return false;
+    }
+    !speed.over_drive
+        || [OVER_DRIVE, OVER_DRIVE_SWITCH].into_iter().all(|bit| {
+            chip.modify(Register::PowerControl, 0, bit);
+            chip.wait(Register::PowerStatus, bit, bit, POLLS)
+        })
+}
+
+/// Switches the core to the PLL; false where it does not.
+fn switch(chip: &mut impl Registers) -> bool {
+    if !cache(chip, WAIT_STATES) {
+        return false;
+    }
+    chip.modify(Register::ClockConfig, PRESCALERS, APB_BY_4_AND_2);
+    chip.modify(Register::ClockConfig, SWITCH, SWITCH_PLL);
+    chip.wait(Register::ClockConfig, SWITCHED, SWITCHED_PLL, POLLS)
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::{Clocks, NUCLEO_F446RE, Plan, STM32F405, Source, probe, start};
+    use crate::mock::{Block, Faults};
+
+    /// Every combination of what can fail.
+    fn all() -> impl Iterator<Item = Faults> {
+        (0..1_u32 << Faults::BITS)
+            .flat_map(|bits| [8, 12, 16, 25].map(|mhz| Faults::of(bits, mhz * 1_000_000)))
+    }
+
+    /// What the chip can reach, by what fails.
+    fn expected(plan: &Plan, faults: Faults) -> Clocks {
+        let is_crystal =
+            !faults.crystal_dead && !faults.timer_dead && faults.crystal_hz == 8_000_000;
+        let mut sources = Vec::new();
+        if is_crystal && !faults.pll_dead_from_crystal {
+            sources.push(Source::Crystal);
+        }
+        if !faults.pll_dead_from_hsi {
+            sources.push(Source::Internal);
+        }
+        let blocked =
+            faults.hsi_hidden || faults.voltage_dead || faults.flash_stuck || faults.switch_stuck;
+        let Some(source) = sources.first().copied().filter(|_| !blocked) else {
+            return Clocks::HSI;
+        };
+        let over_drive =
+            plan.over_drive && !faults.over_drive_dead && !faults.over_drive_switch_dead;
+        let mhz = if over_drive { 180 } else { 168 };
+        Clocks {
+            core_hz: mhz * 1_000_000,
+            apb1_hz: mhz * 250_000,
+            apb2_hz: mhz * 500_000,
+            pll: Some(source),
+        }
+    }
+
+    /// The block of registers panics at a write that the reference manuals forbid.
+    #[test]
+    fn whatever_fails_the_clocks_are_those_that_the_chip_has() {
+        let none = Plan {
+            crystal: None,
+            ..STM32F405
+        };
+        let mut count = 0;
+        let mut reached = std::collections::BTreeMap::new();
+        for plan in [STM32F405, NUCLEO_F446RE] {
+            for faults in all() {
+                let mut block = Block::with(faults, plan.over_drive);
+                let clocks = start(&mut block, &plan);
+                assert_eq!(clocks, expected(&plan, faults), "{faults:?}");
+                let [core, apb1, apb2] = block.clocks();
+                let said = [clocks.core_hz, clocks.apb1_hz, clocks.apb2_hz];
+                assert_eq!(said, [core, apb1, apb2], "{faults:?}");
+                assert!(block.reads < 700_000, "{} reads, {faults:?}", block.reads);
+                count += 1;
+                *reached
+                    .entry((clocks.core_hz / 1_000_000, clocks.pll.map(|pll| pll as u8)))
+                    .or_insert(0) += 1;
+            }
+        }
+        std::println!("{count} combinations: {reached:?}");
+        let mut block = Block::with(Faults::default(), false);
+        assert_eq!(start(&mut block, &none).pll, Some(Source::Internal));
+    }
+
+    /// A HAL finds the HSI, and the PLL off.
+    #[test]
+    fn a_probe_leaves_the_hsi() {
+        for plan in [STM32F405, NUCLEO_F446RE] {
+            for faults in all() {
+                let mut block = Block::with(faults, plan.over_drive);
+                assert_eq!(
+                    probe(&mut block, &plan),
+                    expected(&plan, faults),
+                    "{faults:?}"
+                );
+                assert_eq!(block.clocks(), [16_000_000; 3], "{faults:?}");
+                assert!(block.is_pll_off() || faults.hsi_hidden, "{faults:?}");
+            }
+        }
+    }
+
+    /// Every port runs at 115 200 baud, within 0.2 % of the clock that was reached.
+    #[test]
+    fn the_baud_rate_is_that_of_the_clock_reached() {
+        for hz in [16, 42, 45, 84, 90].map(|mhz| mhz * 1_000_000) {
+            let asked = crate::baud::believed(115_200, hz);
+            // As stm32f4xx-hal 0.23 computes it, with the clock of the reset.
+            let divisor = (16_000_000 + asked / 2) / asked;
+            let baud = f64::from(hz) / f64::from(divisor);
+            assert!((baud / 115_200.0 - 1.0).abs() < 2e-3, "{hz}: {baud}");
+        }
+    }
+}

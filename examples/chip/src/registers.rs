@@ -1,0 +1,90 @@
+//! The registers that are read and written, by their names in RM0090 and RM0390, and the chip that has them.
+
+/// A register of the STM32F405 and the STM32F446; its value is its address.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[repr(u32)]
+pub enum Register {
+    /// IWDG_KR: key.
+    WatchdogKey = 0x4000_3000,
+    /// IWDG_PR: prescaler.
+    WatchdogPrescaler = 0x4000_3004,
+    /// IWDG_RLR: reload value.
+    WatchdogReload = 0x4000_3008,
+    /// IWDG_SR: updates that have not reached the watchdog's clock yet.
+    WatchdogStatus = 0x4000_300C,
+    /// PWR_CR: voltage scale and over-drive.
+    PowerControl = 0x4000_7000,
+    /// PWR_CSR: their states.
+    PowerStatus = 0x4000_7004,
+    /// TIM11_CR1.
+    Timer11Control = 0x4001_4800,
+    /// TIM11_SR.
+    Timer11Status = 0x4001_4810,
+    /// TIM11_CCMR1: the input that is captured.
+    Timer11Mode = 0x4001_4818,
+    /// TIM11_CCER: whether it is.
+    Timer11Enable = 0x4001_4820,
+    /// TIM11_ARR: the largest count.
+    Timer11Reload = 0x4001_482C,
+    /// TIM11_CCR1: the count at the last edge of the input.
+    Timer11Capture = 0x4001_4834,
+    /// TIM11_OR: what is at the input.
+    Timer11Option = 0x4001_4850,
+    /// RCC_CR: oscillators and PLL, on and ready.
+    ClockControl = 0x4002_3800,
+    /// RCC_PLLCFGR.
+    PllConfig = 0x4002_3804,
+    /// RCC_CFGR: system clock and prescalers.
+    ClockConfig = 0x4002_3808,
+    /// RCC_APB1ENR.
+    Apb1Enable = 0x4002_3840,
+    /// RCC_APB2ENR.
+    Apb2Enable = 0x4002_3844,
+    /// RCC_CSR: the cause of the last reset.
+    ResetStatus = 0x4002_3874,
+    /// FLASH_ACR: wait states and caches.
+    FlashAccess = 0x4002_3C00,
+    /// DBGMCU_IDCODE: which chip, and which revision of it.
+    ChipId = 0xE004_2000,
+    /// DBGMCU_APB1_FZ: what stands still while a debugger has stopped the core.
+    DebugFreeze = 0xE004_2008,
+}
+
+/// A block of registers: a chip's, or one in RAM for tests.
+pub trait Registers {
+    /// Returns the value of `register`.
+    fn read(&mut self, register: Register) -> u32;
+
+    /// Writes the value of `register`.
+    fn write(&mut self, register: Register, value: u32);
+
+    /// Clears `clear` and sets `set`.
+    fn modify(&mut self, register: Register, clear: u32, set: u32) {
+        let value = self.read(register);
+        self.write(register, value & !clear | set);
+    }
+
+    /// Reads `register` at most `polls` times; returns true once the bits of `mask` are `value`.
+    fn wait(&mut self, register: Register, mask: u32, value: u32, polls: u32) -> bool {
+        (0..polls).any(|_| self.read(register) & mask == value)
+    }
+}
+
+/// The chip's own registers.
+#[cfg(target_arch = "arm")]
+#[derive(Clone, Copy, Debug)]
+pub struct Chip;
+
+#[cfg(target_arch = "arm")]
+impl Registers for Chip {
+    fn read(&mut self, register: Register) -> u32 {
+        // SAFETY: an aligned register that every STM32F405 and STM32F446 has, and that is read without a side effect.
+        unsafe { core::ptr::read_volatile(register as u32 as *const u32) }
+    }
+
+    fn write(&mut self, register: Register, value: u32) {
+        // SAFETY: as above. None of these registers moves memory or lets a peripheral write to it, and nobody else writes them: the functions of
+        // this crate run before interrupts are let through, but for the key of the watchdog, which is one write.
+        unsafe { core::ptr::write_volatile(register as u32 as *mut u32, value) }
+    }
+}

@@ -1,0 +1,85 @@
+//! The cause of the last reset.
+
+use crate::registers::{Register, Registers};
+
+/// The bit that forgets all causes: RMVF.
+const FORGET: u32 = 1 << 24;
+
+/// The cause of the last reset.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Reset {
+    /// Power came on.
+    Power,
+    /// The supply voltage was too low.
+    Brownout,
+    /// The reset pin: a button, or a debug probe.
+    Pin,
+    /// The program or a debug probe asked for it.
+    Software,
+    /// The watchdog was not fed: the relay's loop hung, or its clock stopped.
+    Watchdog,
+    /// The chip does not tell, or it is emulated.
+    #[default]
+    Unknown,
+}
+
+impl Reset {
+    /// Returns the cause of the last reset, and has the chip forget it. Constant work.
+    pub fn take(chip: &mut impl Registers) -> Self {
+        let status = chip.read(Register::ResetStatus);
+        chip.modify(Register::ResetStatus, 0, FORGET);
+        Self::of(status)
+    }
+
+    /// Every reset drives the pin, and power that comes on is a brownout, too: the most telling bit counts.
+    fn of(status: u32) -> Self {
+        let is = |bit: u32| status >> bit & 1 != 0;
+        match status {
+            // Independent and window watchdog.
+            _ if is(29) || is(30) => Self::Watchdog,
+            _ if is(28) => Self::Software,
+            _ if is(27) => Self::Power,
+            _ if is(25) => Self::Brownout,
+            _ if is(31) || is(26) => Self::Pin,
+            _ => Self::Unknown,
+        }
+    }
+
+    /// Returns the words for it.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Power => "power came on",
+            Self::Brownout => "the supply voltage was too low",
+            Self::Pin => "the reset pin",
+            Self::Software => "the program or the debug probe",
+            Self::Watchdog => "the watchdog was not fed",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Reset;
+    use crate::mock::Block;
+    use crate::registers::{Register, Registers as _};
+
+    /// RCC_CSR as the reference manuals have it after each reset.
+    #[test]
+    fn the_cause_is_read_once_and_forgotten() {
+        for (status, cause) in [
+            (0x0E00_0000, Reset::Power),
+            (0x0600_0000, Reset::Brownout),
+            (0x0400_0000, Reset::Pin),
+            (0x1400_0000, Reset::Software),
+            (0x2400_0000, Reset::Watchdog),
+            (0x4400_0000, Reset::Watchdog),
+            (0x0000_0000, Reset::Unknown),
+        ] {
+            let mut block = Block::default();
+            block.write(Register::ResetStatus, status);
+            assert_eq!(Reset::take(&mut block), cause, "{status:#010x}");
+            assert_eq!(block.read(Register::ResetStatus) >> 24 & 1, 1, "RMVF");
+        }
+    }
+}

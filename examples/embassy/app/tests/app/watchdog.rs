@@ -1,0 +1,45 @@
+//! The watchdog: it is fed while the relay's ports and timers are served, and not otherwise.
+
+use uav_relay::{Duration, Event};
+use uav_relay_chip::reset::Reset;
+
+use crate::bench::{Bench, FED, SITES, block, block_alone};
+use crate::ram::Ram;
+use crate::vehicle::Vehicle;
+use uav_relay::Placement;
+
+#[test]
+fn it_is_fed_at_every_turn_and_a_loop_that_hangs_feeds_it_no_more() {
+    let mut bench = Bench::new();
+    bench.boot(Ram::blank().board(&block(Some(1), None), 1));
+    FED.with_borrow_mut(Vec::clear);
+    assert!(bench.run(60_000).contains(&Event::Converged));
+    let fed = FED.with_borrow_mut(core::mem::take);
+    assert!((120..=121).contains(&fed.len()), "{}", fed.len());
+    for pair in fed.windows(2) {
+        assert_eq!(pair[1].since(pair[0]), Duration::from_millis(500));
+    }
+    // A turn that does not end, for longer than the watchdog waits.
+    bench.hang(12_000);
+    assert!(FED.with_borrow(Vec::is_empty));
+    // The watchdog restarts the chip: it rejoins before its neighbour has given it up.
+    let board = Ram::blank().board(&block(Some(2), None), 2);
+    bench.boot(board.reset_by(Reset::Watchdog));
+    let told = bench.run(30_000);
+    println!("{told:?}");
+    assert!(told.contains(&Event::Converged), "{told:?}");
+    assert!(FED.with_borrow(Vec::len) >= 60);
+}
+
+/// The operator reads it on the ground station.
+#[test]
+fn the_operator_is_told_that_it_restarted_the_relay() {
+    for (reset, told) in [(Reset::Watchdog, true), (Reset::Power, false)] {
+        let mut bench = Bench::with(Vehicle::new(Placement::on_line(100.0, 20.0)));
+        bench.boot(Ram::blank().board(&block_alone(SITES), 1).reset_by(reset));
+        bench.run(5_000);
+        let line = "relay: restarted by its watchdog";
+        let said = bench.vehicle().texts.iter().any(|text| text == line);
+        assert_eq!(said, told, "{:?}", bench.vehicle().texts);
+    }
+}
