@@ -93,9 +93,97 @@ impl Add<Duration> for Instant {
     }
 }
 
+/// Largest backward step of the caller's time that is taken for disorder of its calls, and not for a step of its clock.
+const DISORDER: Duration = Duration::from_millis(100);
+
+/// Longest time between two calls. A larger forward step is one of the caller's clock, and as good as this one: all that a relay waits for
+/// has expired by then.
+const LONGEST: Duration = Duration::from_millis(24 * 3_600 * 1_000);
+
+/// Converts the caller's time, which may step in either direction, to internal time, which never runs backward.
+///
+/// | caller's time | internal time |
+/// | --- | --- |
+/// | up to one day after the latest | advances as much |
+/// | later than that | advances by one day |
+/// | up to 100 ms before the latest | stands still until the caller's time has caught up |
+/// | earlier than that | goes on from the latest, in step with the caller's time from now on |
+///
+/// So timers go on after a backward step, and a lease lasts no longer for it than the time between two calls.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MonotonicClock {
+    /// Latest time of the caller, and the internal time then.
+    latest: Instant,
+    internal: Instant,
+}
+
+impl MonotonicClock {
+    /// Creates a clock whose internal time is the caller's until that steps.
+    pub(crate) const fn new(now: Instant) -> Self {
+        Self {
+            latest: now,
+            internal: now,
+        }
+    }
+
+    /// Takes the caller's time, and returns the internal one.
+    pub(crate) fn advance(&mut self, now: Instant) -> Instant {
+        if now >= self.latest {
+            self.internal = self.internal + now.since(self.latest).min(LONGEST);
+            self.latest = now;
+        } else if self.latest.since(now) > DISORDER {
+            self.latest = now;
+        }
+        self.internal
+    }
+
+    /// Returns the internal time of the caller's time `at`.
+    pub(crate) fn internal(&self, at: Instant) -> Instant {
+        shifted(at, self.latest, self.internal)
+    }
+
+    /// Returns the caller's time of the internal time `at`.
+    pub(crate) fn external(&self, at: Instant) -> Instant {
+        shifted(at, self.internal, self.latest)
+    }
+}
+
+/// Returns the instant that is as far from `to` as `at` is from `from`.
+fn shifted(at: Instant, from: Instant, to: Instant) -> Instant {
+    let back = from.since(at).as_micros();
+    Instant::from_micros((to + at.since(from)).as_micros().saturating_sub(back))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Duration, Instant};
+    use super::{Duration, Instant, MonotonicClock};
+
+    fn ms(millis: u64) -> Instant {
+        Instant::from_millis(millis)
+    }
+
+    #[test]
+    fn internal_time_never_runs_backward() {
+        let mut clock = MonotonicClock::new(ms(1_000));
+        assert_eq!(clock.advance(ms(5_000)), ms(5_000));
+        // Calls in disorder.
+        assert_eq!(clock.advance(ms(4_950)), ms(5_000));
+        assert_eq!(clock.advance(ms(5_010)), ms(5_010));
+        // The clock steps back by five seconds, and on.
+        assert_eq!(clock.advance(ms(10)), ms(5_010));
+        assert_eq!(clock.advance(ms(20)), ms(5_020));
+        assert_eq!(clock.internal(ms(15)), ms(5_015));
+        assert_eq!(clock.external(ms(5_120)), ms(120));
+        assert_eq!(clock.external(ms(4_000)), Instant::ZERO);
+        // It steps forward by an hour, and to the end of time and back.
+        assert_eq!(clock.advance(ms(3_600_020)), ms(3_605_020));
+        let day = 24 * 3_600 * 1_000;
+        let end = Instant::from_micros(u64::MAX);
+        assert_eq!(clock.advance(end), ms(3_605_020 + day));
+        assert_eq!(clock.external(ms(3_605_021 + day)), end);
+        assert_eq!(clock.advance(ms(7)), ms(3_605_020 + day));
+        assert_eq!(clock.advance(ms(8)), ms(3_605_021 + day));
+    }
 
     #[test]
     fn arithmetic_saturates_at_both_ends() {

@@ -24,7 +24,7 @@ use crate::sensing::level::is_level;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::{Stats, bump};
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, MonotonicClock};
 use crate::view::ViewId;
 use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;
@@ -95,6 +95,8 @@ pub struct Ground {
     answer: Option<u16>,
     due: bool,
     again: Option<Instant>,
+    /// Started by the first upload.
+    clock: MonotonicClock,
     levels: Levels,
     deframer: Deframer,
     session: Session,
@@ -129,6 +131,7 @@ impl Ground {
             answer: None,
             due: false,
             again: None,
+            clock: MonotonicClock::new(Instant::ZERO),
             levels: Levels::NONE,
             deframer: Deframer::new(),
             session: Session::new(auth, 0),
@@ -151,6 +154,7 @@ impl Ground {
         self.answer = None;
         self.unanswered = 0;
         self.due = true;
+        self.clock = MonotonicClock::new(now);
         self.again = Some(now + PATIENCE);
         Ok(())
     }
@@ -318,6 +322,7 @@ impl Ground {
 
     /// Asks again, or the next relay, if it is time to. Constant work.
     pub fn handle_timeout(&mut self, now: Instant) {
+        let now = self.clock.advance(now);
         if self.again.is_none_or(|again| again > now) {
             return;
         }
@@ -352,8 +357,8 @@ impl Ground {
     }
 
     /// When [`Ground::handle_timeout`] is to be called at the latest; `None` once there is nothing left to do.
-    pub const fn poll_timeout(&self) -> Option<Instant> {
-        self.again
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        Some(self.clock.external(self.again?))
     }
 
     /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.

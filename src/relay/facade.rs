@@ -10,7 +10,7 @@ use crate::node::Node;
 use crate::settings::{Identity, Settings, SetupError, Wiring, check};
 use crate::side::Side;
 use crate::stats::bump;
-use crate::time::Instant;
+use crate::time::{Instant, MonotonicClock};
 use crate::wire::deframe::{DeframeError, Deframer};
 use crate::wire::frame::{self, FrameBuf, Header};
 #[cfg(feature = "auth")]
@@ -21,7 +21,9 @@ use crate::wire::session::Session;
 /// # Contract
 /// - *Inputs* [`handle_bytes`](Self::handle_bytes) and [`handle_timeout`](Self::handle_timeout) take anything, never fail
 ///   and do a bounded amount of work; what is wrong with it is counted in [`stats`](Self::stats).
-/// - *Time* is an argument and should not run backward. The relay never reads a clock.
+/// - *Time* is an argument; the relay never reads a clock. After a backward step of the caller's clock timers and lease go on as if no time had
+///   passed between the two calls, after a forward step they expire. Give it a monotonic clock: a forward step while a part of the chain is out of reach ends the wait for the
+///   leases of that part early, so two chains may fly until these have expired.
 /// - *Getters* take constant work, and their numbers are those of the last agreement. Places are in metres in the frame of
 ///   [`MissionConfig`](crate::MissionConfig).
 /// - *Output* is made from the state when it is asked for, so nothing can overflow. After every input, call
@@ -69,6 +71,7 @@ pub struct Relay {
     /// Upstream or shared, and downstream.
     deframers: [Deframer; 2],
     pub(super) counter: u32,
+    pub(super) clock: MonotonicClock,
     #[cfg(feature = "auth")]
     session: Option<Session>,
 }
@@ -127,6 +130,7 @@ impl Relay {
             wiring: settings.wiring,
             deframers: [Deframer::new(), Deframer::new()],
             counter: 0,
+            clock: MonotonicClock::new(now),
             #[cfg(feature = "auth")]
             session: None,
         }
@@ -163,6 +167,7 @@ impl Relay {
         if shared != (port == Port::Shared) {
             return;
         }
+        let now = self.clock.advance(now);
         let [first, second] = &mut self.deframers;
         let deframer = if port == Port::Downstream {
             second
@@ -230,7 +235,7 @@ impl Relay {
     /// ```
     #[inline(never)] // as `poll_transmit`
     pub fn handle_timeout(&mut self, now: Instant) {
-        self.node.handle_timeout(now);
+        self.node.handle_timeout(self.clock.advance(now));
     }
 
     /// Has the chain agree again, from the beginning of its method: in a closed loop, once it has measured where it stands.
@@ -247,7 +252,7 @@ impl Relay {
     /// assert_eq!(relay.phase(), Phase::Planning);
     /// ```
     pub fn restart(&mut self, now: Instant) {
-        self.node.restart(now);
+        self.node.restart(self.clock.advance(now));
     }
 
     /// Writes the next frame to be sent into `frame`, if there is one. Call until there is none.
@@ -269,6 +274,7 @@ impl Relay {
     /// ```
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
+        let now = self.clock.advance(now);
         let sender = self.node.member().node;
         let mut header = Header {
             network: self.network,
@@ -341,6 +347,7 @@ impl Relay {
     /// assert!(relay.poll_timeout().is_some_and(|due| due >= Instant::ZERO), "sleep until then, or the next byte");
     /// ```
     pub fn poll_timeout(&self) -> Option<Instant> {
-        self.node.poll_timeout()
+        let due = self.node.poll_timeout()?;
+        Some(self.clock.external(due))
     }
 }

@@ -116,7 +116,8 @@ impl Relay {
     /// Until when it may hold what was agreed on without hearing more: by then nobody else flies anything else. `None` before that is
     /// known, and when the time is over.
     pub fn lease(&self) -> Option<Instant> {
-        self.node.lease()
+        let until = self.node.lease()?;
+        Some(self.clock.external(until))
     }
 
     /// The node numbers of its neighbours toward the transmitter and toward the receiver, `None` where it has none. A node number is

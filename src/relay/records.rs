@@ -20,6 +20,6 @@ impl Relay {
     /// [`RecordError::Base`] if it was stored by a relay that was loaded with another mission, [`RecordError::Begun`] if the relay
     /// has begun to talk or to compute. Nothing has changed then.
     pub fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
-        self.node.resume_view(now, record)
+        self.node.resume_view(self.clock.advance(now), record)
     }
 }

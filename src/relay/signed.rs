@@ -80,14 +80,14 @@ pub(super) fn next(
             && ask != 0
             && ask % QUESTIONS == 0
         {
-            session.ask(to);
+            session.ask_silent(to);
         }
         if let Message::Hello(hello) = message
             && hello.ask
             && !hello.is_heard(header.sender, to)
         {
             // It may have been switched on since: then it reads nothing else, and has nothing to say by itself.
-            session.ask(to);
+            session.ask_silent(to);
         }
         say(session, to, &message, header, frame)?
     };

@@ -24,7 +24,7 @@ impl Relay {
     /// # }
     /// ```
     pub fn handle_sample(&mut self, now: Instant, sample: Sample) {
-        self.node.handle_sample(now, sample);
+        self.node.handle_sample(self.clock.advance(now), sample);
     }
 
     /// Takes in where the drone was at time `at`, `x_m` and altitude: when that was measured, not when it was read. Where
@@ -46,7 +46,9 @@ impl Relay {
     /// # }
     /// ```
     pub fn handle_position(&mut self, now: Instant, at: Instant, place: Placement) {
-        self.node.handle_position(now, at, place);
+        let now = self.clock.advance(now);
+        self.node
+            .handle_position(now, self.clock.internal(at), place);
     }
 
     /// Whether the drone flies to the setpoints from now on: not while its pilot has it, or it is on the ground. A relay is taken to be
@@ -69,7 +71,7 @@ impl Relay {
     /// relay.handle_control(Instant::from_millis(9_000), true);
     /// ```
     pub fn handle_control(&mut self, now: Instant, flown: bool) {
-        self.node.handle_control(now, flown);
+        self.node.handle_control(self.clock.advance(now), flown);
     }
 
     /// Relays at `side` that fell silent, or are not flown ([`handle_control`](Self::handle_control)), have landed, or were taken away: the
@@ -77,7 +79,7 @@ impl Relay {
     ///
     /// Constant work.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
-        self.node.clear_lost(now, side);
+        self.node.clear_lost(self.clock.advance(now), side);
     }
 
     /// Reports that the other relay with this one's number ([`Event::IndexTaken`](crate::Event::IndexTaken)) has landed, or has another number
@@ -85,6 +87,6 @@ impl Relay {
     ///
     /// Constant work.
     pub fn clear_index_taken(&mut self, now: Instant) {
-        self.node.clear_duplicate(now);
+        self.node.clear_duplicate(self.clock.advance(now));
     }
 }

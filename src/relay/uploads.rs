@@ -26,7 +26,7 @@ impl Relay {
     /// [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it is for other relays, [`UploadError::Line`] if
     /// there is no line on earth for it, [`UploadError::Old`] if a mission as new as that is held.
     pub fn handle_upload(&mut self, now: Instant, upload: &Upload) -> Result<(), UploadError> {
-        self.node.handle_upload(now, upload)
+        self.node.handle_upload(self.clock.advance(now), upload)
     }
 
     /// The newest mission held, flown or not yet, if it was uploaded.

@@ -9,7 +9,7 @@ use super::port::SerialPort;
 use super::stats::SerialStats;
 use crate::relay::{Port, Relay};
 use crate::stats::bump;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, MonotonicClock};
 use crate::wire::frame::MAX_FRAME;
 
 /// The most bytes, or failed reads, that one poll takes from one port.
@@ -59,6 +59,7 @@ pub struct SerialLink<P, D = NoPin> {
     level: Option<bool>,
     byte_time: Duration,
     waiting: Deque<u8, QUEUE>,
+    clock: MonotonicClock,
     /// When a byte was taken last, or the first one began to wait.
     moved_at: Instant,
     /// Bytes written by the last poll: when exactly is not known, so they count from the next one.
@@ -92,6 +93,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
             level: None,
             byte_time: byte_time.max(Duration::from_micros(1)),
             waiting: Deque::new(),
+            clock: MonotonicClock::new(Instant::ZERO),
             moved_at: Instant::ZERO,
             uncounted: 0,
             quiet_at: Instant::ZERO,
@@ -175,8 +177,9 @@ pub(super) trait FrameLink {
 impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay) {
         let written = core::mem::take(&mut self.uncounted);
+        let internal = self.clock.advance(now);
         if written > 0 {
-            self.quiet_at = self.quiet_at.max(now) + self.byte_time.times(written);
+            self.quiet_at = self.quiet_at.max(internal) + self.byte_time.times(written);
         }
         let mut buffer = [0; READ_LIMIT];
         let mut room = buffer.as_mut_slice();
@@ -207,7 +210,7 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
             return bump(&mut self.stats.dropped);
         }
         if self.waiting.is_empty() {
-            self.moved_at = now;
+            self.moved_at = self.clock.advance(now);
         }
         for &byte in frame {
             // There is room, as just seen.
@@ -220,6 +223,7 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
     }
 
     fn transmit(&mut self, now: Instant) {
+        let now = self.clock.advance(now);
         if !self.waiting.is_empty() && !self.raise() {
             return;
         }
@@ -247,7 +251,8 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
         }
         // A port that takes nothing is left alone for as long again as it has been stuck.
         let longest = self.byte_time.times(LONGEST_PAUSE);
-        let pause = now.since(self.moved_at).min(longest).max(self.byte_time);
+        let stuck = self.clock.internal(now).since(self.moved_at);
+        let pause = stuck.min(longest).max(self.byte_time);
         (!self.waiting.is_empty()).then(|| now + pause)
     }
 }

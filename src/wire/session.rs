@@ -187,6 +187,14 @@ impl Session {
         }
     }
 
+    /// Owes the same to a silent node, but not while its handshakes are those of a start with a used nonce: shown its own nonce, such a
+    /// node would pass for the one that it was, and its nonces and counters would be used twice.
+    pub(crate) fn ask_silent(&mut self, to: u16) {
+        if self.find(to).is_none_or(|peer| peer.older.times == 0) {
+            self.ask(to);
+        }
+    }
+
     /// Returns the claim to this relay's number that the last frame has shown.
     pub(crate) const fn poll_rival(&mut self) -> Option<Rival> {
         self.rival.take()

@@ -54,6 +54,8 @@ pub(crate) enum Deed {
     Loss(f64),
     /// A mission is handed to a relay.
     Upload(usize, Box<Upload>),
+    /// The clock of a relay steps by so many µs, not below 0.
+    Step(usize, i64),
 }
 
 #[derive(Clone, Debug)]
@@ -97,6 +99,8 @@ struct Drone {
     starts: u32,
     stored: Option<(ViewRecord, Option<Upload>)>,
     wake_us: Option<u64>,
+    /// What its clock is ahead of the time, µs.
+    ahead_us: i64,
     /// When its transmitter is free again, by port, µs.
     free_us: [u64; 2],
 }
@@ -131,8 +135,11 @@ pub(crate) struct Air {
     pub(crate) story: bool,
 }
 
-fn instant(us: u64) -> Instant {
-    Instant::from_micros(us)
+impl Drone {
+    /// What its clock shows at `us`.
+    fn clock(&self, us: u64) -> Instant {
+        Instant::from_micros(us.saturating_add_signed(self.ahead_us))
+    }
 }
 
 impl Air {
@@ -142,11 +149,12 @@ impl Air {
         let all = usize::from(kind.mission.relays());
         let drones: Vec<Drone> = (0..all)
             .map(|at| Drone {
-                relay: switched_on(&kind, at, 1, rng.random(), 0),
+                relay: switched_on(&kind, at, 1, rng.random(), Instant::ZERO),
                 is_on: false,
                 starts: 0,
                 stored: None,
                 wake_us: None,
+                ahead_us: 0,
                 free_us: [0; 2],
             })
             .collect();
@@ -206,15 +214,17 @@ impl Air {
                         continue;
                     }
                     drone.wake_us = None;
-                    drone.relay.handle_timeout(instant(at_us));
+                    let now = drone.clock(at_us);
+                    drone.relay.handle_timeout(now);
                     at
                 }
                 Happening::Frame { to, port, bytes } => {
                     if !self.drones[to].is_on {
                         continue;
                     }
-                    let relay = &mut self.drones[to].relay;
-                    relay.handle_bytes(instant(at_us), port, &bytes);
+                    let drone = &mut self.drones[to];
+                    let now = drone.clock(at_us);
+                    drone.relay.handle_bytes(now, port, &bytes);
                     to
                 }
                 Happening::Deed(deed) => {
@@ -244,12 +254,12 @@ impl Air {
                 drone.starts += 1;
                 drone.is_on = true;
                 drone.wake_us = None;
-                drone.relay = switched_on(&self.kind, at, drone.starts, seed, self.now_us);
+                let now = drone.clock(self.now_us);
+                drone.relay = switched_on(&self.kind, at, drone.starts, seed, now);
                 if let Some((record, upload)) = &drone.stored {
                     if let Some(upload) = upload {
                         drone.relay.resume(upload).unwrap();
                     }
-                    let now = instant(self.now_us);
                     drone.relay.resume_view(now, record).unwrap();
                 }
                 return Some(at);
@@ -262,12 +272,18 @@ impl Air {
             Deed::Mend { from, to } => self.cuts[from * all + to] -= 1,
             Deed::Loss(loss) => self.loss = loss,
             Deed::Upload(at, upload) => {
-                if self.drones[at].is_on {
-                    let now = instant(self.now_us);
+                let drone = &mut self.drones[at];
+                if drone.is_on {
+                    let now = drone.clock(self.now_us);
                     // One that is refused is as old as the one held.
-                    let _ = self.drones[at].relay.handle_upload(now, &upload);
+                    let _ = drone.relay.handle_upload(now, &upload);
                     return Some(at);
                 }
+            }
+            Deed::Step(at, by_us) => {
+                let drone = &mut self.drones[at];
+                drone.ahead_us = (drone.ahead_us + by_us).max(-(self.now_us as i64));
+                return Some(at);
             }
         }
         None
@@ -275,7 +291,7 @@ impl Air {
 
     /// Sends what relay `at` has to say, and takes in what is to be seen of it.
     fn drain(&mut self, at: usize) {
-        let now = instant(self.now_us);
+        let now = self.drones[at].clock(self.now_us);
         let mut frame = [0; MAX_FRAME];
         if self.drones[at].is_on {
             let drone = &mut self.drones[at];
@@ -294,7 +310,7 @@ impl Air {
             let drone = &mut self.drones[at];
             if let Some(wake) = drone.relay.poll_timeout() {
                 assert!(wake > now, "it spins");
-                let wake_us = wake.as_micros();
+                let wake_us = self.now_us + wake.since(now).as_micros();
                 if drone.wake_us.is_none_or(|known| known != wake_us) {
                     drone.wake_us = Some(wake_us);
                     self.put(wake_us, Happening::Wake(at));
@@ -445,7 +461,7 @@ impl Air {
     }
 }
 
-fn switched_on(kind: &Kind, at: usize, start: u32, seed: u32, now_us: u64) -> Relay {
+fn switched_on(kind: &Kind, at: usize, start: u32, seed: u32, now: Instant) -> Relay {
     let index = u16::try_from(at + 1).unwrap();
     let auth = kind.signed.then(|| Auth {
         key: Key::new([7; 32]),
@@ -466,5 +482,5 @@ fn switched_on(kind: &Kind, at: usize, start: u32, seed: u32, now_us: u64) -> Re
         Some((stranger, mission)) if stranger == at => mission,
         _ => kind.mission,
     };
-    Relay::new(mission, identity, settings, seed, instant(now_us)).unwrap()
+    Relay::new(mission, identity, settings, seed, now).unwrap()
 }

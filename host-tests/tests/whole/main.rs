@@ -9,7 +9,9 @@ mod schedule;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use schedule::{SECOND, Schedule, random};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use schedule::{SECOND, Schedule, random, without_steps};
 
 /// The time after the last fault within which the chain is whole, s.
 const WHOLE_S: u64 = 120;
@@ -123,7 +125,7 @@ fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
 #[test]
 fn schedules_that_were_stuck_once_end_in_one_whole_chain() {
     for seed in [105, 218, 587, 593, 371, 1_463] {
-        let found = flown(seed, &random(seed));
+        let found = flown(seed, &without_steps(seed));
         assert!(
             found.whole_s.is_some_and(|s| s <= WHOLE_S as f64),
             "{found:?}"
@@ -182,4 +184,52 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
         }
     }
     assert!(late.is_empty(), "{late:?}");
+}
+
+/// Flies chains in which the clocks of some relays step by up to ten hours, half of them with one relay that is alone for three minutes and
+/// is woken by nothing but its own timers. Returns how many there were, those that were late, and those with two chains at once.
+fn with_steps(forward: bool) -> (u64, Vec<Found>, Vec<Found>) {
+    let (mut late, mut two) = (Vec::new(), Vec::new());
+    let count = number("COUNT", 200);
+    for seed in 1..=count {
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        let relays = rng.random_range(2..=8);
+        let mut schedule = Schedule::of(relays, seed);
+        let all = usize::from(relays);
+        if rng.random_bool(0.5) {
+            let alone = rng.random_range(0..all);
+            schedule.cut(|at| at == alone, 60 * SECOND, 240 * SECOND);
+        }
+        for _ in 0..rng.random_range(1..=6) {
+            let at = rng.random_range(0..all);
+            let at_us = rng.random_range(0..300 * SECOND);
+            schedule.step(at, at_us, forward && rng.random_bool(0.5), rng);
+        }
+        let found = flown(seed, &schedule);
+        if found.whole_s.is_none_or(|s| s > WHOLE_S as f64) {
+            late.push(found);
+        } else if found.groups > 1 {
+            two.push(found);
+        }
+    }
+    println!(
+        "{count} chains, steps forward too: {forward}; {} whole later than {WHOLE_S} s, {} with two chains at once: {late:?} {two:?}",
+        late.len(),
+        two.len()
+    );
+    (count, late, two)
+}
+
+#[test]
+fn clocks_that_step_back_leave_one_whole_chain() {
+    let (_, late, two) = with_steps(false);
+    assert!(late.is_empty() && two.is_empty());
+}
+
+/// A clock that steps forward ends the wait for the leases of others early: two chains may fly until these have expired.
+#[test]
+fn clocks_that_step_forward_leave_a_whole_chain_and_seldom_two_for_a_while() {
+    let (count, late, two) = with_steps(true);
+    assert!(late.is_empty());
+    assert!(two.len() as u64 * 100 <= count);
 }

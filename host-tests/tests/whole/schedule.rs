@@ -57,6 +57,13 @@ impl Schedule {
         self.put(on_us, Deed::On(at));
     }
 
+    /// The clock of relay `at` steps by a millisecond to ten hours, forward or back.
+    pub(crate) fn step(&mut self, at: usize, at_us: u64, forward: bool, rng: &mut ChaCha8Rng) {
+        let by_us = 1e3 * f64::powf(3.6e7, rng.random_range(0.0..1.0));
+        let by_us = if forward { by_us as i64 } else { -by_us as i64 };
+        self.put(at_us, Deed::Step(at, by_us));
+    }
+
     /// Frames of `from` do not reach `to` for a time.
     pub(crate) fn deafen(&mut self, from: usize, to: usize, from_us: u64, until_us: u64) {
         self.put(from_us, Deed::Cut { from, to });
@@ -111,8 +118,23 @@ fn span(rng: &mut ChaCha8Rng) -> u64 {
 }
 
 /// A random schedule: cuts of seconds to minutes, in one of twenty of hours; one-way links; flapping links; losses; reboots; early and
-/// late starts; uploads.
+/// late starts; uploads; in one of six, clocks that step back.
 pub(crate) fn random(seed: u64) -> Schedule {
+    let mut schedule = without_steps(seed);
+    // Of their own random numbers, so that the rest of a schedule does not depend on them.
+    let rng = &mut ChaCha8Rng::seed_from_u64(!seed);
+    if rng.random_range(0..6) == 0 {
+        for _ in 0..rng.random_range(1..=4) {
+            let at = rng.random_range(0..usize::from(schedule.kind.mission.relays()));
+            let at_us = rng.random_range(0..=schedule.faults_end_us + 60 * SECOND);
+            schedule.step(at, at_us, false, rng);
+        }
+    }
+    schedule
+}
+
+/// The same without clocks that step.
+pub(crate) fn without_steps(seed: u64) -> Schedule {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let count = relays(rng);
     let all = usize::from(count);

@@ -25,7 +25,7 @@ use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::side::Side;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, MonotonicClock};
 
 /// An onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
 const COMPONENT: u8 = 191;
@@ -54,7 +54,7 @@ const NEXT_REASON: Duration = Duration::from_millis(5_000);
 ///
 /// # Contract
 /// - *Inputs* take anything, never fail and do a bounded amount of work.
-/// - *Time* is an argument and should not run backward.
+/// - *Time* is an argument. After a backward step of the caller's clock timers go on as if no time had passed between the two calls.
 /// - After every input call [`poll_transmit`](Self::poll_transmit), [`poll_position`](Self::poll_position) and
 ///   [`poll_event`](Self::poll_event) until each gives `None`, and hand the relay what [`is_flown`](Self::is_flown) says; then sleep
 ///   until [`poll_timeout`](Self::poll_timeout) or the next byte.
@@ -62,6 +62,7 @@ const NEXT_REASON: Duration = Duration::from_millis(5_000);
 pub struct Autopilot {
     axis: Axis,
     pace: Pace,
+    clock: MonotonicClock,
     began: Instant,
     parser: Parser,
     trust: Trust,
@@ -103,6 +104,7 @@ impl Autopilot {
         Self {
             axis,
             pace,
+            clock: MonotonicClock::new(now),
             began: now,
             parser: Parser::new(),
             trust: Trust::default(),
@@ -133,6 +135,7 @@ impl Autopilot {
 
     /// Bytes from the autopilot, any number of them.
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
+        let now = self.clock.advance(now);
         for byte in bytes {
             self.parser.push(*byte);
             while let Some(received) = self.trust.next_received(now, &mut self.parser) {
@@ -189,6 +192,7 @@ impl Autopilot {
     /// [`handle_setpoint`](Self::handle_setpoint). The drone stays where it is until a setpoint is given: what was given before is of the
     /// other line. Constant work; the same line again has no effect.
     pub fn fly_along(&mut self, now: Instant, axis: Axis) {
+        let now = self.clock.advance(now);
         if axis == self.axis {
             return;
         }
@@ -210,6 +214,7 @@ impl Autopilot {
 
     /// Where to fly: what `Relay::setpoint` says; `None` to hold the place, and so is one that is not finite or not near the line.
     pub fn handle_setpoint(&mut self, now: Instant, setpoint: Option<Placement>) {
+        let now = self.clock.advance(now);
         let setpoint = setpoint.filter(|place| self.axis.is_around(*place));
         if self.setpoint != setpoint {
             let before = core::mem::replace(&mut self.setpoint, setpoint);
@@ -231,12 +236,13 @@ impl Autopilot {
 
     /// The numbers that an operator may plot once a second: the SIR of the hop to this relay in decibels, and its place in the chain.
     pub fn handle_values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
-        self.report.values(now, sir_db, place);
+        self.report.values(self.clock.advance(now), sir_db, place);
     }
 
     /// Sets whether the relay is ready to be engaged; true at the start. While it is false, a PX4 in [`State::Standby`] is streamed nothing,
     /// so that it refuses OFFBOARD. Nothing else changes: an engaged drone stays engaged, and an ArduCopter takes GUIDED all the same.
     pub fn handle_ready(&mut self, now: Instant, ready: bool) {
+        let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
         if before != ready && self.state == State::Standby {
             // Streamed anew, if at all.
@@ -276,6 +282,7 @@ impl Autopilot {
 
     /// Does what is due at `now`. Constant work.
     pub fn handle_timeout(&mut self, now: Instant) {
+        let now = self.clock.advance(now);
         self.streams.handle_timeout(now);
         self.review(now);
     }
@@ -451,6 +458,7 @@ impl Autopilot {
 
     /// The next frame to send. Call until there is none.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<FrameBytes> {
+        let now = self.clock.advance(now);
         if now == Instant::from_micros(u64::MAX) {
             // The clock stands still there, and what is due then stays due.
             return None;
@@ -575,14 +583,16 @@ impl Autopilot {
     }
 
     /// The next place where the drone was, and when: for `Relay::handle_position`. Of several since the last call the newest.
-    pub const fn poll_position(&mut self) -> Option<Position> {
-        self.position.take()
+    pub fn poll_position(&mut self) -> Option<Position> {
+        let position = self.position.take()?;
+        let at = self.clock.external(position.at);
+        Some(Position { at, ..position })
     }
 
     /// How far from its line the drone is, while it is too far to have a place along it; `None` where it has one, or none was heard of for 3 s.
     /// Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
-        let at = self.astray.newest(now)?;
+        let at = self.astray.newest(self.clock.internal(now))?;
         OffLine::new(at, &self.axis)
     }
 
@@ -604,6 +614,7 @@ impl Autopilot {
 
     /// When to call [`handle_timeout`](Self::handle_timeout) at the latest.
     pub fn poll_timeout(&self, now: Instant) -> Instant {
+        let now = self.clock.internal(now);
         let target = self.target.map(|target| target.due);
         let report = self
             .report
@@ -611,12 +622,13 @@ impl Autopilot {
             .filter(|_| self.state != State::Silent);
         let recovered = self.located_at.map(|at| at + self.recovery);
         let streams = self.streams.next_timeout(now);
-        [target, report, self.vehicle.next_timeout(now)]
+        let due = [target, report, self.vehicle.next_timeout(now)]
             .into_iter()
             .chain([recovered, self.wait_told_at()])
             .chain([self.release.map(|(_, until)| until)])
             .flatten()
-            .fold(self.heartbeat_at.min(streams), Instant::min)
+            .fold(self.heartbeat_at.min(streams), Instant::min);
+        self.clock.external(due)
     }
 
     /// Who flies.

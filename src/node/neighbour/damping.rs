@@ -73,7 +73,7 @@ impl Loss {
         };
         let times = (1 << more.min(DOUBLINGS)).min(LONGEST);
         let span = settings.dead_after.times(times);
-        !self.back.is_some_and(|back| now.since(back.since) >= span)
+        self.back.is_none_or(|back| now.since(back.since) < span)
     }
 }
 
