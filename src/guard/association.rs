@@ -235,13 +235,14 @@ impl Association {
         self.told_open = opens;
     }
 
-    /// Takes from any message of the neighbour whether the chain is to halt.
-    pub(super) const fn hear_halt(&mut self, fence: &Fence) {
-        self.halt_left = if fence.says(Fence::HALTS) {
-            HALT_REMINDERS
-        } else {
-            0
-        };
+    /// Takes from any message of the neighbour whether the chain is to halt. A request is withdrawn by a relay that is in order on its
+    /// other side (`is_placed`): one that was rebooted does not know yet what it had requested.
+    pub(super) const fn hear_halt(&mut self, fence: &Fence, is_placed: bool) {
+        if fence.says(Fence::HALTS) {
+            self.halt_left = HALT_REMINDERS;
+        } else if is_placed {
+            self.halt_left = 0;
+        }
     }
 
     /// Returns true while the neighbour requests a halt.

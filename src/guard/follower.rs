@@ -110,7 +110,8 @@ impl FenceFollower {
     }
 
     pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
-        self.association.hear_halt(fence);
+        let is_placed = !fence.says(Fence::RELEASED) && fence.number != 0;
+        self.association.hear_halt(fence, is_placed);
         // With a number it is the place of a fence, which may be far from its owner.
         if fence.says(Fence::UNPLACED) || !fence.says(Fence::RELEASED) && fence.number == 0 {
             self.association.see(fence.x_m);

@@ -287,7 +287,7 @@ impl Guard {
             let (x_m, apart) = (found.x_m, self.own.config.separation_m);
             self.follower.keep_out.begin(x_m, x_m + apart);
             self.owner.keep_out.begin(x_m, x_m - apart);
-            self.own.go(found, now);
+            self.own.begin(found, now);
             return self.own.setpoint;
         };
         self.follower.settle(&self.own);

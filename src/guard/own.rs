@@ -25,6 +25,9 @@ pub(super) struct Own {
     pub(super) halted: bool,
     /// Place reported last.
     pub(super) reported: Option<Placement>,
+    /// Last setpoint at which this relay arrived, or the one that it began with. It is on its way from there, so it stops no farther
+    /// outside the box than that.
+    left: Placement,
 }
 
 impl Own {
@@ -40,6 +43,7 @@ impl Own {
             open: false,
             halted: true,
             reported: None,
+            left: Placement::on_line(0.0, 0.0),
         }
     }
 
@@ -68,7 +72,7 @@ impl Own {
             && let Some(reported) = self.reported
         {
             let ReachableInterval { low_m, high_m, .. } = self.reachable;
-            let reported = self.config.cut_toward(reported, stop);
+            let reported = self.config.cut_toward(reported, self.left);
             if !self.reachable.is_still() {
                 stop.x_m = reported.x_m.max(low_m).min(high_m);
             }
@@ -80,10 +84,19 @@ impl Own {
         }
     }
 
+    /// Begins with the setpoint `place`.
+    pub(super) fn begin(&mut self, place: Placement, now: Instant) {
+        self.left = place;
+        self.go(place, now);
+    }
+
     /// It was at `place` at time `at`: across the line it has arrived if that was long enough after it was told to go there.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.still |= at >= self.turned + self.config.lag
             && self.is_near(place.cross_section(), self.across());
+        if let Some(setpoint) = self.setpoint.filter(|_| self.still) {
+            self.left = setpoint;
+        }
     }
 
     /// Whether `is` is `to_be` but for what a relay hovers off.

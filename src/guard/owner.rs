@@ -118,23 +118,29 @@ impl FenceOwner {
         self.association.is_none() || self.is_heard() && self.is_beyond(own)
     }
 
-    /// Returns true if the neighbour downstream has told that it is not beyond this relay.
+    /// Returns true if the neighbour downstream has told that it is not beyond this relay, in this association or in none.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
-        self.is_heard() && !self.is_beyond(own) && self.counted_m > f32::NEG_INFINITY
+        if self.is_heard() {
+            !self.is_beyond(own) && self.counted_m > f32::NEG_INFINITY
+        } else {
+            !self.is_ordered(own) && self.association.is_passed(own, Side::Downstream)
+        }
     }
 
     /// Returns true if the neighbour is known to be beyond this relay along x.
     ///
     /// Reported places are off by up to `hover_m` each. Before the first fence is cleared, two relays whose reports are nearer than
-    /// that along x are in order only if they may pass each other: the separation apart across the line. Such a pair, or one that has
-    /// been in order, may have moved by that error once more at each of the two since then: each time that one halts or is rebooted.
+    /// that along x are in order only if they were reported in order and may pass each other: the separation apart across the line. Were
+    /// they taken to be in order the other way round, so could be two relays with a third one between, which may not pass each other. A
+    /// pair that has been in order may have moved by that error once more at each of the two since then, each time that one halts or is
+    /// rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
-        let may_pass = self.clear || own.config.least_step(own.across(), self.across) <= 0.0;
-        let least_m = if may_pass {
-            -2.0 * off_m - own.config.rounding()
-        } else {
-            off_m
+        let may_pass = own.config.least_step(own.across(), self.across) <= 0.0;
+        let least_m = match (self.clear, may_pass) {
+            (true, _) => -2.0 * off_m - own.config.rounding(),
+            (false, true) => -own.config.rounding(),
+            (false, false) => off_m,
         };
         self.counted_m - own.reachable.high_m >= least_m
     }
@@ -162,7 +168,8 @@ impl FenceOwner {
     }
 
     pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
-        self.association.hear_halt(fence);
+        let is_placed = !fence.says(Fence::RELEASED) && !fence.says(Fence::UNPLACED);
+        self.association.hear_halt(fence, is_placed);
         if !fence.says(Fence::RELEASED) || fence.says(Fence::UNPLACED) {
             self.association.see(fence.x_m);
         }

@@ -277,6 +277,27 @@ impl World {
             }
         }
         self.check(report);
+        if std::env::var_os("STORY").is_some() && (self.now_s * 10.0).round() as u64 % 5 == 0 {
+            self.tell();
+        }
+    }
+
+    /// Prints where the drones are, for a person.
+    fn tell(&self) {
+        let each = self.drones.iter().map(|drone| {
+            let at = drone.line.along(drone.at);
+            let goal = drone.setpoint().map(|goal| drone.line.along(goal));
+            let holds =
+                [Side::Upstream, Side::Downstream].map(|side| drone.guard.hold_reason(side));
+            format!(
+                "[{:.1?} to {:.1?} {}{:?}]",
+                at,
+                goal,
+                if drone.pilot.is_some() { "pilot " } else { "" },
+                holds
+            )
+        });
+        println!("{:.1} {}", self.now_s, each.collect::<Vec<_>>().join(" "));
     }
 
     fn check(&self, report: &mut Report) {
@@ -424,6 +445,9 @@ fn agenda(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<(f64
 
 fn happen(world: &mut World, what: What, report: &mut Report) {
     let now = instant(world.now_s);
+    if std::env::var_os("STORY").is_some() {
+        println!("{:.1} {what:?}", world.now_s);
+    }
     match what {
         What::Take(k, to) => {
             let drone = &mut world.drones[k];
@@ -517,6 +541,9 @@ fn fly(seed: u64) -> Report {
         brakes: Vec::new(),
         rng,
     };
+    if std::env::var_os("STORY").is_some() {
+        println!("{config:?} {faults:?}");
+    }
     for k in 0..relays {
         world.boot(k);
         world.begin(k);

@@ -18,6 +18,9 @@ use uav_relay_tools::provision::block::Flight;
 
 use crate::log::{self, Line};
 
+/// First lines of every image: the emulator has no cause of a reset and no PLL.
+pub(crate) const OF_THE_CHIP: [&str; 2] = ["started: unknown", "clock 16 MHz, no PLL"];
+
 /// How long anything may take before a test gives up.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
 
@@ -230,6 +233,11 @@ impl Fleet {
     /// The lines of one drone.
     pub(crate) fn of_drone(&self, drone: u16) -> impl Iterator<Item = &Line> {
         self.lines.iter().filter(move |line| line.drone == drone)
+    }
+
+    /// The lines of one drone after those about its chip.
+    pub(crate) fn after_start(&self, drone: u16) -> impl Iterator<Item = &Line> {
+        self.of_drone(drone).skip(OF_THE_CHIP.len())
     }
 
     /// Waits until every drone has been told where to fly, and gives the bits of those places.

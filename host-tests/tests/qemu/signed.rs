@@ -33,7 +33,7 @@ fn five_that_sign_settle_where_the_simulated_chain_does() {
             }
             assert!(counters.counter("handshakes").unwrap() > 0);
             // The emulator has no flash that can be written, and the drone notices.
-            let mut lines = fleet.of_drone(drone).skip(1);
+            let mut lines = fleet.after_start(drone).skip(1);
             assert_eq!(
                 lines.next().unwrap().text,
                 "frames are signed, epoch 77; it cannot be kept: raise the epoch of the block before the next start"
@@ -77,13 +77,13 @@ fn a_drone_without_the_key_takes_no_part() {
         counter(4, "version") > 0,
         "it does not know what a tag is for"
     );
-    let said = fleet.of_drone(4).nth(1).unwrap();
+    let said = fleet.after_start(4).nth(1).unwrap();
     assert_eq!(
         said.text,
         "no key: frames are not signed, and anybody can send some"
     );
     assert_eq!(
-        fleet.of_drone(4).nth(2).unwrap().text,
+        fleet.after_start(4).nth(2).unwrap().text,
         "no sites: no autopilot is told where to fly, and nothing keeps drones apart on their way"
     );
 }

@@ -8,7 +8,7 @@ use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_tools::provision::config::LEN;
 
 use crate::chain::{paper, simulated};
-use crate::fleet::{Fleet, Image};
+use crate::fleet::{Fleet, Image, OF_THE_CHIP};
 use crate::log::Line;
 use crate::methods::field;
 
@@ -131,10 +131,13 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
         "configuration refused: field, Upsilon",
     ];
     let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
-    fleet.wait("word from every drone", |lines| lines.len() >= words.len());
+    fleet.wait("word from every drone", |lines| {
+        lines.len() >= 3 * words.len()
+    });
     for (drone, word) in (1..).zip(words) {
         let texts: Vec<&str> = fleet.of_drone(drone).map(|line| &line.text[..]).collect();
-        assert_eq!(texts, [word], "drone {drone}");
+        let [started, clock] = OF_THE_CHIP;
+        assert_eq!(texts, [started, clock, word], "drone {drone}");
     }
 }
 
@@ -143,9 +146,12 @@ fn a_drone_with_half_a_secret_takes_no_part_and_says_why() {
     let good = paper(3).block(2).unwrap().to_vec();
     let blocks = [with(&good, 252, &[1]), with(&good, 256, &[1])];
     let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
-    fleet.wait("word from every drone", |lines| lines.len() >= 4);
+    fleet.wait("word from every drone", |lines| lines.len() >= 8);
     for drone in [1, 2] {
-        let texts: Vec<&str> = fleet.of_drone(drone).map(|line| &line.text[..]).collect();
+        let texts: Vec<&str> = fleet
+            .after_start(drone)
+            .map(|line| &line.text[..])
+            .collect();
         let refused = "configuration refused: key or epoch, without the other or out of range";
         assert_eq!(texts, ["relay 2 of 3, network 7", refused]);
     }

@@ -154,7 +154,7 @@ fn three_fly_what_they_were_handed_before_they_were_switched_on() {
     let mut fleet = Fleet::with_flash(Image::Wires, &blocks, &flash, Faults::default(), 1);
     assert_eq!(fleet.places(), simulated(&moved(3)));
     for drone in 1..=3 {
-        let said = fleet.of_drone(drone).take(4);
+        let said = fleet.after_start(drone).take(4);
         let told = said.filter(|line| line.text == "mission version 3 was uploaded before");
         assert_eq!(told.count(), 1);
     }

@@ -70,11 +70,13 @@ fn a_start_outside_the_box_goes_no_farther_out() {
     assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
 }
 
-/// Reports that are off by 1 m each do not tell the order of two relays that are 1 m apart, unless they may pass each other.
+/// Reports that are off by 1 m each do not tell the order of two relays that are 1 m apart. Where the two may pass each other, the order of
+/// their reports counts.
 #[test]
 fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
-    for (up_m, is_ordered) in [(0.0, false), (9.9, false), (10.1, true)] {
-        for x_m in [99.0, 101.0] {
+    for (up_m, may_pass) in [(0.0, false), (9.9, false), (10.1, true)] {
+        for (x_m, is_beyond) in [(99.0, false), (101.0, true)] {
+            let is_ordered = may_pass && is_beyond;
             let config = GuardConfig {
                 hover_m: 1.0,
                 ..config()
@@ -143,6 +145,105 @@ fn a_relay_that_halts_on_its_way_stops_there() {
             one.hears(Side::Downstream, 2, told);
         }
         assert_eq!(one.setpoint().to_bits(), goal_m.to_bits());
+    }
+}
+
+/// A relay that halts on its way into the box stops where it is, outside: the nearest place in the box may be a neighbour's.
+#[test]
+fn a_relay_that_halts_outside_the_box_stops_there() {
+    let mut one = One {
+        guard: Guard::new(config(), [None, Some(2)], 7, Instant::ZERO),
+        now: Instant::ZERO,
+    };
+    one.guard.commit(at(100.0));
+    let high = aside(100.0, 0.0, 180.0);
+    one.is_at_place(high);
+    one.is_at_place(high);
+    let told = answer(&mut one, Side::Downstream, 150.0, 0);
+    one.hears(Side::Downstream, 2, told);
+    let fence = one.says(Side::Downstream);
+    let told = answer(&mut one, Side::Downstream, fence.x_m + 1.0, fence.number);
+    one.hears(Side::Downstream, 2, told);
+    assert_eq!(
+        one.guard.setpoint(),
+        Some(at(100.0)),
+        "it sinks into the box"
+    );
+    let halts = Fence {
+        flags: Fence::HALTS,
+        ..told
+    };
+    let midway = aside(100.0, 0.0, 150.0);
+    one.guard.position(one.now, midway);
+    one.hears(Side::Downstream, 2, halts);
+    assert_eq!(one.guard.setpoint(), Some(midway));
+    // No report lets it go farther out than where it came from.
+    one.hears(Side::Downstream, 2, told);
+    one.guard.position(one.now, aside(100.0, 0.0, 190.0));
+    one.hears(Side::Downstream, 2, halts);
+    assert_eq!(one.guard.setpoint(), Some(high));
+}
+
+/// A neighbour that was rebooted does not know what it had requested: its first messages withdraw no halt.
+#[test]
+fn a_halt_outlasts_the_reboot_of_the_neighbour_that_requested_it() {
+    for side in [Side::Upstream, Side::Downstream] {
+        let (neighbours, node, x_m) = match side {
+            Side::Upstream => ([Some(1), None], 1, 50.0),
+            Side::Downstream => ([None, Some(2)], 2, 150.0),
+        };
+        let mut one = One::new(neighbours, 100.0, 100.0);
+        let halts = Fence {
+            flags: Fence::HALTS,
+            ..fence(9, x_m, x_m)
+        };
+        one.hears(side, node, halts);
+        assert_eq!(one.guard.hold_reason(side.other()), None);
+        let is_halted = |one: &One| match side {
+            Side::Upstream => one.guard.follower.association.requests_halt(),
+            Side::Downstream => one.guard.owner.association.requests_halt(),
+        };
+        assert!(is_halted(&one));
+        for flags in [Fence::RELEASED | Fence::UNPLACED, Fence::UNPLACED] {
+            let first = Fence {
+                flags,
+                ..fence(77, x_m, x_m)
+            };
+            one.hears(side, node, first);
+            assert!(is_halted(&one), "{side:?} {flags}");
+        }
+        let placed = Fence {
+            number: 1,
+            ..fence(77, x_m, x_m)
+        };
+        one.hears(side, node, placed);
+        assert!(!is_halted(&one), "{side:?}");
+    }
+}
+
+/// A relay that is given back beyond a neighbour that it knows requests a halt with its first message.
+#[test]
+fn a_relay_that_is_given_back_out_of_order_requests_a_halt_at_once() {
+    for side in [Side::Upstream, Side::Downstream] {
+        let (neighbours, node, x_m) = match side {
+            Side::Upstream => ([Some(1), None], 1, 150.0),
+            Side::Downstream => ([None, Some(2)], 2, 50.0),
+        };
+        let mut one = One {
+            guard: Guard::new(config(), neighbours, 7, Instant::ZERO),
+            now: Instant::ZERO,
+        };
+        one.guard.commit(at(100.0));
+        one.guard.control(one.now, false);
+        one.is_at(100.0);
+        one.hears(side, node, fence(9, x_m, x_m));
+        while one.guard.poll().is_some() {}
+        one.guard.control(one.now, true);
+        one.is_at(100.0);
+        one.is_at(100.0);
+        let told = core::iter::from_fn(|| one.guard.poll());
+        let halts = told.filter(|(.., fence)| fence.says(Fence::HALTS));
+        assert!(halts.count() > 0, "{side:?}");
     }
 }
 

@@ -145,6 +145,12 @@ impl Damping {
         held.any(|lost| lost.holds(now, settings))
     }
 
+    /// Returns true if a link on this side has been lost more often than is forgiven.
+    pub(super) fn flaps(&self, now: Instant, settings: &Settings) -> bool {
+        let recent = |lost: &Loss| lost.recent(now, settings) > FORGIVEN;
+        recent(&self.last) || recent(&self.before)
+    }
+
     /// The nodes whose links are held down: bit 0 is the nearest one.
     pub(super) fn held(&self, now: Instant, settings: &Settings) -> u8 {
         [&self.last, &self.before]

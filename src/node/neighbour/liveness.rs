@@ -105,11 +105,17 @@ impl Liveness {
         }
     }
 
-    /// Another node is there. What the channel has shown stays: if the one before was not lost after all, so many questions were too few.
-    pub(crate) fn renew(&mut self, now: Instant) {
+    /// Begins anew with another node. The longest run of open questions is kept, with the one that has just ended: if that node was not lost
+    /// after all, so many questions were too few. Where its link `flaps`, the run was an outage of the link, and says nothing of the channel.
+    pub(crate) fn renew(&mut self, now: Instant, flaps: bool) {
+        let longest = if flaps {
+            QUESTIONS
+        } else {
+            self.longest.max(self.unanswered)
+        };
         *self = Self {
             met: true,
-            longest: self.longest.max(self.unanswered),
+            longest,
             ..Self::new(now)
         };
     }

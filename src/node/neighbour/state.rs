@@ -416,7 +416,8 @@ impl Neighbour {
         self.node = node;
         self.distance = candidate.distance;
         self.state = NeighbourState::Pairing { since: now };
-        self.liveness.renew(now);
+        let flaps = self.damping.flaps(now, settings);
+        self.liveness.renew(now, flaps);
         self.damping.clear();
         self.look_at = Some(now + self.tick);
         true
