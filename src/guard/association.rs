@@ -102,6 +102,15 @@ impl Association {
         }
     }
 
+    /// Returns the place along x that the neighbour told last, m; NaN if that is not known or was forgotten.
+    pub(super) const fn seen_m(&self) -> f32 {
+        if self.seen_left == 0 {
+            f32::NAN
+        } else {
+            self.seen_m
+        }
+    }
+
     /// Returns true if this relay was reported on the wrong side of the place that the neighbour told last.
     pub(super) fn is_passed(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
@@ -296,6 +305,8 @@ pub(super) struct KeepOut {
     /// Where along x this relay may be no farther than the separation from it, and has not been beyond since, m: only where the two are
     /// across the line keeps them apart. Not a number where that is over.
     near_m: f32,
+    /// True if a lost relay was out of order with this one when it was heard last.
+    disordered: bool,
 }
 
 impl KeepOut {
@@ -304,6 +315,7 @@ impl KeepOut {
         Self {
             lost: None,
             near_m: f32::NAN,
+            disordered: false,
         }
     }
 
@@ -358,11 +370,28 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// This relay is somewhere now; `is_beyond` says whether that is beyond a limit.
-    pub(super) fn part(&mut self, is_beyond: impl Fn(f32) -> bool) {
+    /// Takes whether this relay is beyond a limit, by `is_beyond`. Once it has gone off to the separation from a relay on `side` that was
+    /// lost near by, it stays at least so far away.
+    pub(super) fn part(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
+            if let Some((_, limit_m)) = &mut self.lost {
+                *limit_m = match side {
+                    Side::Upstream => limit_m.max(self.near_m),
+                    Side::Downstream => limit_m.min(self.near_m),
+                };
+            }
             self.near_m = f32::NAN;
         }
+    }
+
+    /// A relay that is out of order with this one is lost.
+    pub(super) const fn disorder(&mut self) {
+        self.disordered = true;
+    }
+
+    /// Returns true while a lost relay may be on the wrong side of this one: then no way along x leads away from it.
+    pub(super) const fn is_disordered(&self) -> bool {
+        self.disordered
     }
 
     pub(super) const fn clear(&mut self) {

@@ -47,6 +47,9 @@ impl FenceFollower {
 
     /// Another neighbour, 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
+        if self.is_out_of_order(own) {
+            self.keep_out.disorder();
+        }
         self.renew(own, jitter);
         self.association.node = node;
     }
@@ -200,12 +203,13 @@ impl FenceFollower {
 
     /// Whether nobody is there, or whoever is has found this relay beyond it: before, it announces no fence.
     pub(super) const fn is_ordered(&self) -> bool {
-        self.association.is_none() || self.is_agreed()
+        !self.keep_out.is_disordered() && (self.association.is_none() || self.is_agreed())
     }
 
     /// Returns true if the neighbour upstream has told that it is beyond this relay.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
-        !self.is_ordered() && self.association.is_passed(own, Side::Upstream)
+        self.keep_out.is_disordered()
+            || !self.is_ordered() && self.association.is_passed(own, Side::Upstream)
     }
 
     /// Whether a fence was heard of.
@@ -240,6 +244,9 @@ impl FenceFollower {
     }
 
     pub(super) fn hold_reason(&self, own: &Own) -> Option<HoldReason> {
+        if self.keep_out.is_disordered() {
+            return Some(HoldReason::Order);
+        }
         let target_m = own.target_m();
         let limit = self.keep_out.limit_m();
         let stays = self.keep_out.is_near() && !own.is_across();

@@ -39,7 +39,7 @@
 //! | 11 | The step is the separation. It becomes less when the follower has told, together with the newest fence, that it has arrived across the line, where, and that it agrees: then it is the largest of what is asked for, of what the two places across the line leave to be kept along x, and of what rule 12 asks for. The owner announces a larger one only once it is that far before what it counts on. | the two are the separation apart in space |
 //! | 12 | The steps upstream and downstream of a relay add up to the separation at least: it agrees to no smaller one upstream before, and takes no smaller one downstream after. | relays that are not neighbours are the separation apart along x |
 //! | 13 | A relay that has to move across the line and may not by rule 10, or that started too close to a neighbour that is to be close, has the chain *open*: it tells both sides, and every relay passes that on. Then all go to places in the same order that are the separation apart along x, and steps are the separation. | there is room to move across the line |
-//! | 14 | From a neighbour that fell silent within the separation along x this relay goes off to the separation, and does not move across the line before; nor where it never heard the neighbour, or had not cleared the first fence, before it has gone as far. | the place of the silent one across the line still counts |
+//! | 14 | From a neighbour that fell silent within the separation along x this relay goes off to the separation, and does not move across the line before, nor comes back nearer; nor where it never heard the neighbour, or had not cleared the first fence, before it has gone as far. Where the neighbour was out of order with it, it stays where it is. | the place of the silent one still counts |
 //! | 15 | A relay that is not flown to its setpoints, in its pilot's hands or on the ground, has none. It leaves both associations and says so until the neighbour has begun anew; flown again it begins as after a start. Meanwhile it tells the place at which it was reported, which grants nothing. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 off to the separation); if the two were in order it is otherwise free, until it receives a new association. | no relay counts on a drone that is flown by hand, and none comes nearer to it |
 //! | 16 | A relay that is out of order with a neighbour, or not in order with both for three reminders and not seen to be so by the places of those that are not flown, has the chain *halt*: it tells both sides at every reminder, and every relay passes that on, also one that is not flown. A relay that halts on its way stops where it was reported last. A request that is not repeated for 15 reminders is forgotten. | no relay flies into a drone that was given back, or has started, at a wrong place |
 //!
@@ -331,8 +331,12 @@ impl Guard {
     /// Who has come up to the limit that a lost neighbour leaves is as far from it as it has to be.
     fn clear_near(&mut self) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
-        self.follower.keep_out.part(|near_m| low_m >= near_m);
-        self.owner.keep_out.part(|near_m| high_m <= near_m);
+        self.follower
+            .keep_out
+            .part(Side::Upstream, |near_m| low_m >= near_m);
+        self.owner
+            .keep_out
+            .part(Side::Downstream, |near_m| high_m <= near_m);
     }
 
     /// Whether the chain is to open, which each relay passes on away from whoever needs it.
@@ -354,9 +358,13 @@ impl Guard {
         self.follower.is_ordered() && self.owner.is_ordered(&self.own)
     }
 
-    /// Returns true if this relay and a neighbour are known not to be in order.
+    /// Returns true if this relay and a neighbour, or its two neighbours, are known not to be in order. Each of the two may be taken to be in
+    /// order with this relay, though only by the error of the reports, and the two may not pass each other.
     fn is_out_of_order(&self) -> bool {
-        self.follower.is_out_of_order(&self.own) || self.owner.is_out_of_order(&self.own)
+        let (up, down) = (&self.follower.association, &self.owner.association);
+        self.follower.is_out_of_order(&self.own)
+            || self.owner.is_out_of_order(&self.own)
+            || up.seen_m() - down.seen_m() > 2.0 * self.own.config.hover_m
     }
 
     /// Returns true if this relay is on its own side of both neighbours, by what they told or by the places at which they were reported.

@@ -53,6 +53,9 @@ impl FenceOwner {
 
     /// Another neighbour, 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
+        if self.is_out_of_order(own) {
+            self.keep_out.disorder();
+        }
         self.renew(own, jitter);
         self.association.node = node;
     }
@@ -115,12 +118,15 @@ impl FenceOwner {
 
     /// Whether nobody is there, or whoever is stands beyond this relay.
     pub(super) fn is_ordered(&self, own: &Own) -> bool {
-        self.association.is_none() || self.is_heard() && self.is_beyond(own)
+        !self.keep_out.is_disordered()
+            && (self.association.is_none() || self.is_heard() && self.is_beyond(own))
     }
 
     /// Returns true if the neighbour downstream has told that it is not beyond this relay, in this association or in none.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
-        if self.is_heard() {
+        if self.keep_out.is_disordered() {
+            true
+        } else if self.is_heard() {
             !self.is_beyond(own) && self.counted_m > f32::NEG_INFINITY
         } else {
             !self.is_ordered(own) && self.association.is_passed(own, Side::Downstream)
@@ -130,16 +136,14 @@ impl FenceOwner {
     /// Returns true if the neighbour is known to be beyond this relay along x.
     ///
     /// Reported places are off by up to `hover_m` each. Before the first fence is cleared, two relays whose reports are nearer than
-    /// that along x are in order only if they were reported in order and may pass each other: the separation apart across the line. Were
-    /// they taken to be in order the other way round, so could be two relays with a third one between, which may not pass each other. A
-    /// pair that has been in order may have moved by that error once more at each of the two since then, each time that one halts or is
-    /// rebooted.
+    /// that along x are in order only if they may pass each other: the separation apart across the line. A pair that has been in order may
+    /// have moved by that error once more at each of the two since then, each time that one halts or is rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.across(), self.across) <= 0.0;
         let least_m = match (self.clear, may_pass) {
             (true, _) => -2.0 * off_m - own.config.rounding(),
-            (false, true) => -own.config.rounding(),
+            (false, true) => -off_m - own.config.rounding(),
             (false, false) => off_m,
         };
         self.counted_m - own.reachable.high_m >= least_m
@@ -327,6 +331,9 @@ impl FenceOwner {
     }
 
     pub(super) fn hold_reason(&self, own: &Own, taken_m: f32) -> Option<HoldReason> {
+        if self.keep_out.is_disordered() {
+            return Some(HoldReason::Order);
+        }
         let target_m = own.target_m();
         let limit = self.keep_out.limit_m();
         let stays = self.keep_out.is_near() && !own.is_across();

@@ -245,8 +245,12 @@ impl Autopilot {
         let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
         if before != ready && self.state == State::Standby {
-            // Streamed anew, if at all.
+            // Streamed anew, if at all, and by a PX4 only after another heartbeat: one that took OFFBOARD while nothing was streamed is in
+            // its failsafe.
             self.target = None;
+            if self.vehicle.kind() == Some(Kind::Px4) {
+                self.vehicle.unchoose();
+            }
         }
         self.review(now);
     }

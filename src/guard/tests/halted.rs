@@ -70,13 +70,12 @@ fn a_start_outside_the_box_goes_no_farther_out() {
     assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
 }
 
-/// Reports that are off by 1 m each do not tell the order of two relays that are 1 m apart. Where the two may pass each other, the order of
-/// their reports counts.
+/// Reports that are off by 1 m each do not tell the order of two relays that are 1 m apart, unless they may pass each other.
 #[test]
 fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
     for (up_m, may_pass) in [(0.0, false), (9.9, false), (10.1, true)] {
-        for (x_m, is_beyond) in [(99.0, false), (101.0, true)] {
-            let is_ordered = may_pass && is_beyond;
+        for (x_m, is_near) in [(97.0, false), (98.5, true), (101.0, true)] {
+            let is_ordered = may_pass && is_near;
             let config = GuardConfig {
                 hover_m: 1.0,
                 ..config()
@@ -106,6 +105,29 @@ fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
             let moves = one.guard.setpoint().is_some_and(|place| place.x_m < 100.0);
             assert_eq!(moves, is_ordered, "{up_m} {x_m}");
         }
+    }
+}
+
+/// Each of two neighbours may be in order with the relay between them by the error of the reports alone, and the two not with each other.
+#[test]
+fn two_neighbours_out_of_order_halt_the_relay_between_them() {
+    for (up_m, down_m, halts) in [(101.5, 98.5, true), (101.5, 100.5, false)] {
+        let config = GuardConfig {
+            hover_m: 1.0,
+            ..config()
+        };
+        let mut one = One {
+            guard: Guard::new(config, [Some(1), Some(3)], 7, Instant::ZERO),
+            now: Instant::ZERO,
+        };
+        one.guard.commit(at(160.0));
+        one.is_at(100.0);
+        one.is_at(100.0);
+        one.hears(Side::Upstream, 1, fence(9, up_m, 50.0));
+        one.hears(Side::Downstream, 3, fence(9, down_m, 200.0));
+        let told = core::iter::from_fn(|| one.guard.poll());
+        let halted = told.filter(|(.., fence)| fence.says(Fence::HALTS)).count();
+        assert_eq!(halted > 0, halts, "{up_m} {down_m}");
     }
 }
 
@@ -298,7 +320,8 @@ fn a_relay_that_is_not_flown_says_that_it_is_out_of_order() {
     assert_eq!(reasons(&one), [None, Some(HoldReason::Order)]);
 }
 
-/// A relay that began beside a silent one goes off from it to the separation, then across, then to its place; meanwhile it says why.
+/// A relay that began beside a silent one goes off from it to the separation, then across, and stays so far away until the silent one is
+/// cleared; meanwhile it tells why.
 #[test]
 fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
     let mut one = One {
@@ -322,7 +345,42 @@ fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
     for _ in 0..3 {
         one.is_at_place(aside(110.0, 0.0, 80.0));
     }
+    assert_eq!(one.guard.setpoint(), Some(at(110.0)));
+    assert_eq!(
+        one.guard.hold_reason(Side::Upstream),
+        Some(HoldReason::Lost)
+    );
+    one.guard.forget(Side::Upstream);
+    one.is_at(110.0);
     assert_eq!(one.guard.setpoint(), Some(at(102.0)));
+}
+
+/// A relay that is out of order with a neighbour stays where it is when that one falls silent, and halts the others, until it is cleared.
+#[test]
+fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
+    for side in [Side::Upstream, Side::Downstream] {
+        let (neighbours, node, x_m, to_m) = match side {
+            Side::Upstream => ([Some(1), Some(3)], 1, 150.0, 300.0),
+            Side::Downstream => ([Some(1), Some(3)], 3, 50.0, 20.0),
+        };
+        let mut one = One::new(neighbours, 100.0, to_m);
+        let told = match side {
+            Side::Upstream => fence(9, x_m, x_m),
+            Side::Downstream => answer(&mut one, side, x_m, 0),
+        };
+        one.hears(side, node, told);
+        assert_eq!(one.guard.hold_reason(side), Some(HoldReason::Order));
+        one.guard.link(side, None);
+        one.guard.link(side.other(), None);
+        for _ in 0..60 {
+            one.is_at(100.0);
+            one.guard.remind();
+            assert_eq!(one.setpoint().to_bits(), 100.0_f32.to_bits(), "{side:?}");
+            assert_eq!(one.guard.hold_reason(side), Some(HoldReason::Order));
+        }
+        [side, side.other()].map(|side| one.guard.forget(side));
+        assert_eq!(one.setpoint().to_bits(), to_m.to_bits(), "{side:?}");
+    }
 }
 
 /// A relay beside one that is not flown waits for it without a halt of the chain, where the places of the two show their order.
