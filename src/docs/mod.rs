@@ -2,7 +2,7 @@
 //!
 //! | page | what it answers |
 //! | --- | --- |
-//! | [`firmware`] | from an empty crate to a relay that flies: in a loop, by interrupts, with Embassy |
+//! | [`firmware`] | from an empty folder to a relay that flies: in a loop, by interrupts, with RTIC or Embassy |
 //! | [`planning`] | how many relays, where, and whether that is the best there is |
 //! | [`lost_relays`] | what happens when a relay falls silent, comes back, or the chain is split |
 //! | [`uploads`] | how a flying chain is given a new mission |

@@ -5,11 +5,14 @@
 const NEAR = 22;
 const DRAGGED = 6;
 
-/** What is held, if anything is. */
-const hand = { holds: null };
+/** A press that moves farther than this is a drag, px. */
+const STILL = 8;
 
-/** The handles of `picture`: `signs()` are where; `moved(id, x, y)` when one is put somewhere, `pressed(relay)` when a relay is, `left()` when one is let go. */
-function handle(picture, signs, { moved, pressed, left }) {
+/** What is held, where the press began, and whether it has become a drag of a relay. */
+const hand = { holds: null, from: [0, 0], drags: false };
+
+/** The handles of `picture`: `signs()` are where; `moved(id, x, y)` when one is put somewhere, `pressed(relay)` when a relay is, `left()` when one is let go, `refused()` when a relay is dragged. */
+function handle(picture, signs, { moved, pressed, left, refused }) {
   const { svg } = picture;
   const relays = () => signs().filter(({ relay }) => relay !== undefined);
   const isSign = (event) => event.target.closest("[role]") !== svg;
@@ -28,18 +31,24 @@ function handle(picture, signs, { moved, pressed, left }) {
     const { id } = nearest;
     turn(id);
     byId(id).focus({ preventScroll: true });
-    hand.holds = id;
+    Object.assign(hand, { holds: id, from: [event.clientX, event.clientY], drags: false });
     svg.setPointerCapture(event.pointerId);
   });
   svg.addEventListener("pointermove", (event) => {
-    if (hand.holds && !hand.holds.startsWith("relay")) moved(hand.holds, ...picture.metres(event.clientX, event.clientY));
+    if (!hand.holds) return;
+    const { clientX, clientY } = event;
+    if (!hand.holds.startsWith("relay")) moved(hand.holds, ...picture.metres(clientX, clientY));
+    else if (!hand.drags && Math.hypot(clientX - hand.from[0], clientY - hand.from[1]) > STILL) {
+      hand.drags = true;
+      refused();
+    }
   });
   const released = (event) => {
     const held = hand.holds;
     hand.holds = null;
     if (!held) return;
     if (!held.startsWith("relay")) left();
-    else if (event.type === "pointerup") pressed(Number(held.slice("relay".length)));
+    else if (event.type === "pointerup" && !hand.drags) pressed(Number(held.slice("relay".length)));
   };
   svg.addEventListener("pointerup", released);
   svg.addEventListener("pointercancel", released);

@@ -2,7 +2,7 @@
 // The page: what is wanted, what came of it, and what is to be seen of that.
 
 /** The last run that came about, what is wrong with the next one, and with the fields, and where a hand is stopped. */
-const shown = { run: null, refused: "", fields: [], stopped: "", places: new Map(), frame: 0 };
+const shown = { run: null, asked: "", refused: "", fields: [], stopped: "", places: new Map(), frame: 0 };
 
 const pictures = Object.fromEntries(Object.entries(VIEWS).map(([name, view]) => [name, new Picture(byId(name), view)]));
 
@@ -41,7 +41,7 @@ function draw(moved) {
   // Of the relays Tab comes to one, whichever of them are there.
   const stop = all.some(({ relay }) => relay === hand.relay) ? hand.relay : (all[0] || {}).relay;
   const marks = new Map();
-  if (wanted && values.length === chain.length + 1) marks.set(values.indexOf(Math.min(...values)), "worst");
+  if (wanted && values.length === chain.length + 1) for (const hop of worstHops(values)) marks.set(hop, "worst");
   chain.forEach((relay, at) => {
     if (!relay.told) for (const hop of [at, at + 1]) marks.set(hop, "waits");
   });
@@ -155,8 +155,12 @@ function glide() {
   shown.frame = requestAnimationFrame(turn);
 }
 
+/** The options and the scenario of what is wanted, to compare. */
+const wish = () => `${options()}\n${scenario()}`;
+
 /** Has what is wanted run; played from `plays` s on, if that is given. */
 function run(plays) {
+  shown.asked = wish();
   engine.ask({ words: options(), toml: scenario(), tx: want.tx, film: !hand.holds, plays });
   byId("numbers").setAttribute("aria-busy", "true");
   tell();
@@ -191,6 +195,10 @@ handle(pictures.above, signs, {
     run();
   },
   left: () => run(),
+  refused() {
+    shown.stopped = "Relays cannot be dragged: they choose their own positions. Press a relay to switch it off.";
+    tell();
+  },
   pressed(relay) {
     if (!want.off.delete(relay)) want.off.add(relay);
     shown.stopped = "";
@@ -198,11 +206,14 @@ handle(pictures.above, signs, {
   },
 });
 
+/** Reads the form. A browser reports one edit twice, on input and on change: the second one starts no run. */
 function typed() {
   shown.fields = read();
   shown.stopped = "";
-  run();
+  if (shown.asked === wish()) tell();
+  else run();
 }
+byId("controls").addEventListener("input", typed);
 byId("controls").addEventListener("change", typed);
 byId("controls").addEventListener("submit", (event) => event.preventDefault());
 byId("controls").addEventListener("reset", () => {

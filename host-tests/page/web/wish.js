@@ -10,6 +10,9 @@ const LISTEN_S = 120;
 /** How fast an interferer goes that moves, m/s toward Rx. */
 const SPEED = 3;
 
+/** A hand that is farther than this from the line, m, means to move Tx or Rx off it. */
+const BESIDE = 60;
+
 /** What Tx and Rx keep of distance, m. */
 const APART = 50;
 
@@ -61,6 +64,7 @@ function move(id, x, y) {
   else want[id] = nx;
   const near = id === "tx" ? there[0] > ranged[0][1] : id === "rx" && there[0] < ranged[0][0];
   if (near) return `Tx and Rx: must be at least ${APART} m apart`;
+  if (id !== "jammer" && Math.abs(there[1]) > BESIDE) return "Tx and Rx cannot leave the line: drag them along it.";
   return nx === there[0] && (id !== "jammer" || ny === there[1]) ? "" : "That is as far as the picture goes.";
 }
 

@@ -18,9 +18,19 @@ function moment(tick, worst, chain) {
   return `At ${tick.at_s.toFixed(3)} s: ${sir}; ${tick.messages} messages.`;
 }
 
-/** A list of SIRs, that of the worst hop marked; `ends` says where each hop ends. */
+/** Hops whose SIR exceeds the least by no more than this share are equal to it: their differences are those of the method's tolerance. */
+const EQUAL = 1e-3;
+
+/** Returns the indices of the worst hops: none where all hops are equal. */
+function worstHops(sirs) {
+  const bound = Math.min(...sirs) * (1 + EQUAL);
+  const worst = [...sirs.keys()].filter((hop) => sirs[hop] <= bound);
+  return worst.length < sirs.length ? worst : [];
+}
+
+/** A list of SIRs, those of the worst hops marked; `ends` says where each hop ends. */
 function list(sirs, ends) {
-  const [most, least] = [Math.max(...sirs), Math.min(...sirs)];
+  const [most, worst] = [Math.max(...sirs), new Set(worstHops(sirs))];
   const all = byId("hops");
   while (all.childElementCount > sirs.length) all.lastChild.remove();
   while (all.childElementCount < sirs.length) {
@@ -32,7 +42,7 @@ function list(sirs, ends) {
     const [name, bar, number] = item.children;
     name.textContent = `to ${ends[at]}`;
     bar.style.width = `${(100 * sirs[at]) / most}%`;
-    bar.className = sirs[at] === least ? "worst" : "";
+    bar.className = worst.has(at) ? "worst" : "";
     number.textContent = `${sirs[at].toPrecision(5)}, ${decibels(sirs[at])}`;
   });
 }

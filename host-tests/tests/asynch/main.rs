@@ -30,22 +30,54 @@ fn five_settle_where_the_polled_ones_do() {
     }
 }
 
-/// What of the guide needs a HAL is what is built.
+/// A block of the guide below the name of a file is a part of that file, or all of it; `cargo ci` builds the files.
 #[test]
 fn the_guide_shows_what_is_built() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let read = |name: &str| std::fs::read_to_string(root.join(name)).unwrap();
-    let built = [
-        read("examples/embassy/pico2/src/bin/wires.rs"),
-        read("examples/embassy/app/src/lib.rs"),
-    ];
     let guide = read("src/docs/firmware.md");
-    let shown: Vec<&str> = (guide.split("```rust,ignore\n").skip(1))
-        .map(|rest| rest.split("```").next().unwrap())
-        .collect();
-    assert_eq!(shown.len(), built.len());
-    for (shown, built) in shown.iter().zip(&built) {
-        assert!(built.contains(shown), "{shown}");
+    let mut shown = std::collections::BTreeSet::new();
+    for part in guide.split("<!-- ").skip(1) {
+        let (name, rest) = part.split_once(" -->\n```").unwrap();
+        let (language, rest) = rest.split_once('\n').unwrap();
+        let block = rest.split("```").next().unwrap();
+        // A line that only the documentation test has.
+        let visible = |line: &&str| !line.starts_with("# ");
+        let block: String = if language.is_empty() {
+            (block.split_inclusive('\n').filter(visible)).collect()
+        } else {
+            block.to_owned()
+        };
+        assert!(
+            read(name).contains(&block),
+            "{name} has no such part: {block}"
+        );
+        shown.insert(name.to_owned());
+    }
+    let ignored = guide.matches("```rust,ignore").count();
+    let named = guide.matches(".rs -->\n```rust,ignore").count();
+    assert_eq!(
+        ignored, named,
+        "what is not compiled is a part of a file that is"
+    );
+    for (template, files) in [
+        (
+            "common",
+            &[
+                "memory.x",
+                "build.rs",
+                ".cargo/config.toml",
+                "src/mission.rs",
+            ][..],
+        ),
+        ("blocking", &["Cargo.toml", "src/main.rs"]),
+        ("rtic", &["Cargo.toml", "src/main.rs"]),
+        ("embassy", &["Cargo.toml", "src/main.rs"]),
+    ] {
+        for file in files {
+            let name = format!("examples/templates/{template}/{file}");
+            assert!(shown.contains(&name), "the guide does not show {name}");
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod number;
 pub mod stack;
+pub mod template;
 pub mod toolchain;
 
 /// The fuzz targets that `cargo ci` runs: all that there are, by name.

@@ -200,10 +200,25 @@ impl Browser {
         }
     }
 
+    /// Types into the field that has the focus.
+    pub(crate) fn types(&mut self, text: &str) {
+        for letter in text.chars() {
+            let parameters = json!({"text": letter.to_string()});
+            self.call("Input.insertText", &parameters);
+        }
+    }
+
     /// What the page looks like, as PNG.
     pub(crate) fn screenshot(&mut self) -> Vec<u8> {
         let parameters = json!({"format": "png", "captureBeyondViewport": true});
         let picture = self.call("Page.captureScreenshot", &parameters);
+        let data = picture["data"].as_str().unwrap();
+        base64::prelude::BASE64_STANDARD.decode(data).unwrap()
+    }
+
+    /// What a user sees of the page without scrolling, as PNG.
+    pub(crate) fn seen(&mut self) -> Vec<u8> {
+        let picture = self.call("Page.captureScreenshot", &json!({"format": "png"}));
         let data = picture["data"].as_str().unwrap();
         base64::prelude::BASE64_STANDARD.decode(data).unwrap()
     }

@@ -1,7 +1,7 @@
 //! Mouse, finger, keyboard.
 
 use crate::numbers::is_native;
-use crate::opened::{choose, middle, number, opened, settled, sir};
+use crate::opened::{choose, middle, number, opened, said, settled, sir};
 
 #[test]
 fn a_hand_and_the_keyboard_move_the_chain() {
@@ -78,5 +78,50 @@ fn a_finger_drags_what_it_touches_and_else_scrolls_the_page() {
     assert_eq!(below, "above", "the finger is on the picture");
     browser.finger(from, [from[0], from[1] - 150.0], 12);
     browser.until(&format!("window.scrollY > {before} + 50"));
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+/// A user types and looks at the picture, and has not left the field.
+#[test]
+fn a_number_counts_as_soon_as_it_is_typed() {
+    let mut browser = opened(1280, 900);
+    browser.run("byId('uavs').focus(); byId('uavs').select()");
+    browser.types("12");
+    browser.until("window.last.told.report.relays.length === 12");
+    assert_eq!(browser.text("document.activeElement.id"), "uavs");
+    settled(&mut browser);
+    let runs = number(&mut browser, "window.last.runs");
+    browser.run("byId('uavs').blur()");
+    settled(&mut browser);
+    let after = number(&mut browser, "window.last.runs");
+    assert!((after - runs).abs() < 0.5, "it is not run again: {after}");
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn a_drag_that_is_refused_is_explained() {
+    let mut browser = opened(1280, 900);
+    let [x, y] = middle(&mut browser, "relay4");
+    browser.drag([x, y], [x + 10.0, y - 90.0], 10);
+    let words = said(&mut browser, "wrong");
+    assert!(words.starts_with("Relays cannot be dragged"), "{words}");
+    assert_eq!(browser.value("want.off.size"), 0, "a drag is no press");
+
+    let [x, y] = middle(&mut browser, "tx");
+    browser.drag([x, y], [x + 10.0, y + 90.0], 10);
+    let words = said(&mut browser, "wrong");
+    assert!(
+        words.starts_with("Tx and Rx cannot leave the line"),
+        "{words}"
+    );
+    let seen = "(() => { const box = byId('wrong').getBoundingClientRect(); \
+        return box.top >= 0 && box.bottom <= window.innerHeight; })()";
+    browser.run("scrollTo(0, 1e6)");
+    assert_eq!(
+        browser.value(seen),
+        true,
+        "wherever the page is scrolled to"
+    );
+    settled(&mut browser);
     assert_eq!(browser.errors(), Vec::<String>::new());
 }

@@ -92,3 +92,38 @@ fn all_of_it_can_be_heard() {
     }
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
+
+/// The differences of a chain that has agreed are those of its tolerance, 1e-7.
+#[test]
+fn no_hop_is_red_where_all_are_equal() {
+    let mut browser = opened(1280, 900);
+    let sirs = browser.value("[Math.min(...sirs()), Math.max(...sirs())]");
+    let [least, most] = [0, 1].map(|at| sirs[at].as_f64().unwrap());
+    assert!(least < most && most / least < 1.001, "{sirs}");
+    let red = browser.value("document.querySelectorAll('.worst').length");
+    assert_eq!(red, 0);
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+/// On the screens of small laptops and telephones, as the page is opened.
+#[test]
+fn play_is_in_view() {
+    for (width, height) in [
+        (1280, 720),
+        (1366, 768),
+        (1920, 1080),
+        (800, 600),
+        (390, 844),
+    ] {
+        let mut browser = opened(width, height);
+        let below = browser.value(
+            "(() => { const box = byId('play').getBoundingClientRect(); \
+             return [window.scrollY, Math.min(box.top, window.innerHeight - box.bottom)]; })()",
+        );
+        assert_eq!(below[0].as_f64(), Some(0.0));
+        let room = below[1].as_f64().unwrap();
+        assert!(room >= 0.0, "{width} x {height}: {room} px");
+        let picture = root().join(format!("target/page/opened-{width}.png"));
+        std::fs::write(picture, browser.seen()).unwrap();
+    }
+}

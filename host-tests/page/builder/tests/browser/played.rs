@@ -80,6 +80,10 @@ fn a_chain_is_seen_to_lose_a_relay_and_to_close_up() {
     let waits = browser.value("document.querySelectorAll('#above .hop.waits').length");
     assert_eq!(waits, 9);
     browser.run(&format!("player.seek({silent})"));
+    let worst =
+        "['#above .hop.worst', '#hops .worst'].map((all) => document.querySelectorAll(all).length)";
+    let worst = browser.value(worst).to_string();
+    assert_eq!(worst, "[1,1]", "the hop over the gap is red");
     let words = said(&mut browser, "summary");
     assert!(words.starts_with("At 20.000 s: worst hop"), "{words}");
     let coming = browser.value("document.querySelectorAll('#events .coming').length");

@@ -104,6 +104,10 @@ pub(crate) fn all() -> Vec<Step> {
     });
     steps.extend(firmware());
     steps.extend(embassy());
+    steps.push(step(
+        "templates of a firmware, in empty folders",
+        "cargo template --check",
+    ));
     steps.push(step("cost, and no panic", "cargo cost"));
     for (name, features) in [
         ("oldest compiler", "--features=defmt,async"),

@@ -1,0 +1,148 @@
+//! What the pages for users say: tables that are displayed as tables, pictures that exist, figures that the commands print.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs
+)]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn root() -> &'static Path {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    own.ancestors().nth(2).unwrap()
+}
+
+fn read(name: &str) -> String {
+    std::fs::read_to_string(root().join(name)).unwrap()
+}
+
+/// Every page of the repository, and the documentation of the crate.
+fn pages() -> Vec<PathBuf> {
+    let mut all = vec![];
+    for folder in ["", "examples", "host-tests", "src/docs", "src/wire"] {
+        for entry in std::fs::read_dir(root().join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|extension| extension == "md") {
+                all.push(path);
+            }
+        }
+    }
+    assert!(all.len() >= 15, "{all:?}");
+    all
+}
+
+/// The lines of a page that are not within a block of code, with their numbers.
+fn prose(text: &str) -> Vec<(usize, &str)> {
+    let mut code = false;
+    let outside = |(_, line): &(usize, &str)| {
+        let fence = line.trim_start().starts_with("```");
+        code ^= fence;
+        !code && !fence
+    };
+    (1..).zip(text.lines()).filter(outside).collect()
+}
+
+/// A row after a blank line has no header, and is displayed as text.
+#[test]
+fn every_row_of_a_table_is_displayed_in_a_table() {
+    let mut cut = vec![];
+    for page in pages() {
+        let text = std::fs::read_to_string(&page).unwrap();
+        let lines = prose(&text);
+        let is_row = |at: usize| {
+            lines
+                .get(at)
+                .is_some_and(|(_, line)| line.starts_with("| "))
+        };
+        for at in 0..lines.len() {
+            let begins = is_row(at) && (at == 0 || !is_row(at - 1));
+            let is_headed = || {
+                lines
+                    .get(at + 1)
+                    .is_some_and(|(_, line)| line.starts_with("| ---"))
+            };
+            if begins && !is_headed() {
+                cut.push(format!("{}:{}", page.display(), lines[at].0));
+            }
+        }
+    }
+    assert_eq!(cut, Vec::<String>::new());
+}
+
+#[test]
+fn the_readme_spells_sir_out_where_it_comes_first_and_stays_short() {
+    let text = read("README.md");
+    let first = text.find("SIR").unwrap();
+    let before = text[..first].trim_end_matches('(').trim_end();
+    assert!(
+        before.ends_with("signal-to-interference ratio"),
+        "SIR comes first in: ...{}",
+        &text[first.saturating_sub(60)..first + 40]
+    );
+    assert!(text.len() < 12_288, "{} bytes", text.len());
+}
+
+/// A browser displays the picture of a page from the checkout.
+#[test]
+fn the_pictures_of_the_readme_are_there_and_one_is_of_the_page() {
+    let text = read("README.md");
+    let pictures: Vec<&str> = (text.split("![").skip(1))
+        .map(|rest| rest.split_once("](").unwrap().1.split(')').next().unwrap())
+        .collect();
+    for picture in &pictures {
+        let bytes = std::fs::read(root().join(picture)).unwrap();
+        assert!(bytes.len() > 1_000, "{picture}");
+        assert!(bytes.len() < 100_000, "{picture}: {} bytes", bytes.len());
+    }
+    assert!(
+        pictures.iter().any(|name| name.contains("page")),
+        "{pictures:?}"
+    );
+}
+
+/// The row on a lost relay has the figures of the command that it names.
+#[test]
+fn the_readme_has_the_figures_of_a_lost_relay_that_the_command_prints() {
+    let text = read("README.md");
+    let row = (text.lines())
+        .find(|line| line.starts_with("| relay 4 of 8 falls silent"))
+        .unwrap();
+    let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+    let command = cells[3].trim_matches('`');
+    let options = command.strip_prefix("cargo chain ");
+    let options = options.unwrap_or_else(|| panic!("not a run that prints it: {command}"));
+    let output = Command::new(env!("CARGO_BIN_EXE_chain"))
+        .args(options.split_whitespace())
+        .output()
+        .unwrap();
+    let printed = String::from_utf8(output.stdout).unwrap();
+    let line = (printed.lines())
+        .find(|line| line.contains("noticed after"))
+        .unwrap();
+    let seconds: Vec<f64> = (line.split_whitespace().zip(line.split_whitespace().skip(1)))
+        .filter(|(_, unit)| unit.trim_end_matches([',', ';']) == "s")
+        .map(|(number, _)| number.parse().unwrap())
+        .collect();
+    let [noticed, formed, converged] = seconds[..] else {
+        panic!("{line}")
+    };
+    let expected = format!(
+        "noticed after {noticed:.1} s, the others at their new places after {:.1} s",
+        noticed + formed + converged
+    );
+    assert_eq!(cells[2], expected, "{command} prints: {line}");
+}
+
+/// The firmware examples pass on what a SiK radio measures (examples/FIRMWARE.md), and a ground station what the receiver hears
+/// (examples/LINUX.md).
+#[test]
+fn the_limits_do_not_deny_what_the_guides_describe() {
+    let limits = read("host-tests/RESULTS.md");
+    assert!(read("examples/FIRMWARE.md").contains("**Have it find the interferer.**"));
+    assert!(read("examples/LINUX.md").contains("how strong the interference is where it stands"));
+    for untrue in ["do not listen yet", "no message brings it from the ground"] {
+        assert!(!limits.contains(untrue), "{untrue}");
+    }
+}
