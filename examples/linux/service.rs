@@ -9,7 +9,7 @@ use rustix::event::PollFlags;
 use serde_json::Value;
 use uav_relay::Instant;
 
-use crate::log::{Log, LogOptions};
+use crate::log::{Log, LogOptions, Source};
 use crate::notify::Notify;
 use crate::requests::Requests;
 use crate::socket::{self, StatusSocket};
@@ -34,15 +34,19 @@ pub struct Service {
 }
 
 impl Service {
-    /// Begins: from now on signals are heard, and time runs.
+    /// Begins: from now on signals are heard, and time runs. Every line of the log names `source`.
     ///
     /// # Errors
     /// One line that says what does not work.
-    pub fn begin(log: &LogOptions, status_socket: Option<&Path>) -> Result<Self, String> {
+    pub fn begin(
+        log: &LogOptions,
+        source: Source,
+        status_socket: Option<&Path>,
+    ) -> Result<Self, String> {
         let (stop, requests) = (on_stop()?, Requests::new()?);
         let socket = status_socket.map(StatusSocket::open).transpose()?;
         Ok(Self {
-            log: Log::open(log)?,
+            log: Log::open(log, source)?,
             clock: Clock::now(),
             socket,
             requests,

@@ -18,7 +18,7 @@ use crate::uploads::Uploads;
 use crate::views::Views;
 use crate::waits::Waits;
 use crate::{positions, status, uploads, views};
-use uav_relay_linux::log::Log;
+use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::refusals::Refusals;
 use uav_relay_linux::service::Service;
 use uav_relay_linux::{config, epoch};
@@ -52,7 +52,13 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
 
 impl Flight {
     fn begin(plan: &Plan) -> Result<Self, String> {
-        let service = Service::begin(&plan.log, plan.status_socket.as_deref())?;
+        let index = plan.identity.index;
+        let source = Source {
+            name: format!("relay {index}"),
+            key: "index",
+            value: index.into(),
+        };
+        let service = Service::begin(&plan.log, source, plan.status_socket.as_deref())?;
         let log = service.log.clone();
         let gate = Gate::new();
         let mut ports = Ports::open(&plan.ttys, plan.baud, plan.capture.as_deref(), &gate)?;
@@ -175,12 +181,13 @@ impl Flight {
         } = self;
         let uploads = self.uploads.as_ref().map(Uploads::kept);
         let views = self.views.kept();
+        let index = report.index();
         service.tend(time, "relay", |log| {
             json!({
                 "program": env!("CARGO_BIN_NAME"),
                 "program_version": env!("CARGO_PKG_VERSION"),
                 "uptime_s": time.as_micros() / 1_000_000,
-                "relay": status::of_relay(relay, |node| report.name(node)),
+                "relay": status::of_relay(relay, index, |node| report.name(node)),
                 "links": ports.status(),
                 "autopilot": self.autopilot.as_ref().map(Companion::status),
                 "positions_refused": self.positions.as_ref().map(Positions::bad),

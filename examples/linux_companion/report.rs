@@ -67,7 +67,7 @@ impl Report {
             Instant::ZERO,
             "started",
             json!({
-                "index": index, "relays": relays, "network": network, "mission": digest, "ports": ttys, "baud": baud,
+                "relays": relays, "network": network, "mission": digest, "ports": ttys, "baud": baud,
                 "version": env!("CARGO_PKG_VERSION"),
             }),
             format_args!(
@@ -270,6 +270,11 @@ impl Report {
         );
     }
 
+    /// Returns the relay's own number, which it keeps in every view.
+    pub(crate) const fn index(&self) -> u16 {
+        self.identity.index
+    }
+
     /// What a node is called. Its number is that of its start, whoever was lost since: the receiver's is one above the last relay's.
     pub(crate) fn name(&self, node: u16) -> String {
         match node {
@@ -308,13 +313,14 @@ impl Report {
     }
 
     fn reformed(&self, now: Instant, relay: &Relay) {
-        let (index, relays) = (relay.index(), relay.mission().relays());
+        // The number of a drone never changes; its place in the chain does when a relay before it is lost.
+        let (place, relays) = (relay.index(), relay.mission().relays());
         let view = relay.view().number();
         self.log.say(
             now,
             "formed anew",
-            json!({ "index": index, "relays": relays, "view": view }),
-            format_args!("relay {index} of {relays}, view {view}"),
+            json!({ "place": place, "relays": relays, "view": view }),
+            format_args!("{relays} relays, this one at place {place}, view {view}"),
         );
     }
 

@@ -11,13 +11,14 @@ pub(crate) fn at(place: Placement) -> Value {
     json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
 }
 
-/// How the relay is.
-pub(crate) fn of_relay(relay: &Relay, name: impl Fn(u16) -> String) -> Value {
+/// Returns the state of relay `index`, its number of the start, as JSON.
+pub(crate) fn of_relay(relay: &Relay, index: u16, name: impl Fn(u16) -> String) -> Value {
     let [upstream, downstream] = relay
         .neighbours()
         .map(|node| node.map(|node| json!({ "node": node, "name": name(node) })));
     json!({
-        "index": relay.index(),
+        "index": index,
+        "place": relay.index(),
         "relays": relay.mission().relays(),
         "view": relay.view().number(),
         "version": relay.version(),

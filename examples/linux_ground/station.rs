@@ -8,7 +8,7 @@ use uav_relay::serial::SerialPort as _;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Ground, Instant, Key, Progress};
 use uav_relay_linux::counters::counted;
-use uav_relay_linux::log::Log;
+use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::refusals::Refusals;
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::service::Service;
@@ -60,7 +60,12 @@ pub(crate) fn stand(plan: &Plan) -> Result<(), String> {
 
 impl<'a> Station<'a> {
     fn begin(plan: &'a Plan) -> Result<Self, String> {
-        let service = Service::begin(&plan.log, plan.status_socket.as_deref())?;
+        let source = Source {
+            name: name(plan.end).to_owned(),
+            key: "station",
+            value: name(plan.end).into(),
+        };
+        let service = Service::begin(&plan.log, source, plan.status_socket.as_deref())?;
         let mut tty = Replug::open("--tty", &plan.tty, plan.baud)?;
         if let Some(capture) = &plan.capture {
             let ports = [tty.to_string()];

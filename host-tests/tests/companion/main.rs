@@ -15,6 +15,7 @@ mod mavsdk;
 mod medium;
 mod mistrust;
 mod moved;
+mod numbered;
 mod options;
 mod peer;
 mod positions;
