@@ -35,6 +35,7 @@
 //! | `positions.rs` | where the drone is, and what is heard there, from a FIFO |
 //! | `relay.rs` | the loop |
 //! | `report.rs` | the lines it says |
+//! | `movement.rs` | log lines for setpoints and the arrival |
 //! | `status.rs` | how the relay is, as JSON |
 //! | `uploads.rs` | the newest mission that was uploaded, in a file |
 //! | `views.rs` | what it has said in the votes on views, in a file |
@@ -61,6 +62,8 @@ mod gate;
 mod kept;
 #[cfg(unix)]
 mod listen;
+#[cfg(unix)]
+mod movement;
 #[cfg(unix)]
 mod options;
 #[cfg(unix)]

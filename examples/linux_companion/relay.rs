@@ -92,6 +92,7 @@ impl Flight {
             plan.identity,
             &plan.mission,
             plan.settings.guard.map(|guard| guard.fence),
+            plan.autopilot.is_some(),
         );
         report.started(&ports.names(), plan.baud);
         config::tell(&plan.overrides, &log);
@@ -127,14 +128,17 @@ impl Flight {
         let time = self.service.now();
         let Self { service, relay, .. } = self;
         let log = &service.log;
+        let mut drone = None;
         if let Some(positions) = &mut self.positions {
             let mut heard = |sample| relay.handle_sample(time, sample);
             if let Some(place) = positions.newest(time, log, &mut heard) {
                 relay.handle_position(time, time, place);
             }
+            drone = positions.place(time);
         }
         if let Some(autopilot) = &mut self.autopilot {
             autopilot.drive(time, log, relay);
+            drone = autopilot.place(time);
         }
         let reopen = self.ports.tend(time, log);
         let views = &mut self.views;
@@ -151,6 +155,7 @@ impl Flight {
             }
             self.report.event(time, event, relay);
         }
+        let moves = self.report.look(time, relay, drone);
         let files = [
             self.uploads.as_mut().and_then(|it| it.tend(time, log)),
             self.views.kept().and_then(Kept::wake),
@@ -162,7 +167,7 @@ impl Flight {
         let waits = self.waits.tend(time, log, relay, name);
         let again = self.autopilot.as_ref().map(|it| it.wake(service.now()));
         let alive = self.tell(time);
-        let others = [again, reopen, alive, waits]
+        let others = [again, reopen, alive, waits, moves]
             .into_iter()
             .chain(files)
             .flatten();
