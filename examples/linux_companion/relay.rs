@@ -21,7 +21,7 @@ use crate::{positions, status, uploads, views};
 use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::refusals::Refusals;
 use uav_relay_linux::service::Service;
-use uav_relay_linux::{config, epoch};
+use uav_relay_linux::{config, epoch, tap};
 
 /// A relay, and all that it is connected to.
 struct Flight {
@@ -61,7 +61,7 @@ impl Flight {
         let service = Service::begin(&plan.log, source, plan.status_socket.as_deref())?;
         let log = service.log.clone();
         let gate = Gate::new();
-        let mut ports = Ports::open(&plan.ttys, plan.baud, plan.capture.as_deref(), &gate)?;
+        let mut ports = Ports::open(&plan.ttys, plan.baud, &gate)?;
         let listens = plan.settings.listen.is_some();
         let positions = plan
             .positions
@@ -87,6 +87,12 @@ impl Flight {
                 .resume_view(service.now(), record)
                 .map_err(|error| views::refused(plan.view_file.as_deref(), &error.to_string()))?;
         }
+        let file = plan.secret.as_ref().and_then(|it| it.upload_file.as_ref());
+        let uploads = file.map(|file| Uploads::new(file)).transpose()?;
+        // Last of what may fail: a start that is refused again and again leaves no files.
+        if let Some(asked) = &plan.capture {
+            tap::tell(&log, asked, &ports.capture(asked)?);
+        }
         let report = Report::new(
             log.clone(),
             plan.identity,
@@ -107,7 +113,6 @@ impl Flight {
         if views.stored().is_some() {
             report.stands_by();
         }
-        let file = plan.secret.as_ref().and_then(|it| it.upload_file.as_ref());
         Ok(Self {
             service,
             report,
@@ -116,7 +121,7 @@ impl Flight {
             positions,
             autopilot,
             views,
-            uploads: file.map(|file| Uploads::new(file)).transpose()?,
+            uploads,
             refusals: Refusals::default(),
             waits: Waits::default(),
             signs: auth.is_some(),

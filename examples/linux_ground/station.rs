@@ -67,12 +67,6 @@ impl<'a> Station<'a> {
         };
         let service = Service::begin(&plan.log, source, plan.status_socket.as_deref())?;
         let mut tty = Replug::open("--tty", &plan.tty, plan.baud)?;
-        if let Some(capture) = &plan.capture {
-            let ports = [tty.to_string()];
-            for tap in tap::taps(env!("CARGO_BIN_NAME"), capture, &ports)? {
-                tty.tapped(tap);
-            }
-        }
         let measurements = plan.measurements.as_deref();
         let measurements = measurements
             .map(|from| Measurements::open(from, plan.end))
@@ -83,6 +77,14 @@ impl<'a> Station<'a> {
         };
         report::started(&service.log, plan, auth.epoch);
         config::tell(&plan.overrides, &service.log);
+        if let Some(asked) = &plan.capture {
+            let ports = [tty.to_string()];
+            let (taps, written) = tap::taps(env!("CARGO_BIN_NAME"), asked, &ports)?;
+            for tap in taps {
+                tty.tapped(tap);
+            }
+            tap::tell(&service.log, asked, &written);
+        }
         let mut ground = Ground::new(&plan.loaded, plan.end, plan.network, plan.wiring, auth);
         let begun = service.now();
         if let Some(upload) = plan.upload {
