@@ -20,7 +20,8 @@
 //! `--config` reads all of that from one file, the scenario of the other tools with sections of its own.
 //!
 //! Every event is one line on standard output or in a file; an f32 also as its bits. In flight neither a port that vanishes nor a full disk nor
-//! a reader that stops ends it or holds it up. It ends with status 0 at Ctrl-C or SIGTERM, 1 where it cannot begin, 2 when the options are wrong.
+//! a reader that stops ends it or holds it up. It ends with status 0 at Ctrl-C or SIGTERM, 1 where it cannot begin, 2 when
+//! the options or the --view-file are wrong.
 //!
 //! | file | one idea |
 //! | --- | --- |
@@ -89,15 +90,22 @@ mod waits;
 fn main() -> std::process::ExitCode {
     use std::process::ExitCode;
 
+    use relay::Refusal;
+
     let plan = match options::read() {
         Ok(plan) => plan,
         Err(code) => return code,
     };
     match relay::fly(&plan) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(line) => {
+        Err(Refusal { line, is_final }) => {
             uav_relay_linux::command::complain(&line);
-            ExitCode::FAILURE
+            if is_final {
+                // As for wrong options: the unit does not start it again.
+                ExitCode::from(2)
+            } else {
+                ExitCode::FAILURE
+            }
         }
     }
 }

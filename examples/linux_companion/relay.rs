@@ -38,11 +38,29 @@ struct Flight {
     signs: bool,
 }
 
+/// Why the relay cannot start.
+#[derive(Debug)]
+pub(crate) struct Refusal {
+    /// The line for the user.
+    pub(crate) line: String,
+    /// True if another start cannot succeed before somebody changes something; false for a port that may come back.
+    pub(crate) is_final: bool,
+}
+
+impl From<String> for Refusal {
+    fn from(line: String) -> Self {
+        Self {
+            line,
+            is_final: false,
+        }
+    }
+}
+
 /// Runs the relay until it is told to stop.
 ///
 /// # Errors
-/// One line that says why it could not begin.
-pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
+/// Why it could not begin.
+pub(crate) fn fly(plan: &Plan) -> Result<(), Refusal> {
     let mut flight = Flight::begin(plan)?;
     flight.service.ready();
     while flight.turn() {}
@@ -51,7 +69,7 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
 }
 
 impl Flight {
-    fn begin(plan: &Plan) -> Result<Self, String> {
+    fn begin(plan: &Plan) -> Result<Self, Refusal> {
         let index = plan.identity.index;
         let source = Source {
             name: format!("relay {index}"),
@@ -85,7 +103,7 @@ impl Flight {
         if let Some(record) = views.stored() {
             relay
                 .resume_view(service.now(), record)
-                .map_err(|error| views::refused(plan.view_file.as_deref(), &error.to_string()))?;
+                .map_err(|error| views::refused(plan.view_file.as_deref(), error))?;
         }
         let file = plan.secret.as_ref().and_then(|it| it.upload_file.as_ref());
         let uploads = file.map(|file| Uploads::new(file)).transpose()?;
