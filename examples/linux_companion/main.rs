@@ -41,6 +41,7 @@
 //! | `uploads.rs` | the newest mission that was uploaded, in a file |
 //! | `views.rs` | what it has said in the votes on views, in a file |
 //! | `waits.rs` | log lines for what keeps the drone from its place |
+//! | `lost.rs` | lost relays, and the operator's command to clear them |
 //! | `kept.rs` | a file that is written in flight, by a thread of its own |
 //! | `gate.rs` | nothing is sent before it is in such a file |
 //!
@@ -63,6 +64,8 @@ mod gate;
 mod kept;
 #[cfg(unix)]
 mod listen;
+#[cfg(unix)]
+mod lost;
 #[cfg(unix)]
 mod movement;
 #[cfg(unix)]

@@ -10,6 +10,7 @@ use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, Upload};
 use crate::autopilot::Companion;
 use crate::gate::Gate;
 use crate::kept::Kept;
+use crate::lost::Lost;
 use crate::options::Plan;
 use crate::ports::Ports;
 use crate::positions::Positions;
@@ -35,6 +36,7 @@ struct Flight {
     uploads: Option<Uploads>,
     refusals: Refusals,
     waits: Waits,
+    lost: Lost,
     signs: bool,
 }
 
@@ -142,6 +144,7 @@ impl Flight {
             uploads,
             refusals: Refusals::default(),
             waits: Waits::default(),
+            lost: Lost::new(plan.identity.index, plan.mission.relays()),
             signs: auth.is_some(),
         })
     }
@@ -176,6 +179,7 @@ impl Flight {
             if let Some(autopilot) = &mut self.autopilot {
                 autopilot.tell(event);
             }
+            self.lost.event(event);
             self.report.event(time, event, relay);
         }
         let moves = self.report.look(time, relay, drone);
@@ -205,17 +209,21 @@ impl Flight {
             relay,
             report,
             ports,
+            lost,
             ..
         } = self;
         let uploads = self.uploads.as_ref().map(Uploads::kept);
         let views = self.views.kept();
         let index = report.index();
-        service.tend(time, "relay", |log| {
+        service.tend(time, "relay", |log, command| {
+            if let Some((command, user)) = command {
+                return lost.command(time, log, relay, command, user);
+            }
             json!({
                 "program": env!("CARGO_BIN_NAME"),
                 "program_version": env!("CARGO_PKG_VERSION"),
                 "uptime_s": time.as_micros() / 1_000_000,
-                "relay": status::of_relay(relay, index, |node| report.name(node)),
+                "relay": status::of_relay(relay, index, lost, |node| report.name(node)),
                 "links": ports.status(),
                 "autopilot": self.autopilot.as_ref().map(Companion::status),
                 "positions_refused": self.positions.as_ref().map(Positions::bad),

@@ -212,7 +212,12 @@ impl<'a> Station<'a> {
             hearing,
             ..
         } = self;
-        service.tend(time, "station", |log| {
+        service.tend(time, "station", |log, command| {
+            if let Some((command, _)) = command {
+                let text =
+                    format!("{command}: a station takes no commands; send nothing for its state");
+                return json!({ "done": false, "text": text });
+            }
             json!({
                 "program": env!("CARGO_BIN_NAME"),
                 "program_version": env!("CARGO_PKG_VERSION"),

@@ -4,6 +4,7 @@
 mod astray;
 mod binary;
 mod captured;
+mod cleared;
 mod datagrams;
 mod ending;
 mod file;
