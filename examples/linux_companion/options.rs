@@ -122,7 +122,8 @@ struct Options {
     field: Option<Field>,
     #[command(flatten)]
     listen: ListenOptions,
-    /// Unix socket that answers each connection with one JSON object of all counters, and closes it
+    /// Unix socket that answers each connection with one JSON object of all counters, and closes it. A client that sends `clear-lost N` reports
+    /// that the lost relay N has landed: this relay need not keep clear of it any more
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     status_socket: Option<PathBuf>,
     /// Write every frame that comes or goes at the ports toward other relays to a pcapng capture, for `cargo decode` and Wireshark. Where FILE

@@ -2,6 +2,7 @@
 #![cfg(target_os = "linux")]
 
 mod astray;
+mod bench;
 mod binary;
 mod captured;
 mod cleared;
