@@ -139,4 +139,9 @@ fn a_client_that_sends_a_part_of_a_command_is_answered() {
     assert_eq!(said["done"], false, "{text}");
     relay.line("command refused: no such command; there is clear-lost N");
     assert_eq!(asked(&socket)["relay"]["index"], 1);
+    let mut silent = UnixStream::connect(&socket).unwrap();
+    silent.set_read_timeout(Some(LIMIT)).unwrap();
+    let mut text = String::new();
+    silent.read_to_string(&mut text).unwrap();
+    assert!(text.contains("\"has_lease\""), "the state: {text}");
 }
