@@ -30,6 +30,24 @@ pub struct LogOptions {
     log_file: Option<PathBuf>,
 }
 
+/// The program that writes the lines. Logs of several programs are read side by side, so every line names it.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Its name in a line of text: `relay 2`.
+    pub name: String,
+    /// The field of a JSON line that names it: `index`.
+    pub key: &'static str,
+    /// The value of that field.
+    pub value: Value,
+}
+
+/// How a line is written.
+#[derive(Debug)]
+struct Format {
+    json: bool,
+    source: Source,
+}
+
 enum Order {
     Line(Instant, String),
     /// All before it has been written, or dropped.
@@ -48,23 +66,27 @@ struct Shared {
 pub struct Log {
     orders: SyncSender<Order>,
     shared: Arc<Shared>,
-    json: bool,
+    format: Arc<Format>,
 }
 
 impl Log {
-    /// Begins to write.
+    /// Starts the thread that writes lines; each line names `source`.
     ///
     /// # Errors
     /// One line that names the file that cannot be opened.
-    pub fn open(options: &LogOptions) -> Result<Self, String> {
+    pub fn open(options: &LogOptions, source: Source) -> Result<Self, String> {
         let out = Out::open(options.log_file.as_deref())?;
         let (orders, taken) = sync_channel(QUEUE);
         let shared = Arc::new(Shared::default());
+        let format = Arc::new(Format {
+            json: options.json,
+            source,
+        });
         let mut writer = Writer {
             out,
             torn: false,
             told: 0,
-            json: options.json,
+            format: Arc::clone(&format),
             shared: Arc::clone(&shared),
         };
         std::thread::Builder::new()
@@ -74,13 +96,13 @@ impl Log {
         Ok(Self {
             orders,
             shared,
-            json: options.json,
+            format,
         })
     }
 
     /// One line: what happened at `now`, in one word or two and for people; `fields` are for programs alone.
     pub fn say(&self, now: Instant, event: &str, fields: Value, text: fmt::Arguments<'_>) {
-        let line = rendered(self.json, now, event, fields, &text.to_string());
+        let line = self.format.line(now, event, fields, &text.to_string());
         if self.orders.try_send(Order::Line(now, line)).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
         }
@@ -154,7 +176,7 @@ struct Writer {
     torn: bool,
     /// Dropped lines that were spoken of.
     told: u64,
-    json: bool,
+    format: Arc<Format>,
     shared: Arc<Shared>,
 }
 
@@ -185,7 +207,7 @@ impl Writer {
             let more = dropped - self.told;
             let fields = json!({ "dropped": dropped });
             let said = format!("{more} lines dropped, nobody took them");
-            text += &rendered(self.json, now, "log", fields, &said);
+            text += &self.format.line(now, "log", fields, &said);
         }
         text += line;
         if self.put(text.as_bytes()) {
@@ -211,27 +233,31 @@ impl Writer {
     }
 }
 
-/// A line with its end: the time of day in UTC, that since the start, what happened.
-fn rendered(json: bool, now: Instant, event: &str, fields: Value, text: &str) -> String {
-    let time = humantime::format_rfc3339_millis(SystemTime::now()).to_string();
-    let micros = now.as_micros();
-    if json {
-        let mut entry = Map::new();
-        if let Value::Object(fields) = fields {
-            entry.extend(fields);
+impl Format {
+    /// Returns a line with its end: the time of day in UTC, the time since the start, the source, the event.
+    fn line(&self, now: Instant, event: &str, fields: Value, text: &str) -> String {
+        let time = humantime::format_rfc3339_millis(SystemTime::now()).to_string();
+        let micros = now.as_micros();
+        let Source { name, key, value } = &self.source;
+        if self.json {
+            let mut entry = Map::new();
+            if let Value::Object(fields) = fields {
+                entry.extend(fields);
+            }
+            entry.insert("time".to_owned(), time.into());
+            entry.insert(
+                "monotonic_s".to_owned(),
+                (f64::from(u32::try_from(micros / 1_000).unwrap_or(u32::MAX)) / 1e3).into(),
+            );
+            entry.insert((*key).to_owned(), value.clone());
+            entry.insert("event".to_owned(), event.into());
+            entry.insert("text".to_owned(), text.into());
+            return format!("{}\n", Value::Object(entry));
         }
-        entry.insert("time".to_owned(), time.into());
-        entry.insert(
-            "monotonic_s".to_owned(),
-            (f64::from(u32::try_from(micros / 1_000).unwrap_or(u32::MAX)) / 1e3).into(),
-        );
-        entry.insert("event".to_owned(), event.into());
-        entry.insert("text".to_owned(), text.into());
-        return format!("{}\n", Value::Object(entry));
+        let (seconds, millis) = (micros / 1_000_000, micros / 1_000 % 1_000);
+        let text = printable(text);
+        format!("{time} {seconds:>6}.{millis:03} s  {name}  {event}: {text}\n")
     }
-    let (seconds, millis) = (micros / 1_000_000, micros / 1_000 % 1_000);
-    let text = printable(text);
-    format!("{time} {seconds:>6}.{millis:03} s  {event}: {text}\n")
 }
 
 /// A name with a line feed in it must not make two lines.

@@ -9,10 +9,10 @@ use rustix::event::PollFlags;
 use serde_json::Value;
 use uav_relay::Instant;
 
-use crate::log::{Log, LogOptions};
+use crate::log::{Log, LogOptions, Source};
 use crate::notify::Notify;
 use crate::requests::Requests;
-use crate::socket::{self, StatusSocket};
+use crate::socket::StatusSocket;
 use crate::system::{now, on_stop};
 
 /// How long the last lines may take.
@@ -34,15 +34,19 @@ pub struct Service {
 }
 
 impl Service {
-    /// Begins: from now on signals are heard, and time runs.
+    /// Begins: from now on signals are heard, and time runs. Every line of the log names `source`.
     ///
     /// # Errors
     /// One line that says what does not work.
-    pub fn begin(log: &LogOptions, status_socket: Option<&Path>) -> Result<Self, String> {
+    pub fn begin(
+        log: &LogOptions,
+        source: Source,
+        status_socket: Option<&Path>,
+    ) -> Result<Self, String> {
         let (stop, requests) = (on_stop()?, Requests::new()?);
         let socket = status_socket.map(StatusSocket::open).transpose()?;
         Ok(Self {
-            log: Log::open(log)?,
+            log: Log::open(log, source)?,
             clock: Clock::now(),
             socket,
             requests,
@@ -62,13 +66,13 @@ impl Service {
         self.notify.iter().for_each(Notify::ready);
     }
 
-    /// Does what signals and the socket ask for, which `status` answers; `who` goes on. When to come back at the latest, to tell systemd that
-    /// it is alive.
+    /// Does what signals and the socket ask for: `answer` gets `None` for the state, or a command and the name of its sender. `who` goes on after
+    /// a hang-up. Returns the time to come back at the latest.
     pub fn tend(
         &mut self,
         time: Instant,
         who: &str,
-        mut status: impl FnMut(&Log) -> Value,
+        mut answer: impl FnMut(&Log, Option<(&str, &str)>) -> Value,
     ) -> Option<Instant> {
         let Self { log, requests, .. } = self;
         if requests.take_hangup() {
@@ -77,21 +81,27 @@ impl Service {
             log.tell(time, "hang-up", what);
         }
         if requests.take_status() {
-            let status = status(log);
+            let status = answer(log, None);
             let text = status.to_string();
             log.say(time, "status", status, format_args!("{text}"));
         }
-        let clients = self.socket.as_ref().map(StatusSocket::clients);
-        for client in clients.into_iter().flatten() {
-            socket::answer(client, &status(log));
+        let socket = self.socket.as_mut();
+        let (questions, again) = socket.map(|it| it.questions(time)).unwrap_or_default();
+        for question in questions {
+            let said = match &question.command {
+                Some(command) => answer(log, Some((command, &question.user()))),
+                None => answer(log, None),
+            };
+            question.answer(&said);
         }
-        self.notify.as_mut().and_then(|it| it.tend(time))
+        let alive = self.notify.as_mut().and_then(|it| it.tend(time));
+        again.into_iter().chain(alive).min()
     }
 
     /// What to sleep on.
     pub fn interests(&self) -> impl Iterator<Item = (BorrowedFd<'_>, PollFlags)> {
         let [hangup, status] = self.requests.fds();
-        let socket = self.socket.as_ref().map(StatusSocket::fd);
+        let socket = self.socket.iter().flat_map(StatusSocket::fds);
         [self.stop.as_fd(), hangup, status]
             .into_iter()
             .chain(socket)

@@ -1,22 +1,48 @@
-//! A unix socket that answers each connection with one JSON object and closes it. What a client does not take it does not get: nobody
-//! is waited for.
+//! A unix socket for the operator: one JSON object for each connection, which is closed then. A client that sends a line gives a command, and the
+//! object says whether it was done; a client that sends nothing gets the state. No client is waited for: what it does not take it does not get.
 
-use std::io::Write as _;
+use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::fd::{AsFd as _, BorrowedFd};
 use std::os::unix::fs::FileTypeExt as _;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
+use uav_relay::{Duration, Instant};
 
-/// Connections that are answered at once, at most.
+use crate::lines::LONGEST;
+
+/// Connections that are accepted at once, at most.
 const ANSWERS: usize = 4;
+
+/// Connections that may be about to send a command, at most; further ones get the state at once.
+const CLIENTS: usize = 16;
+
+/// How long a client may take to send a command.
+const PATIENCE: Duration = Duration::from_millis(200);
 
 /// The socket; its name is removed in the end.
 #[derive(Debug)]
 pub struct StatusSocket {
     listener: UnixListener,
     path: PathBuf,
+    clients: Vec<Client>,
+}
+
+/// A connection that is not answered yet.
+#[derive(Debug)]
+struct Client {
+    stream: UnixStream,
+    received: Vec<u8>,
+    until: Instant,
+}
+
+/// What a client asks for.
+#[derive(Debug)]
+pub struct Question {
+    stream: UnixStream,
+    /// The line that it has sent, `None` for the state.
+    pub command: Option<String>,
 }
 
 impl StatusSocket {
@@ -43,25 +69,78 @@ impl StatusSocket {
         Ok(Self {
             listener,
             path: path.to_owned(),
+            clients: Vec::new(),
         })
     }
 
-    /// What to sleep on.
-    pub fn fd(&self) -> BorrowedFd<'_> {
-        self.listener.as_fd()
+    /// Returns what to sleep on.
+    pub fn fds(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
+        let clients = self.clients.iter().map(|client| client.stream.as_fd());
+        std::iter::once(self.listener.as_fd()).chain(clients)
     }
 
-    /// Whoever has connected since.
-    pub fn clients(&self) -> Vec<UnixStream> {
+    /// Accepts connections and reads from them; returns the questions that are complete, and the time to look again.
+    pub fn questions(&mut self, now: Instant) -> (Vec<Question>, Option<Instant>) {
         let accepted = (0..ANSWERS).map_while(|_| self.listener.accept().ok());
-        accepted.map(|(client, _)| client).collect()
+        let accepted = accepted.filter(|(stream, _)| stream.set_nonblocking(true).is_ok());
+        self.clients.extend(accepted.map(|(stream, _)| Client {
+            stream,
+            received: Vec::new(),
+            until: now + PATIENCE,
+        }));
+        let over = self.clients.len().saturating_sub(CLIENTS);
+        let mut at = 0;
+        let complete = self.clients.extract_if(.., |client| {
+            at += 1;
+            client.is_complete(now) || at <= over
+        });
+        let questions = complete.map(Client::question).collect();
+        let wake = self.clients.iter().map(|client| client.until).min();
+        (questions, wake)
     }
 }
 
-/// Answers with `status`. It fits into what the kernel holds for a connection; who leaves no room gets less.
-pub fn answer(mut client: UnixStream, status: &Value) {
-    if client.set_nonblocking(true).is_ok() {
-        let _ = client.write_all(format!("{status}\n").as_bytes());
+impl Client {
+    /// Reads; returns true once a line, the end or the time has come.
+    fn is_complete(&mut self, now: Instant) -> bool {
+        let mut bytes = [0; LONGEST];
+        let has_ended = match self.stream.read(&mut bytes) {
+            Ok(0) => true,
+            Ok(count) => {
+                self.received.extend(bytes.get(..count).unwrap_or_default());
+                false
+            }
+            Err(error) => error.kind() != ErrorKind::WouldBlock,
+        };
+        let is_long = self.received.len() > LONGEST;
+        has_ended || is_long || self.received.contains(&b'\n') || self.until <= now
+    }
+
+    fn question(self) -> Question {
+        let text = String::from_utf8_lossy(&self.received);
+        let line = text.lines().next().map(str::trim).unwrap_or_default();
+        Question {
+            command: (!line.is_empty()).then(|| line.to_owned()),
+            stream: self.stream,
+        }
+    }
+}
+
+impl Question {
+    /// Returns the user and the process at the other end, as the system knows them.
+    #[must_use]
+    pub fn user(&self) -> String {
+        #[cfg(target_os = "linux")]
+        if let Ok(peer) = rustix::net::sockopt::socket_peercred(&self.stream) {
+            let (uid, pid) = (peer.uid.as_raw(), peer.pid.as_raw_nonzero());
+            return format!("user {uid}, process {pid}");
+        }
+        "an unknown user".to_owned()
+    }
+
+    /// Answers. It fits into what the kernel holds for a connection; a client that leaves no room gets less.
+    pub fn answer(mut self, answer: &Value) {
+        let _ = self.stream.write_all(format!("{answer}\n").as_bytes());
     }
 }
 

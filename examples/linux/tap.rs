@@ -3,16 +3,22 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use serde_json::json;
 use uav_relay_capture::{Capture, Cut, Direction, Frame, Interface};
+
+use crate::log::Log;
 
 /// Pieces that wait to be written, at most.
 const WAITING: usize = 1_024;
+
+/// Captures of one name, at most.
+const MOST: u32 = 9_999;
 
 /// What came or went at once, at a port of that number.
 struct Piece {
@@ -81,13 +87,17 @@ impl Tap {
     }
 }
 
-/// Begins the capture of `program` at `path`, in place of what was there, and gives a tap for each of the ports of these names.
+/// Starts the capture of `program`, and returns a tap for each of the ports of these names and the file that is written.
+///
+/// An earlier capture is never overwritten, because it may be the only record of a crash that this start follows: where `path` exists, the file
+/// is [`numbered`].
 ///
 /// # Errors
 /// One line that names the file.
-pub fn taps(program: &str, path: &Path, ports: &[String]) -> Result<Vec<Tap>, String> {
+pub fn taps(program: &str, path: &Path, ports: &[String]) -> Result<(Vec<Tap>, PathBuf), String> {
+    let (file, path) = create(path)?;
     let wrong = |error: io::Error| format!("--capture {}: {error}", path.display());
-    let out = BufWriter::new(File::create(path).map_err(wrong)?);
+    let out = BufWriter::new(file);
     let mut capture = Capture::new(out, program, "").map_err(wrong)?;
     let interfaces: Vec<Interface> = ports
         .iter()
@@ -103,15 +113,68 @@ pub fn taps(program: &str, path: &Path, ports: &[String]) -> Result<Vec<Tap>, St
             _ = ended.fault.set(error.to_string());
         }
     });
-    Ok((0..ports.len())
-        .map(|port| Tap {
-            port,
-            fate: Arc::clone(&fate),
-            sender: sender.clone(),
-            left_out: 0,
-            is_over: false,
-        })
-        .collect())
+    let taps = (0..ports.len()).map(|port| Tap {
+        port,
+        fate: Arc::clone(&fate),
+        sender: sender.clone(),
+        left_out: 0,
+        is_over: false,
+    });
+    Ok((taps.collect(), path))
+}
+
+/// Logs which file is written instead of `asked`, if another one is.
+pub fn tell(log: &Log, asked: &Path, written: &Path) {
+    if asked == written {
+        return;
+    }
+    let name = written.display().to_string();
+    let fields = json!({ "file": name });
+    log.say(
+        uav_relay::Instant::ZERO,
+        "capture",
+        fields,
+        format_args!(
+            "written to {name}, because {} holds an earlier capture",
+            asked.display()
+        ),
+    );
+}
+
+/// Creates the file, under the first name that is free; a device or a FIFO is opened as it is.
+fn create(path: &Path) -> Result<(File, PathBuf), String> {
+    let named = |error: io::Error| format!("--capture {}: {error}", path.display());
+    let is_other = path.metadata().is_ok_and(|it| !it.is_file());
+    if is_other {
+        let file = File::options().write(true).open(path).map_err(named)?;
+        return Ok((file, path.to_owned()));
+    }
+    for number in 1..=MOST {
+        let path = numbered(path, number);
+        match File::options().write(true).create_new(true).open(&path) {
+            Ok(file) => return Ok((file, path)),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(named(error)),
+        }
+    }
+    Err(format!(
+        "--capture {}: {MOST} captures of this name exist already; move them away",
+        path.display()
+    ))
+}
+
+/// Returns the name of capture `number`: `relay2.pcapng`, `relay2-2.pcapng`, `relay2-3.pcapng`.
+fn numbered(path: &Path, number: u32) -> PathBuf {
+    if number == 1 {
+        return path.to_owned();
+    }
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{number}"));
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
 }
 
 /// Cuts what comes into frames, and writes them; what is written is in the file whenever nothing more waits.

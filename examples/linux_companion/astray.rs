@@ -58,6 +58,12 @@ impl Astray {
         self.newest = Some((now, place));
     }
 
+    /// Returns the newest place, unless it is stale.
+    pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
+        let fresh = self.newest.filter(|(at, _)| now.since(*at) < STALE);
+        fresh.map(|(_, place)| place)
+    }
+
     /// Returns what to tell of a drone that the link says is off the line between `sites`.
     pub(crate) fn is_off_line(&mut self, sites: Sites, off_line: OffLine) -> Option<Off> {
         self.lines(sites).map(|lines| lines.off_line(off_line))

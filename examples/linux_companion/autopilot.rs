@@ -16,7 +16,7 @@ use uav_relay::flight::autopilot::{
 use uav_relay::flight::axis::Axis;
 use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Event, Instant, Relay, Sites};
+use uav_relay::{Event, Instant, Placement, Relay, Sites};
 
 use crate::answers::{Answer, Answers};
 use crate::astray::{Astray, Off};
@@ -163,6 +163,11 @@ impl Companion {
             "unanswered": self.answers.missing().map(|missing| self.unanswered(missing)),
             "position": self.astray.status(),
         })
+    }
+
+    /// Returns the drone's place along the line, unless it is older than 3 s.
+    pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
+        self.astray.place(now)
     }
 
     /// Moves bytes either way; hands the relay where the drone is and whether its setpoints are flown, and the autopilot the setpoint.

@@ -20,7 +20,8 @@
 //! `--config` reads all of that from one file, the scenario of the other tools with sections of its own.
 //!
 //! Every event is one line on standard output or in a file; an f32 also as its bits. In flight neither a port that vanishes nor a full disk nor
-//! a reader that stops ends it or holds it up. It ends with status 0 at Ctrl-C or SIGTERM, 1 where it cannot begin, 2 when the options are wrong.
+//! a reader that stops ends it or holds it up. It ends with status 0 at Ctrl-C or SIGTERM, 1 where it cannot begin, 2 when
+//! the options or the --view-file are wrong.
 //!
 //! | file | one idea |
 //! | --- | --- |
@@ -35,10 +36,12 @@
 //! | `positions.rs` | where the drone is, and what is heard there, from a FIFO |
 //! | `relay.rs` | the loop |
 //! | `report.rs` | the lines it says |
+//! | `movement.rs` | log lines for setpoints and the arrival |
 //! | `status.rs` | how the relay is, as JSON |
 //! | `uploads.rs` | the newest mission that was uploaded, in a file |
 //! | `views.rs` | what it has said in the votes on views, in a file |
 //! | `waits.rs` | log lines for what keeps the drone from its place |
+//! | `lost.rs` | lost relays, and the operator's command to clear them |
 //! | `kept.rs` | a file that is written in flight, by a thread of its own |
 //! | `gate.rs` | nothing is sent before it is in such a file |
 //!
@@ -61,6 +64,10 @@ mod gate;
 mod kept;
 #[cfg(unix)]
 mod listen;
+#[cfg(unix)]
+mod lost;
+#[cfg(unix)]
+mod movement;
 #[cfg(unix)]
 mod options;
 #[cfg(unix)]
@@ -86,15 +93,22 @@ mod waits;
 fn main() -> std::process::ExitCode {
     use std::process::ExitCode;
 
+    use relay::Refusal;
+
     let plan = match options::read() {
         Ok(plan) => plan,
         Err(code) => return code,
     };
     match relay::fly(&plan) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(line) => {
+        Err(Refusal { line, is_final }) => {
             uav_relay_linux::command::complain(&line);
-            ExitCode::FAILURE
+            if is_final {
+                // As for wrong options: the unit does not start it again.
+                ExitCode::from(2)
+            } else {
+                ExitCode::FAILURE
+            }
         }
     }
 }

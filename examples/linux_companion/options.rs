@@ -122,11 +122,12 @@ struct Options {
     field: Option<Field>,
     #[command(flatten)]
     listen: ListenOptions,
-    /// Unix socket that answers each connection with one JSON object of all counters, and closes it
+    /// Unix socket that answers each connection with one JSON object of all counters, and closes it. A client that sends `clear-lost N` reports
+    /// that the lost relay N has landed: this relay need not keep clear of it any more
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     status_socket: Option<PathBuf>,
-    /// Write every frame that comes or goes at the ports toward other relays to a pcapng capture, for `cargo decode` and Wireshark. It takes the
-    /// place of what was there, and grows as long as the relay flies
+    /// Write every frame that comes or goes at the ports toward other relays to a pcapng capture, for `cargo decode` and Wireshark. Where FILE
+    /// exists it is kept, and FILE-2, FILE-3 and so on is written. It grows as long as the relay flies
     #[arg(long, value_name = "FILE", help_heading = "Log")]
     capture: Option<PathBuf>,
     #[command(flatten)]

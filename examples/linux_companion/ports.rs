@@ -1,7 +1,7 @@
 //! The ttys of either wiring, and sleep until one of them or a timer needs the relay.
 
 use std::os::fd::BorrowedFd;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rustix::event::PollFlags;
@@ -47,23 +47,18 @@ pub(crate) enum Ports {
 }
 
 impl Ports {
-    /// Opens them, and writes down what goes over them in `capture`, if there is one. Nothing is sent while `gate` is shut.
+    /// Opens them. Nothing is sent while `gate` is shut.
     ///
     /// # Errors
-    /// One line that names the tty or the file.
-    pub(crate) fn open(
-        ttys: &Ttys,
-        baud: u32,
-        capture: Option<&Path>,
-        gate: &Gate,
-    ) -> Result<Self, String> {
+    /// One line that names the tty.
+    pub(crate) fn open(ttys: &Ttys, baud: u32, gate: &Gate) -> Result<Self, String> {
         let link = |option, path: Option<&_>| {
             let tty = path
                 .map(|path| Replug::open(option, path, baud))
                 .transpose()?;
             Ok::<_, String>(SerialLink::new(End(tty, gate.clone()), byte_time(baud)))
         };
-        let mut ports = match ttys {
+        Ok(match ttys {
             Ttys::Pair {
                 upstream,
                 downstream,
@@ -76,14 +71,19 @@ impl Ports {
                 let channel = link("--shared", Some(tty.as_path()))?;
                 Self::Shared(Box::new(Shared::new(channel)))
             }
-        };
-        if let Some(capture) = capture {
-            let taps = tap::taps(env!("CARGO_BIN_NAME"), capture, &ports.names())?;
-            for (tty, tap) in ports.ttys().zip(taps) {
-                tty.tapped(tap);
-            }
+        })
+    }
+
+    /// Writes what goes over them to a capture from now on, and returns the file.
+    ///
+    /// # Errors
+    /// One line that names the file.
+    pub(crate) fn capture(&mut self, file: &Path) -> Result<PathBuf, String> {
+        let (taps, file) = tap::taps(env!("CARGO_BIN_NAME"), file, &self.names())?;
+        for (tty, tap) in self.ttys().zip(taps) {
+            tty.tapped(tap);
         }
-        Ok(ports)
+        Ok(file)
     }
 
     /// Moves what can be moved, with a call of `keep` before anything is sent, and says when to come back at the latest.

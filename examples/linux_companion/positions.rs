@@ -4,9 +4,12 @@
 use std::os::fd::BorrowedFd;
 use std::path::Path;
 
-use uav_relay::{Instant, Placement, Sample};
+use uav_relay::{Duration, Instant, Placement, Sample};
 use uav_relay_linux::lines::{Fifo, LONGEST};
 use uav_relay_linux::log::Log;
+
+/// A position older than this is not the drone's place any more.
+const STALE: Duration = Duration::from_millis(3_000);
 
 /// The FIFO, and what its lines may say.
 #[derive(Debug)]
@@ -16,6 +19,8 @@ pub(crate) struct Positions {
     listens: bool,
     /// Lines that were none.
     bad: u64,
+    /// The newest position, and when it came.
+    newest: Option<(Instant, Placement)>,
 }
 
 impl Positions {
@@ -28,6 +33,7 @@ impl Positions {
             fifo: Fifo::open("--positions", path)?,
             listens,
             bad: 0,
+            newest: None,
         })
     }
 
@@ -44,7 +50,9 @@ impl Positions {
         heard: &mut impl FnMut(Sample),
     ) -> Option<Placement> {
         let mut newest = None;
-        let Self { fifo, listens, bad } = self;
+        let Self {
+            fifo, listens, bad, ..
+        } = self;
         fifo.read(|line| match news(line) {
             Some((place, sample)) if *listens || sample.is_none() => {
                 newest = place.or(newest);
@@ -52,7 +60,14 @@ impl Positions {
             }
             _ => refuse(now, log, *listens, bad, line),
         });
+        self.newest = newest.map(|place| (now, place)).or(self.newest);
         newest
+    }
+
+    /// Returns the newest position, unless it is older than 3 s.
+    pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
+        let fresh = self.newest.filter(|(at, _)| now.since(*at) < STALE);
+        fresh.map(|(_, place)| place)
     }
 
     /// Lines that were none.

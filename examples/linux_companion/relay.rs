@@ -10,6 +10,7 @@ use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, Upload};
 use crate::autopilot::Companion;
 use crate::gate::Gate;
 use crate::kept::Kept;
+use crate::lost::Lost;
 use crate::options::Plan;
 use crate::ports::Ports;
 use crate::positions::Positions;
@@ -18,10 +19,10 @@ use crate::uploads::Uploads;
 use crate::views::Views;
 use crate::waits::Waits;
 use crate::{positions, status, uploads, views};
-use uav_relay_linux::log::Log;
+use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::refusals::Refusals;
 use uav_relay_linux::service::Service;
-use uav_relay_linux::{config, epoch};
+use uav_relay_linux::{config, epoch, tap};
 
 /// A relay, and all that it is connected to.
 struct Flight {
@@ -35,14 +36,33 @@ struct Flight {
     uploads: Option<Uploads>,
     refusals: Refusals,
     waits: Waits,
+    lost: Lost,
     signs: bool,
+}
+
+/// Why the relay cannot start.
+#[derive(Debug)]
+pub(crate) struct Refusal {
+    /// The line for the user.
+    pub(crate) line: String,
+    /// True if another start cannot succeed before somebody changes something; false for a port that may come back.
+    pub(crate) is_final: bool,
+}
+
+impl From<String> for Refusal {
+    fn from(line: String) -> Self {
+        Self {
+            line,
+            is_final: false,
+        }
+    }
 }
 
 /// Runs the relay until it is told to stop.
 ///
 /// # Errors
-/// One line that says why it could not begin.
-pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
+/// Why it could not begin.
+pub(crate) fn fly(plan: &Plan) -> Result<(), Refusal> {
     let mut flight = Flight::begin(plan)?;
     flight.service.ready();
     while flight.turn() {}
@@ -51,11 +71,17 @@ pub(crate) fn fly(plan: &Plan) -> Result<(), String> {
 }
 
 impl Flight {
-    fn begin(plan: &Plan) -> Result<Self, String> {
-        let service = Service::begin(&plan.log, plan.status_socket.as_deref())?;
+    fn begin(plan: &Plan) -> Result<Self, Refusal> {
+        let index = plan.identity.index;
+        let source = Source {
+            name: format!("relay {index}"),
+            key: "index",
+            value: index.into(),
+        };
+        let service = Service::begin(&plan.log, source, plan.status_socket.as_deref())?;
         let log = service.log.clone();
         let gate = Gate::new();
-        let mut ports = Ports::open(&plan.ttys, plan.baud, plan.capture.as_deref(), &gate)?;
+        let mut ports = Ports::open(&plan.ttys, plan.baud, &gate)?;
         let listens = plan.settings.listen.is_some();
         let positions = plan
             .positions
@@ -79,13 +105,20 @@ impl Flight {
         if let Some(record) = views.stored() {
             relay
                 .resume_view(service.now(), record)
-                .map_err(|error| views::refused(plan.view_file.as_deref(), &error.to_string()))?;
+                .map_err(|error| views::refused(plan.view_file.as_deref(), error))?;
+        }
+        let file = plan.secret.as_ref().and_then(|it| it.upload_file.as_ref());
+        let uploads = file.map(|file| Uploads::new(file)).transpose()?;
+        // Last of what may fail: a start that is refused again and again leaves no files.
+        if let Some(asked) = &plan.capture {
+            tap::tell(&log, asked, &ports.capture(asked)?);
         }
         let report = Report::new(
             log.clone(),
             plan.identity,
             &plan.mission,
             plan.settings.guard.map(|guard| guard.fence),
+            plan.autopilot.is_some(),
         );
         report.started(&ports.names(), plan.baud);
         config::tell(&plan.overrides, &log);
@@ -100,7 +133,6 @@ impl Flight {
         if views.stored().is_some() {
             report.stands_by();
         }
-        let file = plan.secret.as_ref().and_then(|it| it.upload_file.as_ref());
         Ok(Self {
             service,
             report,
@@ -109,9 +141,10 @@ impl Flight {
             positions,
             autopilot,
             views,
-            uploads: file.map(|file| Uploads::new(file)).transpose()?,
+            uploads,
             refusals: Refusals::default(),
             waits: Waits::default(),
+            lost: Lost::new(plan.identity.index, plan.mission.relays()),
             signs: auth.is_some(),
         })
     }
@@ -121,14 +154,17 @@ impl Flight {
         let time = self.service.now();
         let Self { service, relay, .. } = self;
         let log = &service.log;
+        let mut drone = None;
         if let Some(positions) = &mut self.positions {
             let mut heard = |sample| relay.handle_sample(time, sample);
             if let Some(place) = positions.newest(time, log, &mut heard) {
                 relay.handle_position(time, time, place);
             }
+            drone = positions.place(time);
         }
         if let Some(autopilot) = &mut self.autopilot {
             autopilot.drive(time, log, relay);
+            drone = autopilot.place(time);
         }
         let reopen = self.ports.tend(time, log);
         let views = &mut self.views;
@@ -143,8 +179,10 @@ impl Flight {
             if let Some(autopilot) = &mut self.autopilot {
                 autopilot.tell(event);
             }
+            self.lost.event(event);
             self.report.event(time, event, relay);
         }
+        let moves = self.report.look(time, relay, drone);
         let files = [
             self.uploads.as_mut().and_then(|it| it.tend(time, log)),
             self.views.kept().and_then(Kept::wake),
@@ -156,7 +194,7 @@ impl Flight {
         let waits = self.waits.tend(time, log, relay, name);
         let again = self.autopilot.as_ref().map(|it| it.wake(service.now()));
         let alive = self.tell(time);
-        let others = [again, reopen, alive, waits]
+        let others = [again, reopen, alive, waits, moves]
             .into_iter()
             .chain(files)
             .flatten();
@@ -171,16 +209,21 @@ impl Flight {
             relay,
             report,
             ports,
+            lost,
             ..
         } = self;
         let uploads = self.uploads.as_ref().map(Uploads::kept);
         let views = self.views.kept();
-        service.tend(time, "relay", |log| {
+        let index = report.index();
+        service.tend(time, "relay", |log, command| {
+            if let Some((command, user)) = command {
+                return lost.command(time, log, relay, command, user);
+            }
             json!({
                 "program": env!("CARGO_BIN_NAME"),
                 "program_version": env!("CARGO_PKG_VERSION"),
                 "uptime_s": time.as_micros() / 1_000_000,
-                "relay": status::of_relay(relay, |node| report.name(node)),
+                "relay": status::of_relay(relay, index, lost, |node| report.name(node)),
                 "links": ports.status(),
                 "autopilot": self.autopilot.as_ref().map(Companion::status),
                 "positions_refused": self.positions.as_ref().map(Positions::bad),

@@ -11,7 +11,7 @@ use uav_relay::{
     Event, Identity, Instant, LineError, Mission, Placement, Relay, Side, Stats, Upload,
 };
 
-use crate::status::at;
+use crate::movement::Movement;
 use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::site::Between;
@@ -36,16 +36,20 @@ pub(crate) struct Report {
     digest: u16,
     /// The box that no setpoint leaves, if there is a guard.
     fence: Option<Geofence>,
+    movement: Movement,
 }
 
 impl Report {
+    /// Writes to `log`; `flies` is true where the companion itself hands the setpoints to an autopilot.
     pub(crate) fn new(
         log: Log,
         identity: Identity,
         mission: &Mission,
         fence: Option<Geofence>,
+        flies: bool,
     ) -> Self {
         Self {
+            movement: Movement::new(flies),
             log,
             identity,
             fence,
@@ -67,7 +71,7 @@ impl Report {
             Instant::ZERO,
             "started",
             json!({
-                "index": index, "relays": relays, "network": network, "mission": digest, "ports": ttys, "baud": baud,
+                "relays": relays, "network": network, "mission": digest, "ports": ttys, "baud": baud,
                 "version": env!("CARGO_PKG_VERSION"),
             }),
             format_args!(
@@ -115,12 +119,12 @@ impl Report {
         );
     }
 
-    pub(crate) fn event(&self, now: Instant, event: Event, relay: &Relay) {
+    pub(crate) fn event(&mut self, now: Instant, event: Event, relay: &Relay) {
         let tell = |word: &str, text: fmt::Arguments<'_>| self.log.tell(now, word, text);
         match event {
             Event::SetpointChanged => {
-                if let Some(place) = relay.setpoint() {
-                    self.fly_to(now, place);
+                if let Some(step) = self.movement.changed(now, relay) {
+                    step.tell(now, &self.log);
                 }
             }
             Event::Converged => self.converged(now, relay.target().unwrap_or_default()),
@@ -158,6 +162,20 @@ impl Report {
             ),
             other => self.of_a_node(now, other, relay),
         }
+    }
+
+    /// Writes a line about the flight of a drone at `drone`, if one is due, and returns the time to look again.
+    pub(crate) fn look(
+        &mut self,
+        now: Instant,
+        relay: &Relay,
+        drone: Option<Placement>,
+    ) -> Option<Instant> {
+        let (step, again) = self.movement.look(now, relay, drone);
+        if let Some(step) = step {
+            step.tell(now, &self.log);
+        }
+        again
     }
 
     /// Why an upload is refused; of the geofence its numbers.
@@ -270,6 +288,11 @@ impl Report {
         );
     }
 
+    /// Returns the relay's own number, which it keeps in every view.
+    pub(crate) const fn index(&self) -> u16 {
+        self.identity.index
+    }
+
     /// What a node is called. Its number is that of its start, whoever was lost since: the receiver's is one above the last relay's.
     pub(crate) fn name(&self, node: u16) -> String {
         match node {
@@ -308,13 +331,14 @@ impl Report {
     }
 
     fn reformed(&self, now: Instant, relay: &Relay) {
-        let (index, relays) = (relay.index(), relay.mission().relays());
+        // The number of a drone never changes; its place in the chain does when a relay before it is lost.
+        let (place, relays) = (relay.index(), relay.mission().relays());
         let view = relay.view().number();
         self.log.say(
             now,
             "formed anew",
-            json!({ "index": index, "relays": relays, "view": view }),
-            format_args!("relay {index} of {relays}, view {view}"),
+            json!({ "place": place, "relays": relays, "view": view }),
+            format_args!("{relays} relays, this one at place {place}, view {view}"),
         );
     }
 
@@ -348,22 +372,6 @@ impl Report {
             Belief::Unknown(spread) => tell(format_args!("nothing is known; spread {spread:?}")),
             Belief::Mission => tell(format_args!("what the mission says")),
         }
-    }
-
-    /// Where to fly, for people and other programs: `place.x_m` metres from the transmitter toward the receiver,
-    /// `place.y_m` to the right of that line as seen from above, at `place.altitude_m` above the ground.
-    fn fly_to(&self, now: Instant, place: Placement) {
-        self.log.say(
-            now,
-            "setpoint",
-            at(place),
-            format_args!(
-                "x {} m, y {} m, altitude {} m",
-                Exact(place.x_m),
-                Exact(place.y_m),
-                Exact(place.altitude_m)
-            ),
-        );
     }
 }
 

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 use uav_relay::{Placement, Relay, Side};
 use uav_relay_linux::counters::counted;
 
+use crate::lost::Lost;
 use crate::waits;
 
 /// A place, m.
@@ -11,13 +12,19 @@ pub(crate) fn at(place: Placement) -> Value {
     json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
 }
 
-/// How the relay is.
-pub(crate) fn of_relay(relay: &Relay, name: impl Fn(u16) -> String) -> Value {
+/// Returns the state of relay `index`, its number of the start, as JSON.
+pub(crate) fn of_relay(
+    relay: &Relay,
+    index: u16,
+    lost: &Lost,
+    name: impl Fn(u16) -> String,
+) -> Value {
     let [upstream, downstream] = relay
         .neighbours()
         .map(|node| node.map(|node| json!({ "node": node, "name": name(node) })));
     json!({
-        "index": relay.index(),
+        "index": index,
+        "place": relay.index(),
         "relays": relay.mission().relays(),
         "view": relay.view().number(),
         "version": relay.version(),
@@ -28,6 +35,7 @@ pub(crate) fn of_relay(relay: &Relay, name: impl Fn(u16) -> String) -> Value {
         "stands_down": relay.stands_down(),
         "ready": relay.is_ready(),
         "waits": waits::reasons(relay).map(|reason| reason.map(waits::word)),
+        "lost": lost.nodes(),
         "has_lease": relay.lease().is_some(),
         "upstream": upstream,
         "downstream": downstream,

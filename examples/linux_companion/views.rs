@@ -8,10 +8,11 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use uav_relay::wire::crc::CRC_32C;
-use uav_relay::{Instant, Relay, ViewRecord};
+use uav_relay::{Instant, RecordError, Relay, ViewRecord};
 
 use crate::gate::Gate;
 use crate::kept::Kept;
+use crate::relay::Refusal;
 use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--view-file";
@@ -32,19 +33,20 @@ impl Views {
     /// What was said before this start; nothing without a `file`, or if there is none yet.
     ///
     /// # Errors
-    /// One line that names the file and what is wrong: who has said something and forgotten it had better not vote.
-    pub(crate) fn load(file: Option<&Path>, gate: Gate) -> Result<Self, String> {
+    /// One line that names the file, what is wrong and what to do: a relay that has lost its votes must not vote again in the same flight.
+    pub(crate) fn load(file: Option<&Path>, gate: Gate) -> Result<Self, Refusal> {
         let stored = match file {
             None => None,
             Some(file) => match std::fs::read(file) {
-                Ok(bytes) => Some(parse(&bytes).ok_or_else(|| {
-                    named(
+                Ok(bytes) => Some(parse(&bytes).ok_or_else(|| Refusal {
+                    line: named(
                         file,
-                        "is damaged, or no record; remove it before another flight",
-                    )
+                        "is damaged, or no record of views: remove the file before the next flight, and start again",
+                    ),
+                    is_final: true,
                 })?),
                 Err(error) if error.kind() == ErrorKind::NotFound => None,
-                Err(error) => return Err(named(file, &format!("cannot be read: {error}"))),
+                Err(error) => return Err(named(file, &format!("cannot be read: {error}")).into()),
             },
         };
         Ok(Self {
@@ -94,9 +96,18 @@ impl Views {
     }
 }
 
-/// One line about a record that the relay does not take.
-pub(crate) fn refused(file: Option<&Path>, error: &str) -> String {
-    named(file.unwrap_or(Path::new("")), error)
+/// Returns the line about a record that the relay does not take.
+pub(crate) fn refused(file: Option<&Path>, error: RecordError) -> Refusal {
+    let what = match error {
+        RecordError::Base => format!(
+            "{error}: for a new flight remove the file, and start again; in the same flight start the relay with the mission that it had"
+        ),
+        _ => error.to_string(),
+    };
+    Refusal {
+        line: named(file.unwrap_or(Path::new("")), &what),
+        is_final: true,
+    }
 }
 
 fn parse(bytes: &[u8]) -> Option<ViewRecord> {

@@ -81,8 +81,8 @@ struct Options {
     /// Unix socket that answers each connection with one JSON object of all counters, and closes it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     status_socket: Option<PathBuf>,
-    /// Write every frame that comes or goes at the tty to a pcapng capture, for `cargo decode` and Wireshark. It takes the place of what was
-    /// there, and grows as long as the program runs
+    /// Write every frame that comes or goes at the tty to a pcapng capture, for `cargo decode` and Wireshark. Where FILE exists it is kept, and
+    /// FILE-2, FILE-3 and so on is written. It grows as long as the program runs
     #[arg(long, value_name = "FILE", help_heading = "Log")]
     capture: Option<PathBuf>,
     #[command(flatten)]

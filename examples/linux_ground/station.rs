@@ -8,7 +8,7 @@ use uav_relay::serial::SerialPort as _;
 use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Ground, Instant, Key, Progress};
 use uav_relay_linux::counters::counted;
-use uav_relay_linux::log::Log;
+use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::refusals::Refusals;
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::service::Service;
@@ -60,14 +60,13 @@ pub(crate) fn stand(plan: &Plan) -> Result<(), String> {
 
 impl<'a> Station<'a> {
     fn begin(plan: &'a Plan) -> Result<Self, String> {
-        let service = Service::begin(&plan.log, plan.status_socket.as_deref())?;
+        let source = Source {
+            name: name(plan.end).to_owned(),
+            key: "station",
+            value: name(plan.end).into(),
+        };
+        let service = Service::begin(&plan.log, source, plan.status_socket.as_deref())?;
         let mut tty = Replug::open("--tty", &plan.tty, plan.baud)?;
-        if let Some(capture) = &plan.capture {
-            let ports = [tty.to_string()];
-            for tap in tap::taps(env!("CARGO_BIN_NAME"), capture, &ports)? {
-                tty.tapped(tap);
-            }
-        }
         let measurements = plan.measurements.as_deref();
         let measurements = measurements
             .map(|from| Measurements::open(from, plan.end))
@@ -78,6 +77,14 @@ impl<'a> Station<'a> {
         };
         report::started(&service.log, plan, auth.epoch);
         config::tell(&plan.overrides, &service.log);
+        if let Some(asked) = &plan.capture {
+            let ports = [tty.to_string()];
+            let (taps, written) = tap::taps(env!("CARGO_BIN_NAME"), asked, &ports)?;
+            for tap in taps {
+                tty.tapped(tap);
+            }
+            tap::tell(&service.log, asked, &written);
+        }
         let mut ground = Ground::new(&plan.loaded, plan.end, plan.network, plan.wiring, auth);
         let begun = service.now();
         if let Some(upload) = plan.upload {
@@ -205,7 +212,12 @@ impl<'a> Station<'a> {
             hearing,
             ..
         } = self;
-        service.tend(time, "station", |log| {
+        service.tend(time, "station", |log, command| {
+            if let Some((command, _)) = command {
+                let text =
+                    format!("{command}: a station takes no commands; send nothing for its state");
+                return json!({ "done": false, "text": text });
+            }
             json!({
                 "program": env!("CARGO_BIN_NAME"),
                 "program_version": env!("CARGO_PKG_VERSION"),

@@ -351,6 +351,86 @@ fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
     assert!(vehicle.targets_since(from).len() > 20, "it stays engaged");
 }
 
+/// A new view: one text on each drone that flies, and none on a drone that waits or stands.
+#[test]
+fn the_operator_reads_one_text_for_a_view_and_that_a_mission_was_adopted() {
+    use uav_relay::Event;
+    use uav_relay::guard::HoldReason::Unheard;
+
+    let texts_since = |vehicle: &Vehicle, from: Instant| -> Vec<String> {
+        let texts = vehicle.said.iter().filter_map(|(at, said)| match said {
+            Said::Text(text) if *at >= from => Some(text.clone()),
+            _ => None,
+        });
+        texts.collect()
+    };
+    let view = |vehicle: &mut Vehicle, hold| -> Vec<String> {
+        let from = vehicle.now;
+        vehicle.link.handle_event(Event::Reformed);
+        vehicle.run(500);
+        vehicle.link.handle_event(Event::Converged);
+        for _ in 0..600 {
+            vehicle.link.handle_hold(vehicle.now, [None, hold]);
+            vehicle.run(20);
+        }
+        texts_since(vehicle, from)
+    };
+    let mut vehicle = Vehicle::new(Kind::ArduCopter);
+    vehicle.run(2_000);
+    assert_eq!(view(&mut vehicle, None), [""; 0], "on the ground");
+    vehicle.fly_off();
+    vehicle.run(2_000);
+    vehicle.engage();
+    vehicle.run(12_000);
+    assert_eq!(view(&mut vehicle, None), ["relay: flies to a new place"]);
+    let waits = "relay: waits, has not heard the next drone";
+    assert_eq!(
+        view(&mut vehicle, Some(Unheard)),
+        ["relay: flies to a new place", waits]
+    );
+    assert_eq!(
+        view(&mut vehicle, Some(Unheard)),
+        [""; 0],
+        "it was told why it waits"
+    );
+    // The places of one view move while the chain listens: not a word.
+    let from = vehicle.now;
+    for _ in 0..20 {
+        vehicle.link.handle_event(Event::Converged);
+        vehicle.link.handle_hold(vehicle.now, [None, Some(Unheard)]);
+        vehicle.run(1_000);
+    }
+    assert_eq!(texts_since(&vehicle, from), [""; 0]);
+    let from = vehicle.now;
+    vehicle.link.handle_event(Event::Adopted);
+    vehicle.run(500);
+    assert_eq!(
+        texts_since(&vehicle, from),
+        ["relay: a new mission was adopted"]
+    );
+}
+
+/// Reasons come and go while an agreement spreads.
+#[test]
+fn a_reason_that_does_not_last_is_not_told() {
+    use uav_relay::guard::HoldReason::Close;
+
+    let mut vehicle = Vehicle::new(Kind::ArduCopter);
+    vehicle.run(2_000);
+    vehicle.fly_off();
+    for i in 0..1_000 {
+        let reason = (i % 100 < 90).then_some(Close);
+        vehicle.link.handle_hold(vehicle.now, [reason, None]);
+        vehicle.run(20);
+    }
+    assert!(!vehicle.heard("relay: waits, may not yet near the drone before"));
+    for _ in 0..200 {
+        vehicle.link.handle_hold(vehicle.now, [Some(Close), None]);
+        vehicle.run(20);
+    }
+    assert!(vehicle.heard("relay: waits, may not yet near the drone before"));
+}
+
 #[test]
 fn the_operator_reads_why_the_guard_holds_the_relay_back() {
     use uav_relay::guard::HoldReason::{Order, Unheard};
@@ -363,7 +443,8 @@ fn the_operator_reads_why_the_guard_holds_the_relay_back() {
     assert!(!vehicle.heard(order), "on the ground nobody asks");
     vehicle.fly_off();
     for i in 0..3_000 {
-        let reason = if i % 7 == 0 { Unheard } else { Order };
+        // For 4 s, and for 3.5 s.
+        let reason = if i % 375 < 200 { Order } else { Unheard };
         vehicle.link.handle_hold(vehicle.now, [None, Some(reason)]);
         vehicle.run(20);
     }

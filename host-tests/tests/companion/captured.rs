@@ -167,3 +167,46 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
     station.signal(Signal::TERM);
     assert_eq!(station.end().status, Some(0));
 }
+
+/// A crash and a restart: the capture of the time before the crash is the record of it.
+#[test]
+fn a_restart_keeps_the_capture_of_the_start_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = |name: &str| folder.path().join(name);
+    let first = name("relay1.pcapng");
+    let mut chain = Chain::of_wires(2, QUIET);
+    let mut second = chain.relay(2);
+    chain.options = ["--capture", first.to_str().unwrap()]
+        .map(str::to_owned)
+        .to_vec();
+    let mut kept = Vec::new();
+    for (number, file) in (1..).zip([&first, &name("relay1-2.pcapng"), &name("relay1-3.pcapng")]) {
+        let mut relay = chain.relay(1);
+        if number > 1 {
+            let line = relay.line("capture: written to ");
+            let said = format!(
+                "written to {}, because {} holds an earlier capture",
+                file.display(),
+                first.display()
+            );
+            assert!(line.ends_with(&said), "{line}");
+        }
+        relay.line("converged: ");
+        std::thread::sleep(Duration::from_millis(300));
+        // A relay that is dropped is killed.
+        drop(relay);
+        assert!(!frames(file).is_empty(), "start {number}");
+        kept.push((file.clone(), std::fs::read(file).unwrap()));
+        for (file, bytes) in &kept {
+            assert!(std::fs::read(file).unwrap() == *bytes, "{}", file.display());
+        }
+    }
+    second.line("converged: ");
+    // A start that is refused leaves no file.
+    chain
+        .options
+        .extend(["--positions", "/dev/null"].map(str::to_owned));
+    let ended = chain.relay(1).end();
+    assert_eq!(ended.status, Some(1), "{ended:?}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+}

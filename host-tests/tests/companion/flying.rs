@@ -191,6 +191,8 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     let moving = all.iter().filter(|target| target.has_velocity());
     assert!(moving.count() > 40, "what moves is said with its velocity");
     assert!(!all.last().unwrap().has_velocity(), "the last one stands");
+    let line = flight.relay.line("arrived: ");
+    assert!(line.contains(" m from the agreed position, x "), "{line}");
     (flight, place)
 }
 

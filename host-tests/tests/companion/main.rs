@@ -2,8 +2,10 @@
 #![cfg(target_os = "linux")]
 
 mod astray;
+mod bench;
 mod binary;
 mod captured;
+mod cleared;
 mod datagrams;
 mod ending;
 mod file;
@@ -15,6 +17,7 @@ mod mavsdk;
 mod medium;
 mod mistrust;
 mod moved;
+mod numbered;
 mod options;
 mod peer;
 mod positions;

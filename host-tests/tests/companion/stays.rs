@@ -1,5 +1,6 @@
 //! What does not end a relay, nor holds it up: a port that vanishes, a reader that stops or goes, a full disk, a hang-up.
 
+use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -26,6 +27,8 @@ pub(crate) fn asked(socket: &Path) -> Value {
         }
     };
     stream.set_read_timeout(Some(LIMIT)).unwrap();
+    // No command follows, so the state comes at once.
+    let _ = stream.shutdown(Shutdown::Write);
     let mut text = String::new();
     stream.read_to_string(&mut text).unwrap();
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"))

@@ -98,6 +98,16 @@ fn three_that_are_started_again_stand_by_what_they_said() {
     }
 }
 
+/// The exit status after which the unit does not start the companion again.
+const NOT_RETRIED: i32 = 2;
+
+#[test]
+fn the_unit_does_not_retry_what_a_restart_cannot_mend() {
+    let unit = include_str!("../../../examples/linux_companion/uav-relay@.service");
+    let setting = format!("RestartPreventExitStatus={NOT_RETRIED}");
+    assert!(unit.lines().any(|line| line == setting), "{unit}");
+}
+
 /// Two of three are a quorum of the chain that was loaded, and none of a view that neither of them is in.
 #[test]
 fn two_that_remember_a_view_without_them_do_not_fly() {
@@ -122,7 +132,7 @@ fn a_file_that_is_of_no_use_is_named_and_nothing_is_flown() {
     let other = store(&file, &voted(digest(&loaded()) ^ 1, 3, 40, true));
     let mut damaged = good.clone();
     damaged[7] ^= 1;
-    let is_damaged = "is damaged, or no record; remove it before another flight";
+    let is_damaged = "is damaged, or no record of views: remove the file before the next flight, and start again";
     for (bytes, words) in [
         (damaged, is_damaged),
         (good[..good.len() - 1].to_vec(), is_damaged),
@@ -130,7 +140,8 @@ fn a_file_that_is_of_no_use_is_named_and_nothing_is_flown() {
         (Vec::new(), is_damaged),
         (
             other,
-            "the record is of a relay that was loaded with another mission",
+            "the record is of a relay that was loaded with another mission: for a new flight remove the file, and start again; in the same \
+             flight start the relay with the mission that it had",
         ),
     ] {
         std::fs::write(&file, &bytes).unwrap();
@@ -140,7 +151,11 @@ fn a_file_that_is_of_no_use_is_named_and_nothing_is_flown() {
             stderr,
         } = channel.start(1).end();
         let line = format!("--view-file {}: {words}", file.display());
-        assert_eq!((status, stderr), (Some(1), vec![line]), "{bytes:?}");
+        assert_eq!(
+            (status, stderr),
+            (Some(NOT_RETRIED), vec![line]),
+            "{bytes:?}"
+        );
         assert_eq!(stdout, Vec::<String>::new());
         assert_eq!(std::fs::read(&file).unwrap(), bytes);
     }

@@ -50,6 +50,9 @@ const FENCE_TOLD: Duration = Duration::from_millis(1_300);
 const SETTLED: Duration = Duration::from_millis(1_000);
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
+/// A reason of the guard is told once it has lasted for this time.
+const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
+
 /// The link to one autopilot.
 ///
 /// # Contract
@@ -88,6 +91,10 @@ pub struct Autopilot {
     ready: bool,
     /// The guard's reasons to hold the relay back that the operator has been told, upstream and downstream.
     hold: [Option<HoldReason>; 2],
+    /// The newest of these reasons, and the time since which they are the same.
+    newest_hold: ([Option<HoldReason>; 2], Instant),
+    /// True from a new view until its positions are agreed on.
+    is_new_view: bool,
     report: Report,
     position: Option<Position>,
     astray: Astray,
@@ -123,6 +130,8 @@ impl Autopilot {
             told_wait: None,
             ready: true,
             hold: [None; 2],
+            newest_hold: ([None; 2], now),
+            is_new_view: false,
             report: Report::default(),
             position: None,
             astray: Astray::default(),
@@ -255,11 +264,18 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Tells the operator why the guard holds the relay back, upstream and downstream, when that changes while the drone is engaged or in
-    /// [`State::Standby`]. Equal lines are at least 10 s apart.
-    pub fn handle_hold(&mut self, _now: Instant, reasons: [Option<HoldReason>; 2]) {
+    /// Tells the operator why the guard holds the relay back, upstream and downstream, while the drone is engaged or in [`State::Standby`]. A
+    /// change is told once it has lasted for 3 s, because reasons come and go while an agreement spreads. Equal lines are at least 10 s apart.
+    pub fn handle_hold(&mut self, now: Instant, reasons: [Option<HoldReason>; 2]) {
+        let now = self.clock.advance(now);
+        if self.newest_hold.0 != reasons {
+            self.newest_hold = (reasons, now);
+        }
         if matches!(self.state, State::Silent | State::Grounded) {
             self.hold = [None; 2];
+            return;
+        }
+        if now.since(self.newest_hold.1) < HOLD_SETTLED {
             return;
         }
         let before = core::mem::replace(&mut self.hold, reasons);
@@ -277,8 +293,20 @@ impl Autopilot {
         self.report.say(text)
     }
 
-    /// Takes an event of the relay: the operator reads of those that matter in flight.
+    /// Takes an event of the relay: the operator reads of those that matter in flight. Of a new view that is one line, on a drone that is
+    /// engaged: what keeps another one from its place is told by [`handle_hold`](Self::handle_hold) and by the reasons not to engage it.
     pub fn handle_event(&mut self, event: Event) {
+        match event {
+            Event::Reformed => self.is_new_view = true,
+            Event::Converged => {
+                let is_new = core::mem::take(&mut self.is_new_view);
+                if is_new && self.state == State::Engaged && self.hold == [None; 2] {
+                    let line = Line::info(Topic::Relay, "relay: flies to a new place");
+                    self.report.tell(line);
+                }
+            }
+            _ => {}
+        }
         if let Some(line) = Line::of(event) {
             self.report.tell(line);
         }

@@ -93,12 +93,11 @@ impl Line {
     /// Returns the line for an event of the relay, if operators are told of it.
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
-            Event::Converged => "relay: the chain has agreed on places",
             Event::Infeasible => "relay: no places meet any target",
             Event::NeighbourLost { .. } => "relay: a neighbour is lost",
-            Event::Reformed => "relay: the chain formed anew",
             Event::NoQuorum => "relay: too few others, holds its place",
             Event::LeaseLapsed => "relay: not certain of the others, holds",
+            Event::Adopted => "relay: a new mission was adopted",
             Event::UploadRefused { .. } => "relay: refused a mission: line or geofence",
             Event::IndexTaken { .. } => "relay: its number is used twice",
             _ => return None,

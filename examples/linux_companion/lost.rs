@@ -1,0 +1,170 @@
+//! Lost relays, and the operator's command to clear them: `clear-lost 3`.
+//!
+//! The guard keeps clear of a relay that fell silent, because its drone may still hover. Only a person can know that it has landed. The guard
+//! frees all of one side at once, so the command has to name every relay that is lost there.
+
+use std::collections::BTreeSet;
+
+use serde_json::{Value, json};
+use uav_relay::{Event, Instant, Relay, Side};
+
+use uav_relay_linux::log::Log;
+
+/// The command.
+pub(crate) const CLEAR: &str = "clear-lost";
+
+/// The relays that are lost, as far as this relay has noticed since its start.
+#[derive(Debug)]
+pub(crate) struct Lost {
+    index: u16,
+    /// Relays that were loaded.
+    relays: u16,
+    nodes: BTreeSet<u16>,
+}
+
+impl Lost {
+    /// Starts with no relay lost.
+    pub(crate) const fn new(index: u16, relays: u16) -> Self {
+        Self {
+            index,
+            relays,
+            nodes: BTreeSet::new(),
+        }
+    }
+
+    /// Takes an event of the relay.
+    pub(crate) fn event(&mut self, event: Event) {
+        match event {
+            Event::NeighbourLost { node, .. } if (1..=self.relays).contains(&node) => {
+                self.nodes.insert(node);
+            }
+            Event::NeighbourBack { node, .. } => {
+                self.nodes.remove(&node);
+            }
+            _ => {}
+        }
+    }
+
+    /// Returns the relays that are lost.
+    pub(crate) const fn nodes(&self) -> &BTreeSet<u16> {
+        &self.nodes
+    }
+
+    /// Does a command of `user`; returns the answer for the socket, and logs it.
+    pub(crate) fn command(
+        &mut self,
+        now: Instant,
+        log: &Log,
+        relay: &mut Relay,
+        command: &str,
+        user: &str,
+    ) -> Value {
+        let done = self.clear(now, relay, command);
+        let is_done = done.is_ok();
+        let (Ok(text) | Err(text)) = done;
+        let event = if is_done {
+            "cleared"
+        } else {
+            "command refused"
+        };
+        let fields = json!({ "command": command, "by": user });
+        log.say(
+            now,
+            event,
+            fields,
+            format_args!("{text} (`{command}` by {user})"),
+        );
+        json!({ "done": is_done, "text": text })
+    }
+
+    fn clear(&mut self, now: Instant, relay: &mut Relay, command: &str) -> Result<String, String> {
+        let mut words = command.split_whitespace();
+        if words.next() != Some(CLEAR) {
+            return Err(format!(
+                "no such command; there is {CLEAR} N, with the numbers of all lost relays on one side that have landed"
+            ));
+        }
+        let named: BTreeSet<u16> = words
+            .map(|word| self.number(relay, word))
+            .collect::<Result<_, _>>()?;
+        let side = match (named.first(), named.last()) {
+            (Some(first), _) if *first > self.index => Side::Downstream,
+            (_, Some(last)) if *last < self.index => Side::Upstream,
+            (None, _) => return Err(format!("name the relays that have landed: {CLEAR} N")),
+            _ => {
+                return Err(format!(
+                    "clear the relays before and after relay {} one after the other",
+                    self.index
+                ));
+            }
+        };
+        let on_side = |node: &u16| (*node > self.index) == (side == Side::Downstream);
+        let missing = self.nodes.iter().filter(|node| on_side(node));
+        let missing: Vec<u16> = missing.copied().filter(|it| !named.contains(it)).collect();
+        if !missing.is_empty() {
+            return Err(format!(
+                "{} lost there, too: have all of them landed? Then name all of them",
+                listed(missing)
+            ));
+        }
+        relay.clear_lost(now, side);
+        self.nodes.retain(|node| !named.contains(node));
+        let stream = match side {
+            Side::Upstream => "upstream",
+            Side::Downstream => "downstream",
+        };
+        Ok(format!(
+            "{} cleared: this relay keeps clear of no lost relay {stream} any more",
+            listed(named)
+        ))
+    }
+
+    /// Returns the number of a relay that can be lost.
+    fn number(&self, relay: &Relay, word: &str) -> Result<u16, String> {
+        let number = word.parse().ok();
+        let Some(number) = number.filter(|number| (1..=self.relays).contains(number)) else {
+            let most = self.relays;
+            return Err(format!("relay {word}: must be within 1 to {most}"));
+        };
+        if number == self.index {
+            return Err(format!("relay {number} is this relay"));
+        }
+        let is_heard = relay.neighbours().contains(&Some(number)) && !self.nodes.contains(&number);
+        if is_heard {
+            return Err(format!(
+                "relay {number} is heard, and is not lost; switch it off first if it has landed"
+            ));
+        }
+        Ok(number)
+    }
+}
+
+/// Returns `relay 3 is` or `relays 3, 4 are`.
+fn listed(nodes: impl IntoIterator<Item = u16>) -> String {
+    let nodes: Vec<String> = nodes.into_iter().map(|node| node.to_string()).collect();
+    match &nodes[..] {
+        [node] => format!("relay {node} is"),
+        _ => format!("relays {} are", nodes.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Lost;
+    use uav_relay::{Event, Side};
+
+    #[test]
+    fn a_relay_is_lost_until_it_is_heard_again() {
+        let mut lost = Lost::new(2, 4);
+        let side = Side::Downstream;
+        for node in [3, 4, 5] {
+            lost.event(Event::NeighbourLost { side, node });
+        }
+        lost.event(Event::NeighbourBack { side, node: 3 });
+        assert_eq!(
+            lost.nodes().iter().collect::<Vec<_>>(),
+            [&4],
+            "5 is the receiver"
+        );
+    }
+}

@@ -1,0 +1,246 @@
+//! Log lines about the flight to the agreed position: setpoints, and the arrival.
+//!
+//! With an autopilot the guard moves the setpoint several times a second, so a line is written for each 0.5 m and for the end of each move.
+//! Without one another program may fly the drone by these lines, so a line is written for each change.
+
+use serde_json::json;
+use uav_relay::{Duration, Instant, Placement, Relay};
+
+use crate::status::at;
+use uav_relay_linux::log::Log;
+
+/// Least change of the setpoint that is logged, m.
+const STEP_M: f32 = 0.5;
+
+/// A drone that is this close to its agreed position has arrived, m: autopilots hover up to 0.9 m off their target.
+const NEAR_M: f32 = 1.0;
+
+/// How long a setpoint has to stay the same, and a drone close to it, for the end of the move: an overshoot is not an arrival.
+const SETTLES: Duration = Duration::from_millis(2_000);
+
+/// A line to write.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Step {
+    /// The setpoint has changed.
+    Setpoint(Placement),
+    /// The drone is close to its agreed position: where that is, and how far the drone is from it, m.
+    Arrived(Placement, f32),
+}
+
+/// The setpoint and the drone's position, and the lines written about them.
+#[derive(Debug)]
+pub(crate) struct Movement {
+    /// True where only changes above [`STEP_M`] are logged.
+    is_sparse: bool,
+    logged: Option<Placement>,
+    newest: Option<Placement>,
+    changed_at: Instant,
+    /// True from a change above [`STEP_M`] until the exact end of the move is logged.
+    is_moving: bool,
+    /// True from a change above [`STEP_M`] until the arrival is logged.
+    is_on_its_way: bool,
+    near_since: Option<Instant>,
+}
+
+impl Movement {
+    /// Starts without a setpoint.
+    pub(crate) const fn new(is_sparse: bool) -> Self {
+        Self {
+            is_sparse,
+            logged: None,
+            newest: None,
+            changed_at: Instant::ZERO,
+            is_moving: false,
+            is_on_its_way: false,
+            near_since: None,
+        }
+    }
+
+    /// Takes the event that the setpoint has changed; returns the line to write.
+    pub(crate) fn changed(&mut self, now: Instant, relay: &Relay) -> Option<Step> {
+        if self.is_sparse {
+            return self.next(now, relay.setpoint(), relay.final_setpoint());
+        }
+        let setpoint = relay.setpoint()?;
+        self.log(setpoint);
+        Some(Step::Setpoint(setpoint))
+    }
+
+    /// Returns the line to write at `now` for a drone at `drone`, if there is one, and the time to look again.
+    pub(crate) fn look(
+        &mut self,
+        now: Instant,
+        relay: &Relay,
+        drone: Option<Placement>,
+    ) -> (Option<Step>, Option<Instant>) {
+        let (setpoint, agreed) = (relay.setpoint(), relay.final_setpoint());
+        if self.is_sparse
+            && let Some(step) = self.next(now, setpoint, agreed)
+        {
+            return (Some(step), Some(now));
+        }
+        let step = self.arrival(now, drone, setpoint.filter(|it| Some(*it) == agreed));
+        let end = self.changed_at + SETTLES;
+        let end = (self.is_sparse && self.is_moving).then_some(end);
+        let near = self.near_since.map(|since| since + SETTLES);
+        let near = near.filter(|_| self.is_on_its_way);
+        (step, end.into_iter().chain(near).min())
+    }
+
+    /// Returns the setpoint if it is to be logged.
+    fn next(
+        &mut self,
+        now: Instant,
+        setpoint: Option<Placement>,
+        agreed: Option<Placement>,
+    ) -> Option<Step> {
+        if self.newest != setpoint {
+            (self.newest, self.changed_at) = (setpoint, now);
+        }
+        let Some(place) = setpoint else {
+            *self = Self::new(self.is_sparse);
+            return None;
+        };
+        if self.logged.is_none_or(|it| apart_m(it, place) > STEP_M) {
+            self.log(place);
+            return Some(Step::Setpoint(place));
+        }
+        let is_end = setpoint == agreed || now.since(self.changed_at) >= SETTLES;
+        if self.is_moving && is_end {
+            self.is_moving = false;
+            if self.logged != setpoint {
+                self.logged = setpoint;
+                return Some(Step::Setpoint(place));
+            }
+        }
+        None
+    }
+
+    fn log(&mut self, place: Placement) {
+        self.logged = Some(place);
+        (self.is_moving, self.is_on_its_way) = (true, true);
+        self.near_since = None;
+    }
+
+    /// Returns the arrival at `goal`, the setpoint once it is the agreed position.
+    fn arrival(
+        &mut self,
+        now: Instant,
+        drone: Option<Placement>,
+        goal: Option<Placement>,
+    ) -> Option<Step> {
+        let near = drone.zip(goal);
+        let near = near.map(|(drone, goal)| (goal, apart_m(drone, goal)));
+        let Some((goal, off_m)) = near.filter(|(_, off_m)| *off_m <= NEAR_M) else {
+            self.near_since = None;
+            return None;
+        };
+        let since = *self.near_since.get_or_insert(now);
+        if !self.is_on_its_way || now.since(since) < SETTLES {
+            return None;
+        }
+        self.is_on_its_way = false;
+        Some(Step::Arrived(goal, off_m))
+    }
+}
+
+impl Step {
+    /// Writes the line. The setpoint is for people and other programs: `x_m` metres from the transmitter toward the receiver, `y_m` to the right
+    /// of that line as seen from above, at `altitude_m` above the ground; each number also as the bits of its f32.
+    pub(crate) fn tell(self, now: Instant, log: &Log) {
+        match self {
+            Self::Setpoint(place) => {
+                let [x, y, altitude] = [place.x_m, place.y_m, place.altitude_m]
+                    .map(|number| format!("{number:.3} (0x{:08x})", number.to_bits()));
+                log.say(
+                    now,
+                    "setpoint",
+                    at(place),
+                    format_args!("x {x} m, y {y} m, altitude {altitude} m"),
+                );
+            }
+            Self::Arrived(place, off_m) => {
+                let Placement {
+                    x_m,
+                    y_m,
+                    altitude_m,
+                } = place;
+                let fields =
+                    json!({ "x_m": x_m, "y_m": y_m, "altitude_m": altitude_m, "off_m": off_m });
+                log.say(
+                    now,
+                    "arrived",
+                    fields,
+                    format_args!(
+                        "{off_m:.1} m from the agreed position, x {x_m:.1} m, y {y_m:.1} m, altitude {altitude_m:.1} m"
+                    ),
+                );
+            }
+        }
+    }
+}
+
+fn apart_m(a: Placement, b: Placement) -> f32 {
+    (a.x_m - b.x_m)
+        .hypot(a.y_m - b.y_m)
+        .hypot(a.altitude_m - b.altitude_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Movement, Step};
+    use uav_relay::{Instant, Placement};
+
+    const fn along(x_m: f32) -> Placement {
+        Placement {
+            x_m,
+            y_m: 0.0,
+            altitude_m: 20.0,
+        }
+    }
+
+    /// A setpoint that moves by 0.1 m every 0.2 s is logged every 0.6 m and where it stops; a small change later is not.
+    #[test]
+    fn a_line_for_each_half_metre_and_the_exact_end() {
+        let mut movement = Movement::new(true);
+        let mut logged = Vec::new();
+        let mut steps = (0_u16..).map(|i| (Instant::from_millis(200 * u64::from(i)), i));
+        for (now, i) in steps.by_ref().take(24) {
+            let place = along(10.0 + 0.1 * f32::from(i.min(13)));
+            let step = movement.next(now, Some(place), Some(along(90.0)));
+            logged.extend(step);
+        }
+        let expected = [10.0, 10.6, 11.2, 10.0 + 0.1 * 13.0].map(|x_m| Step::Setpoint(along(x_m)));
+        assert_eq!(logged.len(), expected.len(), "{logged:?}");
+        assert_eq!(logged.last(), expected.last(), "the end is exact");
+        for (now, _) in steps.take(50) {
+            let step = movement.next(now, Some(along(11.6)), Some(along(11.6)));
+            assert_eq!(step, None);
+        }
+    }
+
+    /// Overshoot within 2 s is not an arrival; one arrival is logged for each move.
+    #[test]
+    fn a_drone_that_stays_has_arrived_once() {
+        let mut movement = Movement::new(true);
+        let goal = Some(along(50.0));
+        movement.next(Instant::ZERO, goal, goal);
+        let mut arrivals = Vec::new();
+        for i in 0..100_u64 {
+            let now = Instant::from_millis(100 * i);
+            let drone = along(match i {
+                10..20 => 50.4,
+                20..30 => 52.0,
+                30.. => 49.7,
+                _ => 40.0,
+            });
+            let step = movement.arrival(now, Some(drone), goal);
+            arrivals.extend(step.map(|step| (i, step)));
+        }
+        let [(50, Step::Arrived(place, off_m))] = arrivals[..] else {
+            panic!("{arrivals:?}");
+        };
+        assert_eq!(place, along(50.0));
+        assert!((off_m - 0.3).abs() < 1e-3, "{off_m}");
+    }
+}
