@@ -10,6 +10,7 @@ use serde_json::json;
 use uav_relay::{Channel, Instant, Interference, Profile};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::deployment::Deployment;
+use uav_relay_scenario::endpoint::FORM;
 use uav_relay_scenario::mission;
 
 use crate::log::Log;
@@ -117,6 +118,23 @@ impl Given {
         }
     }
 
+    /// Refuses what a file says of an autopilot that neither the file nor the command line has.
+    fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
+        let value_of = |name: &str| self.options.iter().find(|(option, _)| *option == name);
+        if value_of("--autopilot").is_some() || said(line, "--autopilot").is_some() {
+            return Ok(());
+        }
+        let key = OF_AUTOPILOTS
+            .iter()
+            .find_map(|(option, key)| Some((key, value_of(option)?.1.as_ref()?)));
+        key.map_or(Ok(()), |(key, value)| {
+            Err(format!(
+                "companion.{key} = {}: needs companion.autopilot, a tty or {FORM}; add that, or leave {key} out",
+                value.to_string_lossy()
+            ))
+        })
+    }
+
     /// The same less what the command line says, and less what it says otherwise; what of that is something else.
     fn less(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
         let mut overrides = Vec::new();
@@ -174,6 +192,13 @@ fn is_same(one: &str, other: &str) -> bool {
     // An option without a value is followed by any other word.
     one == other || other.is_empty() || numbers(one).is_some_and(|one| Some(one) == numbers(other))
 }
+
+/// Options of an autopilot, and the keys of a file that give them.
+const OF_AUTOPILOTS: [(&str, &str); 3] = [
+    ("--autopilot-baud", "autopilot_baud"),
+    ("--autopilot-key-file", "autopilot_key_file"),
+    ("--speed", "speed_m_s"),
+];
 
 /// Options of the command line, and those of a file whose place they take.
 const OTHERWISE: [(&str, &[&str]); 6] = [
@@ -235,6 +260,9 @@ pub fn read<T: Parser>(
             }));
         }
     }
+    given
+        .has_autopilot(&line)
+        .map_err(|error| format!("--config {name}: {error}"))?;
     let beyond = Beyond {
         overrides,
         ..beyond

@@ -6,9 +6,31 @@ use std::path::Path;
 
 use rustix::fs::{FileType, Mode, OFlags, fstat, open};
 use rustix::io::{Errno, read};
+use uav_relay_scenario::number::{narrow, watts};
 
 /// No line is longer, bytes.
 pub const LONGEST: usize = 200;
+
+/// What a line may say of a power.
+pub const POWER: &str =
+    "a power within 1e-30 to 1e6 W, or that in dBm with the unit behind it, as -95 dBm";
+
+/// Returns the power in W that the words of a line give: a number of W, or a number of dBm with that unit behind it. `None` for anything else and
+/// outside 1e-30 to 1e6 W.
+#[must_use]
+pub fn power_w(words: &[&str]) -> Option<f32> {
+    let number = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
+    let power_w = match words {
+        [power, "dBm"] => watts(number(power)?),
+        [power] => match power.strip_suffix("dBm") {
+            Some(power) => watts(number(power)?),
+            None => number(power)?,
+        },
+        _ => return None,
+    };
+    let power_w = narrow(power_w);
+    (1e-30..=1e6).contains(&power_w).then_some(power_w)
+}
 
 /// Buffers that are read at once, at most.
 const READS: usize = 16;

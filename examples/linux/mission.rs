@@ -20,10 +20,10 @@ pub struct MissionOptions {
     /// Distance from transmitter to receiver, m, 1 to 1e6
     #[arg(long, value_name = "M", default_value_t = 1000.0, allow_negative_numbers = true, value_parser = distance)]
     pub distance: f32,
-    /// Altitude of every relay, m, 0.1 to 1e5
+    /// Altitude of every relay, m, 0.1 to 1e4
     #[arg(long, value_name = "M", default_value_t = 20.0, allow_negative_numbers = true, value_parser = altitude)]
     pub altitude: f32,
-    /// Altitudes to choose from, m, 0.1 to 1e5, --altitude among them; without it that alone
+    /// Altitudes to choose from, m, 0.1 to 1e4, --altitude among them; without it that alone
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     pub band: Option<Band>,
     /// Room to the left of the line to the receiver, as y in m, -1e5 to 0, for places that `joint` chooses
@@ -127,12 +127,12 @@ pub fn distance(text: &str) -> Result<f32, String> {
     number(text, 1.0, 1e6)
 }
 
-/// m, 0.1 to 1e5.
+/// m, 0.1 to 1e4.
 ///
 /// # Errors
 /// What it must be, where it is not.
 pub fn altitude(text: &str) -> Result<f32, String> {
-    number(text, 0.1, 1e5)
+    number(text, 0.1, 1e4)
 }
 
 /// y, m, -1e5 to 0.
@@ -210,7 +210,7 @@ pub fn band(text: &str) -> Result<Band, String> {
         .split_once(',')
         .ok_or("must be two numbers: LEAST,MOST")?;
     Ok(Band {
-        least_m: named("LEAST", least, 0.1, 1e5)?,
-        most_m: named("MOST", most, 0.1, 1e5)?,
+        least_m: named("LEAST", least, 0.1, 1e4)?,
+        most_m: named("MOST", most, 0.1, 1e4)?,
     })
 }

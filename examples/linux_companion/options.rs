@@ -82,7 +82,7 @@ struct Options {
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 3_600_000))]
     dead_after_ms: u64,
     /// FIFO with a line `x_m y_m altitude_m` whenever the autopilot knows better where the drone is, twice a second or more often:
-    /// setpoints then keep drones apart on their way. With --listen a line may end with the interference that was heard there, W
+    /// setpoints then keep drones apart on their way. With --listen a line may end with the interference that was heard there, in W, or in dBm with that unit behind it
     #[arg(long, value_name = "FIFO")]
     positions: Option<PathBuf>,
     /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It is told where to fly, and tells where the

@@ -1,11 +1,12 @@
 //! Where the drone is, line by line from a FIFO: the autopilot's side writes `x_m y_m altitude_m` as often as it knows better, and behind
-//! that the interference that was heard there, W, if it was measured. `receiver power_w` is what the ground receiver hears.
+//! that the interference that was heard there, if it was measured: `1.2e-12` in W, or `-95 dBm`. `receiver POWER` is what the ground receiver
+//! hears.
 
 use std::os::fd::BorrowedFd;
 use std::path::Path;
 
 use uav_relay::{Duration, Instant, Placement, Sample};
-use uav_relay_linux::lines::{Fifo, LONGEST};
+use uav_relay_linux::lines::{self, Fifo, LONGEST, POWER};
 use uav_relay_linux::log::Log;
 
 /// A position older than this is not the drone's place any more.
@@ -100,9 +101,9 @@ fn refuse(now: Instant, log: &Log, listens: bool, bad: &mut u64, line: &[u8]) {
         format_args!(
             "{text:?} is not x_m y_m altitude_m{}; more of these are only counted",
             if listens {
-                " [power_w] or receiver power_w, a power within 1e-30 to 1e6"
+                format!(" [POWER] or receiver POWER, {POWER}")
             } else {
-                ""
+                String::new()
             }
         ),
     );
@@ -134,9 +135,8 @@ fn news(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
         .filter(|_| text.len() <= LONGEST)?;
     let words: Vec<&str> = text.split_whitespace().collect();
     let number = |word: &str| word.parse::<f32>().ok().filter(|number| number.is_finite());
-    let power = |word: &str| number(word).filter(|power_w| (1e-30..=1e6).contains(power_w));
-    if let ["receiver", power_w] = words[..] {
-        let power_w = power(power_w)?;
+    if let ["receiver", power @ ..] = words.as_slice() {
+        let power_w = lines::power_w(power)?;
         return Some((None, Some(Sample::Receiver { power_w })));
     }
     let [x, y, altitude, rest @ ..] = &words[..] else {
@@ -149,11 +149,10 @@ fn news(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
     };
     let sample = match rest {
         [] => None,
-        [power_w] => Some(Sample::Heard {
+        power => Some(Sample::Heard {
             at,
-            power_w: power(power_w)?,
+            power_w: lines::power_w(power)?,
         }),
-        _ => return None,
     };
     Some((Some(at), sample))
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use uav_relay::{Duration, Instant, Side};
-use uav_relay_linux::lines::{Begun, Fifo, LONGEST};
+use uav_relay_linux::lines::{self, Begun, Fifo, LONGEST, POWER};
 use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--measurements";
@@ -177,7 +177,7 @@ impl Measurements {
             now,
             "measurement",
             format_args!(
-                "{text:?} is not power_w or {own} power_w, a power within 1e-30 to 1e6; more of these are only counted"
+                "{text:?} is not POWER or {own} POWER, {POWER}; more of these are only counted"
             ),
         );
     }
@@ -268,17 +268,14 @@ pub(crate) const fn name(end: Side) -> &'static str {
     }
 }
 
-/// A power, W, alone or behind the name of this end.
+/// Returns a power, W, that stands alone or behind the name of this end, in W or in dBm.
 fn level(text: &[u8], end: Side) -> Option<f32> {
     let text = std::str::from_utf8(text)
         .ok()
         .filter(|_| text.len() <= LONGEST)?;
     let words: Vec<&str> = text.split_whitespace().collect();
-    let power = match words[..] {
-        [power] => power,
-        [whose, power] if whose == name(end) => power,
-        _ => return None,
-    };
-    let power_w: f32 = power.parse().ok()?;
-    (1e-30..=1e6).contains(&power_w).then_some(power_w)
+    match words.as_slice() {
+        [whose, power @ ..] if *whose == name(end) => lines::power_w(power),
+        power => lines::power_w(power),
+    }
 }

@@ -28,10 +28,10 @@ pub(crate) struct NewOptions {
     /// New distance from transmitter to receiver, m, 1 to 1e6
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = distance)]
     new_distance: Option<f32>,
-    /// New altitude of every relay, m, 0.1 to 1e5
+    /// New altitude of every relay, m, 0.1 to 1e4
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = altitude)]
     new_altitude: Option<f32>,
-    /// New altitudes to choose from, m, 0.1 to 1e5; without it those of --band, or the new altitude alone
+    /// New altitudes to choose from, m, 0.1 to 1e4; without it those of --band, or the new altitude alone
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     new_band: Option<Band>,
     /// New room to the left of the line to the receiver, as y in m, -1e5 to 0

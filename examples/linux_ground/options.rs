@@ -66,7 +66,7 @@ struct Options {
     #[command(flatten)]
     new: NewOptions,
     /// How strong the interference is here, line by line: a FIFO, a file whose last line counts, or `udp:PORT` or `udp:HOST:PORT` to be
-    /// told there. A line is the mean power that is received here, W, 1e-30 to 1e6. The relays near by are told of it, those that --listen
+    /// told there. A line is the mean power that is received here, W, 1e-30 to 1e6, or dBm with that unit behind it, as -95 dBm. The relays near by are told of it, those that --listen
     #[arg(
         long,
         value_name = "FIFO|FILE|udp:[HOST:]PORT",

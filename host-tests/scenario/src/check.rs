@@ -1,6 +1,5 @@
-//! A file against the table of keys: shape, known and required keys, ranges; and the words for a wrong type.
+//! A file against the table of keys: shape, known and required keys, types, ranges.
 
-use serde_path_to_error::Segment;
 use toml::{Table, Value};
 
 use crate::deployment_keys::SECTIONS;
@@ -26,7 +25,7 @@ pub(super) fn mistake(
     }
 }
 
-/// Checks shape, known and required keys, and every range. A scalar of the wrong type is left for serde to find.
+/// Checks shape, known and required keys, types, and every range.
 pub(super) fn table(file: &str, table: &Table) -> Result<(), ScenarioError> {
     Check { file }.table("", table, sections())
 }
@@ -129,9 +128,11 @@ impl Check<'_> {
             ))
         };
         match (rule, value) {
+            (LinkOrNumber(_), Value::String(link)) if link == "los" || link == "nlos" => Ok(()),
             (Number(range) | LinkOrNumber(range), _) => match as_number(value) {
-                Some(number) if !range.holds(number) => fail(Problem::OutOfRange),
-                _ => Ok(()),
+                Some(number) if range.holds(number) => Ok(()),
+                Some(_) => fail(Problem::OutOfRange),
+                None => fail(Problem::WrongType),
             },
             (Whole(range), Value::Integer(whole)) if !range.holds(*whole as f64) => {
                 fail(Problem::OutOfRange)
@@ -146,7 +147,9 @@ impl Check<'_> {
             (Rule::Choice(texts), Value::String(text)) if !texts.contains(&text.as_str()) => {
                 fail(Problem::UnknownChoice)
             }
-            (Whole(_) | Rule::Flag | Rule::Text | Rule::TtyOrUdp | Rule::Choice(_), _) => Ok(()),
+            (Whole(_), Value::Integer(_))
+            | (Rule::Flag, Value::Boolean(_))
+            | (Rule::Text | Rule::Choice(_), Value::String(_)) => Ok(()),
             (Rule::Table(keys), Value::Table(table)) => self.table(path, table, *keys),
             (Rule::Tables(_, least), Value::Array(list)) if list.len() < *least => {
                 fail(Problem::EmptyList)
@@ -162,7 +165,7 @@ impl Check<'_> {
                 fail(Problem::NoTable)
             }
             // serde would take a list for a table, field by field; nobody who writes one means that.
-            (Rule::Table(_) | Rule::Tables(..), _) => fail(Problem::WrongType),
+            _ => fail(Problem::WrongType),
         }
     }
 }
@@ -199,40 +202,13 @@ fn as_number(value: &Value) -> Option<f64> {
     }
 }
 
-/// The mistake at a path that serde stumbled over: in a file that passed [`table`], a scalar of the wrong type.
-pub(super) fn wrong_type(
-    file: &str,
-    table: &Table,
-    path: &serde_path_to_error::Path,
-) -> ScenarioError {
-    let mut value = None;
-    let mut allowed = format!("the keys {}", names(sections()));
-    let mut keys: Vec<&Key> = sections().collect();
-    let mut here = Some(table);
-    let mut list = None;
-    for segment in path {
-        match segment {
-            Segment::Map { key } => {
-                let Some(known) = keys.iter().find(|known| known.name == key).copied() else {
-                    break;
-                };
-                value = here.and_then(|table| table.get(key));
-                allowed = known.rule.to_string();
-                if let Rule::Table(inner) | Rule::Tables(inner, _) = known.rule {
-                    keys = inner.iter().collect();
-                }
-            }
-            Segment::Seq { index } => value = list.and_then(|list: &Vec<Value>| list.get(*index)),
-            Segment::Enum { .. } | Segment::Unknown => break,
-        }
-        here = value.and_then(Value::as_table);
-        list = value.and_then(Value::as_array);
+/// The error for a table that serde refuses after [`table`] has passed it: the table of keys and the typed form differ.
+pub(super) fn unread(file: &str, error: &toml::de::Error) -> ScenarioError {
+    ScenarioError {
+        file: file.to_owned(),
+        key: None,
+        value: None,
+        problem: Problem::WrongType,
+        allowed: error.message().to_owned(),
     }
-    mistake(
-        file,
-        &path.to_string(),
-        value.map(quote),
-        Problem::WrongType,
-        allowed,
-    )
 }

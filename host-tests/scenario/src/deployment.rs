@@ -8,7 +8,7 @@ use toml::Table;
 
 use crate::check;
 use crate::deployment_keys::SECTIONS;
-use crate::error::ScenarioError;
+use crate::error::{Problem, ScenarioError};
 
 /// The number of the network where none is given: what every tool assumes, so that they agree.
 pub const NETWORK: u16 = 1;
@@ -124,6 +124,25 @@ pub(super) fn split(mut table: Table) -> (Table, Table) {
 
 /// The typed form of sections that [`check::table`] has passed.
 pub(super) fn from_table(file: &str, sections: &Table) -> Result<Deployment, ScenarioError> {
-    serde_path_to_error::deserialize(sections.clone())
-        .map_err(|error| check::wrong_type(file, sections, error.path()))
+    let sections = sections.clone();
+    sections
+        .try_into()
+        .map_err(|error| check::unread(file, &error))
+}
+
+/// Refuses a `[network]` whose number of relays is not that of a plan.
+///
+/// # Errors
+/// Names the key, its value and the number of the plan.
+pub fn agree(file: &str, relays: Option<u16>, planned: Option<u16>) -> Result<(), ScenarioError> {
+    match (relays, planned) {
+        (Some(relays), Some(planned)) if relays != planned => Err(check::mistake(
+            file,
+            "network.relays",
+            Some(relays.to_string()),
+            Problem::OtherNumber,
+            format!("{planned}, the number of relays of the plan; or leave network.relays out"),
+        )),
+        _ => Ok(()),
+    }
 }

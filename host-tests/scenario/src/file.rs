@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::Table;
 
-use crate::check::{mistake, wrong_type};
+use crate::check::{mistake, unread};
 use crate::error::{Problem, ScenarioError};
 use crate::interferer::{RawSource, Room, sources};
 use crate::keys::number;
@@ -134,8 +134,8 @@ struct RawPlan {
 
 /// The typed form of a table that [`crate::check::table`] has passed.
 pub(super) fn from_table(file: &str, table: &Table) -> Result<RawFile, ScenarioError> {
-    serde_path_to_error::deserialize(table.clone())
-        .map_err(|error| wrong_type(file, table, error.path()))
+    let table = table.clone();
+    table.try_into().map_err(|error| unread(file, &error))
 }
 
 /// The scenario, once its keys agree with each other.

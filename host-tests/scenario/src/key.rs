@@ -5,12 +5,36 @@ use std::path::Path;
 /// Reads the key in `file`, which `option` named.
 ///
 /// # Errors
-/// One line that names both and what is wrong with it; never what is in it.
+/// One line that names both and what is wrong with it, a file that every user of the computer can read among that; never what is in it.
 pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
     let named = |error: &str| format!("{option} {}: {error}", file.display());
+    check_mode(file).map_err(|error| named(&error))?;
     let text = std::fs::read_to_string(file)
         .map_err(|error| named(&format!("cannot be read: {error}")))?;
     parse(&text).map_err(named)
+}
+
+/// Refuses a file that users other than its owner and its group can read or write. A file that cannot be opened is left to the reader.
+#[cfg(unix)]
+fn check_mode(file: &Path) -> Result<(), String> {
+    use std::os::unix::fs::PermissionsExt as _;
+    const OTHERS: u32 = 0o006;
+    match std::fs::metadata(file) {
+        Ok(about) if about.is_file() && about.permissions().mode() & OTHERS != 0 => {
+            let mode = about.permissions().mode() & 0o777;
+            Err(format!(
+                "mode {mode:04o}: other users of this computer can read or write the key; allowed: at most 0660; type: chmod 600 {}",
+                file.display()
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Elsewhere a file has no mode.
+#[cfg(not(unix))]
+fn check_mode(_: &Path) -> Result<(), String> {
+    Ok(())
 }
 
 /// The key in `text`; white space around it does not count.

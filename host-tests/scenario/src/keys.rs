@@ -111,7 +111,8 @@ const fn without(others: &'static [&'static str], name: &'static str, rule: Rule
 
 use Rule::{LinkOrNumber, Number, Whole};
 
-const ALTITUDE: Range = range(0.1, 1e5, "m");
+// Up to the altitude of aircraft.
+const ALTITUDE: Range = range(0.1, 1e4, "m");
 const POWER: Range = range(1e-6, 1e6, "W");
 const POWER_DBM: Range = range(-30.0, 90.0, "dBm");
 const SOURCE_DBM: Range = range(-30.0, 120.0, "dBm");

@@ -10,8 +10,8 @@
 //! | [`key`] | the network's key, or an autopilot's, from a file |
 //! | [`number`] | from the f64 of files to the f32 of relays |
 //!
-//! A file is read in three passes, each with one job: `check` compares its shape, its keys and every range with
-//! the table in `keys`; serde checks the types; `file` checks what only several keys together can break.
+//! A file is read in three passes, each with one job: `check` compares its shape, its keys, their types and every range with the table in
+//! `keys`; serde makes typed values of them; `file` checks what only several keys together can break.
 //! Whatever is wrong comes back as a [`ScenarioError`], one line that names the file, the key, the value and
 //! what is allowed.
 
@@ -77,11 +77,24 @@ impl deployment::Deployment {
     /// Reads both parts of a file: the scenario, and the sections.
     ///
     /// # Errors
-    /// As [`Scenario::load`].
+    /// As [`Scenario::load`], and a number of relays in `[network]` that is not that of `[plan]`.
     pub fn load(path: &Path) -> Result<(Scenario, Self), ScenarioError> {
         let (name, text) = (path.display().to_string(), read::text_of(path)?);
         let scenario = Scenario::parse(&name, &text)?;
-        let (_, sections) = deployment::split(read::table_of(&name, &text)?);
-        Ok((scenario, deployment::from_table(&name, &sections)?))
+        let sections = Self::parse(&name, &text)?;
+        let planned = scenario.plan.as_ref().map(|plan| plan.uavs);
+        deployment::agree(&name, sections.network.relays, planned)?;
+        Ok((scenario, sections))
+    }
+
+    /// Reads the sections of a file whose plan is about to be replaced; `file_name` only serves the error message.
+    ///
+    /// # Errors
+    /// TOML that does not parse, and any mistake in a section.
+    pub fn parse(file_name: &str, text: &str) -> Result<Self, ScenarioError> {
+        let table = read::table_of(file_name, text)?;
+        check::table(file_name, &table)?;
+        let (_, sections) = deployment::split(table);
+        deployment::from_table(file_name, &sections)
     }
 }

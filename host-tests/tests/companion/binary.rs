@@ -1,4 +1,4 @@
-//! The programs. `cargo test` at the root has built them already, `cargo test -p host-tests` has not, and there is
+//! The programs. `cargo test --workspace` has built them already, `cargo test -p host-tests` has not, and there is
 //! no variable with its place as there is for a package's own binaries: so cargo is asked, which builds what is missing.
 
 use std::path::{Path, PathBuf};

@@ -145,7 +145,27 @@ fn what_is_wrong_with_the_file_is_named() {
         ),
         (
             "[companion]\nspeed_m_s = 5.0",
-            &["--autopilot", "not provided"],
+            &[
+                "--config",
+                "companion.speed_m_s = 5: needs companion.autopilot, a tty or udp:HOST:PORT",
+                "leave speed_m_s out",
+            ],
+        ),
+        (
+            "[companion]\nautopilot_baud = 57600",
+            &[
+                "--config",
+                "companion.autopilot_baud = 57600: needs companion.autopilot, a tty or udp:HOST:PORT",
+                "leave autopilot_baud out",
+            ],
+        ),
+        (
+            "[companion]\nautopilot_key_file = \"key\"",
+            &[
+                "--config",
+                "companion.autopilot_key_file = ",
+                "needs companion.autopilot",
+            ],
         ),
         (
             "[companion]\nkey = 5",

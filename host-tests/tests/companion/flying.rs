@@ -66,7 +66,7 @@ impl Flight {
         let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
         let file = |name: &str, key: Option<&str>| {
             let name = path(name);
-            key.map(|key| std::fs::write(&name, key).unwrap())?;
+            key.map(|key| crate::signed::write_key(&name, key))?;
             Some(name)
         };
         let (link, [theirs, ours]) = (path("tty"), keys);

@@ -45,9 +45,10 @@ fn one_finds_the_interferer_by_its_fifo() {
         let power_w = scene.interference_w(at);
         writeln!(lines, "{x_m} {y_m} {altitude_m} {power_w:e}").unwrap();
     }
-    writeln!(lines, "receiver {:e}", scene.interference_rx_w()).unwrap();
+    let receiver_dbm = 10.0 * scene.interference_rx_w().log10() + 30.0;
+    writeln!(lines, "receiver {receiver_dbm} dBm").unwrap();
     write(&fifo, &lines);
-    relay.line("position: \"1 2 3 0\" is not x_m y_m altitude_m [power_w] or receiver power_w, a power within 1e-30 to 1e6");
+    relay.line("position: \"1 2 3 0\" is not x_m y_m altitude_m [POWER] or receiver POWER, a power within 1e-30 to 1e6 W, or that in dBm with the unit behind it, as -95 dBm");
     let believed = relay.line("believed: interferer ");
     let [power_w, x_m, y_m] = bits(&believed)[..3] else {
         panic!("{believed}");

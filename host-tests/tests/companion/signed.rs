@@ -9,6 +9,13 @@ use crate::medium::{Noise, QUIET};
 use crate::process::{Ended, Relay};
 use crate::{Chain, simulated};
 
+/// Writes a key as a key is to be kept: for its owner alone.
+pub(crate) fn write_key(file: impl AsRef<Path>, key: &str) {
+    use std::os::unix::fs::PermissionsExt as _;
+    std::fs::write(&file, key).unwrap();
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).unwrap();
+}
+
 /// A file with a key, and a folder for the epochs of relays.
 pub(crate) struct Files(tempfile::TempDir);
 
@@ -25,7 +32,7 @@ impl Files {
     }
 
     fn write(&self, name: &str, text: &str) {
-        std::fs::write(self.path(name), text).unwrap();
+        write_key(self.path(name), text);
     }
 
     pub(crate) fn options(&self, key: &str, epoch: &str) -> Vec<String> {

@@ -137,10 +137,12 @@ fn three_relays_know_what_both_stations_measure() {
             .contains("\"end\":\"transmitter\"")
     );
     rx.line("started: receiver of 3 relays, ");
-    rx.line("measurement: \"nonsense\" is not power_w or receiver power_w");
+    rx.line("measurement: \"nonsense\" is not POWER or receiver POWER, a power within 1e-30 to 1e6 W, or that in dBm");
     let meter = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     let to = format!("127.0.0.1:{port}");
-    meter.send_to(format!("{tx_w:e}").as_bytes(), &to).unwrap();
+    // As a spectrum analyser shows it.
+    let tx_dbm = format!("{} dBm", 10.0 * f64::log10(tx_w) + 30.0);
+    meter.send_to(tx_dbm.as_bytes(), &to).unwrap();
     std::fs::write(&level, format!("1\nreceiver {rx_w:e}\nhalf a li")).unwrap();
     tx.line("\"event\":\"back\"");
     rx.line("back: relay 3 is heard");

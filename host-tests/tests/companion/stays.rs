@@ -406,7 +406,7 @@ fn a_slow_disk_holds_up_what_is_sent_and_nothing_else() {
 fn an_epoch_that_cannot_be_kept_is_refused_at_the_start() {
     let folder = tempfile::tempdir().unwrap();
     let key = folder.path().join("key");
-    std::fs::write(&key, "5ec2".repeat(16)).unwrap();
+    crate::signed::write_key(&key, &"5ec2".repeat(16));
     let Ended { status, stderr, .. } = Relay::start(&[
         "--index",
         "1",

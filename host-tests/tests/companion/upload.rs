@@ -312,7 +312,7 @@ fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
         ),
         (
             &["--new-altitude", "0"],
-            &["--new-altitude", "'0'", "0.1 to 100000.0"],
+            &["--new-altitude", "'0'", "0.1 to 10000.0"],
         ),
         (
             &["--new-band", "30,300"],

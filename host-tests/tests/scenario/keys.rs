@@ -16,7 +16,7 @@ struct Row {
 
 type Values = [&'static str; 4];
 
-const ALTITUDES: (Values, &str) = (["0.0999", "0.1", "1e5", "100000.1"], "0.1 to 1e5 m");
+const ALTITUDES: (Values, &str) = (["0.0999", "0.1", "1e4", "10000.1"], "0.1 to 10000 m");
 const POWERS: (Values, &str) = (["0.9e-6", "1e-6", "1e6", "1000001"], "1e-6 to 1e6 W");
 const POWERS_DBM: (Values, &str) = (["-30.1", "-30", "90", "90.1"], "-30 to 90 dBm");
 const SOURCES_DBM: (Values, &str) = (["-30.1", "-30", "120", "120.1"], "-30 to 120 dBm");
@@ -41,7 +41,7 @@ fn geometry_and_power_rows() -> Vec<Row> {
     let geometry = |lines: &str| format!("[geometry]\n{lines}\n{POWER}{INTERFERER}");
     let distances = (["0.99", "1", "1e6", "1000000.5"], "1 to 1e6 m");
     let separations = (["-1e-9", "0", "1e5", "100001"], "0 to 1e5 m");
-    let low = "distance_m = 9\naltitude_m = 1e5\naltitude_min_m = @";
+    let low = "distance_m = 9\naltitude_m = 1e4\naltitude_min_m = @";
     let high = "distance_m = 9\naltitude_m = 0.1\naltitude_max_m = @";
     let left = "distance_m = 9\naltitude_m = 9\nlateral_min_m = @";
     let right = "distance_m = 9\naltitude_m = 9\nlateral_max_m = @";
@@ -308,7 +308,7 @@ fn every_required_key_is_missed() {
     refused(
         &format!("{POWER}{INTERFERER}"),
         Problem::Missing,
-        &["geometry.altitude_m is missing", "0.1 to 1e5 m"],
+        &["geometry.altitude_m is missing", "0.1 to 10000 m"],
     );
     refused(
         &format!("{GEOMETRY}{INTERFERER}"),

@@ -67,7 +67,7 @@ fn what_is_wrong_with_a_plan_is_named() {
         (
             plan("altitude_m = 30", "altitude_m = 0"),
             Problem::OutOfRange,
-            ["plan.places[0].altitude_m = 0", "0.1 to 1e5 m"],
+            ["plan.places[0].altitude_m = 0", "0.1 to 10000 m"],
         ),
         (
             plan("x_m = 4", "x_m = 1e8"),

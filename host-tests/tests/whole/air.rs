@@ -282,7 +282,8 @@ impl Air {
             }
             Deed::Step(at, by_us) => {
                 let drone = &mut self.drones[at];
-                drone.ahead_us = (drone.ahead_us + by_us).max(-(self.now_us as i64));
+                let least = i64::try_from(self.now_us).map_or(i64::MIN, |now_us| -now_us);
+                drone.ahead_us = (drone.ahead_us + by_us).max(least);
                 return Some(at);
             }
         }
@@ -418,14 +419,6 @@ impl Air {
             (count == usize::from(one.relays)).then_some(count)
         };
         holding.iter().filter_map(of).max().unwrap_or(0)
-    }
-
-    /// Views that the relays have accepted, in all.
-    pub(crate) fn views(&self) -> u32 {
-        self.drones
-            .iter()
-            .map(|drone| drone.relay.stats().views)
-            .sum()
     }
 
     /// Whether all relays are on, in one view of them all, and have a setpoint in it.

@@ -182,19 +182,88 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
     }
 }
 
+/// All hops share one frequency: the rate of the worst hop is divided by the slots, one for each hop.
 #[test]
-fn rates_are_those_of_the_sir() {
-    let report = json(&["--uavs", "8", "--bandwidth-hz", "1e7"]);
-    let expected = 1e7 * (1.0 + number(&report["sir"])).log2();
-    assert!((number(&report["rate_bps"]) / expected - 1.0).abs() < 1e-12);
-    // 2 bit/s and hertz take an SIR of 3, in either way of asking.
-    let by_rate = json(&["--target-rate-bps", "2e7", "--bandwidth-hz", "1e7"]);
-    let by_sir = json(&["--target-sir", "3"]);
-    assert!((number(&by_rate["target_sir"]) - 3.0).abs() < 1e-12);
-    assert_eq!(by_rate["uavs"], by_sir["uavs"]);
-    assert!(number(&by_rate["rate_bps"]) >= 2e7 * (1.0 - 1e-5));
-    let (status, line) = refusal(&["--target-rate-bps", "1e12", "--bandwidth-hz", "1"]);
-    assert!(status == 2 && line.contains("--target-rate-bps"), "{line}");
+fn rates_are_divided_by_the_slots() {
+    for relays in [1_u32, 4, 8] {
+        let uavs = relays.to_string();
+        let report = json(&["--uavs", &uavs, "--bandwidth-hz", "1e7"]);
+        let hop = 1e7 * (1.0 + number(&report["sir"])).log2();
+        let slots = relays + 1;
+        assert!((number(&report["hop_rate_bps"]) / hop - 1.0).abs() < 1e-12);
+        assert!((number(&report["rate_bps"]) / (hop / f64::from(slots)) - 1.0).abs() < 1e-12);
+        assert_eq!(report["slots"].as_u64(), Some(slots.into()));
+        assert_eq!(report["best_uavs"].as_u64(), Some(1), "{report}");
+        assert!((number(&report["best_rate_bps"]) / 6.58e6 - 1.0).abs() < 1e-3);
+        assert_eq!(report["best_is_proven"].as_bool(), Some(true), "{report}");
+    }
+    let output = plan(&["--uavs", "12", "--bandwidth-hz", "1e7"]);
+    let table = String::from_utf8(output.stdout).unwrap();
+    for part in [
+        "data rate: 1.57",
+        "e6 bit/s: 13 hops share one frequency in 13 equal time slots, and the worst hop carries ",
+        "largest data rate: 1 relay carries 6.58",
+        "e6 bit/s; no other number carries more\n",
+    ] {
+        assert!(table.contains(part), "{part}: {table}");
+    }
+    // Without a bandwidth there is no rate.
+    assert!(json(&["--uavs", "2"])["rate_bps"].is_null());
+}
+
+#[test]
+fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
+    let report = json(&["--target-rate-bps", "6e6", "--bandwidth-hz", "1e7"]);
+    assert_eq!(report["uavs"].as_u64(), Some(1), "{report}");
+    assert!(number(&report["rate_bps"]) >= 6e6);
+    // Twelve relays give every hop 20 Mbit/s, while it sends; the chain carries a thirteenth of it.
+    let (status, line) = refusal(&["--target-rate-bps", "2e7", "--bandwidth-hz", "1e7"]);
+    assert_eq!(status, 1, "{line}");
+    for part in [
+        "--target-rate-bps 20000000.0: no number of relays carries it: all hops share one frequency in equal time slots",
+        "1 relay carries 6.58",
+        "--bandwidth-hz",
+    ] {
+        assert!(line.contains(part), "{part}: {line}");
+    }
+    // In noise alone more relays carry more, up to a number.
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let noisy = "[geometry]\ndistance_m = 10000\naltitude_m = 20\n[power]\ntx_w = 1\nuav_w = 1\n[channel]\nexcess_loss_los_db = 30\n\
+                 excess_loss_nlos_db = 50\n[noise]\nbandwidth_hz = 1e7\n[[interferer]]\npower_w = 1e-6\nx_m = 5000\ny_m = 1e6\n";
+    std::fs::write(file.path(), noisy).unwrap();
+    let path = file.path().to_str().unwrap();
+    let ask =
+        |more: &[&str]| json(&[&["--scenario", path, "--bandwidth-hz", "1e7"], more].concat());
+    let one = ask(&["--uavs", "1"]);
+    let best = one["best_uavs"].as_u64().unwrap();
+    assert!(best > 1, "{one}");
+    assert!(number(&one["best_rate_bps"]) > number(&one["rate_bps"]));
+    let at_best = ask(&["--uavs", &best.to_string()]);
+    assert_eq!(at_best["rate_bps"], one["best_rate_bps"]);
+    for beside in [best - 1, best + 1] {
+        let rate = number(&ask(&["--uavs", &beside.to_string()])["rate_bps"]);
+        assert!(rate <= number(&one["best_rate_bps"]), "{beside}: {rate}");
+    }
+    // The fewest that do, and not those that carry most.
+    let half = 0.5 * (number(&one["rate_bps"]) + number(&one["best_rate_bps"]));
+    let met = ask(&["--target-rate-bps", &format!("{half:?}")]);
+    let uavs = met["uavs"].as_u64().unwrap();
+    assert!(uavs > 1 && uavs <= best, "{met}");
+    let fewer = ask(&["--uavs", &(uavs - 1).to_string()]);
+    assert!(number(&fewer["rate_bps"]) < half, "{fewer}");
+}
+
+#[test]
+fn the_answer_names_what_the_model_leaves_out() {
+    for arguments in [&["--uavs", "3"][..], &["--target-sir", "3"]] {
+        let table = String::from_utf8(plan(arguments).stdout).unwrap();
+        assert!(
+            table.contains(
+                "; not modelled: terrain and obstacles, and the link from Rx back to Tx\n"
+            ) && table.contains("in this model no "),
+            "{table}"
+        );
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! `cargo page`: the page in one file, `target/page/index.html`, which needs no server and nothing from elsewhere.
+//! `cargo page`: the page in one file, `page/index.html` in the target folder, which needs no server and nothing from elsewhere.
 
 use std::error::Error;
 use std::io::Write as _;
@@ -56,17 +56,11 @@ fn main() -> ExitCode {
 fn build() -> Result<PathBuf, Box<dyn Error>> {
     let own = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = own.ancestors().nth(3).ok_or("no folder above")?;
-    let target = root.join("target");
+    let target = target_directory(&mut Command::new("cargo"), root)?;
     add_target()?;
     let built = Command::new("cargo")
         .current_dir(root)
-        .args([
-            "build",
-            "--quiet",
-            "--locked",
-            "--package",
-            "uav-relay-page",
-        ])
+        .args(["build", "--locked", "--package", "uav-relay-page"])
         .args(["--lib", "--target", TARGET, "--profile", "browser"])
         .status()?;
     if !built.success() {
@@ -102,6 +96,17 @@ fn build() -> Result<PathBuf, Box<dyn Error>> {
     Ok(file)
 }
 
+/// Returns the target folder as cargo has it: `target`, or that of `CARGO_TARGET_DIR` or of a configuration file.
+fn target_directory(cargo: &mut Command, root: &Path) -> Result<PathBuf, Box<dyn Error>> {
+    let output = cargo
+        .current_dir(root)
+        .args(["metadata", "--format-version", "1", "--no-deps", "--locked"])
+        .output()?;
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout)?;
+    let folder = metadata.get("target_directory").and_then(|it| it.as_str());
+    Ok(folder.ok_or("cargo metadata: no target_directory")?.into())
+}
+
 /// By gzip, which a browser unpacks by itself.
 fn packed(code: &[u8]) -> std::io::Result<Vec<u8>> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
@@ -125,5 +130,31 @@ fn add_target() -> Result<(), Box<dyn Error>> {
         Ok(())
     } else {
         Err(format!("the target is missing; type: rustup target add {TARGET}").into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by it")]
+
+    use super::*;
+
+    /// The page is built where cargo builds, wherever the user has it build.
+    #[test]
+    fn the_page_follows_the_target_folder_of_cargo() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .ancestors()
+            .nth(3)
+            .unwrap();
+        let mut elsewhere = Command::new("cargo");
+        elsewhere.env("CARGO_TARGET_DIR", "/nowhere/built");
+        let folder = target_directory(&mut elsewhere, root).unwrap();
+        assert_eq!(folder, Path::new("/nowhere/built"));
+        let mut usual = Command::new("cargo");
+        usual.env_remove("CARGO_TARGET_DIR");
+        assert_eq!(
+            target_directory(&mut usual, root).unwrap(),
+            root.join("target")
+        );
     }
 }

@@ -8,6 +8,7 @@ use uav_relay::{Interference, Interferer, Mission, MissionConfig};
 
 use super::hops::db;
 use crate::simulator::chain::run;
+use crate::simulator::optima::alone;
 use crate::simulator::outcome::Outcome;
 use crate::simulator::setup::Setup;
 use crate::simulator::sky::Sky;
@@ -33,10 +34,10 @@ pub struct ListenedReport {
     pub believed: Option<BelievedReport>,
     /// How often the chain has agreed on other places, the first time included.
     pub agreements: u32,
-    /// The SIR of the chain in the end against the true interferers, linear.
+    /// The SIR of the relays that are left in the end against the true interferers, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub true_sir: Option<f64>,
-    /// That of the chain that was told of the interferer as it is in the end, linear. Of one interferer.
+    /// That of the same relays if they were told of the interferer as it is in the end, linear. Of one interferer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optimum_sir: Option<f64>,
     /// The one over the other.
@@ -64,16 +65,18 @@ impl ListenedReport {
             ..Self::default()
         };
         let mut shares = Vec::new();
-        let mut still = None;
+        let mut still: Option<(Vec<u16>, Option<f64>)> = None;
         for stand in outcome.stands.iter().filter(|stand| stand.agreements > 0) {
-            let scene = sky.scene_at(stand.at);
+            let scene = with_relays(sky.scene_at(stand.at), &stand.nodes);
             let sir = scene.chain_sir(&stand.places);
             report.true_sir = Some(sir);
             report.agreements = stand.agreements;
-            // Of one that does not move it is found once.
-            let optimum = still.or_else(|| optimum(setup, &scene));
+            // Of an interferer that does not move it is found once for the same relays.
+            let known = still.take().filter(|(nodes, _)| *nodes == stand.nodes);
+            let optimum =
+                known.map_or_else(|| optimum(setup, &scene, &stand.nodes), |(_, known)| known);
             if !moves(sky) {
-                still = optimum;
+                still = Some((stand.nodes.clone(), optimum));
             }
             report.optimum_sir = optimum;
             report.share_of_optimum = optimum.map(|optimum| sir / optimum);
@@ -124,8 +127,20 @@ fn moves(sky: &Sky) -> bool {
     sky.velocity_mps.iter().any(|speed| speed.abs() > 0.0)
 }
 
-/// The SIR of the chain that is told of the one interferer of `scene`, linear.
-fn optimum(setup: &Setup, scene: &Scene) -> Option<f64> {
+/// The scene of `nodes` alone, the relays that are left, by index from 1.
+fn with_relays(scene: Scene, nodes: &[u16]) -> Scene {
+    let relay = |node: &u16| {
+        scene
+            .relays
+            .get(usize::from(*node).checked_sub(1)?)
+            .copied()
+    };
+    let relays = nodes.iter().filter_map(relay).collect();
+    Scene { relays, ..scene }
+}
+
+/// The SIR of the chain of `nodes` that is told of the one interferer of `scene`, linear.
+fn optimum(setup: &Setup, scene: &Scene, nodes: &[u16]) -> Option<f64> {
     let [source] = scene.sources.as_slice() else {
         return None;
     };
@@ -138,12 +153,12 @@ fn optimum(setup: &Setup, scene: &Scene) -> Option<f64> {
         ..*setup.mission.config()
     })
     .ok()?;
-    let mut told = Setup::new(mission);
-    told.settings = setup.settings;
+    let told = Setup {
+        mission,
+        ..setup.clone()
+    };
+    let mut told = alone(&told, nodes, 0)?;
     told.settings.listen = None;
-    told.settings.guard = None;
-    told.profiles.clone_from(&setup.profiles);
-    told.held.clone_from(&setup.held);
     let outcome = run(told).ok()?;
     let places: Option<Vec<_>> = outcome.relays.iter().map(|relay| relay.setpoint).collect();
     Some(scene.chain_sir(&places?))

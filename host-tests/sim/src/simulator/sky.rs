@@ -173,7 +173,9 @@ fn decibel(db: f64) -> f64 {
 pub struct Stand {
     /// When.
     pub at: Instant,
-    /// Of every relay: where its drone is, or where it was told to be where drones are not simulated.
+    /// The relays that are on, by index from 1. A relay that went silent is not among them.
+    pub nodes: Vec<u16>,
+    /// Of each of them that has a place: where its drone is, or where it was told to be where drones are not simulated.
     pub places: Vec<Placement>,
     /// Where they were told to be, if all were.
     pub goals: Option<Vec<Placement>>,

@@ -1,6 +1,6 @@
 //! What relays that listen are simulated with.
 
-use super::{json, refusal};
+use super::{chain, json, refusal};
 
 const TOML: &str =
     "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[listen]\n";
@@ -26,4 +26,38 @@ fn what_is_heard_comes_from_an_interferer() {
         "30",
     ];
     assert!(json(&options)["sir"].is_number());
+}
+
+/// A lost relay is no part of the chain: the SIR and the optimum are those of the relays that are left.
+#[test]
+fn a_lost_relay_does_not_count() {
+    let options = [
+        "--uavs",
+        "6",
+        "--kill",
+        "4@20",
+        "--listen",
+        "--listen-for",
+        "120",
+    ];
+    let report = json(&options);
+    let of = |name: &str| report[name].as_f64().unwrap();
+    assert_eq!(report["lost"][0]["index"].as_u64(), Some(4), "{report}");
+    let [worst, true_sir, share] = ["sir", "true_sir", "share_of_optimum"].map(of);
+    assert!((true_sir / worst - 1.0).abs() < 0.01, "{report}");
+    assert!(share > 0.99 && share < 1.01, "{report}");
+    assert!((true_sir / of("optimum_sir") - share).abs() < 1e-6);
+    // The relays that are left have the optimum of five, and not of six.
+    let five = json(&["--uavs", "5"]);
+    let optimum = five["sir"].as_f64().unwrap();
+    assert!((of("optimum_sir") / optimum - 1.0).abs() < 1e-3, "{report}");
+    let table = String::from_utf8(chain(&options).stdout).unwrap();
+    let line = table
+        .lines()
+        .find(|line| line.starts_with("true SIR "))
+        .unwrap();
+    assert!(
+        !line.contains("inf") && !line.contains("0.0000 of"),
+        "{line}"
+    );
 }

@@ -10,6 +10,7 @@
 
 mod air;
 mod capture;
+mod first;
 mod hostile;
 mod listen;
 mod methods;

@@ -37,6 +37,7 @@ pub fn write_index(dir: &Path, sheets: &[Sheet]) -> Result<PathBuf, Trouble> {
          <p>Hosseinalipour, Rahmati and Dai, <em>Interference Avoidance Position Planning in Dual-hop and Multi-hop UAV Relay \
          Networks</em>, section Numerical Results, and what this project adds.</p>\n"
     );
+    contents(&mut html, sheets);
     for sheet in sheets {
         figure(&mut html, sheet);
     }
@@ -44,6 +45,16 @@ pub fn write_index(dir: &Path, sheets: &[Sheet]) -> Result<PathBuf, Trouble> {
     let file = dir.join("index.html");
     write(&file, &html)?;
     Ok(file)
+}
+
+/// Adds the list of the figures, each a link to it.
+fn contents(html: &mut String, sheets: &[Sheet]) {
+    html.push_str("<nav>\n<h2>Contents</h2>\n<ol>\n");
+    for sheet in sheets {
+        let (name, title) = (sheet.name, escape(sheet.title));
+        _ = writeln!(html, "<li><a href=\"#{name}\">{title}</a></li>");
+    }
+    html.push_str("</ol>\n</nav>\n");
 }
 
 fn figure(html: &mut String, sheet: &Sheet) {

@@ -20,6 +20,7 @@ mod found;
 pub mod map;
 pub mod noise;
 mod one;
+pub mod rate;
 pub mod report;
 mod several;
 mod source;

@@ -1,6 +1,6 @@
 //! The report of a plan.
 
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 
 use serde::Serialize;
 
@@ -10,6 +10,7 @@ use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
 use super::ask::Number;
 use super::found::{Plan, Why};
 use super::noise::NoiseReport;
+use super::rate::{self, BestRate};
 use super::unit::Unit;
 
 /// The one interferer that stands for several.
@@ -38,6 +39,92 @@ pub struct HypotheticalReport {
     pub gain: Option<f64>,
 }
 
+/// The data rates of a chain whose hops share one frequency in time slots of equal length.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct RateReport {
+    /// The data rate of the chain, bit/s: that of the worst hop over the number of slots. Absent where there is no plan.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_bps: Option<f64>,
+    /// The data rate of the worst hop while it sends, bit/s: bandwidth x log2(1 + SIR).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hop_rate_bps: Option<f64>,
+    /// Number of time slots: one for each hop.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slots: Option<u32>,
+    /// The target, bit/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_rate_bps: Option<f64>,
+    /// The number of relays that carries most.
+    #[serde(flatten)]
+    pub best: BestRate,
+}
+
+impl RateReport {
+    /// The rates of `plan` over `bandwidth_hz`; without a plan only the largest.
+    pub fn new(
+        plan: Option<&Plan>,
+        bandwidth_hz: f64,
+        target_rate_bps: Option<f64>,
+        best: BestRate,
+    ) -> Self {
+        let relays = |plan: &Plan| u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+        Self {
+            rate_bps: plan.map(|plan| rate::chain_bps(bandwidth_hz, relays(plan), plan.sir())),
+            hop_rate_bps: plan.map(|plan| rate::hop_bps(bandwidth_hz, plan.sir())),
+            slots: plan.map(|plan| rate::slots(relays(plan))),
+            target_rate_bps,
+            best,
+        }
+    }
+
+    fn describe(&self, text: &mut String) {
+        if let (Some(rate_bps), Some(hop_bps), Some(slots)) =
+            (self.rate_bps, self.hop_rate_bps, self.slots)
+        {
+            _ = writeln!(
+                text,
+                "data rate: {rate_bps:.6e} bit/s: {slots} hops share one frequency in {slots} equal time slots, and the worst hop carries \
+                 {hop_bps:.6e} bit/s while it sends"
+            );
+        }
+        if let Some(target_bps) = self.target_rate_bps {
+            _ = writeln!(
+                text,
+                "target: {target_bps:.6e} bit/s; no fewer relays carry it"
+            );
+        }
+        _ = writeln!(text, "{}", self.best);
+    }
+}
+
+impl fmt::Display for BestRate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            best_uavs,
+            best_rate_bps,
+            tried_uavs,
+            best_is_proven,
+        } = self;
+        let (relays, verb) = if *best_uavs == 1 {
+            ("relay", "carries")
+        } else {
+            ("relays", "carry")
+        };
+        write!(
+            f,
+            "largest data rate: {best_uavs} {relays} {verb} {best_rate_bps:.6e} bit/s"
+        )?;
+        if *best_is_proven {
+            f.write_str("; no other number carries more")
+        } else {
+            write!(f, ", of 1 to {tried_uavs} relays")
+        }
+    }
+}
+
+/// What the model leaves out.
+const NOT_MODELLED: &str = "not modelled: terrain and obstacles, and the link from Rx back to Tx";
+
 /// The result of `cargo plan`.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct PlanReport {
@@ -59,9 +146,9 @@ pub struct PlanReport {
     /// The same in dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
-    /// The data rate of the worst hop over the bandwidth that was given, bit/s: bandwidth x log2(1 + SIR).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rate_bps: Option<f64>,
+    /// The data rates over the bandwidth that was given.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub rates: Option<RateReport>,
     /// The target, linear SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_sir: Option<f64>,
@@ -113,19 +200,9 @@ pub struct PlanReport {
     pub unit: Unit,
 }
 
-/// The data rate at an SIR (linear) over a bandwidth, bit/s: Shannon's, with the interference as noise.
-pub fn rate_bps(bandwidth_hz: f64, sir: f64) -> f64 {
-    bandwidth_hz * sir.ln_1p() / std::f64::consts::LN_2
-}
-
-/// The SIR (linear) that a data rate takes over a bandwidth; the inverse of [`rate_bps`].
-pub fn sir_for_rate(bandwidth_hz: f64, rate_bps: f64) -> f64 {
-    (rate_bps / bandwidth_hz * std::f64::consts::LN_2).exp_m1()
-}
-
 impl PlanReport {
-    /// The report of a plan for `number` relays, with rates over `bandwidth_hz` where one is given.
-    pub fn new(plan: &Plan, number: Number, unit: Unit, bandwidth_hz: Option<f64>) -> Self {
+    /// The report of a plan for `number` relays.
+    pub fn new(plan: &Plan, number: Number, unit: Unit) -> Self {
         let sir = plan.sir();
         let rx_sir = plan.sirs.last().copied();
         let target_sir = match number {
@@ -156,7 +233,7 @@ impl PlanReport {
             best_sir_db: None,
             sir: Some(sir),
             sir_db: Some(db(sir)),
-            rate_bps: bandwidth_hz.map(|bandwidth_hz| rate_bps(bandwidth_hz, sir)),
+            rates: None,
             target_sir,
             target_sir_db: target_sir.map(db),
             most_sir: plan.most,
@@ -194,6 +271,12 @@ impl PlanReport {
         }
     }
 
+    /// The same, with data rates.
+    #[must_use]
+    pub fn with_rates(self, rates: Option<RateReport>) -> Self {
+        Self { rates, ..self }
+    }
+
     /// The same, of a scenario with that noise.
     #[must_use]
     pub fn in_noise(self, noise: &Noise) -> Self {
@@ -212,9 +295,6 @@ impl PlanReport {
         let relays = if uavs == 1 { "relay" } else { "relays" };
         let unit = self.unit;
         _ = write!(text, "worst hop: {}", unit.both(sir));
-        if let Some(rate) = self.rate_bps {
-            _ = write!(text, ", {rate:.6e} bit/s");
-        }
         _ = writeln!(
             text,
             " with {uavs} {relays}, by {}",
@@ -224,6 +304,9 @@ impl PlanReport {
             let theorem = self.how.unwrap_or_default();
             _ = writeln!(text, "{words} ({theorem}, case {case})");
         }
+        if let Some(rates) = &self.rates {
+            rates.describe(&mut text);
+        }
         if let (Some(target), Some(most)) = (self.target_sir, self.most_sir) {
             let target = unit.asked(target);
             let most = unit.say(most);
@@ -232,7 +315,7 @@ impl PlanReport {
                 "target: SIR {target}; so many relays can have up to {most} (--uavs {uavs})"
             );
         }
-        _ = writeln!(text, "{}", self.certainty());
+        _ = writeln!(text, "{}; {NOT_MODELLED}", self.certainty());
         if let Some(noise) = &self.noise {
             _ = writeln!(text, "{noise}");
         }
@@ -244,10 +327,12 @@ impl PlanReport {
 
     fn certainty(&self) -> &'static str {
         match (self.proven, self.target_sir) {
-            (Some(true), Some(_)) => "no fewer relays meet the target",
-            (Some(true), None) => "no places are better",
-            (_, Some(_)) => "whether fewer relays could meet the target is not certain",
-            (_, None) => "whether other places could be better is not certain",
+            (Some(true), Some(_)) => "in this model no fewer relays meet the target",
+            (Some(true), None) => "in this model no places are better",
+            (_, Some(_)) => {
+                "in this model whether fewer relays could meet the target is not certain"
+            }
+            (_, None) => "in this model whether other places could be better is not certain",
         }
     }
 }

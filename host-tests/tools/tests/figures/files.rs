@@ -231,3 +231,41 @@ fn help_lists_the_figures() {
         "{help}"
     );
 }
+
+/// A page of many screens begins with its contents, a link to every figure on it.
+#[test]
+fn the_page_begins_with_its_contents() {
+    let page = fs::read_to_string(written().join("index.html")).unwrap();
+    let (contents, rest) = page.split_once("</nav>").unwrap();
+    for figure in ALL {
+        let name = figure.name;
+        assert!(
+            contents.contains(&format!("<a href=\"#{name}\">")),
+            "{name}"
+        );
+        assert!(rest.contains(&format!("<figure id=\"{name}\">")), "{name}");
+    }
+    assert!(!contents.contains("<figure"), "the contents come first");
+}
+
+/// Without a terminal every finished figure has its line, so that a run of a minute is not taken for one that hangs.
+#[test]
+fn every_finished_figure_is_told() {
+    let folder = TempDir::new().unwrap();
+    let names = [ALL[0].name, ALL[1].name];
+    let out = folder.path().to_str().unwrap();
+    let output = figures(&["--out", out, "--only", names[0], "--only", names[1]]);
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stderr).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines.len(), 2, "{text}");
+    assert!(lines[0].starts_with("1 of 2 figures: ") && lines[1].starts_with("2 of 2 figures: "));
+    for name in names {
+        assert!(
+            lines
+                .iter()
+                .any(|line| line.ends_with(&format!(": {name}"))),
+            "{text}"
+        );
+    }
+}

@@ -105,3 +105,63 @@ fn a_scenario_in_field_units_is_planned() {
     ]);
     assert!(table.contains("worst hop: 8.00"), "{table}");
 }
+
+/// A map is read by people: measures to the millimetre and a thousandth of a decibel, counts as counts.
+#[test]
+fn a_map_has_rounded_numbers_with_units_in_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let [geojson, kml] = ["plan.geojson", "plan.kml"]
+        .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    let scenario = example("decibels.toml");
+    let maps = ["--geojson", &geojson, "--kml", &kml];
+    said(&[&["--scenario", &scenario, "--uavs", "3"], &maps[..]].concat());
+    let is_short = |name: &str, number: &str| {
+        let decimals = number.split_once('.').map_or("", |(_, decimals)| decimals);
+        let most = match name {
+            "index" | "hop" => 0,
+            "sir_ratio" => 6,
+            _ => 3,
+        };
+        decimals.len() <= most && !number.contains('e')
+    };
+    let text = std::fs::read_to_string(&geojson).unwrap();
+    let map: Value = serde_json::from_str(&text).unwrap();
+    let mut names = std::collections::BTreeSet::new();
+    for feature in map["features"].as_array().unwrap() {
+        for (name, value) in feature["properties"].as_object().unwrap() {
+            let Value::Number(number) = value else {
+                continue;
+            };
+            names.insert(name.clone());
+            let is_count = matches!(name.as_str(), "index" | "hop");
+            assert_eq!(number.is_u64(), is_count, "{name}: {number}");
+            assert!(
+                is_count || is_short(name, number.to_string().trim_end_matches(".0")),
+                "{name}: {number}"
+            );
+        }
+    }
+    let known = [
+        "amsl_m",
+        "eirp_dbm",
+        "h_m",
+        "hop",
+        "index",
+        "sir_db",
+        "sir_ratio",
+        "x_m",
+        "y_m",
+    ];
+    assert!(names.iter().eq(known), "{names:?}");
+    let text = std::fs::read_to_string(&kml).unwrap();
+    let descriptions = text.split("<description>").skip(1);
+    let mut numbers = 0;
+    for description in descriptions {
+        for pair in description.split('<').next().unwrap().split(", ") {
+            let (name, number) = pair.split_once(" = ").unwrap();
+            assert!(is_short(name, number), "{pair}");
+            numbers += 1;
+        }
+    }
+    assert!(numbers > 20, "{text}");
+}

@@ -9,7 +9,7 @@ use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
 use uav_relay_tools::provision::config::{Block, secret};
 
-use super::{example, provision, reads, refusal};
+use super::{example, provision, reads, refusal, write_key};
 
 fn plan(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_plan"))
@@ -108,7 +108,7 @@ fn a_plan_goes_to_every_drone() {
     let before = std::fs::read_to_string(&decibels).unwrap();
     assert!(std::fs::read_to_string(&file).unwrap().starts_with(&before));
 
-    std::fs::write(&key, "0123456789abcdef".repeat(4)).unwrap();
+    write_key(&key, &"0123456789abcdef".repeat(4));
     let command = said
         .lines()
         .last()
@@ -378,4 +378,101 @@ fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
         &out,
     ]);
     assert!(output.status.success(), "{output:?}");
+}
+
+/// drone.toml without the settings that the firmware does not have.
+fn for_the_firmware(text: &str) -> String {
+    let own = ["baud = 57600", "probe_after_ms", "dead_after_ms"];
+    let kept = text
+        .lines()
+        .filter(|line| !own.iter().any(|key| line.starts_with(key)));
+    kept.collect::<Vec<_>>().join("\n")
+}
+
+/// The command that `plan --out` names takes the file that it has written.
+#[test]
+fn the_next_command_takes_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scenario, file, dir, key] =
+        ["mine.toml", "plan.toml", "blocks", "network7.key"].map(|name| folder.path().join(name));
+    let drone = std::fs::read_to_string(example().with_file_name("drone.toml")).unwrap();
+    let [mine, planned_file] = [text(&scenario), text(&file)];
+    std::fs::write(&scenario, &drone).unwrap();
+    write_key(&key, &"0123456789abcdef".repeat(4));
+    let arguments = ["--scenario", &mine, "--uavs", "3", "--out", &planned_file];
+    // The published example is for Linux computers.
+    let said = planned(&arguments);
+    assert!(
+        said.contains("network.baud = 57600: must be 115200"),
+        "{said}"
+    );
+    assert!(
+        said.ends_with(&format!(
+            "  cargo companion --config {planned_file} --index INDEX\n"
+        )),
+        "{said}"
+    );
+    let line = refusal(&[
+        "--scenario",
+        &planned_file,
+        "--all",
+        "--out-dir",
+        &text(&dir),
+    ]);
+    assert!(line.contains("network.baud = 57600"), "{line}");
+    // For the firmware the last line is one that succeeds.
+    std::fs::write(&scenario, for_the_firmware(&drone)).unwrap();
+    let said = planned(&[&arguments[..], &["--force"]].concat());
+    let command = said.lines().last().unwrap().trim();
+    let command = command.replace("DIR", &text(&dir));
+    let words: Vec<&str> = command.split(' ').collect();
+    assert_eq!(words[..2], ["cargo", "provision"], "{said}");
+    let output = provision(&words[2..]);
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(names(&dir).len(), 4);
+}
+
+/// One file has one number of relays.
+#[test]
+fn a_plan_and_a_network_of_different_sizes_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scenario, file, dir] =
+        ["mine.toml", "plan.toml", "blocks"].map(|name| text(&folder.path().join(name)));
+    let drone = std::fs::read_to_string(example().with_file_name("drone.toml")).unwrap();
+    let drone = for_the_firmware(&drone).replace("key_file", "# key_file");
+    std::fs::write(&scenario, drone.replace("relays = 3", "relays = 4")).unwrap();
+    let words =
+        "network.relays = 4 contradicts plan.uavs; allowed: 6, the number of relays of the plan";
+    for wanted in [&["--uavs", "6"][..], &["--target-sir-db", "3"]] {
+        let arguments = [&["--scenario", &scenario, "--out", &file], wanted].concat();
+        let output = plan(&arguments);
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        assert!(
+            line.contains("network.relays = 4 contradicts plan.uavs; allowed: "),
+            "{line}"
+        );
+        assert!(!Path::new(&file).exists());
+    }
+    // A file that was made so by hand.
+    planned(&["--scenario", &scenario, "--uavs", "4", "--out", &file]);
+    let four = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&scenario, four.replace("relays = 4", "relays = 6")).unwrap();
+    planned(&[
+        "--scenario",
+        &scenario,
+        "--uavs",
+        "6",
+        "--out",
+        &file,
+        "--force",
+    ]);
+    let six = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, six.replace("relays = 6", "relays = 4")).unwrap();
+    for more in [&[][..], &["--uavs", "6"], &["--uavs", "4"]] {
+        let all = ["--scenario", &file, "--all", "--out-dir", &dir];
+        let line = refusal(&[&all[..], more].concat());
+        assert!(line.contains(words), "{line}");
+        assert!(!Path::new(&dir).exists());
+    }
 }

@@ -53,6 +53,13 @@ fn field(points: usize) -> Block {
     flight.block(3).unwrap()
 }
 
+/// Writes a key as a key is to be kept: for its owner alone.
+fn write_key(file: impl AsRef<Path>, key: &str) {
+    use std::os::unix::fs::PermissionsExt as _;
+    std::fs::write(&file, key).unwrap();
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).unwrap();
+}
+
 /// What a drone makes of a block.
 fn reads(block: &Block) -> Result<Config, ConfigError> {
     read(block, Box::leak(Box::new(EMPTY)))

@@ -50,7 +50,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (out, file) = (path("block.bin"), path("key"));
-    std::fs::write(&file, format!("\n  {}\r\n", "0aF1".repeat(16))).unwrap();
+    super::write_key(&file, &format!("\n  {}\r\n", "0aF1".repeat(16)));
     let plain = of_paper(&out);
     let block = || <Block>::try_from(&std::fs::read(&out).unwrap()[..]).unwrap();
     let clock = || {
@@ -105,13 +105,13 @@ fn a_bad_key_is_named_and_not_shown() {
         (&good.replace('9', "é"), digits),
         (&"0".repeat(64), "must not be all 0"),
     ] {
-        std::fs::write(&file, content).unwrap();
+        super::write_key(&file, content);
         let text = refusal(&keyed);
         assert!(text.contains("--key-file"), "{text}");
         assert!(text.contains(words), "{content}: {text}");
         assert!(!text.contains("cdef"), "{text}");
     }
-    std::fs::write(&file, &good).unwrap();
+    super::write_key(&file, &good);
     for epoch in ["--epoch=0", "--epoch=4294967295", "--epoch=-1"] {
         let text = refusal(&[&keyed[..], &[epoch]].concat());
         assert!(text.contains("--epoch"), "{text}");
@@ -119,4 +119,36 @@ fn a_bad_key_is_named_and_not_shown() {
     let text = refusal(&[&plain[..], &["--epoch", "9"]].concat());
     assert!(text.contains("--key-file"), "{text}");
     assert!(!Path::new(&out).exists());
+}
+
+/// A key that every user of the computer can read is no secret.
+#[test]
+fn a_key_file_that_others_can_read_is_refused() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (out, file) = (path("block.bin"), path("key"));
+    std::fs::write(&file, "0123456789abcdef".repeat(4)).unwrap();
+    let plain = ["--uavs", "5", "--index", "3", "--out", &out];
+    let keyed = [&plain[..], &["--key-file", &file]].concat();
+    for (mode, is_taken) in [
+        (0o644, false),
+        (0o604, false),
+        (0o602, false),
+        (0o666, false),
+        (0o600, true),
+        (0o400, true),
+        // A service reads it through its group.
+        (0o640, true),
+    ] {
+        std::fs::set_permissions(&file, std::fs::Permissions::from_mode(mode)).unwrap();
+        if is_taken {
+            assert!(provision(&keyed).status.success(), "{mode:o}");
+            continue;
+        }
+        let text = refusal(&keyed);
+        let words = format!("--key-file {file}: mode {mode:04o}: other users of this computer");
+        assert!(text.contains(&words), "{text}");
+        assert!(text.contains(&format!("type: chmod 600 {file}")), "{text}");
+    }
 }

@@ -176,7 +176,7 @@ fn provision_has_the_key_of_the_autopilot_from_a_file() {
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (out, file, sites) = (path("block.bin"), path("key"), path("sites.toml"));
     std::fs::write(&sites, TOML.replace("-47", "47")).unwrap();
-    std::fs::write(&file, "4b".repeat(32)).unwrap();
+    super::write_key(&file, &"4b".repeat(32));
     let plain = ["--uavs", "5", "--index", "3", "--out", &out];
     let keyed = [&plain[..], &["--autopilot-key-file", &file]].concat();
     let text = refusal(&keyed);

@@ -1,13 +1,11 @@
 //! `cargo chain`: simulated relays, each running the on-board code, find their places over simulated serial links.
 
 mod capture;
+mod progress;
 
-use std::io::IsTerminal as _;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
 
 use clap::Parser as _;
-use indicatif::{ProgressBar, ProgressStyle};
 use uav_relay_scenario::Scenario;
 use uav_relay_sim::cli::{Options, Prepared, Refused};
 use uav_relay_sim::command::{self, Failure};
@@ -18,6 +16,7 @@ use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::svg;
 
 use capture::AirCapture;
+use progress::Progress;
 
 fn main() -> ExitCode {
     match Options::try_parse() {
@@ -87,33 +86,16 @@ fn fly(
 
 /// Runs the chain, with a progress line on a terminal once it takes longer than a second.
 fn watch(chain: &mut Chain, capture: &mut Option<&mut AirCapture>) -> Result<(), Failure> {
-    let started = Instant::now();
-    let mut line: Option<ProgressBar> = None;
+    let mut line = Progress::begin();
     while !chain.step(20_000) {
         if let Some(capture) = capture {
             capture.follow(chain, false)?;
         }
-        if line.is_none()
-            && started.elapsed() > Duration::from_secs(1)
-            && std::io::stderr().is_terminal()
-        {
-            let bar = ProgressBar::new_spinner();
-            if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
-                bar.set_style(style);
-            }
-            line = Some(bar);
-        }
-        if let Some(bar) = &line {
+        line.show(|| {
             let (sweeps, now) = chain.progress();
-            bar.set_message(format!(
-                "sweep {sweeps}, {:.0} s of virtual time",
-                now.as_micros() as f64 / 1e6
-            ));
-            bar.tick();
-        }
-    }
-    if let Some(bar) = line {
-        bar.finish_and_clear();
+            let seconds = now.as_micros() as f64 / 1e6;
+            format!("sweep {sweeps}, {seconds:.0} s of virtual time")
+        });
     }
     Ok(())
 }

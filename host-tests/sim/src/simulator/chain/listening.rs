@@ -17,7 +17,7 @@ impl Chain {
         };
         let now = self.now;
         let scene = sky.scene_at(now);
-        let mut places = Vec::new();
+        let (mut nodes, mut places) = (Vec::new(), Vec::new());
         if now == Instant::ZERO + sky.period {
             for (node, sample) in &sky.handed {
                 let mut members = self.members.iter_mut();
@@ -37,12 +37,13 @@ impl Chain {
             let Some(member) = self.members.get_mut(index) else {
                 continue;
             };
-            let Some(at) = flown.or(member.relay.setpoint()) else {
-                continue;
-            };
             if member.killed.is_some() {
                 continue;
             }
+            nodes.push(member.node);
+            let Some(at) = flown.or(member.relay.setpoint()) else {
+                continue;
+            };
             places.push(at);
             if !sky.handed.is_empty() || sky.once && member.measured == Some(at) {
                 continue;
@@ -74,7 +75,7 @@ impl Chain {
         if sky.ends_measure(now) && sky.handed.is_empty() {
             self.measure_at_ends(&sky, &scene);
         }
-        self.stand(places);
+        self.stand(nodes, places);
         if now < sky.until {
             self.queue.put(now + sky.period, 0, Happening::Listen);
         } else {
@@ -82,7 +83,7 @@ impl Chain {
         }
     }
 
-    fn stand(&mut self, places: Vec<Placement>) {
+    fn stand(&mut self, nodes: Vec<u16>, places: Vec<Placement>) {
         let agreed = self
             .members
             .iter()
@@ -97,6 +98,7 @@ impl Chain {
         self.outcome.stands.push(Stand {
             believed: leader.map_or_else(Told::default, |leader| leader.relay.belief()),
             at: self.now,
+            nodes,
             places,
             goals,
             agreements: self.agreements,

@@ -4,7 +4,8 @@ mod options;
 
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
-use std::time::Instant;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use clap::Parser as _;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -42,18 +43,17 @@ fn run(options: &Options) -> Result<(), Trouble> {
         options.only.is_empty() || options.only.iter().any(|name| name == figure.name)
     };
     let chosen: Vec<&Figure> = ALL.iter().filter(asked).collect();
-    let bar = progress(chosen.len());
+    let progress = Progress::begin(chosen.len());
     let made: Result<Vec<Sheet>, Trouble> = chosen
         .into_par_iter()
         .map(|figure| {
             let sheet = (figure.make)()?;
             write_sheet(dir, &sheet)?;
-            bar.set_message(figure.name);
-            bar.inc(1);
+            progress.made(figure.name);
             Ok(sheet)
         })
         .collect();
-    bar.finish_and_clear();
+    progress.bar.finish_and_clear();
     let sheets = made?;
     let index = write_index(dir, &sheets)?;
     let tables: usize = sheets.iter().map(|sheet| sheet.tables.len()).sum();
@@ -66,15 +66,46 @@ fn run(options: &Options) -> Result<(), Trouble> {
     Ok(())
 }
 
-/// A bar on a terminal, else nothing.
-fn progress(figures: usize) -> ProgressBar {
-    if !std::io::stderr().is_terminal() {
-        return ProgressBar::hidden();
+/// The progress of a run: a bar on a terminal, elsewhere a line on standard error for every figure.
+struct Progress {
+    bar: ProgressBar,
+    is_terminal: bool,
+    figures: usize,
+    made: AtomicUsize,
+}
+
+impl Progress {
+    fn begin(figures: usize) -> Self {
+        let is_terminal = std::io::stderr().is_terminal();
+        let bar = if is_terminal {
+            ProgressBar::new(figures as u64)
+        } else {
+            ProgressBar::hidden()
+        };
+        if let Ok(style) = ProgressStyle::with_template(
+            "{spinner} {elapsed} {bar:30} {pos} of {len} figures {msg}",
+        ) {
+            bar.set_style(style);
+        }
+        if is_terminal {
+            // A figure takes up to a minute: the clock shows that the work goes on.
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
+        Self {
+            bar,
+            is_terminal,
+            figures,
+            made: AtomicUsize::new(0),
+        }
     }
-    let bar = ProgressBar::new(figures as u64);
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}") {
-        bar.set_style(style);
+
+    /// Counts a finished figure.
+    fn made(&self, name: &str) {
+        let made = self.made.fetch_add(1, Ordering::Relaxed) + 1;
+        self.bar.set_message(format!("(last: {name})"));
+        self.bar.inc(1);
+        if !self.is_terminal {
+            command::complain(&format!("{made} of {} figures: {name}", self.figures));
+        }
     }
-    bar.tick();
-    bar
 }

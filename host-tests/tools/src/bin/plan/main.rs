@@ -10,8 +10,9 @@ use clap::Parser as _;
 use uav_relay_scenario::{Scenario, mission};
 use uav_relay_sim::command::{self, Failure};
 use uav_relay_sim::svg::{self, Picture, room};
-use uav_relay_tools::plan::report::PlanReport;
-use uav_relay_tools::plan::{self, Ask, NoPlan, Plan};
+use uav_relay_tools::plan::rate::{self, Rates};
+use uav_relay_tools::plan::report::{PlanReport, RateReport};
+use uav_relay_tools::plan::{self, Ask, NoPlan, Number, Plan, Why};
 
 use options::{Altitude, Options};
 
@@ -31,7 +32,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         let line = "interferer: is missing: without [[interferer]] a scenario with [listen] is for cargo provision alone";
         return Err(Failure::input(line.to_owned()));
     }
-    let number = options.number()?;
+    let number = options.number();
     out::check(options, &scenario)?;
     map::check(options, &scenario)?;
     let ask = Ask {
@@ -40,8 +41,16 @@ fn run(options: &Options) -> Result<(), Failure> {
         x_m: options.x_m,
         tolerance: options.tolerance,
     };
-    match plan::plan(&scenario, &ask) {
-        Ok(plan) => {
+    let planned = match options.target_rate() {
+        Some(target) => by_rate(&scenario, &ask, target),
+        None => plain(&scenario, &ask, options.bandwidth_hz),
+    };
+    match planned {
+        Ok(Planned {
+            plan: Some(plan),
+            number,
+            rates,
+        }) => {
             let uavs = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
             if let Some(line) = mission::left_out(&scenario, uavs) {
                 return Err(Failure::input(format!("{}: {line}", options.file())));
@@ -51,15 +60,33 @@ fn run(options: &Options) -> Result<(), Failure> {
             }
             map::write(options, &scenario, &plan)?;
             let next = out::write(options, &scenario, &plan, number)?;
+            let asked = match options.target_rate() {
+                // The SIR of a rate is not what was asked for.
+                Some(_) => Number::Of(uavs),
+                None => number,
+            };
             show(
                 options,
-                &PlanReport::new(&plan, number, options.unit(), options.bandwidth_hz)
+                &PlanReport::new(&plan, asked, options.unit())
+                    .with_rates(rates)
                     .in_noise(&scenario.noise),
             )?;
             if !options.json {
                 command::print(&next);
             }
             Ok(())
+        }
+        Ok(Planned {
+            plan: None, rates, ..
+        }) => {
+            let error = rates.as_ref().map(too_fast).unwrap_or_default();
+            let why = Why::Plain(error);
+            let report = PlanReport::unmet(&why, None, Number::Of(0), options.unit());
+            let report = PlanReport {
+                uavs: None,
+                ..report
+            };
+            show(options, &report.with_rates(rates).in_noise(&scenario.noise))
         }
         Err(NoPlan::Wrong(line)) => {
             let file = options.file();
@@ -75,6 +102,65 @@ fn run(options: &Options) -> Result<(), Failure> {
             &PlanReport::unmet(&why, best_sir, number, options.unit()).in_noise(&scenario.noise),
         ),
     }
+}
+
+/// A plan, the number of relays or the SIR that it has to reach, and its data rates.
+struct Planned {
+    /// Absent where no number of relays carries the target rate.
+    plan: Option<Plan>,
+    number: Number,
+    rates: Option<RateReport>,
+}
+
+/// Plans for a number of relays or an SIR; with data rates where a bandwidth is given.
+fn plain(scenario: &Scenario, ask: &Ask, bandwidth_hz: Option<f64>) -> Result<Planned, NoPlan> {
+    let plan = plan::plan(scenario, ask)?;
+    let rates = match bandwidth_hz {
+        Some(bandwidth_hz) => {
+            let Rates { best, .. } = Rates::new(scenario, ask, bandwidth_hz, None)?;
+            Some(RateReport::new(Some(&plan), bandwidth_hz, None, best))
+        }
+        None => None,
+    };
+    Ok(Planned {
+        plan: Some(plan),
+        number: ask.number,
+        rates,
+    })
+}
+
+/// Plans the fewest relays that carry a data rate over a bandwidth.
+fn by_rate(
+    scenario: &Scenario,
+    ask: &Ask,
+    (target_bps, bandwidth_hz): (f64, f64),
+) -> Result<Planned, NoPlan> {
+    let Rates { best, meeting } = Rates::new(scenario, ask, bandwidth_hz, Some(target_bps))?;
+    let rates = RateReport::new(meeting.as_ref(), bandwidth_hz, Some(target_bps), best);
+    let relays = meeting.as_ref().map_or(0, |plan| plan.places.len());
+    let slots = rate::slots(u16::try_from(relays).unwrap_or(u16::MAX));
+    let needed = rate::sir_for_hop(bandwidth_hz, target_bps * f64::from(slots));
+    Ok(Planned {
+        plan: meeting,
+        number: Number::Meeting(needed),
+        rates: Some(rates),
+    })
+}
+
+/// The line on a data rate that no number of relays carries.
+fn too_fast(rates: &RateReport) -> String {
+    let target_bps = rates.target_rate_bps.unwrap_or_default();
+    let tried = rates.best.tried_uavs;
+    let among = if rates.best.best_is_proven {
+        "no number of relays".to_owned()
+    } else {
+        format!("no number of relays from 1 to {tried}")
+    };
+    format!(
+        "--target-rate-bps {target_bps:?}: {among} carries it: all hops share one frequency in equal time slots; {}. Ask for less, or for more \
+         with a larger --bandwidth-hz",
+        rates.best
+    )
 }
 
 fn picture(plan: &Plan, scenario: &Scenario) -> Picture {

@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, ValueEnum};
-use uav_relay_sim::command::{Failure, number, whole};
-use uav_relay_tools::plan::report::sir_for_rate;
+use uav_relay_sim::command::{number, whole};
 use uav_relay_tools::plan::{Number, Unit};
 
 /// How many relays a target SIR needs, or the best places for a given number, worked out without any messages.
@@ -23,7 +22,8 @@ pub(crate) struct Options {
     /// Where the only relay has to stand, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
     #[arg(long, value_name = "X", allow_negative_numbers = true, conflicts_with = "altitude", value_parser = along)]
     pub(crate) x_m: Option<f64>,
-    /// Bandwidth of a hop, hertz, 1 to 1e12: SIRs are also told as data rates, log2(1 + SIR) bits a second and hertz
+    /// Bandwidth of the one frequency that all hops share, hertz, 1 to 1e12: the data rate is added, log2(1 + SIR) bit/s per hertz of the worst
+    /// hop, divided by the N + 1 time slots, and the number of relays that carries most
     #[arg(long, value_name = "B", value_parser = |text: &str| number(text, 1.0, 1e12))]
     pub(crate) bandwidth_hz: Option<f64>,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
@@ -62,7 +62,7 @@ struct Wanted {
     /// The same in dB, -90 to 90
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, -90.0, 90.0))]
     target_sir_db: Option<f64>,
-    /// The fewest relays that carry this data rate, bit/s, above 0 to 1e15; needs --bandwidth-hz
+    /// The fewest relays that carry this data rate, bit/s, 1e-9 to 1e15, while all hops share one frequency; needs --bandwidth-hz
     #[arg(long, value_name = "R", requires = "bandwidth_hz", value_parser = |text: &str| number(text, 1e-9, 1e15))]
     target_rate_bps: Option<f64>,
 }
@@ -98,27 +98,19 @@ impl Options {
         }
     }
 
-    /// How many relays are asked for.
-    pub(crate) fn number(&self) -> Result<Number, Failure> {
+    /// The data rate that is asked for, bit/s, and the bandwidth, hertz.
+    pub(crate) fn target_rate(&self) -> Option<(f64, f64)> {
+        self.wanted.target_rate_bps.zip(self.bandwidth_hz)
+    }
+
+    /// How many relays are asked for; a data rate is asked for by [`target_rate`](Self::target_rate).
+    pub(crate) fn number(&self) -> Number {
         let wanted = &self.wanted;
-        if let Some(uavs) = wanted.uavs {
-            return Ok(Number::Of(uavs));
+        match (wanted.uavs, wanted.target_sir, wanted.target_sir_db) {
+            (Some(uavs), ..) => Number::Of(uavs),
+            (_, Some(target), _) => Number::Meeting(target),
+            (_, _, Some(db)) => Number::Meeting(10_f64.powf(db / 10.0)),
+            (None, None, None) => Number::Of(1),
         }
-        let target = match (wanted.target_sir, wanted.target_sir_db) {
-            (Some(target), _) => target,
-            (None, Some(db)) => 10_f64.powf(db / 10.0),
-            (None, None) => {
-                let rate = wanted.target_rate_bps.unwrap_or(f64::NAN);
-                let bandwidth = self.bandwidth_hz.unwrap_or(f64::NAN);
-                let target = sir_for_rate(bandwidth, rate);
-                if !(1e-9..=1e9).contains(&target) {
-                    return Err(Failure::input(format!(
-                        "--target-rate-bps {rate:?}: over {bandwidth:?} Hz it takes an SIR of {target:.3e}, which must be within 1e-9 to 1e9"
-                    )));
-                }
-                target
-            }
-        };
-        Ok(Number::Meeting(target))
     }
 }

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use uav_relay_scenario::deployment::{Companion, Deployment, agree};
 use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario};
 use uav_relay_sim::command::Failure;
 use uav_relay_tools::plan::carried::{planned, with_plan};
 use uav_relay_tools::plan::flown::flown;
 use uav_relay_tools::plan::{NoPlan, Number, Plan};
+use uav_relay_tools::provision::firmware::probe_after_ms;
 
 use crate::options::{Altitude, Options};
 
@@ -27,6 +29,11 @@ pub(crate) fn check(options: &Options, scenario: &Scenario) -> Result<(), Failur
             "--altitude free is not for --out with a [field]: relays hold geometry.altitude_m there, and best at geometry.altitude_min_m"
                 .to_owned(),
         );
+    }
+    if options.target_rate().is_none()
+        && let Number::Of(relays) = options.number()
+    {
+        sections(options, relays)?;
     }
     if file.exists() && !options.force {
         return refuse(format!(
@@ -56,6 +63,7 @@ pub(crate) fn write(
         NoPlan::Wrong(why) => Failure::input(why),
         NoPlan::Unmet(why, _) => Failure::unmet(why.say(options.unit())),
     })?;
+    let sections = sections(options, relays)?;
     let sir = db(flown.plan.sir());
     if flown.is_poor() {
         return Err(Failure::unmet(format!(
@@ -81,12 +89,47 @@ pub(crate) fn write(
     let text = with_plan(&text, &planned(&flown, method, options.tolerance))
         .map_err(|why| Failure::input(format!("--out {}: {why}", file.display())))?;
     save(file, "--out", &text)?;
+    let file = file.display().to_string();
     Ok(format!(
-        "{}: the scenario with its plan, {relays} relays that reach {sir:.3} dB by themselves; next:\n  \
-         cargo provision --scenario {} --all --out-dir DIR\n",
-        file.display(),
-        file.display()
+        "{file}: the scenario with its plan, {relays} relays that reach {sir:.3} dB by themselves; {}",
+        next(&file, &sections)
     ))
+}
+
+/// The sections of the scenario file, whose number of relays has to be that of the plan.
+fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
+    let Some(path) = &options.scenario else {
+        return Ok(Deployment::default());
+    };
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| Failure::input(format!("{name}: {error}")))?;
+    let sections =
+        Deployment::parse(&name, &text).map_err(|error| Failure::input(error.to_string()))?;
+    agree(&name, sections.network.relays, Some(relays))
+        .map_err(|error| Failure::input(error.to_string()))?;
+    Ok(sections)
+}
+
+/// The next command: it takes the file as it was written.
+fn next(file: &str, sections: &Deployment) -> String {
+    let firmware = format!("  cargo provision --scenario {file} --all --out-dir DIR\n");
+    let companions = format!("  cargo companion --config {file} --index INDEX\n");
+    let is_for_companions = sections.companion != Companion::default();
+    match (
+        probe_after_ms(&sections.network, None, file),
+        is_for_companions,
+    ) {
+        (Ok(_), false) => format!("next:\n{firmware}"),
+        (Ok(_), true) => {
+            format!(
+                "next, on the Linux computer of every drone:\n{companions}or, for drones with the firmware:\n{firmware}"
+            )
+        }
+        (Err(why), _) => format!(
+            "next, on the Linux computer of every drone (cargo provision refuses the file for the firmware: {why}):\n{companions}"
+        ),
+    }
 }
 
 fn db(sir: f64) -> f64 {

@@ -17,8 +17,8 @@ use uav_relay_tools::plan::carried::is_current;
 use uav_relay_tools::plan::flown::{Flown, flown};
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::{ADDRESS, LEN, Secret};
-use uav_relay_tools::provision::folder;
 use uav_relay_tools::provision::summary::{Heading, summary};
+use uav_relay_tools::provision::{firmware, folder};
 
 use options::{Method, Options};
 
@@ -148,7 +148,7 @@ impl<'a> Asked<'a> {
             (method, planned) => method.or(planned),
         };
         let method = network::method(method, of_section, &name, planned.is_some())?;
-        let probe_after_ms = network::of_the_firmware(&section, options.probe_after_ms, &name)?;
+        let probe_after_ms = firmware::probe_after_ms(&section, options.probe_after_ms, &name)?;
         let tolerance = match (options.tolerance, plan) {
             (Some(tolerance), Some(plan)) if tolerance.total_cmp(&plan.tolerance).is_ne() => {
                 return Err(other(
@@ -195,7 +195,7 @@ impl<'a> Asked<'a> {
         };
         let flight = Flight::new(&self.scenario, self.uavs, self.tolerance, self.network)
             .map_err(|error| format!("{}: {error}", self.name))?;
-        let [probe_after, _] = network::silence(self.probe_after_ms);
+        let [probe_after, _] = firmware::silence(self.probe_after_ms);
         carried(options, self.uavs, probe_after)?;
         let flight = match options.speed {
             Some(_) if !flight.has_sites() => {

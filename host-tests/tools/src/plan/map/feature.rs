@@ -1,5 +1,7 @@
 //! What there is to show of a plan, and where on earth it is.
 
+use std::fmt;
+
 use uav_relay::{Geodetic, Placement};
 use uav_relay_scenario::{Line, Scenario};
 
@@ -15,7 +17,40 @@ pub struct Feature {
     /// Where: one point, or the two ends of a hop.
     pub at: Vec<Geodetic>,
     /// Its numbers, by names with their units.
-    pub numbers: Vec<(&'static str, f64)>,
+    pub numbers: Vec<(&'static str, Number)>,
+}
+
+/// A number as a map shows it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Number {
+    /// A count.
+    Whole(u16),
+    /// A measure, rounded to three decimals: a millimetre, or a thousandth of a decibel.
+    Rounded(f64),
+    /// A ratio, rounded to six decimals.
+    Ratio(f64),
+}
+
+impl Number {
+    /// The value after rounding, where it is no count.
+    pub(super) fn rounded(self) -> f64 {
+        let (value, decimals) = match self {
+            Self::Whole(count) => return f64::from(count),
+            Self::Rounded(value) => (value, 1e3),
+            Self::Ratio(value) => (value, 1e6),
+        };
+        // Adding 0 makes -0 a 0.
+        (value * decimals).round() / decimals + 0.0
+    }
+}
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Whole(count) => count.fmt(f),
+            other => other.rounded().fmt(f),
+        }
+    }
 }
 
 /// What there is to show.
@@ -56,11 +91,11 @@ impl Map {
                 kind: "relay",
                 at: vec![at],
                 numbers: vec![
-                    ("index", f64::from(index)),
-                    ("x_m", place.x_m.into()),
-                    ("y_m", place.y_m.into()),
-                    ("h_m", place.altitude_m.into()),
-                    ("eirp_dbm", dbm(profile.power_w.into())),
+                    ("index", Number::Whole(index)),
+                    ("x_m", Number::Rounded(place.x_m.into())),
+                    ("y_m", Number::Rounded(place.y_m.into())),
+                    ("h_m", Number::Rounded(place.altitude_m.into())),
+                    ("eirp_dbm", Number::Rounded(dbm(profile.power_w.into()))),
                 ],
             });
         }
@@ -81,7 +116,11 @@ impl Map {
                 name: format!("interferer {number}"),
                 kind: "interferer",
                 at: vec![at],
-                numbers: vec![("x_m", x_m), ("y_m", y_m), ("eirp_dbm", dbm(power_w))],
+                numbers: vec![
+                    ("x_m", Number::Rounded(x_m)),
+                    ("y_m", Number::Rounded(y_m)),
+                    ("eirp_dbm", Number::Rounded(dbm(power_w))),
+                ],
             });
         }
         let hops = ends.iter().zip(ends.iter().skip(1)).zip(&plan.sirs);
@@ -91,9 +130,9 @@ impl Map {
                 kind: "hop",
                 at: vec![*from, *to],
                 numbers: vec![
-                    ("hop", f64::from(number)),
-                    ("sir", *sir),
-                    ("sir_db", 10.0 * sir.log10()),
+                    ("hop", Number::Whole(number)),
+                    ("sir_ratio", Number::Ratio(*sir)),
+                    ("sir_db", Number::Rounded(10.0 * sir.log10())),
                 ],
             });
         }

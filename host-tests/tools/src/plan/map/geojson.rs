@@ -5,7 +5,7 @@
 
 use geojson::{FeatureCollection, Geometry, GeometryValue, JsonObject};
 
-use super::feature::{Feature, Map, position};
+use super::feature::{Feature, Map, Number, position};
 
 /// The text of a GeoJSON file.
 pub fn text(map: &Map) -> String {
@@ -17,7 +17,7 @@ pub fn text(map: &Map) -> String {
 
 fn feature(feature: &Feature, geoid_m: Option<f64>) -> geojson::Feature {
     let shown = |[lon, lat, amsl]: [f64; 3]| match geoid_m {
-        Some(geoid_m) => vec![lon, lat, amsl + geoid_m],
+        Some(geoid_m) => vec![lon, lat, Number::Rounded(amsl + geoid_m).rounded()],
         None => vec![lon, lat],
     };
     let at: Vec<[f64; 3]> = feature.at.iter().map(|at| position(*at)).collect();
@@ -38,7 +38,11 @@ fn feature(feature: &Feature, geoid_m: Option<f64>) -> geojson::Feature {
         properties.insert("amsl_m".to_owned(), at[2].into());
     }
     for (name, number) in &feature.numbers {
-        properties.insert((*name).to_owned(), (*number).into());
+        let value = match number {
+            Number::Whole(count) => (*count).into(),
+            other => other.rounded().into(),
+        };
+        properties.insert((*name).to_owned(), value);
     }
     geojson::Feature {
         geometry: Some(Geometry::new(value)),

@@ -10,4 +10,4 @@ mod feature;
 pub mod geojson;
 pub mod kml;
 
-pub use feature::{Feature, Map};
+pub use feature::{Feature, Map, Number};

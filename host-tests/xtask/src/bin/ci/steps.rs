@@ -217,6 +217,11 @@ fn firmware() -> Vec<Step> {
         step(name, command)
     };
     vec![
+        // As a user types it at the root, and as `cargo hack check --target` does: without --package, the default members.
+        step(
+            "the default members, target",
+            format!("cargo check --locked --target {TARGET}"),
+        ),
         build("firmware", ""),
         build("firmware, no features", "--no-default-features"),
         build("firmware, asynchronous", "--features async"),

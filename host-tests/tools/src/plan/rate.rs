@@ -1,0 +1,156 @@
+//! Data rates of a chain whose hops share one frequency in time slots of equal length.
+//!
+//! The paper assumes one frequency. A hop then sends in one of N + 1 slots, and N relays carry B log2(1 + SIR) / (N + 1), with the SIR of the
+//! worst hop: more relays raise the SIR and divide the time. Slots fitted to the hops, spatial reuse and a frequency of its own for every hop
+//! are not modelled here.
+
+use serde::Serialize;
+use uav_relay_scenario::{Interference, Scenario};
+
+use super::ask::{Ask, Number};
+use super::found::{NoPlan, Plan};
+
+/// The largest number of relays that is tried, where a plan of many relays takes milliseconds.
+const MOST_FAST: u16 = 200;
+
+/// The same, where it takes seconds.
+const MOST_SLOW: u16 = 20;
+
+/// Returns the number of slots of a chain of `relays` relays: one for each hop.
+pub const fn slots(relays: u16) -> u32 {
+    relays as u32 + 1
+}
+
+/// Returns the data rate of a hop while it sends at an SIR (linear) over a bandwidth, bit/s: Shannon's, with the interference as noise.
+pub fn hop_bps(bandwidth_hz: f64, sir: f64) -> f64 {
+    bandwidth_hz * sir.ln_1p() / std::f64::consts::LN_2
+}
+
+/// Returns the SIR (linear) that a data rate takes over a bandwidth; the inverse of [`hop_bps`].
+pub fn sir_for_hop(bandwidth_hz: f64, rate_bps: f64) -> f64 {
+    (rate_bps / bandwidth_hz * std::f64::consts::LN_2).exp_m1()
+}
+
+/// Returns the data rate of a chain of `relays` relays with a worst SIR (linear) of `sir`, bit/s.
+pub fn chain_bps(bandwidth_hz: f64, relays: u16, sir: f64) -> f64 {
+    hop_bps(bandwidth_hz, sir) / f64::from(slots(relays))
+}
+
+/// The number of relays that carries most, of the numbers that were tried.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
+pub struct BestRate {
+    /// Number of relays.
+    pub best_uavs: u16,
+    /// Their data rate, bit/s.
+    pub best_rate_bps: f64,
+    /// The numbers tried are 1 to this.
+    pub tried_uavs: u16,
+    /// True if no larger number can carry more: the SIR at the receiver is bounded, and the slots shorten.
+    pub best_is_proven: bool,
+}
+
+/// The data rates of a scenario's chains over one bandwidth.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Rates {
+    /// The number of relays that carries most.
+    pub best: BestRate,
+    /// The fewest relays that carry the target, where there is one and they do.
+    pub meeting: Option<Plan>,
+}
+
+impl Rates {
+    /// Plans 1, 2, 3 and more relays as `ask` has it, until no larger number can carry more or as many are tried as are planned in seconds;
+    /// `target_bps` is the rate that is wanted.
+    ///
+    /// # Errors
+    /// [`NoPlan`] where no number of relays has a plan.
+    pub fn new(
+        scenario: &Scenario,
+        ask: &Ask,
+        bandwidth_hz: f64,
+        target_bps: Option<f64>,
+    ) -> Result<Self, NoPlan> {
+        let most = most_tried(scenario, ask);
+        let mut best: Option<BestRate> = None;
+        let mut meeting = None;
+        let mut refused = None;
+        let mut bound_bps = f64::INFINITY;
+        for relays in 1..=most {
+            if let Some(best) = &mut best {
+                best.best_is_proven = bound_bps / f64::from(slots(relays)) <= best.best_rate_bps;
+                if best.best_is_proven {
+                    break;
+                }
+            }
+            let one = Ask {
+                number: Number::Of(relays),
+                ..*ask
+            };
+            let plan = match super::plan(scenario, &one) {
+                Ok(plan) => plan,
+                // A larger number has still less room.
+                Err(none) => {
+                    refused = Some(none);
+                    break;
+                }
+            };
+            if relays == 1 {
+                bound_bps = hop_bps(bandwidth_hz, most_at_receiver(scenario, &plan));
+            }
+            let rate_bps = chain_bps(bandwidth_hz, relays, plan.sir());
+            if best.is_none_or(|best| rate_bps > best.best_rate_bps) {
+                best = Some(BestRate {
+                    best_uavs: relays,
+                    best_rate_bps: rate_bps,
+                    ..BestRate::default()
+                });
+            }
+            if let Some(best) = &mut best {
+                best.tried_uavs = relays;
+            }
+            if meeting.is_none() && target_bps.is_some_and(|target| rate_bps >= target) {
+                meeting = Some(plan);
+            }
+        }
+        match (best, refused) {
+            (Some(best), _) => Ok(Self { best, meeting }),
+            (None, Some(none)) => Err(none),
+            (None, None) => Err(NoPlan::Unmet(super::Why::default(), None)),
+        }
+    }
+}
+
+/// Returns the largest number of relays that is tried.
+fn most_tried(scenario: &Scenario, ask: &Ask) -> u16 {
+    let is_several =
+        matches!(&scenario.interference, Interference::Sources(sources) if sources.len() > 1);
+    if ask.x_m.is_some() {
+        1
+    } else if ask.free_altitude || is_several {
+        MOST_SLOW
+    } else {
+        MOST_FAST
+    }
+}
+
+/// Returns an upper bound on the SIR (linear) at the receiver of any number of relays, from that of `plan`.
+///
+/// The interference at the receiver does not depend on the relays. The signal is largest from right above it, at the lowest altitude and with
+/// the largest power.
+fn most_at_receiver(scenario: &Scenario, plan: &Plan) -> f64 {
+    let (Some((last, profile)), Some(sir)) = (plan.places.last(), plan.sirs.last()) else {
+        return f64::INFINITY;
+    };
+    let [x, y, h] = [last.x_m, last.y_m, last.altitude_m].map(f64::from);
+    let along = scenario.distance_m - x;
+    let squared = along * along + y * y + h * h;
+    let own = scenario.relays.values();
+    let lowest = own
+        .clone()
+        .filter_map(|own| own.altitude_m)
+        .fold(scenario.altitude_min_m.min(scenario.altitude_m), f64::min);
+    let largest_w = own
+        .filter_map(|own| own.power_w)
+        .fold(scenario.uav_w, f64::max);
+    sir * squared / (lowest * lowest) * largest_w / f64::from(profile.power_w)
+}

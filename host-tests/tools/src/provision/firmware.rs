@@ -1,0 +1,55 @@
+//! What the firmware can be told of the section `[network]` of a file.
+
+use uav_relay::{Duration, Settings};
+use uav_relay_scenario::deployment::Network;
+
+use super::config::{BAUD, MOST_PROBE_AFTER_MS};
+
+/// After which silence relays ask a neighbour for a sign of life, and after which that counts as lost; `probe_after_ms` is 0 for the usual
+/// ones.
+pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
+    let Settings {
+        probe_after,
+        dead_after,
+        ..
+    } = Settings::default();
+    match u64::from(probe_after_ms) {
+        0 => [probe_after, dead_after],
+        ms => [ms, 3 * ms].map(Duration::from_millis),
+    }
+}
+
+/// Refuses what a block cannot say, where it is not what the firmware does anyway; `given_ms` is the silence of the command line. Returns the
+/// milliseconds of silence after which relays ask, 0 for the usual ones.
+///
+/// # Errors
+/// One line that names the key, its value and the one that is allowed.
+pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> Result<u32, String> {
+    let refuse = |key: &str, value: u32, own: u32, why: &str| {
+        format!(
+            "{name}: network.{key} = {value}: must be {own}, or left out: {why}, and no block changes it"
+        )
+    };
+    let ms = |time: Duration| u32::try_from(time.as_micros() / 1_000).unwrap_or(u32::MAX);
+    if let Some(baud) = section.baud.filter(|baud| *baud != BAUD) {
+        let line = refuse("baud", baud, BAUD, "the firmware's ports run at that");
+        return Err(format!("{line}; a radio's own data rate is --baud"));
+    }
+    let probe_after_ms = given_ms.or(section.probe_after_ms).unwrap_or(0);
+    if probe_after_ms > MOST_PROBE_AFTER_MS {
+        return Err(format!(
+            "{name}: network.probe_after_ms = {probe_after_ms}: must be within 1 to {MOST_PROBE_AFTER_MS}"
+        ));
+    }
+    let [_, dead_after] = silence(probe_after_ms);
+    let dead = ms(dead_after);
+    let own = section.dead_after_ms.filter(|_| given_ms.is_none());
+    if let Some(after) = own.filter(|after| *after != dead) {
+        let why = "three times probe_after_ms, as the firmware has it";
+        return Err(refuse("dead_after_ms", after, dead, why));
+    }
+    // What the firmware does anyway is the same block.
+    let [usual, _] = silence(0);
+    let is_usual = Duration::from_millis(probe_after_ms.into()) == usual;
+    Ok(if is_usual { 0 } else { probe_after_ms })
+}
