@@ -277,7 +277,9 @@ impl World {
             }
         }
         self.check(report);
-        if std::env::var_os("STORY").is_some() && (self.now_s * 10.0).round() as u64 % 5 == 0 {
+        if std::env::var_os("STORY").is_some()
+            && ((self.now_s * 10.0).round() as u64).is_multiple_of(5)
+        {
             self.tell();
         }
     }
