@@ -224,7 +224,12 @@ fn drones_handed_over_anywhere_come_no_nearer_than_they_may() {
     let first = uav_relay_oracle::random::seed(1);
     let count = number("COUNT", 100);
     let begun = std::time::Instant::now();
-    let all: Vec<_> = (first..first + count).into_par_iter().map(judged).collect();
+    let all: Vec<_> = (first..first + count)
+        .into_par_iter()
+        .map(|seed| {
+            std::panic::catch_unwind(|| judged(seed)).unwrap_or_else(|_| panic!("SEED={seed}"))
+        })
+        .collect();
     let least_m = all
         .iter()
         .map(|it| it.margin_m)
