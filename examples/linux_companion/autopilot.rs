@@ -21,6 +21,7 @@ use uav_relay::{Event, Instant, Placement, Relay, Sites};
 use crate::answers::{Answer, Answers};
 use crate::astray::{Astray, Off};
 use crate::datagrams::Datagrams;
+use crate::relay::seed;
 use crate::waits;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
@@ -101,6 +102,7 @@ impl Companion {
         let port = port(&plan.place)?;
         let axis = Axis::between(plan.sites).map_err(|error| error.to_string())?;
         let mut link = Autopilot::new(axis, plan.pace, now);
+        link.set_seed(seed());
         if let Some(SigningKey(key)) = plan.key {
             link.sign(Signing::new(key, LINK, stamp(), now));
         }

@@ -292,7 +292,7 @@ fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
 }
 
 /// Another number at every start, of the source that std keys its hash maps with.
-fn seed() -> u32 {
+pub(crate) fn seed() -> u32 {
     let [a, b, c, d, ..] = RandomState::new().build_hasher().finish().to_le_bytes();
     u32::from_le_bytes([a, b, c, d])
 }

@@ -116,6 +116,7 @@ impl Autopilot {
             flown: None,
             target: None,
         })?;
+        autopilot.link.set_seed(board::seed());
         sign(&mut autopilot.link, now).ok()?;
         if chip::was_hung() {
             // There is room for the first line.

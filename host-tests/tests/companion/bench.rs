@@ -1,5 +1,6 @@
 //! The bench of examples/LINUX.md, run as the page has it.
 
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::Command;
 
@@ -44,7 +45,10 @@ fn the_bench_of_the_page_runs_twice() {
         script = script.replace(name, is.to_str().unwrap());
     }
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("network7.key"), "5e".repeat(32)).unwrap();
+    let key = folder.path().join("network7.key");
+    std::fs::write(&key, "5e".repeat(32)).unwrap();
+    // As the page has it before: programs refuse a key that other users can read.
+    std::fs::set_permissions(&key, std::fs::Permissions::from_mode(0o600)).unwrap();
     if Command::new("socat").arg("-V").output().is_err() {
         let file = folder.path().join("socat.py");
         std::fs::write(&file, SOCAT).unwrap();

@@ -4,6 +4,8 @@
 //! link sends its own time twice a second and the autopilot sends it back. Bytes stay in order: whatever comes after an answer was said
 //! after the question, and is no older than the question.
 //!
+//! A question has a tag, drawn at each start of the companion: an answer that a cable kept since before a restart is not of this link.
+//!
 //! An autopilot that has answered no question within [`GIVES_UP`] of the first has no echoes; the ages of its positions are all that is known
 //! then. Until then a link that has just begun is taken for late. An autopilot that has answered once is late whenever it does not.
 
@@ -19,13 +21,15 @@ const GIVES_UP: Duration = Duration::from_millis(10_000);
 /// An answer to a question older than this is not of this link.
 const OLDEST: Duration = Duration::from_millis(60_000);
 
-/// The lowest bits of a question. It holds µs in the higher bits: nearly nanoseconds, and the autopilot only sends them back.
-const SHIFT: u32 = 10;
-const TAG: u64 = 0x2A5;
+/// Low bits of a question that hold the link's tag; the higher ones hold µs, for 200 days. The autopilot only sends them back.
+const SHIFT: u32 = 20;
+const TAG: u32 = 0xA_52A5;
 
 /// Questions and answers.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
+    /// Low bits of every question.
+    tag: u32,
     due: Option<Instant>,
     /// When the first question was asked.
     begun_at: Option<Instant>,
@@ -33,7 +37,31 @@ pub(super) struct Echo {
     asked_at: Option<Instant>,
 }
 
+impl Default for Echo {
+    fn default() -> Self {
+        Self {
+            tag: TAG,
+            due: None,
+            begun_at: None,
+            asked_at: None,
+        }
+    }
+}
+
 impl Echo {
+    /// Draws the tag from `seed`.
+    pub(super) const fn seed(&mut self, seed: u32) {
+        self.tag = (seed ^ seed >> 12 ^ TAG) & ((1 << SHIFT) - 1);
+    }
+
+    /// Forgets all questions and answers.
+    pub(super) fn restart(&mut self) {
+        *self = Self {
+            tag: self.tag,
+            ..Self::default()
+        };
+    }
+
     /// Returns the question to ask at `now`.
     pub(super) fn take(&mut self, now: Instant) -> Option<u64> {
         if self.due.is_some_and(|due| due > now) {
@@ -41,13 +69,13 @@ impl Echo {
         }
         self.due = Some(now + PERIOD);
         self.begun_at = self.begun_at.or(Some(now));
-        Some(now.as_micros() << SHIFT | TAG)
+        Some(now.as_micros() << SHIFT | u64::from(self.tag))
     }
 
     /// Takes an answer.
     pub(super) fn hear(&mut self, now: Instant, question: u64) {
         let asked_at = Instant::from_micros(question >> SHIFT);
-        let is_own = question & ((1 << SHIFT) - 1) == TAG && asked_at <= now;
+        let is_own = question & ((1 << SHIFT) - 1) == u64::from(self.tag) && asked_at <= now;
         if is_own && now.since(asked_at) < OLDEST {
             self.asked_at = self.asked_at.max(Some(asked_at));
         }
@@ -72,5 +100,30 @@ impl Echo {
         let late = self.asked_at.map(|at| at + LATE).filter(|at| *at > now);
         let all = [self.due, late, self.begun_at.map(|at| at + GIVES_UP)];
         all.into_iter().flatten().filter(|at| *at > now).min()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Echo;
+    use crate::time::{Duration, Instant};
+
+    #[test]
+    fn an_answer_to_a_question_of_another_start_is_none() {
+        let at = |ms| Instant::from_millis(ms);
+        let mut before = Echo::default();
+        before.seed(1);
+        let asked = before.take(at(5_000)).expect("the first question");
+        let mut after = Echo::default();
+        after.seed(2);
+        after.restart();
+        let own = after.take(at(5_100)).expect("the first question");
+        after.hear(at(5_200), asked);
+        assert_eq!(after.floor(), None);
+        after.hear(at(5_200), own);
+        assert_eq!(after.floor(), Some(at(5_100)));
+        assert!(
+            !after.is_late(at(5_200)) && after.is_late(at(5_100) + Duration::from_millis(1_500))
+        );
     }
 }

@@ -142,6 +142,12 @@ impl Autopilot {
         }
     }
 
+    /// Sets a number that differs from one start of the companion to the next: a chip's random number, the relay's seed. Without it, answers that
+    /// a cable kept since before a restart may pass for answers to this link, and with them a choice of the mode that was made then.
+    pub const fn set_seed(&mut self, seed: u32) {
+        self.vehicle.echo.seed(seed);
+    }
+
     /// Bytes from the autopilot, any number of them.
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         let now = self.clock.advance(now);

@@ -316,7 +316,7 @@ impl Vehicle {
         self.granted = false;
         self.chosen = false;
         self.is_breached = false;
-        self.echo = Echo::default();
+        self.echo.restart();
         self.told_at = None;
         self.armed = false;
         self.in_air = false;

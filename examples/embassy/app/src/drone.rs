@@ -94,6 +94,7 @@ pub(crate) fn begin<F: NorFlash>(
             let Course { axis, pace } = course.map_err(Refused::Course)?;
             log::flies(axis.distance_m(), pace.speed_m_s);
             let mut link = Autopilot::new(axis, pace, now);
+            link.set_seed(board.seed);
             if let Some(key) = config::autopilot_key(&board.block) {
                 // Without a clock it takes the time from what it hears.
                 link.sign(Signing::new(key, 0, Stamp::UNKNOWN, now));
