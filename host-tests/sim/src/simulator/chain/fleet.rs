@@ -140,7 +140,10 @@ impl Chain {
         while let Some(frame) = vehicle.link.poll_transmit(now) {
             vehicle.hear(now, &frame);
         }
-        let mut has_said = is_flown != member.lent;
+        // A relay that was rebooted takes it for news that its drone is not flown, though nothing has changed for the drone.
+        let due = member.relay.poll_timeout();
+        let is_sooner = due.is_some_and(|at| member.wake.is_none_or(|wake| at < wake));
+        let mut has_said = is_flown != member.lent || is_sooner;
         while let Some(position) = vehicle.link.poll_position() {
             member
                 .relay
