@@ -96,16 +96,16 @@ impl Add<Duration> for Instant {
 /// Largest backward step of the caller's time that is taken for disorder of its calls, and not for a step of its clock.
 const DISORDER: Duration = Duration::from_millis(100);
 
-/// Longest time between two calls. A larger forward step is one of the caller's clock, and as good as this one: all that a relay waits for
-/// has expired by then.
-const LONGEST: Duration = Duration::from_millis(24 * 3_600 * 1_000);
+/// Longest forward step that is followed, some 140 years: a single wrong reading does not bring internal time to its end, where nothing
+/// expires any more.
+const LONGEST: Duration = Duration::from_micros(1 << 52);
 
 /// Converts the caller's time, which may step in either direction, to internal time, which never runs backward.
 ///
 /// | caller's time | internal time |
 /// | --- | --- |
-/// | up to one day after the latest | advances as much |
-/// | later than that | advances by one day |
+/// | up to 140 years after the latest | advances as much |
+/// | later than that | advances by 140 years |
 /// | up to 100 ms before the latest | stands still until the caller's time has caught up |
 /// | earlier than that | goes on from the latest, in step with the caller's time from now on |
 ///
@@ -177,12 +177,13 @@ mod tests {
         assert_eq!(clock.external(ms(4_000)), Instant::ZERO);
         // It steps forward by an hour, and to the end of time and back.
         assert_eq!(clock.advance(ms(3_600_020)), ms(3_605_020));
-        let day = 24 * 3_600 * 1_000;
         let end = Instant::from_micros(u64::MAX);
-        assert_eq!(clock.advance(end), ms(3_605_020 + day));
-        assert_eq!(clock.external(ms(3_605_021 + day)), end);
-        assert_eq!(clock.advance(ms(7)), ms(3_605_020 + day));
-        assert_eq!(clock.advance(ms(8)), ms(3_605_021 + day));
+        let far = ms(3_605_020) + super::LONGEST;
+        let later = far + Duration::from_millis(1);
+        assert_eq!(clock.advance(end), far);
+        assert_eq!(clock.external(later), end);
+        assert_eq!(clock.advance(ms(7)), far);
+        assert_eq!(clock.advance(ms(8)), later);
     }
 
     #[test]

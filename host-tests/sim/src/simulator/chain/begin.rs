@@ -145,7 +145,7 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
             swept: 0,
             stored: None,
             safe: None,
-            before: None,
+            been: None,
             measured: None,
             filmed: None,
             relay,

@@ -1,6 +1,6 @@
 //! What a relay may never do: leave its limits, or make the chain worse.
 
-use uav_relay::Method;
+use uav_relay::{Method, Placement};
 
 use super::state::Chain;
 
@@ -31,8 +31,9 @@ impl Chain {
             let chosen = (0.0..=end).contains(&place.x_m)
                 && aside
                 && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
-            // With a guard it may be on its way from anywhere: from outside the box it goes no farther out.
-            let before = member.before.unwrap_or(place);
+            // With a guard it may be on its way from anywhere, and may be halted on it: it goes no farther outside the box than where it
+            // has been since its drone was engaged.
+            let [low, high] = member.been.unwrap_or([place; 2]);
             let guard = self.setup.settings.guard;
             let inside = guard.map_or(chosen, |guard| {
                 let fence = guard.fence;
@@ -40,23 +41,40 @@ impl Chain {
                 let longer_m = end - self.setup.mission.config().distance_m;
                 let most_x_m = fence.most_x_m + longer_m;
                 [
-                    (place.x_m, before.x_m, fence.least_x_m, most_x_m),
-                    (place.y_m, before.y_m, fence.least_y_m, fence.most_y_m),
+                    (place.x_m, low.x_m, high.x_m, fence.least_x_m, most_x_m),
+                    (
+                        place.y_m,
+                        low.y_m,
+                        high.y_m,
+                        fence.least_y_m,
+                        fence.most_y_m,
+                    ),
                     (
                         place.altitude_m,
-                        before.altitude_m,
+                        low.altitude_m,
+                        high.altitude_m,
                         fence.least_altitude_m,
                         fence.most_altitude_m,
                     ),
                 ]
                 .iter()
-                .all(|(is, was, least, most)| (least.min(*was)..=most.max(*was)).contains(is))
+                .all(|(is, low, high, least, most)| {
+                    (least.min(*low)..=most.max(*high)).contains(is)
+                })
             });
             self.outcome.unsafe_setpoints += u64::from(!inside);
             // With a new mission it stays where it is until the next agreement.
             member.safe = inside.then_some(place);
         }
-        member.before = member.relay.setpoint();
+        member.been = member.relay.setpoint().map(|place| {
+            let [low, high] = member.been.unwrap_or([place; 2]);
+            let of = |low: Placement, pick: fn(f32, f32) -> f32| Placement {
+                x_m: pick(low.x_m, place.x_m),
+                y_m: pick(low.y_m, place.y_m),
+                altitude_m: pick(low.altitude_m, place.altitude_m),
+            };
+            [of(low, f32::min), of(high, f32::max)]
+        });
         if let Some((done, sir)) = member.relay.rounds()
             && sir > 0.0
             && self.outcome.rounds.len() <= usize::from(done)

@@ -36,8 +36,8 @@ pub(super) struct Member {
     pub(super) stored: Option<Upload>,
     /// Where it was told to fly when that was last found to be within its limits.
     pub(super) safe: Option<Placement>,
-    /// Setpoint when it was checked last.
-    pub(super) before: Option<Placement>,
+    /// Least and greatest coordinates of its setpoints since its drone was engaged.
+    pub(super) been: Option<[Placement; 2]>,
     /// Where it has measured the interference last.
     pub(super) measured: Option<Placement>,
     /// What it looked like when it was filmed last: whether it was on, and where it was told to fly.
