@@ -144,12 +144,13 @@ fn the_same_number_with_other_reaches_or_another_profile_is_not_the_same_pass() 
 
 #[test]
 fn the_fourth_straggler_in_a_row_is_a_leader_that_insists() {
-    let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
+    let (mut now, sweep) = first_sweep(&mut relay(mission(2), 1));
     let mut tail = after_two(&sweep, now, 1);
     for round in 0..3 {
         for _ in 0..3 {
             again(&mut tail, &sweep, now, 0);
             assert!(!calls(&mut tail, now), "{round}");
+            now = now + Duration::from_millis(1);
         }
         // The chain goes on: those were late, all three of them.
         again(&mut tail, &sweep, now, 2 + round);
@@ -158,6 +159,7 @@ fn the_fourth_straggler_in_a_row_is_a_leader_that_insists() {
     for _ in 0..3 {
         again(&mut tail, &sweep, now, 0);
         assert!(!calls(&mut tail, now));
+        now = now + Duration::from_millis(1);
     }
     again(&mut tail, &sweep, now, 0);
     assert!(calls(&mut tail, now));

@@ -15,6 +15,9 @@ const LONGEST: u32 = 6;
 /// Losses after which a link is not one that comes and goes yet.
 const FORGIVEN: u8 = 2;
 
+/// Least time from one loss of a link to the next, in `dead_after`, if the link comes and goes slowly.
+const SLOW: u32 = 10;
+
 /// After so many times `dead_after` without another, a loss is forgotten.
 const MEMORY: u32 = 32;
 
@@ -54,6 +57,8 @@ struct Loss {
     /// Since when the node is back.
     back: Option<Heard>,
     losses: u8,
+    /// Time since the loss before.
+    apart: Duration,
 }
 
 impl Loss {
@@ -93,6 +98,7 @@ impl Damping {
             at: now,
             back: None,
             losses: 0,
+            apart: Duration::from_micros(0),
         };
         Self {
             candidate: None,
@@ -110,10 +116,10 @@ impl Damping {
             core::mem::swap(&mut self.last, &mut self.before);
         }
         let other = self.before.recent(now, settings);
-        let own = if distance == self.last.distance {
-            self.last.recent(now, settings)
+        let (own, apart) = if distance == self.last.distance {
+            (self.last.recent(now, settings), now.since(self.last.at))
         } else {
-            0
+            (0, Duration::from_micros(0))
         };
         let known = if other > FORGIVEN {
             own.max(other)
@@ -126,6 +132,7 @@ impl Damping {
             at: now,
             back: None,
             losses: known.saturating_add(u8::from(counts)),
+            apart,
         };
     }
 
@@ -145,10 +152,12 @@ impl Damping {
         held.any(|lost| lost.holds(now, settings))
     }
 
-    /// Returns true if a link on this side has been lost more often than is forgiven.
-    pub(super) fn flaps(&self, now: Instant, settings: &Settings) -> bool {
-        let recent = |lost: &Loss| lost.recent(now, settings) > FORGIVEN;
-        recent(&self.last) || recent(&self.before)
+    /// Returns true if a link on this side comes and goes slowly: it has been lost more often than is forgiven, and stays for long each time,
+    /// so that it is worth to notice early when it is lost again.
+    pub(super) fn is_slow(&self, now: Instant, settings: &Settings) -> bool {
+        let slow = settings.dead_after.times(SLOW);
+        let is_slow = |lost: &Loss| lost.recent(now, settings) > FORGIVEN && lost.apart >= slow;
+        is_slow(&self.last) || is_slow(&self.before)
     }
 
     /// The nodes whose links are held down: bit 0 is the nearest one.

@@ -106,7 +106,7 @@ impl Liveness {
     }
 
     /// Begins anew with another node. The longest run of open questions is kept, with the one that has just ended: if that node was not lost
-    /// after all, so many questions were too few. Where its link `flaps`, the run was an outage of the link, and says nothing of the channel.
+    /// after all, so many questions were too few. Where its link `flaps` slowly, the run was an outage of the link, and says nothing of the channel.
     pub(crate) fn renew(&mut self, now: Instant, flaps: bool) {
         let longest = if flaps {
             QUESTIONS

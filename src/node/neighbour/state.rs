@@ -416,7 +416,7 @@ impl Neighbour {
         self.node = node;
         self.distance = candidate.distance;
         self.state = NeighbourState::Pairing { since: now };
-        let flaps = self.damping.flaps(now, settings);
+        let flaps = self.damping.is_slow(now, settings);
         self.liveness.renew(now, flaps);
         self.damping.clear();
         self.look_at = Some(now + self.tick);
