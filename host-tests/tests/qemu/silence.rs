@@ -88,7 +88,7 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
     let mut damaged = good.clone();
     damaged[20] ^= 1;
     let mut other_version = good.clone();
-    other_version[4] = 9;
+    other_version[4] = other_version[4].wrapping_add(1);
     let field = field().block(2).unwrap().to_vec();
     let blocks = [
         vec![0xFF; LEN],

@@ -107,7 +107,7 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
         );
         if view == 2 {
             // It still holds a newer one than it flies.
-            let [_, later] = both(&mut after);
+            let [_, later] = both_at(&mut after, NOW + Duration::from_millis(1));
             let call = Greeting {
                 mission: base,
                 neighbour: 3,

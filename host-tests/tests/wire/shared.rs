@@ -1,7 +1,7 @@
 //! On a channel that all hear: who is heard, and how two relays become neighbours.
 
 use uav_relay::wire::digest::digest;
-use uav_relay::{Instant, Port, Relay, Wiring};
+use uav_relay::{Duration, Instant, Port, Relay, Wiring};
 
 use super::codec::Said;
 use super::kinds::{FIRST, one_of_each, sent};
@@ -74,6 +74,7 @@ fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
         let hello = |neighbour| hearing(1, a_hello(newest, mission, neighbour, 0));
         relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(0)));
         assert!(soon(&mut relay, now).is_empty(), "{newest}");
+        let now = now + Duration::from_millis(1);
         relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(6)));
         // Somebody is on its other side now; but node 5 takes nobody, as far as it has said, so this relay comes between it and nobody.
         let flags = ASKS | FORMS | FRESH;

@@ -69,10 +69,15 @@ pub(crate) fn mission_id(offer: &Offer) -> (u16, u16) {
 
 /// What it says now, and what a millisecond later.
 pub(crate) fn both(relay: &mut Relay) -> [Vec<(u16, Said)>; 2] {
-    let now = said(relay, NOW);
-    let later = NOW + Duration::from_millis(1);
+    both_at(relay, NOW)
+}
+
+/// The same at another time.
+pub(crate) fn both_at(relay: &mut Relay, now: Instant) -> [Vec<(u16, Said)>; 2] {
+    let first = said(relay, now);
+    let later = now + Duration::from_millis(1);
     relay.handle_timeout(later);
-    [now, said(relay, later)]
+    [first, said(relay, later)]
 }
 
 pub(crate) fn held(relay: &Relay) -> Option<(u16, u16)> {

@@ -1,7 +1,7 @@
 //! A relay in a view of the chain: which digests it takes, what is over for it, and whose call it hands on.
 
 use uav_relay::wire::digest::digest;
-use uav_relay::{Event, Instant, Port, Relay, Wiring};
+use uav_relay::{Duration, Event, Instant, Port, Relay, Wiring};
 
 use super::codec::{Proposed, Said, SizedView};
 use super::kinds::{FIRST, framed, one_of_each, sent};
@@ -123,13 +123,14 @@ fn heartbeats_bear_the_digest_of_the_mission_in_every_view() {
 #[test]
 fn a_late_proposal_of_an_old_view_changes_nothing_and_a_leader_that_insists_hears_of_the_newest() {
     let (mut relay, mission) = in_view(4, id(5, 2));
-    let now = Instant::ZERO;
+    let mut now = Instant::ZERO;
     let of = (mission, 0);
     // View 5 from another place than the one it was agreed with.
     for (nth, view, place) in [(1, id(5, 2), 2), (2, id(5, 1), 3), (3, id(3, 9), 3)] {
         let proposal = Said::Proposal(proposed(view, of, place, 8));
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
         assert_eq!(soon(&mut relay, now), []);
+        now = now + Duration::from_millis(1);
         assert_eq!((relay.stats().stale, relay.view().bits()), (nth, id(5, 2)));
         assert_eq!((relay.index(), relay.mission().relays()), (4, 8));
         assert_eq!(events(&mut relay), []);
