@@ -190,7 +190,9 @@ impl Session {
     /// Owes the same to a silent node, but not while its handshakes are those of a start with a used nonce: shown its own nonce, such a
     /// node would pass for the one that it was, and its nonces and counters would be used twice.
     pub(crate) fn ask_silent(&mut self, to: u16) {
-        if self.find(to).is_none_or(|peer| peer.older.times == 0) {
+        let begun_anew =
+            |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.other >> 32;
+        if !self.find(to).is_some_and(begun_anew) {
             self.ask(to);
         }
     }
