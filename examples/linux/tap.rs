@@ -90,7 +90,7 @@ impl Tap {
 /// Starts the capture of `program`, and returns a tap for each of the ports of these names and the file that is written.
 ///
 /// An earlier capture is never overwritten, because it may be the only record of a crash that this start follows: where `path` exists, the file
-/// is [`numbered`].
+/// is `numbered`.
 ///
 /// # Errors
 /// One line that names the file.
