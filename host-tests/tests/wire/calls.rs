@@ -70,10 +70,23 @@ fn a_leader_whose_part_is_cut_off_holds_and_proposes_again_and_again() {
             (head.phase(), soon(&mut head, now)),
             (Phase::NoQuorum, vec![])
         );
+        let mut turns = 0..10_000;
         let proposal = loop {
+            assert!(turns.next().is_some(), "{number}: no proposal");
             now = head.poll_timeout().unwrap();
             head.handle_timeout(now);
             let out = sent(&mut head, now);
+            // Its neighbour is there: alone it would propose nothing.
+            for (port, said) in &out {
+                if let Said::Heartbeat { mission, ask, .. } = said {
+                    let answer = Said::Heartbeat {
+                        mission: *mission,
+                        ask: 0,
+                        answer: *ask,
+                    };
+                    head.handle_bytes(now, *port, &framed(1, *port, &answer));
+                }
+            }
             let proposal = out
                 .into_iter()
                 .find(|(_, said)| matches!(said, Said::Proposal(_)));
