@@ -70,6 +70,8 @@ pub(crate) const fn word(reason: HoldReason) -> &'static str {
         HoldReason::Order => "order",
         HoldReason::Close => "close",
         HoldReason::Lost => "lost",
+        HoldReason::NotFlown => "not_flown",
+        HoldReason::Pending => "pending",
         HoldReason::Halted => "halted",
     }
 }
@@ -86,6 +88,10 @@ fn said(reason: HoldReason, whom: &str) -> String {
         HoldReason::Lost => {
             format!("a relay beyond that fell silent may still hover there, between it and {whom}")
         }
+        HoldReason::NotFlown => {
+            format!("{whom} is not engaged, and is in the way or makes no room")
+        }
+        HoldReason::Pending => format!("{whom} has made no room yet"),
         HoldReason::Halted => {
             format!("a relay beyond {whom} is not in order; its own log says why")
         }

@@ -5,9 +5,11 @@
 //! takes up another of the owner's. So two numbers go together once, and what was said in an earlier one cannot count in a
 //! later one, however late it comes.
 
-use super::fence::Fence;
+use super::config::GuardConfig;
+use super::fence::{Fence, HoldReason};
 use super::own::Own;
 use crate::jitter::Jitter;
+use crate::place::Placement;
 use crate::side::Side;
 
 /// So many messages of another association in a row are of a new one, not late ones of an old.
@@ -307,6 +309,8 @@ pub(super) struct KeepOut {
     near_m: f32,
     /// True if a lost relay was out of order with this one when it was heard last.
     disordered: bool,
+    /// The relay that told last that it is not flown, and the place at which it was reported.
+    unflown: Option<(u16, Placement)>,
 }
 
 impl KeepOut {
@@ -316,6 +320,7 @@ impl KeepOut {
             lost: None,
             near_m: f32::NAN,
             disordered: false,
+            unflown: None,
         }
     }
 
@@ -344,6 +349,65 @@ impl KeepOut {
         if self.lost.is_some_and(|(lost, _)| is_beyond(lost)) {
             self.clear();
         }
+        if self.unflown.is_some_and(|(unflown, _)| is_beyond(unflown)) {
+            self.unflown = None;
+        }
+    }
+
+    /// Takes from a message of `node` that it is not flown, and where it was reported.
+    pub(super) fn see(&mut self, node: u16, fence: &Fence) {
+        if fence.says(Fence::RELEASED) && fence.says(Fence::UNPLACED) {
+            self.unflown = Some((node, fence.across.at(fence.x_m)));
+        }
+    }
+
+    /// Returns what holds along another line: the place of a drone that is not flown is not known along it.
+    pub(super) const fn leave_line(mut self) -> Self {
+        self.unflown = None;
+        self
+    }
+
+    /// Returns the reason for a limit, or a wait, at this side.
+    pub(super) const fn reason(&self, otherwise: HoldReason) -> HoldReason {
+        if self.unflown.is_some() {
+            HoldReason::NotFlown
+        } else {
+            otherwise
+        }
+    }
+
+    /// Returns true if a drone that is not flown is in the way of this relay to its agreed place.
+    pub(super) fn bars(&self, own: &Own) -> bool {
+        let ways = own.setpoint.zip(own.target);
+        ways.is_some_and(|(from, to)| self.way(from, to, &own.config) != to)
+    }
+
+    /// Returns the part of the way from `from` to `to` that does not come nearer than the separation to the drone that is not flown, or no
+    /// nearer than `from` is.
+    ///
+    /// Along x the way ends before that drone, unless the two are the separation apart across the line. Within the separation along x only
+    /// moves across the line that lead away from it are left.
+    pub(super) fn way(&self, from: Placement, to: Placement, config: &GuardConfig) -> Placement {
+        let Some((_, drone)) = self.unflown else {
+            return to;
+        };
+        let (separation_m, across) = (config.separation_m, drone.cross_section());
+        let is_passed = |place: Placement| {
+            place.cross_section().apart_squared(across) >= separation_m * separation_m
+        };
+        if is_passed(from) && is_passed(to) && from.cross_section() == to.cross_section() {
+            return to;
+        }
+        let x_m = if from.x_m >= drone.x_m {
+            to.x_m.max(from.x_m.min(drone.x_m + separation_m))
+        } else {
+            to.x_m.min(from.x_m.max(drone.x_m - separation_m))
+        };
+        let away = (from.y_m - drone.y_m) * (to.y_m - from.y_m)
+            + (from.altitude_m - drone.altitude_m) * (to.altitude_m - from.altitude_m);
+        let nearest_m = (from.x_m - drone.x_m).abs().min((x_m - drone.x_m).abs());
+        let turns = nearest_m >= separation_m || away >= 0.0;
+        if turns { to } else { from }.cross_section().at(x_m)
     }
 
     /// The first setpoint is `x_m`: whoever was lost before was never heard, and may hover anywhere beyond, from `near_m` on the

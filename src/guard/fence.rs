@@ -89,6 +89,10 @@ pub enum HoldReason {
     Close,
     /// A relay that fell silent may still hover there.
     Lost,
+    /// The neighbour is not flown, and is in the way or has not made room.
+    NotFlown,
+    /// The neighbour has not made room, for five seconds or more.
+    Pending,
     /// Another relay of the chain is not in order with its neighbours: all stay where they are.
     Halted,
 }

@@ -92,7 +92,7 @@ impl FenceFollower {
     /// Places are along another line: it begins anew, and what it knows of who is lost is that there is somebody.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
-            keep_out: self.keep_out,
+            keep_out: self.keep_out.leave_line(),
             association: self.association.renew(jitter),
             ..Self::new(self.association.node, jitter)
         };
@@ -115,6 +115,7 @@ impl FenceFollower {
     pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
         let is_placed = !fence.says(Fence::RELEASED) && fence.number != 0;
         self.association.hear_halt(fence, is_placed);
+        self.keep_out.see(self.association.node, fence);
         // With a number it is the place of a fence, which may be far from its owner.
         if fence.says(Fence::UNPLACED) || !fence.says(Fence::RELEASED) && fence.number == 0 {
             self.association.see(fence.x_m);
@@ -248,10 +249,13 @@ impl FenceFollower {
             return Some(HoldReason::Order);
         }
         let target_m = own.target_m();
+        if self.keep_out.bars(own) {
+            return Some(HoldReason::NotFlown);
+        }
         let limit = self.keep_out.limit_m();
         let stays = self.keep_out.is_near() && !own.is_across();
         if stays || limit.is_some_and(|limit| target_m < limit) {
-            return Some(HoldReason::Lost);
+            return Some(self.keep_out.reason(HoldReason::Lost));
         }
         if self.association.is_none() {
             return None;

@@ -40,7 +40,7 @@
 //! | 12 | The steps upstream and downstream of a relay add up to the separation at least: it agrees to no smaller one upstream before, and takes no smaller one downstream after. | relays that are not neighbours are the separation apart along x |
 //! | 13 | A relay that has to move across the line and may not by rule 10, or that started too close to a neighbour that is to be close, has the chain *open*: it tells both sides, and every relay passes that on. Then all go to places in the same order that are the separation apart along x, and steps are the separation. | there is room to move across the line |
 //! | 14 | From a neighbour that fell silent within the separation along x this relay goes off to the separation, and does not move across the line before, nor comes back nearer; nor where it never heard the neighbour, or had not cleared the first fence, before it has gone as far. Where the neighbour was out of order with it, it stays where it is. | the place of the silent one still counts |
-//! | 15 | A relay that is not flown to its setpoints, in its pilot's hands or on the ground, has none. It leaves both associations and says so until the neighbour has begun anew; flown again it begins as after a start. Meanwhile it tells the place at which it was reported, which grants nothing. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 off to the separation); if the two were in order it is otherwise free, until it receives a new association. | no relay counts on a drone that is flown by hand, and none comes nearer to it |
+//! | 15 | A relay that is not flown to its setpoints, in its pilot's hands or on the ground, has none. It leaves both associations and says so until the neighbour has begun anew; flown again it begins as after a start. Meanwhile it tells the place at which it was reported, which grants nothing. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 off to the separation); if the two were in order it is otherwise free, until it receives a new association, but for the place that was told last: until the neighbour is flown again, is linked anew or is forgotten, it does not go past that place along x nor nearer to it than the separation, unless the two are the separation apart across the line, and within the separation along x it moves across the line only away from it. A relay that is on its way stops where it was reported. | no relay counts on a drone that is flown by hand, and none comes nearer to it or flies through it |
 //! | 16 | A relay that is out of order with a neighbour, or not in order with both for three reminders and not seen to be so by the places of those that are not flown, has the chain *halt*: it tells both sides at every reminder, and every relay passes that on, also one that is not flown. A relay that halts on its way stops where it was reported last. A request that is not repeated for 15 reminders is forgotten. | no relay flies into a drone that was given back, or has started, at a wrong place |
 //!
 //! Where places are along another line from one moment to the next ([`Guard::leave_line`]), a relay has no setpoint and begins as after a
@@ -74,7 +74,8 @@
 //!   much again each time that one is rebooted before a fence has opened what is missing. What a relay hovers off across the line counts
 //!   where the two are within the separation along x.
 //! - A relay says nothing before it has both a place to go to and a report of where it is: until then nobody moves toward it.
-//! - A drone in its pilot's hands is the pilot's affair: its neighbours only come no nearer. A drone that is given back at a wrong place
+//! - A drone in its pilot's hands is the pilot's affair: its neighbours only come no nearer, to the place that they have received last, which is told
+//!   every second while it changes and every four seconds else. Relays that are not its neighbours do not know it, and may fly past it. A drone that is given back at a wrong place
 //!   stays there, and the chain halts around it; a drone that is just flying past needs some seconds for that. A drone that is given back
 //!   in motion overshoots as far as its autopilot takes to stop it.
 //! - A relay that starts, or is flown again, beside one that is not flown has not heard it, and stays where it is until that one is
@@ -320,6 +321,9 @@ impl Guard {
         // A relay outside the box comes back as far as its limits allow, and goes no farther out.
         let wanted = across.cross_section().at(x_m);
         let next = own.config.cut_toward(wanted, before);
+        let from = own.way_begins(before);
+        let next = self.follower.keep_out.way(from, next, &own.config);
+        let next = self.owner.keep_out.way(from, next, &own.config);
         self.own.reachable.go(next.x_m, now);
         self.own.go(next, now);
         if self.follower.is_ordered() {
@@ -408,12 +412,16 @@ impl Guard {
         if !self.flown || self.own.target.is_none() || !self.own.reachable.is_known() {
             self.pass_halt();
             let (up, down) = (&mut self.follower.association, &mut self.owner.association);
-            return [(Side::Upstream, up), (Side::Downstream, down)]
+            let told = [(Side::Upstream, up), (Side::Downstream, down)]
                 .into_iter()
                 .find_map(|(side, association)| {
                     let fence = association.tell_alone(&self.own)?;
                     Some((side, association.node, fence))
                 });
+            if let Some((_, _, fence)) = &told {
+                self.own.told = fence.across.at(fence.x_m);
+            }
+            return told;
         }
         let own = &self.own;
         let placed = self.owner.is_ordered(own);
@@ -442,9 +450,10 @@ impl Guard {
         let follower = self.follower.association.node != 0 && !(there && self.follower.is_agreed());
         let owner = self.owner.association.node != 0 && !(there && self.owner.is_agreed());
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
-        // A relay that is in no association tells its place less often.
+        self.own.age();
+        // A relay that is in no association tells its place less often, unless it moves.
         self.reminders = self.reminders.wrapping_add(1);
-        let speaks = begun || self.reminders.is_multiple_of(ALONE_EVERY);
+        let speaks = begun || self.own.has_moved() || self.reminders.is_multiple_of(ALONE_EVERY);
         up.due |= follower && (speaks || up.tells_halt());
         down.due |= owner && (speaks || down.tells_halt());
         up.age();
@@ -491,7 +500,20 @@ impl Guard {
             Side::Downstream => &self.owner.association,
         };
         let halted = association.requests_halt();
-        reason.or(halted.then_some(HoldReason::Halted))
+        reason
+            .or(halted.then_some(HoldReason::Halted))
+            .or_else(|| self.pending(side))
+    }
+
+    /// Returns the reason for a setpoint that has stood for long on its way toward `side`.
+    fn pending(&self, side: Side) -> Option<HoldReason> {
+        let own = &self.own;
+        let (clear, keep_out) = match side {
+            Side::Upstream => (self.follower.is_clear(own), &self.follower.keep_out),
+            Side::Downstream => (self.owner.is_clear(own), &self.owner.keep_out),
+        };
+        let waits = own.waits(side, clear);
+        waits.then(|| keep_out.reason(HoldReason::Pending))
     }
 
     /// Inputs that were refused: not a number, or out of range. It stays at its maximum.

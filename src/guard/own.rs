@@ -3,7 +3,11 @@
 use super::config::GuardConfig;
 use super::reachable::ReachableInterval;
 use crate::place::{CrossSection, Placement};
+use crate::side::Side;
 use crate::time::Instant;
+
+/// Reminders, of one a second, after which a setpoint that stands short of the agreed place is reported.
+const MOST_STANDS: u8 = 5;
 
 /// What both fences go by.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +29,10 @@ pub(super) struct Own {
     pub(super) halted: bool,
     /// Place reported last.
     pub(super) reported: Option<Placement>,
+    /// Place told last while it was not flown.
+    pub(super) told: Placement,
+    /// Reminders since the setpoint changed last.
+    stands: u8,
     /// Last setpoint at which this relay arrived, or the one that it began with. It is on its way from there, so it stops no farther
     /// outside the box than that.
     left: Placement,
@@ -43,6 +51,8 @@ impl Own {
             open: false,
             halted: true,
             reported: None,
+            told: Placement::on_line(0.0, 0.0),
+            stands: 0,
             left: Placement::on_line(0.0, 0.0),
         }
     }
@@ -53,7 +63,50 @@ impl Own {
             self.turned = now;
             self.still = false;
         }
+        if self.setpoint != Some(setpoint) {
+            self.stands = 0;
+        }
         self.setpoint = Some(setpoint);
+    }
+
+    /// Returns the place from which this relay goes on: on its way to `setpoint` it may stop as far along x as it was reported.
+    pub(super) fn way_begins(&self, setpoint: Placement) -> Placement {
+        let ReachableInterval { low_m, high_m, .. } = self.reachable;
+        let (at_m, off_m) = match self.reported {
+            Some(place) if !self.reachable.is_still() => (place.x_m, self.config.hover_m),
+            _ => return setpoint,
+        };
+        let least_m = (at_m - off_m).max(low_m);
+        let most_m = (at_m + off_m).min(high_m);
+        let x_m = setpoint.x_m.max(least_m).min(most_m);
+        setpoint.cross_section().at(x_m)
+    }
+
+    /// Counts a reminder.
+    pub(super) const fn age(&mut self) {
+        self.stands = self.stands.saturating_add(1);
+    }
+
+    /// Returns true if the setpoint has stood for some reminders although the agreed place is farther on toward `side`, or across the line
+    /// unless this side is `clear` for that.
+    pub(super) fn waits(&self, side: Side, clear: bool) -> bool {
+        let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
+            return false;
+        };
+        let ahead_m = match side {
+            Side::Upstream => setpoint.x_m - target.x_m,
+            Side::Downstream => target.x_m - setpoint.x_m,
+        };
+        let wants = ahead_m > self.config.rounding() || !clear && !self.is_across();
+        self.stands >= MOST_STANDS && wants
+    }
+
+    /// Returns true if it was reported elsewhere than it has told its neighbours while it is not flown.
+    pub(super) fn has_moved(&self) -> bool {
+        self.reported.is_some_and(|place| {
+            !self.is_near(place.cross_section(), self.told.cross_section())
+                || (place.x_m - self.told.x_m).abs() > self.config.hover_m + self.config.rounding()
+        })
     }
 
     /// It is not flown to its setpoints any more, or again: there is none, and it may be anywhere.

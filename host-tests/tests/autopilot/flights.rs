@@ -11,7 +11,8 @@ use uav_relay::flight::autopilot::Autopilot;
 use uav_relay::flight::autopilot::carrot::Pace;
 
 use super::real::{Mode, Real};
-use super::vehicle::axis;
+use super::runner::Runner;
+use super::vehicle::{axis, sites};
 use super::*;
 
 const STEP: Duration = Duration::from_millis(20);
@@ -82,13 +83,20 @@ impl Cable {
     }
 }
 
+/// A companion that is polled, or on the asynchronous runner.
+enum Companion {
+    Polled(Autopilot),
+    Async(Runner),
+}
+
 struct Flight {
     rng: ChaCha8Rng,
+    is_async: bool,
     now: Instant,
     real: Real,
     to: Cable,
     from: Cable,
-    link: Option<Autopilot>,
+    companion: Option<Companion>,
     /// When the companion was started; when it is started again, or goes on.
     started: Instant,
     starts_at: Option<Instant>,
@@ -116,13 +124,15 @@ impl Flight {
         }
         // Both real ones do.
         real.echoes = rng.random_bool(0.9);
-        Self {
+        let is_async = rng.random_bool(0.25);
+        let mut flight = Self {
             rng,
+            is_async,
             now,
             real,
             to: Cable::new(),
             from: Cable::new(),
-            link: Some(Autopilot::new(axis(), Pace::default(), now)),
+            companion: None,
             started: now,
             starts_at: None,
             paused_until: now,
@@ -135,7 +145,20 @@ impl Flight {
             engaged: 0,
             wrong: Vec::new(),
             log: Vec::new(),
-        }
+        };
+        flight.start();
+        flight
+    }
+
+    /// Starts the companion.
+    fn start(&mut self) {
+        let link = Autopilot::new(axis(), Pace::default(), self.now);
+        self.started = self.now;
+        self.companion = Some(if self.is_async {
+            Companion::Async(Runner::new(link, sites(), self.now))
+        } else {
+            Companion::Polled(link)
+        });
     }
 
     fn note(&mut self, what: &str) {
@@ -171,7 +194,7 @@ impl Flight {
                 }
             }
             7 => {
-                self.link = None;
+                self.companion = None;
                 let at = self.soon(20, 15_000);
                 self.starts_at = Some(at);
                 self.note(&format!("companion killed until {at:?}"));
@@ -226,8 +249,7 @@ impl Flight {
         }
         if self.starts_at.is_some_and(|at| at <= now) {
             self.starts_at = None;
-            self.link = Some(Autopilot::new(axis(), Pace::default(), now));
-            self.started = now;
+            self.start();
             self.texts.clear();
             // What came meanwhile is flushed when the port is opened.
             while self.from.take(now).is_some() {}
@@ -242,9 +264,33 @@ impl Flight {
 
     fn drive(&mut self) {
         let now = self.now;
-        let Some(link) = self.link.as_mut().filter(|_| now >= self.paused_until) else {
+        if now < self.paused_until {
             return;
+        }
+        let mut companion = self.companion.take();
+        let engages = match &mut companion {
+            Some(Companion::Polled(link)) => self.poll(link),
+            Some(Companion::Async(runner)) => self.run(runner),
+            None => false,
         };
+        self.companion = companion;
+        if engages {
+            self.engaged += 1;
+            if now.since(self.flown_at) > KNOWN_WITHIN {
+                self.wrong
+                    .push(format!("engaged by what was long ago at {now:?}"));
+            }
+            // It was given since the companion was started, but for what is known late.
+            if self.given_at.is_none_or(|at| at < self.started) {
+                self.wrong
+                    .push(format!("engaged without a pilot at {now:?}"));
+            }
+        }
+    }
+
+    /// Returns true if the drone becomes engaged.
+    fn poll(&mut self, link: &mut Autopilot) -> bool {
+        let now = self.now;
         let before = link.state();
         let mut became = before;
         let mut engages = false;
@@ -259,38 +305,55 @@ impl Flight {
         link.handle_timeout(now);
         see(link.state());
         link.handle_setpoint(now, self.setpoint);
-        let mut wrong = Vec::new();
         while let Some(frame) = link.poll_transmit(now) {
-            if frame[7] == 253 {
-                let end = frame.len() - 2;
-                let text = String::from_utf8_lossy(&frame[11..end])
-                    .trim_end_matches('\0')
-                    .to_owned();
-                let again = self.texts.iter().rev().find(|(_, other)| *other == text);
-                if again.is_some_and(|(at, _)| now.since(*at) < Duration::from_millis(10_000)) {
-                    wrong.push(format!("{text} again at {now:?}"));
-                }
-                self.texts.push((now, text));
-            }
-            self.to.put(now, frame.to_vec());
+            self.send(&frame);
         }
         while link.poll_position().is_some() {}
         while link.poll_event().is_some() {}
         assert!(link.poll_timeout(now) > now, "it would spin");
-        if engages {
-            self.engaged += 1;
-            if now.since(self.flown_at) > KNOWN_WITHIN {
-                wrong.push(format!("engaged by what was long ago at {now:?}"));
-            }
-            // It was given since the companion was started, but for what is known late.
-            if self.given_at.is_none_or(|at| at < self.started) {
-                wrong.push(format!("engaged without a pilot at {now:?}"));
-            }
-        }
         if became != before {
             self.note(&format!("link {became:?}, {:?}", self.real.mode));
         }
-        self.wrong.extend(wrong);
+        engages
+    }
+
+    /// The same on the asynchronous runner. Its setpoint is its relay's.
+    fn run(&mut self, runner: &mut Runner) -> bool {
+        let before = runner.is_flown();
+        let mut engages = false;
+        while let Some((_, bytes)) = self.from.take(self.now) {
+            runner.handle_bytes(&bytes);
+        }
+        let written = runner.run(self.now);
+        engages |= !before && runner.is_flown();
+        let mut left = &written[..];
+        while let Some(length) = left.get(1) {
+            let (frame, rest) = left.split_at(12 + usize::from(*length));
+            self.send(frame);
+            left = rest;
+        }
+        if before != runner.is_flown() {
+            let what = format!("async, flown {}, {:?}", !before, self.real.mode);
+            self.note(&what);
+        }
+        engages
+    }
+
+    /// Puts a frame of the companion on the cable, and checks texts.
+    fn send(&mut self, frame: &[u8]) {
+        let now = self.now;
+        if frame[7] == 253 {
+            let end = frame.len() - 2;
+            let text = String::from_utf8_lossy(&frame[11..end])
+                .trim_end_matches('\0')
+                .to_owned();
+            let again = self.texts.iter().rev().find(|(_, other)| *other == text);
+            if again.is_some_and(|(at, _)| now.since(*at) < Duration::from_millis(10_000)) {
+                self.wrong.push(format!("{text} again at {now:?}"));
+            }
+            self.texts.push((now, text));
+        }
+        self.to.put(now, frame.to_vec());
     }
 
     fn setpoint(&mut self) {
@@ -303,8 +366,8 @@ impl Flight {
     }
 }
 
-/// What went wrong in a flight; how often it was engaged, and how many texts there were.
-fn fly(seed: u64) -> (Vec<String>, u32) {
+/// What went wrong in a flight; how often it was engaged, and whether on the asynchronous runner.
+fn fly(seed: u64) -> (Vec<String>, u32, bool) {
     let mut flight = Flight::new(seed);
     for i in 0..FLIGHT_S * 50 {
         if i == 150 {
@@ -322,7 +385,7 @@ fn fly(seed: u64) -> (Vec<String>, u32) {
     let wrong = flight.wrong.into_iter();
     let log = flight.log.join("\n  ");
     let wrong = wrong.map(|what| format!("SEED={seed} {kind:?}: {what}\n  {log}"));
-    (wrong.take(1).collect(), flight.engaged)
+    (wrong.take(1).collect(), flight.engaged, flight.is_async)
 }
 
 #[test]
@@ -331,15 +394,18 @@ fn nothing_is_engaged_without_a_pilots_choice() {
     let count = std::env::var("COUNT").ok();
     let count: u64 = count.and_then(|text| text.parse().ok()).unwrap_or(1_000);
     let all: Vec<_> = (first..first + count).into_par_iter().map(fly).collect();
-    let engaged: u32 = all.iter().map(|(_, engaged)| engaged).sum();
-    let wrong: Vec<&String> = all.iter().flat_map(|(wrong, _)| wrong).collect();
+    let engaged: u32 = all.iter().map(|(_, engaged, _)| engaged).sum();
+    let on_runner = all.iter().filter(|(.., is_async)| *is_async);
+    let on_runner: u32 = on_runner.map(|(_, engaged, _)| engaged).sum();
+    let wrong: Vec<&String> = all.iter().flat_map(|(wrong, ..)| wrong).collect();
     println!(
-        "{count} flights, engaged {engaged} times, {} wrong",
+        "{count} flights, engaged {engaged} times, {on_runner} of them on the asynchronous runner, {} wrong",
         wrong.len()
     );
     assert!(
         u64::from(engaged) > count,
         "too few were engaged: {engaged}"
     );
+    assert!(u64::from(on_runner) > count / 4, "{on_runner}");
     assert!(wrong.is_empty(), "{} of {count}: {}", wrong.len(), wrong[0]);
 }

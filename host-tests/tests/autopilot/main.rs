@@ -7,6 +7,7 @@ mod motion;
 mod px4;
 mod radio;
 mod real;
+mod runner;
 mod signed;
 mod vehicle;
 

@@ -11,7 +11,7 @@ use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind, Position};
 use uav_relay::flight::axis::Axis;
 use uav_relay::flight::mavlink::table;
-use uav_relay::{Instant, Placement};
+use uav_relay::{Instant, Placement, Sites};
 
 use crate::signed::Key;
 
@@ -27,10 +27,15 @@ pub(crate) const fn place(x_m: f32) -> Placement {
     Placement::on_line(x_m, 20.0)
 }
 
+pub(crate) fn sites() -> Sites {
+    Sites {
+        tx: Geodetic::from_degrees(47.40, 8.54, 420.0).unwrap(),
+        rx: Geodetic::from_degrees(47.41, 8.55, 431.0).unwrap(),
+    }
+}
+
 pub(crate) fn axis() -> Axis {
-    let tx = Geodetic::from_degrees(47.40, 8.54, 420.0).unwrap();
-    let rx = Geodetic::from_degrees(47.41, 8.55, 431.0).unwrap();
-    Axis::try_new(tx, rx).unwrap()
+    Axis::between(sites()).unwrap()
 }
 
 /// What the link says.

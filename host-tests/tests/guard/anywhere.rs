@@ -17,8 +17,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::flight::autopilot::carrot::Pace;
-use uav_relay::guard::Guard;
 use uav_relay::guard::config::{Geofence, GuardConfig};
+use uav_relay::guard::{Fence, Guard};
 use uav_relay::{Placement, Side};
 use uav_relay_oracle::random::seed;
 use uav_relay_sim::simulator::drones::Point;
@@ -174,6 +174,12 @@ struct World {
     noise_m: f64,
     /// What each pair may come to: least of the separation and of what it was at the start, m.
     least_m: Vec<f64>,
+    /// Since when each drone has hovered in its pilot's hands; infinite while it does not.
+    hovers_s: Vec<f64>,
+    /// When a drone was first told of the place where its neighbour hovers in its pilot's hands; infinite before.
+    known_s: Vec<f64>,
+    /// The same as `least_m` for such a pair, counted from `BRAKES_S` after that.
+    hovering_m: Vec<f64>,
     /// Drones that their pilots give back once no other one is on its way past them.
     later: Vec<usize>,
     /// Drones that were given back in motion, and until when they brake: their distances count from then on.
@@ -237,8 +243,13 @@ impl World {
             drone.guard.position(now, placement(said));
         }
         for letter in self.medium.arrived(self.now_s) {
+            let pair = self.pair(letter.from, letter.to);
             let drone = &mut self.drones[letter.to];
             if drone.line.number == letter.line {
+                let is_place = letter.fence.flags & Fence::UNPLACED != 0;
+                if is_place && letter.sent_s >= self.hovers_s[letter.from] {
+                    self.known_s[pair] = self.known_s[pair].min(self.now_s);
+                }
                 drone
                     .guard
                     .hear(letter.side, node(letter.from), &letter.fence);
@@ -276,11 +287,39 @@ impl World {
                 self.begin(k);
             }
         }
+        self.watch_pilots();
         self.check(report);
         if std::env::var_os("STORY").is_some()
             && ((self.now_s * 10.0).round() as u64).is_multiple_of(5)
         {
             self.tell();
+        }
+    }
+
+    /// Takes which drones hover in their pilots' hands, and how near their neighbours are once they know it.
+    fn watch_pilots(&mut self) {
+        for k in 0..self.drones.len() {
+            let drone = &self.drones[k];
+            let stands = length(drone.velocity) < 0.2;
+            let hovers = drone.pilot.is_some() && stands;
+            let since_s = self.hovers_s[k].min(self.now_s);
+            self.hovers_s[k] = if hovers { since_s } else { f64::INFINITY };
+            for other in beside(k, self.drones.len()).into_iter().flatten() {
+                let pair = self.pair(k, other);
+                let is_flown = self.drones[other].pilot.is_none();
+                if !hovers || !is_flown {
+                    self.known_s[pair] = f64::INFINITY;
+                }
+                let counts = self.now_s > self.known_s[pair] + BRAKES_S;
+                let apart = length(way(self.drones[k].at, self.drones[other].at));
+                let most = apart.min(f64::from(self.config.separation_m));
+                let before = self.hovering_m[pair];
+                self.hovering_m[pair] = match (counts, before.is_finite()) {
+                    (false, _) => f64::INFINITY,
+                    (true, false) => most,
+                    (true, true) => before,
+                };
+            }
         }
     }
 
@@ -307,11 +346,17 @@ impl World {
         for k in 0..self.drones.len() {
             for other in 0..k {
                 let (one, two) = (&self.drones[k], &self.drones[other]);
-                if one.pilot.is_some() || two.pilot.is_some() {
+                let apart = length(way(one.at, two.at));
+                let least_m = match (one.pilot, two.pilot) {
+                    (None, None) => self.least_m[self.pair(k, other)],
+                    (Some(_), None) => self.hovering_m[self.pair(k, other)],
+                    (None, Some(_)) => self.hovering_m[self.pair(other, k)],
+                    (Some(_), Some(_)) => continue,
+                };
+                if !least_m.is_finite() {
                     continue;
                 }
-                let apart = length(way(one.at, two.at));
-                let margin = apart - (self.least_m[self.pair(k, other)] - off_m);
+                let margin = apart - (least_m - off_m);
                 if margin < report.margin_m {
                     report.margin_m = margin;
                     report.nearest = Some((other + 1, k + 1, apart, self.now_s));
@@ -539,6 +584,9 @@ fn fly(seed: u64) -> Report {
         faults,
         now_s: 0.1,
         noise_m: 0.3 * error_m,
+        hovers_s: vec![f64::INFINITY; relays],
+        known_s: vec![f64::INFINITY; relays * relays],
+        hovering_m: vec![f64::INFINITY; relays * relays],
         later: Vec::new(),
         brakes: Vec::new(),
         rng,

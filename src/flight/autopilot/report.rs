@@ -84,6 +84,8 @@ impl Line {
             Some(HoldReason::Order) => "relay: waits, wrong order with",
             Some(HoldReason::Close) => "relay: waits, may not yet near",
             Some(HoldReason::Lost) => "relay: waits, has lost",
+            Some(HoldReason::NotFlown) => "relay: waits for engagement of",
+            Some(HoldReason::Pending) => "relay: waits, no room yet from",
             Some(HoldReason::Halted) => "relay: halts, wrong order beyond",
             None => "relay: no longer waits for",
         };
@@ -321,9 +323,10 @@ mod tests {
 
     #[test]
     fn every_reason_of_the_guard_fits_into_a_line() {
-        use HoldReason::{Close, Lost, Order, Unheard};
+        use HoldReason::{Close, Halted, Lost, NotFlown, Order, Pending, Unheard};
         for side in [Side::Upstream, Side::Downstream] {
-            for reason in [Some(Unheard), Some(Order), Some(Close), Some(Lost), None] {
+            let all = [Unheard, Order, Close, Lost, NotFlown, Pending, Halted];
+            for reason in all.map(Some).into_iter().chain([None]) {
                 let line = Line::hold(side, reason);
                 assert!(line.text.map(str::len).into_iter().sum::<usize>() <= 50);
             }

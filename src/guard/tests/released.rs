@@ -86,7 +86,7 @@ fn nobody_comes_nearer_to_a_relay_that_its_pilot_has() {
             Side::Upstream
         };
         let reason = row.all[k].guard.hold_reason(side);
-        assert_eq!(reason, Some(HoldReason::Lost));
+        assert_eq!(reason, Some(HoldReason::NotFlown));
         let high = Placement {
             altitude_m: 90.0,
             ..at(away)
@@ -104,6 +104,112 @@ fn nobody_comes_nearer_to_a_relay_that_its_pilot_has() {
     row.all[0].guard.commit(at(180.0));
     row.all[0].guard.forget(Side::Downstream);
     assert_eq!(row.setpoint(0), Some(180.0));
+}
+
+/// Rule 15: its pilot flies the middle one in front of its neighbour, across the line or along it.
+#[test]
+fn nobody_flies_through_a_drone_that_its_pilot_hovers_in_the_way() {
+    for (y_m, expected_m) in [(0.0, 80.0), (6.0, 80.0), (20.0, 20.0)] {
+        let mut row = Row::new();
+        row.take();
+        let drone = Placement { y_m, ..at(70.0) };
+        let now = row.all[1].now;
+        row.all[1].guard.position(now, drone);
+        row.talk();
+        row.all[0].guard.commit(at(20.0));
+        assert_eq!(row.setpoint(0), Some(expected_m), "{y_m}");
+        let reason = row.all[0].guard.hold_reason(Side::Downstream);
+        let expected = (expected_m > 20.0).then_some(HoldReason::NotFlown);
+        assert_eq!(reason, expected);
+        // It is gone again.
+        row.all[1].guard.position(now, at(200.0));
+        row.talk();
+        assert_eq!(row.setpoint(0), Some(20.0));
+    }
+}
+
+/// A relay that is already on its way stops before it, and stays there whatever the noise of its reports.
+#[test]
+fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
+    let mut row = Row::new();
+    row.take();
+    row.talk();
+    row.all[0].guard.commit(at(20.0));
+    assert_eq!(row.setpoint(0), Some(20.0));
+    row.all[0].is_at(90.0);
+    let now = row.all[1].now;
+    row.all[1].guard.position(now, at(40.0));
+    row.talk();
+    assert_eq!(row.setpoint(0), Some(40.0 + APART));
+    for _ in 0..20 {
+        row.all[0].is_at(40.0 + APART);
+    }
+    assert_eq!(row.setpoint(0), Some(40.0 + APART));
+}
+
+/// Within the separation along x it moves across the line away from the drone only.
+#[test]
+fn nobody_moves_across_the_line_toward_a_drone_beside_it() {
+    for (y_m, moves) in [(-30.0, true), (30.0, false)] {
+        let mut row = Row::new();
+        row.take();
+        let now = row.all[1].now;
+        let beside = Placement {
+            y_m: 20.0,
+            ..at(100.0)
+        };
+        row.all[1].guard.position(now, beside);
+        row.talk();
+        let across = Placement { y_m, ..at(100.0) };
+        row.all[0].guard.commit(across);
+        let expected = if moves { across } else { at(100.0) };
+        let one = &mut row.all[0];
+        assert_eq!(one.guard.steer(one.now), Some(expected));
+    }
+}
+
+/// The companion of the neighbour was started again and not engaged: its old association still limits this relay.
+#[test]
+fn a_relay_that_waits_for_one_that_was_not_engaged_again_says_so() {
+    let mut row = Row::new();
+    let neighbours = [Some(1), Some(3)];
+    let now = row.all[1].now;
+    row.all[1].guard = Guard::new(config(), neighbours, 99, now);
+    row.all[1].guard.control(now, false);
+    row.all[1].guard.position(now, at(200.0));
+    row.talk();
+    row.all[0].guard.commit(at(195.0));
+    let least_m = row.setpoint(0);
+    assert!(least_m < Some(195.0));
+    row.talk();
+    let reason = row.all[0].guard.hold_reason(Side::Downstream);
+    assert_eq!(reason, Some(HoldReason::NotFlown));
+}
+
+/// A neighbour that is flown and silent makes no room: that is told after five reminders, and not while the way goes on.
+#[test]
+fn a_relay_that_stands_for_long_says_that_it_waits_for_room() {
+    let mut row = Row::new();
+    row.all[0].guard.commit(at(180.0));
+    let _ = row.setpoint(0);
+    let reason = |row: &Row| row.all[0].guard.hold_reason(Side::Downstream);
+    assert_eq!(reason(&row), None);
+    for _ in 0..5 {
+        row.all[0].guard.remind();
+    }
+    assert_eq!(reason(&row), Some(HoldReason::Pending));
+    row.all[1].guard.commit(at(300.0));
+    row.all[2].guard.commit(at(400.0));
+    for _ in 0..4 {
+        row.talk();
+        for k in 0..3 {
+            if let Some(x_m) = row.setpoint(k) {
+                row.all[k].is_at(x_m);
+            }
+        }
+    }
+    assert_eq!(row.setpoint(0), Some(180.0));
+    assert_eq!(reason(&row), None);
 }
 
 #[test]
