@@ -233,6 +233,10 @@ impl Round {
                     ..Effects::NONE
                 }
             }
+            Action::Settled => {
+                self.retransmit.stop();
+                Effects::NONE
+            }
             Action::Infeasible => {
                 self.retransmit.stop();
                 Effects {

@@ -181,7 +181,7 @@ impl Computation {
             return Action::Answer { agreed: false };
         }
         if holds && self.tries(context, &hearing) {
-            return Action::Nothing;
+            return Action::Settled;
         }
         if holds && !self.reconsiders(context, &hearing) {
             if let Some(ear) = self.sensing.ear_mut() {
@@ -190,7 +190,7 @@ impl Computation {
                     ear.wait = (2 * ear.wait).min(RAREST);
                 }
             }
-            return Action::Nothing;
+            return Action::Settled;
         }
         self.state.plan();
         Action::Work

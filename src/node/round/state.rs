@@ -63,6 +63,8 @@ pub(crate) enum Action {
         /// Whether the chain has agreed with it.
         agreed: bool,
     },
+    /// What came of the pass is known to the leader, which has no other one to begin.
+    Settled,
     /// No target can be met.
     Infeasible,
     /// Ask for a new view: this pass cannot be taken part in.

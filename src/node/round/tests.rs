@@ -1,15 +1,19 @@
 //! What of a round is a sign of life.
 
+extern crate std;
+
 use super::Round;
+use super::state::Phase;
 use crate::mission::Mission;
 use crate::mission::tests::paper;
 use crate::node::context::{Context, Effects, Member};
 use crate::node::view::electorate::Held;
 use crate::optimiser::search::Schedule;
-use crate::settings::Settings;
+use crate::settings::{Listen, Settings};
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::message::Message;
+use std::vec::Vec;
 
 const RELAYS: u16 = 3;
 
@@ -22,16 +26,19 @@ struct Line {
 
 impl Line {
     fn new() -> Self {
-        let settings = Settings {
+        Self::with(Settings {
             predict: false,
             schedule: Schedule::FixedStep { step: 0.1 },
             ..Settings::default()
-        };
+        })
+    }
+
+    fn with(settings: Settings) -> Self {
         let mission = Mission::try_new(paper(RELAYS)).unwrap();
         let profile = mission.config().common;
         let of = |at: u16| Member::new(mission, settings, at + 1);
-        let mut rounds = [0, 1, 2]
-            .map(|at| Round::new(at == 0, 7, profile, &Settings::default(), at, Instant::ZERO));
+        let mut rounds =
+            [0, 1, 2].map(|at| Round::new(at == 0, 7, profile, &settings, at, Instant::ZERO));
         rounds[0].work_soon(Instant::ZERO);
         Self {
             members: [0, 1, 2].map(of),
@@ -75,6 +82,46 @@ impl Line {
         self.step(at, |round, context| round.take_back(context, true))
             .unwrap()
     }
+}
+
+/// Has all relays exchange what they have, in turn, until `ends`; returns the messages.
+fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Message> {
+    let mut all = Vec::new();
+    for _ in 0..100_000 {
+        for at in 0..usize::from(RELAYS) {
+            line.step(at, Round::handle_timeout);
+            let onward = line.step(at, |round, context| round.take_onward(context, true));
+            let back = line.step(at, |round, context| round.take_back(context, true));
+            for (message, to) in [(onward, at + 1), (back, at.wrapping_sub(1))] {
+                if let Some(message) = message.filter(|_| to < usize::from(RELAYS)) {
+                    line.hear(to, &message);
+                    all.push(message);
+                    if all.last().is_some_and(|message| ends(line, message)) {
+                        return all;
+                    }
+                }
+            }
+        }
+    }
+    panic!("it does not end: {all:?}");
+}
+
+/// What came of a pass is known: the leader awaits no answer to it any more, so nothing tells it that frames get lost.
+#[test]
+#[cfg(feature = "sensing")]
+fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
+    let mut line = Line::with(Settings {
+        listen: Some(Listen::default()),
+        ..Settings::default()
+    });
+    let holds = |line: &Line| line.rounds[0].phase() == Phase::Holding;
+    exchange(&mut line, |line, message| {
+        matches!(message, Message::Verdict(_)) && holds(line)
+    });
+    exchange(&mut line, |line, message| {
+        matches!(message, Message::Sensed(_)) && holds(line)
+    });
+    assert_eq!(line.rounds[0].retransmit.next_timeout(), None);
 }
 
 fn heard(effects: Effects) -> [Option<Instant>; 2] {
