@@ -206,6 +206,7 @@ impl Computation {
             })),
             PassKind::Gather(roster) if ALTITUDE => Some(Message::Gather(roster.clone())),
             PassKind::Sense(sense) if SENSING => Some(Message::Sense(sense.hearing)),
+            PassKind::Turn(turning) if turning.is_searching() => None,
             PassKind::Turn(turning) if ADJUST => self.setpoint.map(|place| {
                 Message::Token(Token {
                     number,

@@ -308,14 +308,10 @@ impl Round {
         reachable: bool,
     ) -> Option<Message> {
         let due = core::mem::take(&mut self.due.onward);
-        if !due || self.computation.phase() != Phase::Waiting {
-            return None;
-        }
+        // A relay that still computes has nothing to hand on.
+        let message = self.computation.onward(context).filter(|_| due)?;
         self.await_answer(context);
-        if !reachable {
-            return None;
-        }
-        self.computation.onward(context)
+        reachable.then_some(message)
     }
 
     /// What is to be sent back; it is taken for sent then.

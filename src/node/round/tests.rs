@@ -3,13 +3,14 @@
 extern crate std;
 
 use super::Round;
+use super::computation::PassKind;
 use super::state::Phase;
 use crate::mission::Mission;
 use crate::mission::tests::paper;
 use crate::node::context::{Context, Effects, Member};
 use crate::node::view::electorate::Held;
 use crate::optimiser::search::Schedule;
-use crate::settings::{Listen, Settings};
+use crate::settings::{Adjust, Listen, Method, Settings};
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::message::Message;
@@ -122,6 +123,24 @@ fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
         matches!(message, Message::Sensed(_)) && holds(line)
     });
     assert_eq!(line.rounds[0].retransmit.next_timeout(), None);
+}
+
+/// A relay that searches does not know its place yet, so it has no token to hand on, whoever its neighbour is.
+#[test]
+#[cfg(feature = "adjust")]
+fn a_relay_that_still_searches_hands_on_no_token() {
+    let mut line = Line::with(Settings {
+        method: Method::Adjust(Adjust::default()),
+        ..Settings::default()
+    });
+    exchange(&mut line, |line, message| {
+        let pass = &line.rounds[1].computation.pass;
+        let searches = matches!(pass, PassKind::Turn(turning) if turning.is_searching());
+        matches!(message, Message::Token(_)) && searches
+    });
+    line.step(1, |round, _| round.resend());
+    let message = line.step(1, |round, context| round.take_onward(context, true));
+    assert_eq!(message, None);
 }
 
 fn heard(effects: Effects) -> [Option<Instant>; 2] {
