@@ -354,11 +354,18 @@ impl KeepOut {
         }
     }
 
-    /// Takes from a message of `node` that it is not flown, and where it was reported.
-    pub(super) fn see(&mut self, node: u16, fence: &Fence) {
-        if fence.says(Fence::RELEASED) && fence.says(Fence::UNPLACED) {
-            self.unflown = Some((node, fence.across.at(fence.x_m)));
+    /// Takes from a message of the neighbour that it is not flown, and where it was reported. A message that bears the number of the
+    /// association that the two have since is late.
+    pub(super) fn see(&mut self, association: &Association, fence: &Fence) {
+        let is_late = fence.association == association.heard;
+        if fence.says(Fence::RELEASED) && fence.says(Fence::UNPLACED) && !is_late {
+            self.unflown = Some((association.node, fence.across.at(fence.x_m)));
         }
+    }
+
+    /// The neighbour is flown.
+    pub(super) const fn flies(&mut self) {
+        self.unflown = None;
     }
 
     /// Returns what holds along another line: the place of a drone that is not flown is not known along it.

@@ -115,7 +115,7 @@ impl FenceFollower {
     pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
         let is_placed = !fence.says(Fence::RELEASED) && fence.number != 0;
         self.association.hear_halt(fence, is_placed);
-        self.keep_out.see(self.association.node, fence);
+        self.keep_out.see(&self.association, fence);
         // With a number it is the place of a fence, which may be far from its owner.
         if fence.says(Fence::UNPLACED) || !fence.says(Fence::RELEASED) && fence.number == 0 {
             self.association.see(fence.x_m);
@@ -139,6 +139,7 @@ impl FenceFollower {
         if !self.association.knows(fence.association, fence.echo) {
             return;
         }
+        self.keep_out.flies();
         self.association.hear_open(fence);
         self.target_m = fence.target_m;
         let ahead = fence.number.wrapping_sub(self.number);

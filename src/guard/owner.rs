@@ -174,7 +174,7 @@ impl FenceOwner {
     pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
         let is_placed = !fence.says(Fence::RELEASED) && !fence.says(Fence::UNPLACED);
         self.association.hear_halt(fence, is_placed);
-        self.keep_out.see(self.association.node, fence);
+        self.keep_out.see(&self.association, fence);
         if !fence.says(Fence::RELEASED) || fence.says(Fence::UNPLACED) {
             self.association.see(fence.x_m);
         }
@@ -199,6 +199,7 @@ impl FenceOwner {
             self.association.due |= self.association.is_absent();
             return;
         }
+        self.keep_out.flies();
         self.association.hear_open(fence);
         if fence.says(Fence::UNPLACED) {
             return;

@@ -1,5 +1,9 @@
 //! A relay that is not flown to its setpoints.
 
+extern crate std;
+
+use std::vec::Vec;
+
 use super::{APART, One, at, config};
 use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
@@ -166,6 +170,31 @@ fn nobody_moves_across_the_line_toward_a_drone_beside_it() {
         let one = &mut row.all[0];
         assert_eq!(one.guard.steer(one.now), Some(expected));
     }
+}
+
+/// What it told in its pilot's hands, and comes late, makes it no obstacle again.
+#[test]
+fn a_late_place_of_a_drone_that_is_flown_again_bars_nothing() {
+    let mut row = Row::new();
+    row.take();
+    row.talk();
+    let now = row.all[1].now;
+    row.all[1].guard.position(now, at(110.0));
+    row.all[1].guard.remind();
+    let mut late = Vec::new();
+    while let Some((side, _, fence)) = row.all[1].guard.poll() {
+        late.extend((side == Side::Upstream).then_some(fence));
+    }
+    let late = late.pop().expect("it tells its place");
+    assert!(late.flags & Fence::UNPLACED != 0);
+    row.talk();
+    row.give();
+    row.all[1].is_at(200.0);
+    row.all[1].is_at(200.0);
+    row.talk();
+    row.all[0].hears(Side::Downstream, 2, late);
+    row.all[0].guard.commit(at(140.0));
+    assert_eq!(row.setpoint(0), Some(140.0));
 }
 
 /// The companion of the neighbour was started again and not engaged: its old association still limits this relay.
