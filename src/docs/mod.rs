@@ -8,6 +8,7 @@
 //! | [`uploads`] | how a flying chain is given a new mission |
 //! | [`sensing`] | how the relays find an interferer, and follow it |
 //! | [`flight`] | how a drone flies to its place, and who flies it |
+//! | [`decisions`] | why the parts that surprise are as they are |
 //! | [`security`] | what signed frames protect, and what not |
 //! | [`wire_format`] | every byte on the wire, enough for another implementation |
 
@@ -29,6 +30,9 @@ pub mod sensing {}
 #[cfg(feature = "flight")]
 #[doc = include_str!("flight.md")]
 pub mod flight {}
+
+#[doc = include_str!("decisions.md")]
+pub mod decisions {}
 
 #[doc = include_str!("../../SECURITY.md")]
 pub mod security {}
