@@ -36,7 +36,8 @@ impl Node {
             }
         }
         let placed = self.setpoint().is_some();
-        let has_lease = self.layers.lease.until().is_some_and(|until| until > now);
+        let leased = self.layers.lease.until().is_some_and(|until| until > now);
+        let has_lease = placed && leased;
         if self.duplicate.hear(now, sender, has_lease, &settings) {
             self.layers.round.discard_place();
             if placed {
@@ -122,10 +123,13 @@ impl Node {
         }
     }
 
-    /// Takes part again, in nothing that goes on without this relay.
+    /// Takes part again, as after a restart with the record of votes: view, lease and proposal may be those of the other node by now.
     pub(super) fn become_active(&mut self, now: Instant) {
+        self.layers.neighbours.leave();
+        self.layers.lease.leave();
         if !self.layers.round.is_fresh() {
-            self.layers.view.asking.ask(now);
+            self.layers.round.suspend();
+            self.layers.view.leave(now);
         }
     }
 }
