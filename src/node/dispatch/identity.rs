@@ -3,6 +3,8 @@
 use super::state::Node;
 use crate::event::{About, Event};
 use crate::node::duplicate::{Duplicated, Sender};
+#[cfg(feature = "auth")]
+use crate::settings::Wiring;
 use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::message::{Claim, Message};
@@ -104,6 +106,18 @@ impl Node {
     #[cfg(feature = "auth")]
     pub(crate) const fn claim_number(&self) -> u32 {
         self.duplicate.number()
+    }
+
+    /// Returns true if a handshake goes with `message`: on a shared channel with one message of each pulse, so that another relay with this
+    /// number that receives it learns of this one although the chain has nothing else to send.
+    #[cfg(feature = "auth")]
+    pub(crate) fn shows_its_nonce(&self, message: &Message) -> bool {
+        let once = match message {
+            Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
+            Message::Pulsed(pulsed) => pulsed.done,
+            _ => false,
+        };
+        once && self.member.settings.wiring == Wiring::Shared
     }
 
     /// Classifies a claim number under this relay's own node number.
