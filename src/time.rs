@@ -137,6 +137,12 @@ impl MonotonicClock {
         self.internal
     }
 
+    /// Returns the internal time that was taken last.
+    #[cfg(feature = "upload")]
+    pub(crate) const fn now(&self) -> Instant {
+        self.internal
+    }
+
     /// Returns the internal time of the caller's time `at`.
     pub(crate) fn internal(&self, at: Instant) -> Instant {
         shifted(at, self.latest, self.internal)

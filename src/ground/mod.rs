@@ -34,6 +34,9 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::session::{Checked, Session};
 use crate::wire::upload::{Upload, UploadError};
 
+/// Silence of a relay after which another one with its number is believed.
+const GONE_AFTER: Duration = Duration::from_millis(15_000);
+
 /// How long an answer is awaited.
 const PATIENCE: Duration = Duration::from_millis(1_000);
 
@@ -134,7 +137,7 @@ impl Ground {
             clock: MonotonicClock::new(Instant::ZERO),
             levels: Levels::NONE,
             deframer: Deframer::new(),
-            session: Session::new(auth, 0),
+            session: Session::new(auth, 0, GONE_AFTER),
             counter: 0,
             stats: Stats::default(),
         }
@@ -240,7 +243,7 @@ impl Ground {
                     bump(&mut self.stats.misaddressed);
                     continue;
                 }
-                match self.session.check(sender, &frame) {
+                match self.session.check(self.clock.now(), sender, &frame) {
                     Checked::Fresh { .. } => match Message::decode(frame.body) {
                         Ok(Message::Hello(hello)) if hello.mission == self.base => {
                             bump(&mut self.stats.received);

@@ -15,13 +15,15 @@
 //! | active | other frame under its own number, no key | send a claim, and 8 more every four `hop_time`; an echo of its own was received within `probe_after`: none | active |
 //! | active | smaller claim, or one that does not name its own | send a claim, and 32 more every four `hop_time` while the other node is not known to be passive | active |
 //! | active | claim of a passive node | send a claim | active |
-//! | active | larger claim of the same epoch, it holds a lease, and its claim number plus 2^31 is the larger one | raise its claim number by 2^31; send claims as before | active |
+//! | active | larger claim of the same epoch, it holds a lease and a place, and its claim number plus 2^31 is the larger one | raise its claim number by 2^31; send claims as before, with a key one and 8 more | active |
 //! | active | larger claim otherwise | discard its agreed place | passive |
 //! | active | 2.25, 2.75, 3.75, 5.75, 9.75, 17.75 s after it became active, 0.25, 0.75 s and so on after a claim of another active node, then every `dead_after`, on links, no key | send a claim | active |
 //! | passive | every quarter of `probe_after`, no key | send a claim with the flag passive | passive |
+//! | active, on a shared channel, with a key | one message of each pulse sent | send a handshake after it | active |
 //! | passive | claim of an active node, or other frame under its own number | restart the timer | passive |
-//! | passive | timer of twice `dead_after`, and up to an eighth more by chance, expired | ask for a view | active |
-//! | passive | its firmware reports that the other node is gone | raise its claim number above the other one; ask for a view | active |
+//! | passive | handshake of a neighbour that shows the nonce of the other node | none: the neighbour may not know yet that it is gone | passive |
+//! | passive | timer of twice `dead_after`, and up to an eighth more by chance, expired | leave the view; ask for another one | active |
+//! | passive | its firmware reports that the other node is gone | raise its claim number above the other one; leave the view; ask for another one | active |
 //!
 //! Claims are sent at most once in four `hop_time`.
 //!
@@ -35,7 +37,12 @@
 //! handshake has no effect: those of this relay have an older epoch or its own claim number, and those of another node are true or have been
 //! overtaken by a larger claim. A message under its own number cannot be checked, because its tag covers nonces that only its two ends
 //! know: it raises the event and restarts the timer of a passive relay, and makes no relay passive.
-//! The neighbours apply the same order: they believe the larger nonce, and show it to the node that sends the smaller one.
+//! The neighbours apply the same order: they believe the larger nonce, and show it to the node that sends the smaller one. Once the node of the
+//! larger nonce is silent for `dead_after` they forget it, and believe the next one.
+//!
+//! Two nodes with one number can call views of one identifier, for different members. So a relay that becomes active takes nothing of its
+//! view, its lease and its proposal along, as after a restart with the record of its votes; no relay takes part in a pulse before it has
+//! agreed on its place in the view; and a decision that does not follow the views that a relay knows makes it ask for a later one.
 
 use crate::jitter::Jitter;
 use crate::settings::{Settings, Wiring};
@@ -246,6 +253,11 @@ impl DuplicateIndex {
             self.number = raised;
             self.sessions_due = true;
             self.defend(now, rival, settings);
+            if settings.auth.is_some() {
+                // No frame that is played back has this effect again.
+                self.defences = QUESTIONS;
+                self.announce(now, settings);
+            }
             return false;
         }
         self.wait(now, settings);
@@ -267,7 +279,9 @@ impl DuplicateIndex {
     fn defend(&mut self, now: Instant, rival: Rival, settings: &Settings) {
         self.defences = 0;
         if !rival.passive {
-            self.defences = DEFENCES;
+            if settings.auth.is_none() {
+                self.defences = DEFENCES;
+            }
             self.announce(now, settings);
         }
         self.claim(now, settings);
@@ -277,14 +291,14 @@ impl DuplicateIndex {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Begins the claims that nothing else causes, and those of a defence.
+    /// Begins the claims that nothing else causes, without a key, and those of a defence.
     ///
     /// On one channel for all, which every unasked frame loads, the other node is received directly, by whatever it sends.
     fn announce(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
-        let announces = settings.wiring == Wiring::Pair || self.defences > 0;
-        self.next_claim =
-            (announces && settings.auth.is_none()).then(|| now + self.jitter.spread(FIRST_CLAIM));
+        let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();
+        let announces = unasked || self.defences > 0;
+        self.next_claim = announces.then(|| now + self.jitter.spread(FIRST_CLAIM));
     }
 
     pub(crate) const fn is_passive(&self) -> bool {
@@ -315,7 +329,7 @@ impl DuplicateIndex {
             } else if let Some(left) = self.defences.checked_sub(1) {
                 self.defences = left;
                 Some(least_interval(settings))
-            } else if settings.wiring == Wiring::Shared {
+            } else if settings.wiring == Wiring::Shared || settings.auth.is_some() {
                 None
             } else if self.interval < LAST_INTERVAL {
                 self.interval = self.interval.times(2);

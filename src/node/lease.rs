@@ -7,6 +7,7 @@
 //! | who | what happens | what it does |
 //! | --- | --- | --- |
 //! | leader | it is time, and none is under way | a pulse: hand it on |
+//! | any | a pulse, while this relay has agreed on no place in the view | ask for a new view |
 //! | any | the next pulse | the lease counts from when it handed on the one before; hand it on |
 //! | any | the first ones, each with more than twice the span of the one before | no lease yet: it would not last until the one after |
 //! | any | the same again | say whether it has come back |
@@ -72,6 +73,8 @@ pub(crate) struct Lease {
     bound: Option<Instant>,
     /// True once all relays of the view are known to have accepted it, or to have taken part in a pulse.
     is_whole: bool,
+    /// True once this relay has agreed on its place in this view.
+    is_agreed: bool,
     /// At the leader: when the next pulse begins, and how long they took lately.
     next_at: Option<Instant>,
     slowest: Duration,
@@ -93,6 +96,7 @@ impl Lease {
             rest: (ViewId::LOADED, now),
             bound: Some(now),
             is_whole: false,
+            is_agreed: false,
             next_at: None,
             slowest: Duration::from_micros(0),
             retransmit: Retransmit::new(seed),
@@ -153,7 +157,13 @@ impl Lease {
         let known = self.bound.filter(|_| self.rest.0 == base);
         self.bound = known.map(|until| until.max(rest).max(self.relied_on));
         self.rest = (view, rest);
+        self.leave();
+    }
+
+    /// Gives up the lease of the view: nothing is agreed on until this relay agrees on its place in another one.
+    pub(crate) fn leave(&mut self) {
         self.is_whole = false;
+        self.is_agreed = false;
         self.state = LeaseState::Open;
         self.current = None;
         self.next_at = None;
@@ -174,9 +184,10 @@ impl Lease {
         self.is_whole
     }
 
-    /// The leader has heard that all agree on their places: there is something to hold from now on.
-    pub(crate) fn begin(&mut self, now: Instant) {
-        if self.current.is_none() && self.next_at.is_none() {
+    /// This relay has agreed on its place in the view. If it leads, all others have, and it begins the pulses.
+    pub(crate) fn begin(&mut self, now: Instant, leads: bool) {
+        self.is_agreed = true;
+        if leads && self.current.is_none() && self.next_at.is_none() {
             self.next_at = Some(now + PAUSE);
         }
     }
@@ -212,6 +223,9 @@ impl Lease {
                 2..=0x7FFF => {}
                 _ => return Effects::STALE,
             }
+        } else if !self.is_agreed {
+            // Another node with this relay's number has agreed on the place.
+            return Effects::FOREIGN;
         }
         self.take(context, pulse.number, pulse.lease);
         effects

@@ -141,8 +141,10 @@ impl Relay {
         #[cfg(feature = "auth")]
         {
             let number = self.node.claim_number();
-            let auth = self.node.member().settings.auth;
-            self.session = auth.map(|auth| Session::new(auth, number));
+            let Settings {
+                auth, dead_after, ..
+            } = self.node.member().settings;
+            self.session = auth.map(|auth| Session::new(auth, number, dead_after));
         }
         self.node.begin(identity, seed, now);
     }

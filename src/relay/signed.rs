@@ -22,8 +22,11 @@ pub(super) fn receive(
     side: Side,
     frame: &Opened<'_>,
 ) {
-    let checked = session.check(frame.header.sender, frame);
-    if let Some(rival) = session.poll_rival() {
+    let checked = session.check(now, frame.header.sender, frame);
+    // A passive relay waits for the other node itself: the neighbours show the nonce of one that is gone, too.
+    if let Some(rival) = session.poll_rival()
+        && !node.is_passive()
+    {
         node.hear_duplicate(now, Sender::Rival(rival));
     }
     match checked {
@@ -81,6 +84,9 @@ pub(super) fn next(
             && ask % QUESTIONS == 0
         {
             session.ask_silent(to);
+        }
+        if node.shows_its_nonce(&message) {
+            session.show(to);
         }
         if let Message::Hello(hello) = message
             && hello.ask

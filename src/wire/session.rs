@@ -11,6 +11,7 @@
 //! | a nonce below the one known, or a counter that has been taken | nothing; it is counted as a replay. Five of one older epoch in a row with rising counters, and nothing newer between them, are told: the node's epoch went back |
 //! | a nonce above the one known | the node has been switched on since: a new session begins |
 //! | a nonce below the one known, of the same epoch and of another claim number | another node of that number: it is answered, if it asks, so that it learns of the one that this relay believes |
+//! | the same, and the node of the nonce known was silent for `dead_after` | that node is forgotten, and a new session begins |
 //! | a nonce of this relay's number that is not its own | another node of this relay's number, which the sender believes: see `node::duplicate` |
 //! | this relay's own nonce | it is proof that the node is there now |
 //! | a question, and none of that to learn by it here | nothing but the answer |
@@ -27,6 +28,7 @@
 use super::auth::{Auth, Nonces, Signer, TAG, Window, is_same};
 use super::frame::Opened;
 use crate::node::duplicate::{RAISED, Rival, Sender};
+use crate::time::{Duration, Instant};
 
 /// Bytes of the body of a handshake.
 pub(crate) const HELLO: usize = 17;
@@ -52,6 +54,8 @@ struct Peer {
     proven: bool,
     /// When it was last used, on the session's own clock.
     used: u32,
+    /// Time of its last proof, or of its first frame with a larger nonce.
+    heard: Instant,
     /// The lower half of this relay's nonce toward it; the upper one is the epoch.
     own: u32,
     /// The largest nonce it has shown, 0 before any.
@@ -104,6 +108,8 @@ impl Peer {
 #[derive(Clone, Debug)]
 pub(crate) struct Session {
     auth: Auth,
+    /// Silence after which another node of the same number takes the place of the one that is believed.
+    gone_after: Duration,
     /// Claim number: the lower halves of this relay's nonces are above it.
     claim: u32,
     /// Lower half of the last nonce made.
@@ -137,10 +143,12 @@ pub(crate) enum Checked {
 }
 
 impl Session {
-    /// A session that knows nobody, of a node with claim number `claim`.
-    pub(crate) const fn new(auth: Auth, claim: u32) -> Self {
+    /// A session that knows nobody, of a node with claim number `claim`. A node that is silent for `gone_after` gives way to another one
+    /// with its number.
+    pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         Self {
             auth,
+            gone_after,
             claim,
             made: claim,
             rival: None,
@@ -176,6 +184,13 @@ impl Session {
             self.made = claim;
         }
         self.peers.clear();
+    }
+
+    /// Owes a handshake to the known node `to`, for other nodes of this relay's number that receive it, too.
+    pub(crate) fn show(&mut self, to: u16) {
+        if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
+            peer.handshake = true;
+        }
     }
 
     /// Owes a handshake to node `to` that asks for one in return, by which its nodes learn this relay's nonce, and this relay theirs.
@@ -248,12 +263,14 @@ impl Session {
     }
 
     /// Checks an intact frame that says it is from node `sender`. Work: that of one tag.
-    pub(crate) fn check(&mut self, sender: u16, frame: &Opened<'_>) -> Checked {
+    pub(crate) fn check(&mut self, now: Instant, sender: u16, frame: &Opened<'_>) -> Checked {
         let Some(told) = frame.tag else {
             return Checked::Unsigned;
         };
         if frame.handshake {
-            return self.meet(sender, frame, told).unwrap_or(Checked::Forged);
+            return self
+                .meet(now, sender, frame, told)
+                .unwrap_or(Checked::Forged);
         }
         let epoch = self.auth.epoch;
         let Some(nonces) = self.find(sender).map(|peer| peer.nonces(epoch).turned()) else {
@@ -270,12 +287,19 @@ impl Session {
         }
         let first = !peer.proven;
         peer.proven = true;
+        peer.heard = now;
         peer.older.times = 0;
         Checked::Fresh { first }
     }
 
     /// A handshake; `None` if its tag is wrong.
-    fn meet(&mut self, sender: u16, frame: &Opened<'_>, told: [u8; TAG]) -> Option<Checked> {
+    fn meet(
+        &mut self,
+        now: Instant,
+        sender: u16,
+        frame: &Opened<'_>,
+        told: [u8; TAG],
+    ) -> Option<Checked> {
         let nonces = said(frame)?;
         let asks = frame.body.last().copied()?;
         if nonces.sender == 0 || !is_same(self.with(nonces).tag(frame.signed), told) {
@@ -284,12 +308,18 @@ impl Session {
         if let Sender::Rival(rival) = self.owner(nonces.receiver) {
             self.rival = Some(rival);
         }
+        let gone_after = self.gone_after;
+        self.peers.retain(|peer| {
+            let succeeds = peer.node == sender && is_rival(nonces.sender, peer.other);
+            !(succeeds && now.since(peer.heard) >= gone_after)
+        });
         self.make(sender);
         let epoch = self.auth.epoch;
         let peer = self.touch(sender)?;
         let begins = nonces.sender > peer.other;
         if begins {
             peer.other = nonces.sender;
+            peer.heard = now;
             peer.taken = Window::default();
             peer.proven = false;
         }
@@ -318,6 +348,7 @@ impl Session {
         }
         let first = !peer.proven;
         peer.proven = true;
+        peer.heard = now;
         Some(Checked::Handshake { first })
     }
 
@@ -382,6 +413,7 @@ impl Session {
             asks: false,
             proven: false,
             used: self.clock,
+            heard: Instant::ZERO,
             own: made,
             other: 0,
             taken: Window::default(),

@@ -58,7 +58,7 @@ fn a_relay_rebooted_in_the_midst_of_a_pass_gets_a_place_by_a_new_view() {
     }
 }
 
-/// One that is rebooted when all is agreed, and hears nothing, calls by itself.
+/// One that is rebooted when all is agreed calls on the first pulse, which it has agreed on nothing for, or by itself.
 #[test]
 fn a_relay_rebooted_in_a_settled_chain_gets_a_place_by_a_new_view() {
     for rebooted in 1..4 {
@@ -68,7 +68,7 @@ fn a_relay_rebooted_in_a_settled_chain_gets_a_place_by_a_new_view() {
         // `quiet`, and two hops for each relay.
         let took = chain.until(5_000 + 2 * 4 * 30 + 500, Chain::holds);
         println!("relay {}: {took:?} ms", rebooted + 1);
-        assert!(took.is_some_and(|ms| ms > 5_000), "{took:?}");
+        assert!(took.is_some(), "{took:?}");
         assert!(chain.relays.iter().all(|relay| relay.view().number() == 1));
         assert!(chain.margin().0 >= -2e-4);
     }

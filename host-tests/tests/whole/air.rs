@@ -33,6 +33,8 @@ pub(crate) struct Kind {
     pub(crate) stranger: Option<(usize, Mission)>,
     /// A relay whose epoch goes back at its second start.
     pub(crate) goes_back: Option<usize>,
+    /// A relay of which there is a second drone with the same number and key, counted after all relays.
+    pub(crate) copied: Option<usize>,
 }
 
 /// What happens at a time, to one relay or one link. Relays are counted from 0.
@@ -41,6 +43,8 @@ pub(crate) enum Deed {
     /// A relay is switched on, with its record of votes and its upload where it was on before.
     On(usize),
     Off(usize),
+    /// A relay is told that the other one with its number is gone.
+    Clear(usize),
     /// Frames of `from` to `to` are all lost from now on, for one more reason, or for one less.
     Cut {
         from: usize,
@@ -62,6 +66,7 @@ pub(crate) enum Deed {
 enum Happening {
     Deed(Deed),
     Frame {
+        from: usize,
         to: usize,
         port: Port,
         bytes: Rc<[u8]>,
@@ -131,6 +136,11 @@ pub(crate) struct Air {
     changed_us: u64,
     /// Frames sent, and events by relay and name.
     pub(crate) frames: u64,
+    /// When the relay and its copy received each other last, since when both have a setpoint all the same without a loss, and the longest of
+    /// these times, µs.
+    received_us: [Option<u64>; 2],
+    both_us: Option<u64>,
+    pub(crate) longest_both_us: u64,
     pub(crate) events: BTreeMap<(usize, String), u32>,
     pub(crate) story: bool,
 }
@@ -146,7 +156,7 @@ impl Air {
     /// All relays are switched off, and all links whole.
     pub(crate) fn new(kind: Kind) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(kind.seed);
-        let all = usize::from(kind.mission.relays());
+        let all = usize::from(kind.mission.relays()) + usize::from(kind.copied.is_some());
         let drones: Vec<Drone> = (0..all)
             .map(|at| Drone {
                 relay: switched_on(&kind, at, 1, rng.random(), Instant::ZERO),
@@ -182,6 +192,9 @@ impl Air {
             flies: false,
             changed_us: 0,
             frames: 0,
+            received_us: [None; 2],
+            both_us: None,
+            longest_both_us: 0,
             events: BTreeMap::new(),
             story: std::env::var_os("STORY").is_some(),
         }
@@ -218,9 +231,17 @@ impl Air {
                     drone.relay.handle_timeout(now);
                     at
                 }
-                Happening::Frame { to, port, bytes } => {
+                Happening::Frame {
+                    from,
+                    to,
+                    port,
+                    bytes,
+                } => {
                     if !self.drones[to].is_on {
                         continue;
+                    }
+                    if self.place(from) == self.place(to) {
+                        self.received_us[usize::from(to > from)] = Some(at_us);
                     }
                     let drone = &mut self.drones[to];
                     let now = drone.clock(at_us);
@@ -266,6 +287,12 @@ impl Air {
             }
             Deed::Off(at) => {
                 self.drones[at].is_on = false;
+                return Some(at);
+            }
+            Deed::Clear(at) => {
+                let drone = &mut self.drones[at];
+                let now = drone.clock(self.now_us);
+                drone.relay.clear_index_taken(now);
                 return Some(at);
             }
             Deed::Cut { from, to } => self.cuts[from * all + to] += 1,
@@ -318,12 +345,13 @@ impl Air {
                 }
             }
         }
+        self.compare_copies();
         let seen = Seen::of(&self.drones[at].relay, self.drones[at].is_on);
         if seen == self.seen[at] {
             return;
         }
         self.seen[at] = seen;
-        let groups = groups(&self.seen);
+        let groups = groups(&self.uncopied());
         if groups > self.groups {
             self.groups = groups;
             self.groups_us = self.now_us;
@@ -362,17 +390,16 @@ impl Air {
         *free_us = (*free_us).max(self.now_us) + frame.len() as u64 * 10_000_000 / BAUD;
         let at_us = *free_us + LATENCY_US;
         let (all, reach) = (self.drones.len(), self.kind.reach);
-        let (receivers, into) = match port {
-            Port::Shared => (
-                from.saturating_sub(reach)..(from + reach + 1).min(all),
-                port,
-            ),
-            Port::Upstream => (from.saturating_sub(1)..from, Port::Downstream),
-            Port::Downstream => (from + 1..(from + 2).min(all), Port::Upstream),
+        let place = self.place(from);
+        let (places, into) = match port {
+            Port::Shared => (place.saturating_sub(reach)..place + reach + 1, port),
+            Port::Upstream => (place.saturating_sub(1)..place, Port::Downstream),
+            Port::Downstream => (place + 1..place + 2, Port::Upstream),
         };
         let bytes: Rc<[u8]> = frame.into();
-        for to in receivers.filter(|to| *to != from) {
-            if self.cuts[from * all + to] == 0
+        for to in (0..all).filter(|to| *to != from) {
+            if places.contains(&self.place(to))
+                && self.cuts[from * all + to] == 0
                 && self.drones[to].is_on
                 && (self.loss == 0.0 || !self.rng.random_bool(self.loss))
             {
@@ -380,12 +407,47 @@ impl Air {
                 self.put(
                     at_us,
                     Happening::Frame {
+                        from,
                         to,
                         port: into,
                         bytes,
                     },
                 );
             }
+        }
+    }
+
+    /// The place of drone `at` in the whole chain, from 0.
+    fn place(&self, at: usize) -> usize {
+        let all = usize::from(self.kind.mission.relays());
+        self.kind.copied.filter(|_| at == all).unwrap_or(at)
+    }
+
+    /// What is seen of the relays without the copied one and its copy.
+    fn uncopied(&self) -> Vec<Seen> {
+        let drones = (0..self.drones.len()).filter(|at| Some(self.place(*at)) != self.kind.copied);
+        drones.map(|at| self.seen[at]).collect()
+    }
+
+    /// Takes in for how long a relay and its copy have setpoints although both have received the other within five seconds.
+    fn compare_copies(&mut self) {
+        let Some(copied) = self.kind.copied else {
+            return;
+        };
+        let pair = [copied, self.drones.len() - 1].map(|at| &self.drones[at]);
+        let both = pair
+            .iter()
+            .all(|drone| drone.is_on && drone.relay.setpoint().is_some());
+        let now_us = self.now_us;
+        let hear = self
+            .received_us
+            .iter()
+            .all(|at_us| at_us.is_some_and(|at_us| now_us - at_us < 5_000_000));
+        if both && hear && self.loss == 0.0 {
+            let since_us = *self.both_us.get_or_insert(now_us);
+            self.longest_both_us = self.longest_both_us.max(now_us - since_us);
+        } else {
+            self.both_us = None;
         }
     }
 
@@ -423,15 +485,21 @@ impl Air {
 
     /// Whether all relays are on, in one view of them all, and have a setpoint in it.
     fn is_whole(&self) -> bool {
-        let view = self.seen[0].view;
-        self.seen.iter().all(|seen| {
-            seen.is_on
-                && seen.view == view
-                && usize::from(seen.relays) == self.seen.len()
-                && seen.place.is_some()
-                && seen.phase == Phase::Holding
-                && seen.target == self.seen[0].target
-        })
+        let all = usize::from(self.kind.mission.relays());
+        let is_on = |at: &usize| self.seen[*at].is_on;
+        let on = (0..self.seen.len()).filter(is_on);
+        let on: Vec<&Seen> = on.map(|at| &self.seen[at]).collect();
+        let places = (0..self.seen.len()).filter(is_on).map(|at| self.place(at));
+        let places: std::collections::BTreeSet<usize> = places.collect();
+        places.len() == all
+            && on.len() == all
+            && on.iter().all(|seen| {
+                seen.view == on[0].view
+                    && usize::from(seen.relays) == all
+                    && seen.place.is_some()
+                    && seen.phase == Phase::Holding
+                    && seen.target == on[0].target
+            })
     }
 
     /// What is to be seen of each relay, for a person.
@@ -455,7 +523,9 @@ impl Air {
 }
 
 fn switched_on(kind: &Kind, at: usize, start: u32, seed: u32, now: Instant) -> Relay {
-    let index = u16::try_from(at + 1).unwrap();
+    let all = usize::from(kind.mission.relays());
+    let place = kind.copied.filter(|_| at == all).unwrap_or(at);
+    let index = u16::try_from(place + 1).unwrap();
     let auth = kind.signed.then(|| Auth {
         key: Key::new([7; 32]),
         epoch: if kind.goes_back == Some(at) {

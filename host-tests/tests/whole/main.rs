@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use schedule::{SECOND, Schedule, random, without_steps};
+use schedule::{SECOND, Schedule, random, with_copy, without_steps};
 
 /// The time after the last fault within which the chain is whole, s.
 const WHOLE_S: u64 = 120;
@@ -29,6 +29,8 @@ struct Found {
     whole_s: Option<f64>,
     groups: usize,
     groups_s: f64,
+    /// Longest time that a relay and its copy had setpoints although they received each other, s.
+    both_s: f64,
     text: String,
 }
 
@@ -50,6 +52,7 @@ fn flown(seed: u64, schedule: &Schedule) -> Found {
         whole_s: whole_us.map(|us| us as f64 / 1e6),
         groups: air.groups,
         groups_s: air.groups_us as f64 / 1e6,
+        both_s: air.longest_both_us as f64 / 1e6,
         text: format!(
             "{} relays, {:?}, signed {}, faults end at {} s: {}",
             schedule.kind.mission.relays(),
@@ -62,7 +65,7 @@ fn flown(seed: u64, schedule: &Schedule) -> Found {
 }
 
 /// Flies `count` schedules on all cores, in the order of their seeds.
-fn flown_all(first: u64, count: u64) -> Vec<Found> {
+fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Found> {
     let next = AtomicU64::new(first);
     let all = Mutex::new(Vec::new());
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -74,7 +77,7 @@ fn flown_all(first: u64, count: u64) -> Vec<Found> {
                     if seed >= first + count {
                         break;
                     }
-                    let found = flown(seed, &random(seed));
+                    let found = flown(seed, &schedule(seed));
                     all.lock().unwrap().push(found);
                 }
             });
@@ -89,7 +92,7 @@ fn flown_all(first: u64, count: u64) -> Vec<Found> {
 fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
     let first = number("SEED", 1);
     let count = number("COUNT", 150);
-    let all = flown_all(first, count);
+    let all = flown_all(first, count, random);
     let late: Vec<&Found> = all
         .iter()
         .filter(|found| found.whole_s.is_none_or(|s| s > WHOLE_S as f64))
@@ -118,6 +121,35 @@ fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
         );
     }
     assert!(late.is_empty() && two.is_empty());
+}
+
+/// Of a relay and its copy one has a setpoint within two seconds, and once one of the two is gone the chain is whole with the other one. Only
+/// where a copy is on either side of a cut can two chains fly: each has its vote.
+#[test]
+fn with_a_copied_relay_one_chain_flies_and_is_whole_once_the_other_is_gone() {
+    let (first, count) = (number("SEED", 1), number("COUNT", 150));
+    let all = flown_all(first, count, with_copy);
+    let mut faults = Vec::new();
+    let mut took: Vec<f64> = Vec::new();
+    for found in &all {
+        let late = found.whole_s.is_none_or(|s| s > WHOLE_S as f64);
+        let two = found.groups > 1 && with_copy(found.seed).is_uncut();
+        if late || two || found.both_s > 2.0 {
+            faults.push(found);
+        }
+        took.push(found.whole_s.unwrap_or(f64::INFINITY));
+    }
+    took.sort_by(f64::total_cmp);
+    let both_s = all.iter().map(|found| found.both_s).fold(0.0, f64::max);
+    let two = all.iter().filter(|found| found.groups > 1).count();
+    println!(
+        "{count} schedules with a copy: whole after {:.1} s (half of them), {:.1} s (the slowest); two setpoints for {both_s:.2} s at most; \
+         {two} with two chains at once, {} faults",
+        took[took.len() / 2],
+        took[took.len() - 1],
+        faults.len()
+    );
+    assert!(faults.is_empty(), "{faults:#?}");
 }
 
 /// Schedules that were found stuck for good, each for one reason: numbers that ran away; a neighbour that was switched on elsewhere and

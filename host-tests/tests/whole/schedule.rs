@@ -29,6 +29,7 @@ impl Schedule {
             reach: 4,
             stranger: None,
             goes_back: None,
+            copied: None,
         };
         let on = (0..usize::from(relays)).map(|at| (0, Deed::On(at)));
         Self {
@@ -236,4 +237,56 @@ fn moved(schedule: &Schedule, rng: &mut ChaCha8Rng) -> Box<Upload> {
         });
     }
     Box::new(Upload::new(base, 1, config).unwrap())
+}
+
+/// A random schedule on a shared channel with a second drone of one relay's number, of which one is taken away once all other faults are
+/// over. In half of them the other one is told so. Two copies that do not receive each other, and a chain that is cut, are part of it.
+pub(crate) fn with_copy(seed: u64) -> Schedule {
+    let mut schedule = without_steps(seed);
+    let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0xC0B1);
+    schedule.kind.wiring = Wiring::Shared;
+    schedule.kind.signed = rng.random_bool(0.5);
+    let copy = usize::from(schedule.kind.mission.relays());
+    let copied = rng.random_range(0..copy);
+    schedule.kind.copied = Some(copied);
+    if rng.random_bool(0.5) {
+        // Nothing but the copy.
+        schedule
+            .deeds
+            .retain(|(_, deed)| matches!(deed, Deed::On(_)));
+        let starts = schedule.deeds.iter().map(|(at_us, _)| *at_us);
+        schedule.faults_end_us = starts.max().unwrap_or(0);
+    }
+    let most_us = schedule.faults_end_us.min(600 * SECOND) + 60 * SECOND;
+    let on_us = rng.random_range(0..most_us);
+    schedule.put(on_us, Deed::On(copy));
+    if rng.random_bool(0.3) {
+        schedule.part(copied, copy, 0, rng.random_range(0..most_us + 60 * SECOND));
+    }
+    let gone_us = schedule.faults_end_us + rng.random_range(0..120 * SECOND);
+    // With a key the neighbours refuse the one with the older epoch.
+    let rebooted = schedule
+        .deeds
+        .iter()
+        .any(|(_, deed)| matches!(deed, Deed::Off(at) if *at == copied));
+    let (gone, left) = if schedule.kind.signed && rebooted || rng.random_bool(0.5) {
+        (copy, copied)
+    } else {
+        (copied, copy)
+    };
+    schedule.put(gone_us, Deed::Off(gone));
+    if rng.random_bool(0.5) {
+        schedule.put(gone_us, Deed::Clear(left));
+    }
+    schedule
+}
+
+impl Schedule {
+    /// Whether no relay is ever cut off from another one.
+    pub(crate) fn is_uncut(&self) -> bool {
+        !self
+            .deeds
+            .iter()
+            .any(|(_, deed)| matches!(deed, Deed::Cut { .. }))
+    }
 }

@@ -25,6 +25,25 @@ fn in_view(own: u16, view: u32) -> (Relay, u16) {
     (relay, mission)
 }
 
+/// The same once it has agreed on its place in the view.
+fn agreed_in_view(own: u16, view: u32) -> (Relay, u16) {
+    let (mut relay, mission) = in_view(own, view);
+    let digest = mission.wrapping_add(mark(view));
+    for (kind, port) in [(0, Port::Upstream), (1, Port::Downstream)] {
+        let said = &one_of_each(FIRST, digest)[kind];
+        relay.handle_bytes(Instant::ZERO, port, &framed(own, port, said));
+        while relay
+            .poll_timeout()
+            .is_some_and(|due| due < Instant::from_millis(5))
+        {
+            relay.handle_timeout(Instant::from_millis(5));
+        }
+        sent(&mut relay, Instant::from_millis(5));
+    }
+    assert!(events(&mut relay).contains(&Event::Converged));
+    (relay, mission)
+}
+
 /// Whoever bears another digest is in another view, or flies another mission: which of the two is for a hello to say.
 #[test]
 fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission() {
@@ -50,7 +69,13 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
                 (1, Port::Downstream, 5),
                 (16, Port::Downstream, 5),
             ] {
-                let mut after = relay.clone();
+                // A pulse is for relays that have agreed on their places.
+                let mut after = if known && kind == 15 {
+                    agreed_in_view(4, view).0
+                } else {
+                    relay.clone()
+                };
+                let before = counted(after.stats());
                 let said = &one_of_each(FIRST, own.wrapping_add(off))[kind];
                 after.handle_bytes(now, port, &framed(4, port, said));
                 let stale = known && neighbour == 5;
@@ -215,7 +240,7 @@ fn a_view_counts_once_something_that_was_begun_in_it_has_come() {
 #[test]
 fn a_lease_is_granted_by_the_next_pulse_and_runs_out() {
     let view = id(3, 2);
-    let (mut relay, mission) = in_view(4, view);
+    let (mut relay, mission) = agreed_in_view(4, view);
     let own = mission.wrapping_add(mark(view));
     let pulse = |number| Said::Pulse {
         number,

@@ -3,6 +3,8 @@
 use super::state::Node;
 use crate::event::{About, Event};
 use crate::node::duplicate::{Duplicated, Sender};
+#[cfg(feature = "auth")]
+use crate::settings::Wiring;
 use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::message::{Claim, Message};
@@ -36,7 +38,8 @@ impl Node {
             }
         }
         let placed = self.setpoint().is_some();
-        let has_lease = self.layers.lease.until().is_some_and(|until| until > now);
+        let leased = self.layers.lease.until().is_some_and(|until| until > now);
+        let has_lease = placed && leased;
         if self.duplicate.hear(now, sender, has_lease, &settings) {
             self.layers.round.discard_place();
             if placed {
@@ -105,6 +108,18 @@ impl Node {
         self.duplicate.number()
     }
 
+    /// Returns true if a handshake goes with `message`: on a shared channel with one message of each pulse, so that another relay with this
+    /// number that receives it learns of this one although the chain has nothing else to send.
+    #[cfg(feature = "auth")]
+    pub(crate) fn shows_its_nonce(&self, message: &Message) -> bool {
+        let once = match message {
+            Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
+            Message::Pulsed(pulsed) => pulsed.done,
+            _ => false,
+        };
+        once && self.member.settings.wiring == Wiring::Shared
+    }
+
     /// Classifies a claim number under this relay's own node number.
     pub(crate) fn rival(&self, claim: Claim) -> Sender {
         self.duplicate.rival(claim)
@@ -122,10 +137,13 @@ impl Node {
         }
     }
 
-    /// Takes part again, in nothing that goes on without this relay.
+    /// Takes part again, as after a restart with the record of votes: view, lease and proposal may be those of the other node by now.
     pub(super) fn become_active(&mut self, now: Instant) {
+        self.layers.neighbours.leave();
+        self.layers.lease.leave();
         if !self.layers.round.is_fresh() {
-            self.layers.view.asking.ask(now);
+            self.layers.round.suspend();
+            self.layers.view.leave(now);
         }
     }
 }

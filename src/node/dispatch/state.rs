@@ -150,9 +150,8 @@ impl Node {
         }
         if effects.converged {
             self.raise(Event::Converged);
-            if self.layers.context(now, &self.member).leads() {
-                self.layers.lease.begin(now);
-            }
+            let leads = self.layers.context(now, &self.member).leads();
+            self.layers.lease.begin(now, leads);
         }
         if effects.infeasible {
             self.raise(Event::Infeasible);

@@ -26,6 +26,11 @@ impl Neighbour {
         self.agreed.agree_with_proposer();
     }
 
+    /// Leaves the view: nobody is here in it.
+    pub(crate) const fn leave(&mut self) {
+        self.agreed.agree(0);
+    }
+
     /// It was not granted: there is nothing to ask again until somebody else is there.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);

@@ -89,6 +89,12 @@ impl Neighbours {
         self.upstream.has_changed(now) || self.downstream.has_changed(now)
     }
 
+    /// Leaves the view: no neighbour is one of a view until the next one is agreed on.
+    pub(crate) const fn leave(&mut self) {
+        self.upstream.leave();
+        self.downstream.leave();
+    }
+
     /// A proposal was decided against.
     pub(crate) const fn refuse(&mut self) {
         self.upstream.refuse();

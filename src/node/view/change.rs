@@ -154,6 +154,15 @@ impl ViewChange {
         self.asking.ask_anew(context.now);
     }
 
+    /// Gives up the proposal under way and asks for a view, as after a restart with the record.
+    pub(crate) fn leave(&mut self, now: Instant) {
+        self.state = ViewState::Settled;
+        self.proposed = None;
+        self.due = ViewDue::default();
+        self.retransmit.stop();
+        self.asking.ask_anew(now);
+    }
+
     /// A proposal or a decision from the neighbour before or after, of a mission that this relay holds.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let all = context.member.all;
@@ -357,6 +366,8 @@ impl ViewChange {
         }
         let proposal = proposed.view;
         if !self.electorate.accept(proposal, base, decided) {
+            // It is the decision on a proposal of the same number by another node with the number of the proposer.
+            self.abandon(context, proposal);
             return Effects::STALE;
         }
         let taught = base.id > proposed.poll.agreed.id;

@@ -14,6 +14,9 @@
 //! | a hello that asks, of a neighbour that knows as new a view, or has just been switched on | asks for a view |
 //! | a newer mission than the one it flies | asks for a view, which flies it if all hold it |
 //! | a proposal, when it is the last | decides, by the rules of [`electorate`] |
+//! | a pulse of its view, in which it has agreed on no place | asks for a view |
+//! | a decision on its proposal that follows an older view than it knows to be agreed on: another node has the proposer's number | asks for a later one |
+//! | it becomes active again after another node had its number | leaves the view, and asks for one |
 //! | the lease of its view has run out | asks for a view, less and less often |
 //! | a view was refused | asks for one after `probe_after` as soon as anything is new, else after up to eight times that; alone it asks itself first, and proposes where it would not be refused |
 //! | a view far ahead of all that it has heard of | takes in 256 numbers of the way to it on each hearing |

@@ -2,6 +2,7 @@
 
 use super::{Checked, HELLO, PEERS, Session};
 use crate::node::duplicate::{RAISED, Rival, Sender};
+use crate::time::{Duration, Instant};
 use crate::wire::auth::{Auth, Key};
 use crate::wire::frame::{self, FrameBuf, Header, MAX_FRAME};
 use crate::wire::message::Message;
@@ -12,11 +13,14 @@ use std::vec::Vec;
 /// [`PEERS`] as node numbers count.
 const ROOM: u16 = 8;
 
+/// As `Settings::dead_after`.
+const GONE: Duration = Duration::from_millis(15_000);
+
 const KEY: Key = Key::new([0xA5; 32]);
 
 /// Node 1 of epoch 5.
 fn session() -> Session {
-    Session::new(Auth { key: KEY, epoch: 5 }, 0)
+    Session::new(Auth { key: KEY, epoch: 5 }, 0, GONE)
 }
 
 /// A frame without COBS.
@@ -52,8 +56,13 @@ fn frame(from: &mut Session, addresses: (u16, u16), handshake: bool, counter: u3
 }
 
 fn check(session: &mut Session, plain: &[u8]) -> Checked {
+    check_at(session, 0, plain)
+}
+
+fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     let opened = frame::open(plain).unwrap();
-    session.check(opened.header.sender, &opened)
+    let now = Instant::from_millis(1_000 * seconds);
+    session.check(now, opened.header.sender, &opened)
 }
 
 /// Hands over the handshakes that both owe each other, and how many those were; `counters` of `one` and `other`.
@@ -86,7 +95,7 @@ fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
 
 /// Session of node `node`, epoch `epoch`, that has met node 1's `own`.
 fn met(own: &mut Session, node: u16, epoch: u32, counters: &mut [u32; 2]) -> Session {
-    let mut other = Session::new(Auth { key: KEY, epoch }, 0);
+    let mut other = Session::new(Auth { key: KEY, epoch }, 0, GONE);
     other.greet(1);
     counters[1] = 0;
     meet([(own, 1), (&mut other, node)], counters);
@@ -214,7 +223,7 @@ fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
 fn recorded_handshakes_do_not_drive_out_who_is_known() {
     let mut handshakes = Vec::new();
     for node in 100..200 {
-        let mut stranger = Session::new(Auth { key: KEY, epoch: 1 }, 0);
+        let mut stranger = Session::new(Auth { key: KEY, epoch: 1 }, 0, GONE);
         stranger.greet(1);
         handshakes.push(frame(&mut stranger, (node, 1), true, 0));
     }
@@ -243,7 +252,7 @@ fn a_greeting_mends_what_only_one_end_knows() {
     let mut own = session();
     let mut counters = [0; 2];
     met(&mut own, 2, 1, &mut counters);
-    let mut anew = Session::new(Auth { key: KEY, epoch: 2 }, 0);
+    let mut anew = Session::new(Auth { key: KEY, epoch: 2 }, 0, GONE);
     let unread = frame(&mut own, (1, 2), false, 1000);
     assert_eq!(check(&mut anew, &unread), Checked::Forged);
     assert!(own.knows(2));
@@ -294,7 +303,7 @@ fn an_epoch_that_went_back_is_told_once_and_a_frame_that_is_played_again_is_not(
         let mut own = session();
         let mut counters = [0; 2];
         met(&mut own, 2, 7, &mut counters);
-        let mut back = Session::new(Auth { key: KEY, epoch }, 0);
+        let mut back = Session::new(Auth { key: KEY, epoch }, 0, GONE);
         back.greet(1);
         let mut told = 0;
         for counter in 0..20 {
@@ -315,7 +324,7 @@ fn what_the_node_itself_says_in_between_keeps_old_handshakes_from_being_told() {
     let mut own = session();
     let mut counters = [0; 2];
     let mut other = met(&mut own, 2, 7, &mut counters);
-    let mut back = Session::new(Auth { key: KEY, epoch: 3 }, 0);
+    let mut back = Session::new(Auth { key: KEY, epoch: 3 }, 0, GONE);
     back.greet(1);
     for counter in 0..20 {
         let old = frame(&mut back, (2, 1), true, counter);
@@ -329,7 +338,7 @@ fn what_the_node_itself_says_in_between_keeps_old_handshakes_from_being_told() {
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
-    let own = Session::new(Auth { key: KEY, epoch: 5 }, FAR);
+    let own = Session::new(Auth { key: KEY, epoch: 5 }, FAR, GONE);
     let other_key = Key::new([1; 32]);
     let rival = |number, newer_epoch| {
         Sender::Rival(Rival {
@@ -349,7 +358,7 @@ fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
         (KEY, 6, 0, false, Sender::Unknown),
         (other_key, 6, 0, true, Sender::Unknown),
     ] {
-        let mut other = Session::new(Auth { key, epoch }, claim);
+        let mut other = Session::new(Auth { key, epoch }, claim, GONE);
         other.greet(2);
         let plain = frame(&mut other, (1, 2), handshake, 0);
         let opened = frame::open(&plain).unwrap();
@@ -376,8 +385,8 @@ fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
     let auth = Auth { key: KEY, epoch: 7 };
     for first_is_larger in [false, true] {
         let mut counters = [0; 2];
-        let (mut one, mut small) = (session(), Session::new(auth, FAR));
-        let mut large = Session::new(auth, 2 * FAR);
+        let (mut one, mut small) = (session(), Session::new(auth, FAR, GONE));
+        let mut large = Session::new(auth, 2 * FAR, GONE);
         let (first, second) = if first_is_larger {
             (&mut large, &mut small)
         } else {
@@ -411,4 +420,47 @@ fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
         let asks = frame(&mut small, (2, 1), true, 0);
         assert_eq!(check(&mut one, &asks), Checked::Unproven);
     }
+}
+
+/// Node 2 with the larger claim falls silent: the one with the smaller claim is believed once it was for long enough, and nothing recorded of the
+/// larger one is taken from then on, until that one is heard itself.
+#[test]
+fn of_two_nodes_of_one_epoch_the_smaller_claim_is_believed_once_the_larger_is_silent() {
+    const FAR: u32 = 1 << 20;
+    let auth = Auth { key: KEY, epoch: 7 };
+    let mut counters = [0; 2];
+    let (mut one, mut small) = (session(), Session::new(auth, FAR, GONE));
+    let mut large = Session::new(auth, 2 * FAR, GONE);
+    large.greet(1);
+    meet([(&mut one, 1), (&mut large, 2)], &mut counters);
+    let fresh = frame(&mut large, (2, 1), false, counters[1]);
+    let later = frame(&mut large, (2, 1), false, counters[1] + 1);
+    assert_eq!(
+        check_at(&mut one, 10, &fresh),
+        Checked::Fresh { first: false }
+    );
+    small.greet(1);
+    for (seconds, counter) in [(10, 0), (24, 1)] {
+        let asks = frame(&mut small, (2, 1), true, counter);
+        assert_eq!(check_at(&mut one, seconds, &asks), Checked::Replayed);
+    }
+    one.take_handshake();
+    let asks = frame(&mut small, (2, 1), true, 2);
+    assert_eq!(check_at(&mut one, 25, &asks), Checked::Unproven);
+    assert_eq!(one.take_handshake(), Some(2));
+    let answer = frame(&mut one, (1, 2), true, counters[0]);
+    assert_eq!(
+        check(&mut small, &answer),
+        Checked::Handshake { first: true }
+    );
+    assert_eq!(small.poll_rival(), None);
+    let proof = frame(&mut small, (2, 1), false, 3);
+    assert_eq!(
+        check_at(&mut one, 25, &proof),
+        Checked::Fresh { first: true }
+    );
+    assert_eq!(check_at(&mut one, 26, &later), Checked::Forged);
+    large.ask(1);
+    let again = frame(&mut large, (2, 1), true, counters[1] + 2);
+    assert_eq!(check_at(&mut one, 27, &again), Checked::Unproven);
 }
