@@ -1,20 +1,27 @@
 //! What a relay holds while it does its share of an algorithm: the pass that is under way, its place, its targets.
+//!
+//! What the leader has beyond every other relay: which pass comes next.
+//!
+//! What the leader works out before it begins a pass: its prediction, the targets or altitudes to try next.
 
-use super::ear::{SENSING, Sense, Sensing};
-use super::seats::Seats;
+use super::gathering::Seats;
+use super::sense::{SENSING, Sense, Sensing};
 use super::state::{Action, Phase, RoundState};
-use super::sweeping::Sweeping;
-use super::task::LeaderTask;
-use super::turning::Turning;
+use super::sweep::Sweeping;
+use super::turn::Turning;
 use crate::mission::Profile;
 use crate::node::context::Context;
 use crate::node::sample::Meter;
+use crate::optimiser::joint::{MOST_SOLVED, Solver};
 use crate::optimiser::ladder::Ladder;
-use crate::optimiser::search::Infeasible;
+use crate::optimiser::local::HopEnd;
+use crate::optimiser::pass::origins;
+use crate::optimiser::plan::Planner;
+use crate::optimiser::search::{Infeasible, Schedule, Search};
 use crate::place::{CrossSection, Placement, Station};
-use crate::settings::Settings;
+use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
-use crate::wire::message::{Answer, Message, Moved, Roster, Sweep, Token};
+use crate::wire::message::{AdjustStep, Answer, Message, Moved, Roster, Sweep, Token};
 
 /// Places weighed in one call of `work` in Algorithm 2, and a row of 24 more at most.
 pub(super) const PLACES_AT_ONCE: u16 = 600;
@@ -296,5 +303,262 @@ impl Computation {
             LeaderTask::Adjusting(rounds) => Some((rounds.done(), rounds.sir)),
             _ => None,
         }
+    }
+}
+
+/// A chain being solved by the joint method.
+pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
+
+/// What the leader is at.
+#[cfg_attr(
+    feature = "altitude",
+    expect(
+        clippy::large_enum_variant,
+        reason = "there is one of it, and nothing allocates"
+    )
+)]
+#[derive(Clone, Debug)]
+pub(crate) enum LeaderTask {
+    /// Not the leader, or nothing begun yet, or all done.
+    No,
+    /// Solving the chain from the mission.
+    Predicting(Planner),
+    /// The same by the joint method: every relay does that, not the leader alone.
+    Solving(ChainSolver),
+    /// Trying targets at the altitudes held; whether the chain settles with what is agreed.
+    Searching {
+        search: Search,
+        /// Nothing comes after it.
+        last: bool,
+        /// Of the places that the relays were given, though others were chosen.
+        given: bool,
+    },
+    /// Algorithm 2.
+    Adjusting(Rounds),
+}
+
+/// Where Algorithm 2 is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rounds {
+    adjust: Adjust,
+    /// Rounds that are over; the first pass, which only looks, is not one.
+    done: u16,
+    turn: AdjustStep,
+    /// SIR of the chain after the last round.
+    pub(crate) sir: f32,
+}
+
+impl Rounds {
+    pub(crate) const fn new(adjust: Adjust) -> Self {
+        Self {
+            adjust,
+            done: 0,
+            turn: AdjustStep::Look,
+            sir: 0.0,
+        }
+    }
+
+    /// What the next pass is for.
+    pub(crate) const fn turn(&self) -> AdjustStep {
+        self.turn
+    }
+
+    /// How many rounds are over.
+    pub(crate) const fn done(&self) -> u16 {
+        self.done
+    }
+
+    /// Takes what came of a pass; whether that was the last one.
+    pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
+        self.sir = sir;
+        let idle = match self.turn {
+            AdjustStep::Stop => return true,
+            AdjustStep::Look => false,
+            AdjustStep::Move { .. } => {
+                self.done = self.done.saturating_add(1);
+                !any
+            }
+        };
+        self.turn = if idle || self.done >= self.adjust.rounds {
+            AdjustStep::Stop
+        } else {
+            AdjustStep::Move {
+                explore_m: self.adjust.explore_m,
+                local: self.adjust.local,
+            }
+        };
+        false
+    }
+}
+
+impl LeaderTask {
+    /// Nothing is left to do.
+    pub(crate) fn rest(&mut self) {
+        *self = Self::No;
+    }
+
+    /// Solves the chain from the mission.
+    pub(crate) fn predict(&mut self, planner: Planner) {
+        *self = Self::Predicting(planner);
+    }
+
+    /// The same by the joint method.
+    pub(crate) fn solve(&mut self, chain: ChainSolver) {
+        *self = Self::Solving(chain);
+    }
+
+    /// Tries targets: the `last` thing to do, and of the places `given`, or not.
+    pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
+        *self = Self::Searching {
+            search,
+            last,
+            given,
+        };
+    }
+
+    /// Begins Algorithm 2.
+    pub(crate) fn adjust(&mut self, adjust: Adjust) {
+        *self = Self::Adjusting(Rounds::new(adjust));
+    }
+}
+
+/// Hops of the prediction in one call of `work`, 16 reaches each. In an uneven field a part of one.
+const HOPS_AT_ONCE: u16 = 12;
+
+/// The same in an even field, where a reach takes twice the work.
+const FIELD_HOPS_AT_ONCE: u16 = 8;
+
+impl Computation {
+    /// Goes on with the leader's computation; whether the next pass can begin.
+    pub(super) fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
+        if self.has_to_tell(context) || self.gathers(context) {
+            return Ok(true);
+        }
+        if self.is_solving(context) {
+            if let Some(target) = self.solve(context) {
+                self.search_chosen(context, target)?;
+                return Ok(true);
+            }
+            return Ok(false);
+        }
+        let (mission, profile) = (context.mission(), self.profile);
+        match &mut self.task {
+            LeaderTask::No => {
+                self.begin_task(context)?;
+                Ok(false)
+            }
+            LeaderTask::Predicting(planner) => {
+                // The leader knows its own profile; of the others it can only assume what the mission has in common.
+                let profile_of = |index| {
+                    if index == context.index() {
+                        profile
+                    } else {
+                        mission.config().common
+                    }
+                };
+                let hops = match mission.field() {
+                    None => HOPS_AT_ONCE,
+                    Some(field) if field.is_constant() => FIELD_HOPS_AT_ONCE,
+                    Some(_) => 1,
+                };
+                let ladder = match planner.step(mission, profile_of, hops) {
+                    Ok(None) => return Ok(false),
+                    Ok(Some(agreed)) => Some(agreed.ladder),
+                    // The others may hold something else: let their answers decide.
+                    Err(Infeasible) => None,
+                };
+                let last = context.settings().method == Method::Align;
+                self.search_with(context, ladder, last)?;
+                Ok(true)
+            }
+            _ => Ok(true),
+        }
+    }
+
+    /// What the leader begins with: its prediction, if it may, or the search itself.
+    #[inline(never)] // a planner is built here once; its stack is not for every call of `work`
+    fn begin_task(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
+        let Settings {
+            predict, schedule, ..
+        } = *context.settings();
+        if predict && schedule == Schedule::Bracketed {
+            let planner = Planner::new(context.mission(), self.profile, schedule)?;
+            self.task.predict(planner);
+            return Ok(());
+        }
+        self.search_by(
+            context,
+            schedule,
+            None,
+            context.settings().method == Method::Align,
+            false,
+        )
+    }
+
+    /// Goes over to trying targets, with `ladder` first if there is one.
+    pub(super) fn search_with(
+        &mut self,
+        context: &Context<'_>,
+        ladder: Option<Ladder>,
+        last: bool,
+    ) -> Result<(), Infeasible> {
+        self.search_by(context, Schedule::Bracketed, ladder, last, false)
+    }
+
+    /// The leader goes back to the places that the relays were given: nothing can be met at those chosen.
+    pub(super) fn search_given(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
+        self.search_by(context, Schedule::Bracketed, None, true, true)
+    }
+
+    #[inline(never)]
+    fn search_by(
+        &mut self,
+        context: &Context<'_>,
+        schedule: Schedule,
+        ladder: Option<Ladder>,
+        last: bool,
+        given: bool,
+    ) -> Result<(), Infeasible> {
+        let mut search = Search::new(context.mission(), self.profile, schedule)?;
+        if let Some(ladder) = ladder {
+            search.begin_with(ladder);
+        }
+        self.task.search(search, last, given);
+        Ok(())
+    }
+
+    /// The leader begins the pass it has planned.
+    pub(super) fn begin_pass(&mut self, context: &Context<'_>) -> Action {
+        let mission = context.mission();
+        if self.has_to_tell(context) {
+            return self.begin_sense(context);
+        }
+        if self.gathers(context) {
+            self.begin();
+            return self.begin_gathering(context);
+        }
+        match &self.task {
+            LeaderTask::Searching { search, given, .. } => {
+                let ladder = *search.ladder();
+                let chosen = context.joins() && self.chosen.is_some() && !given;
+                self.begin();
+                self.sweep_on(context, ladder, chosen, None, &origins(mission))
+            }
+            LeaderTask::Adjusting(rounds) if ADJUST => {
+                let (turn, sir) = (rounds.turn(), rounds.sir);
+                self.begin();
+                let tx = HopEnd {
+                    place: Placement::default(),
+                    apart_m: 0.0,
+                };
+                self.take_turn(context, Turning::new(turn, sir, tx, mission.tx_gain()))
+            }
+            _ => Action::Work,
+        }
+    }
+
+    pub(super) fn begin(&mut self) {
+        self.state.begin();
+        self.sweeps = self.sweeps.saturating_add(1);
     }
 }

@@ -2,13 +2,22 @@
 //!
 //! A pass has room for a few relays. Each that differs adds itself while there is room, and what came of the pass tells all of them. Where
 //! a roster is full, the next pass goes on after the last relay in it.
+//!
+//! What the relays of a view bring along, as far as a relay knows it.
+//!
+//! A relay's own solution of the chain by the joint method: where it is to be.
 
-use super::computation::{Computation, PassKind};
-use super::seats::Seats;
+use super::computation::{ChainSolver, LeaderTask};
+use super::computation::{Chosen, Computation, PassKind};
 use super::state::Action;
+use crate::mission::{Mission, Profile};
 use crate::node::context::Context;
-use crate::optimiser::joint::Seat;
+use crate::optimiser::joint::{MOST_SOLVED, Seat};
+use crate::optimiser::ladder::Ladder;
+use crate::optimiser::pass::Link;
+use crate::optimiser::search::Infeasible;
 use crate::wire::message::{OwnSeat, OwnSeats, Roster};
+use core::task::Poll;
 
 impl Computation {
     /// What this relay brings along.
@@ -119,5 +128,153 @@ impl Computation {
             return Action::Work;
         }
         Action::Answer { agreed: false }
+    }
+}
+
+/// What the relays of the view bring along, as far as it is known.
+#[derive(Clone, Debug)]
+pub(super) struct Seats {
+    /// Relays that are known, from Tx on; `None` before anybody has asked.
+    pub(super) known: Option<u16>,
+    /// The altitude that a relay keeps to, m, or 0; its power, W, or 0 where the mission says all.
+    own: [[f32; 2]; MOST_SOLVED],
+}
+
+impl Seats {
+    /// Nobody has asked.
+    pub(super) const UNKNOWN: Self = Self {
+        known: None,
+        own: [[0.0; 2]; MOST_SOLVED],
+    };
+
+    /// What relay `index` brings along: what the mission says where nobody has asked.
+    #[inline(never)] // the solver asks in many places
+    pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
+        let at = usize::from(index).wrapping_sub(1);
+        match self.own.get(at) {
+            Some(&[altitude_m, power_w]) if power_w > 0.0 => {
+                let own = Profile {
+                    altitude_m,
+                    power_w,
+                };
+                Seat::of(mission, own, altitude_m > 0.0)
+            }
+            _ => Seat::common(mission),
+        }
+    }
+
+    /// Whether it is known of some of `relays` alone.
+    pub(super) fn is_partial(&self, relays: u16) -> bool {
+        self.known.is_some_and(|known| known < relays)
+    }
+
+    /// Takes what came of a pass along `relays`; whether that is all.
+    pub(super) fn take(&mut self, roster: &Roster, relays: u16) -> bool {
+        for seat in &roster.seats {
+            let at = usize::from(seat.index).wrapping_sub(1);
+            if let Some(own) = self.own.get_mut(at) {
+                *own = [seat.held_m, seat.power_w];
+            }
+        }
+        let last = roster.seats.last().filter(|_| roster.seats.is_full());
+        self.known = Some(last.map_or(relays, |last| last.index));
+        !self.is_partial(relays)
+    }
+}
+
+impl Computation {
+    /// Whether it has still to find out where it is to be.
+    pub(super) fn is_solving(&self, context: &Context<'_>) -> bool {
+        let partial = self.seats.is_partial(context.mission().relays());
+        context.joins() && self.chosen.is_none() && !partial
+    }
+
+    /// Goes on with the chain's solution while there is nothing else to do.
+    pub(super) fn think(&mut self, context: &Context<'_>) -> Action {
+        if self.is_solving(context) {
+            _ = self.solve(context);
+            return Action::Think;
+        }
+        Action::Nothing
+    }
+
+    /// What this relay is on a sweep.
+    pub(super) fn link<'a>(&self, context: &Context<'a>, chosen: bool) -> Link<'a> {
+        let there = self.chosen.filter(|_| chosen);
+        Link {
+            mission: context.mission(),
+            behind: None,
+            index: context.index(),
+            own: self.station_for(chosen),
+            measured_per_w: self.meter.published(),
+            plain: chosen && there.is_none_or(|there| there.plain),
+            end_m: there.map(|there| there.end_m),
+        }
+    }
+
+    /// Solves some more of the chain, of relays that bring along what is known; the target, linear SIR, once this relay knows where it is
+    /// to be.
+    ///
+    /// Where that is not to be had, it stays where it was given to be, and the target says nothing.
+    #[inline(never)]
+    pub(super) fn solve(&mut self, context: &Context<'_>) -> Option<f32> {
+        let mission = context.mission();
+        if !matches!(self.task, LeaderTask::Solving(_)) && !self.begin_solving(mission) {
+            self.choose_given(context);
+            return Some(0.0);
+        }
+        let LeaderTask::Solving(chain) = &mut self.task else {
+            return None;
+        };
+        let seats = &self.seats;
+        let seat_of = |index| seats.of(mission, index);
+        let Poll::Ready(solved) = chain.step(mission, seat_of) else {
+            return None;
+        };
+        let index = context.index();
+        let target = if let Ok(target) = solved {
+            let end_m = chain.end_m(mission, &seat_of, index);
+            let (at, plain) = (chain.at(index, seat_of(index)), !chain.holds_back());
+            // Before it has been asked, the others do not know what it holds.
+            let at = self.seat(context).room.nearest(at);
+            self.chosen = Some(Chosen { at, end_m, plain });
+            target
+        } else {
+            self.choose_given(context);
+            0.0
+        };
+        self.task.rest();
+        Some(target)
+    }
+
+    /// Whether the chain can be solved.
+    #[inline(never)] // a solver is built here once
+    fn begin_solving(&mut self, mission: &Mission) -> bool {
+        let Some(chain) = ChainSolver::new(mission) else {
+            return false;
+        };
+        self.task.solve(chain);
+        true
+    }
+
+    fn choose_given(&mut self, context: &Context<'_>) {
+        self.chosen = Some(Chosen {
+            at: self.seat(context).room.nearest(self.profile.on_line().at),
+            end_m: context.mission().end_for(context.index(), 0.0),
+            plain: true,
+        });
+    }
+
+    /// The leader goes over to sweeps at the places chosen, about `target` if that is known.
+    pub(super) fn search_chosen(
+        &mut self,
+        context: &Context<'_>,
+        target: f32,
+    ) -> Result<(), Infeasible> {
+        let ladder = (target > 0.0 && context.settings().predict).then(|| {
+            let gap = context.mission().config().tolerance / 4.0;
+            Ladder::around(target * 1.000_001, gap, target * 0.5, target * 2.0)
+        });
+        self.search_with(context, ladder, false)
     }
 }

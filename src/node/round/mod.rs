@@ -3,33 +3,24 @@
 //! | file | one idea |
 //! | --- | --- |
 //! | [`state`] | the state table of a pass, and its number |
-//! | `computation` | what a relay holds while it does its share |
-//! | `sweep`, `sweeping` | a sweep of targets (Algorithms 1 and 4) and its verdict |
-//! | `chosen` | a relay's own solution of the chain by the joint method |
-//! | `seats`, `gathering` | what it has to know of the others for that, and the pass that gathers it |
-//! | `turn`, `turning` | a turn of Algorithm 2 |
-//! | `sense`, `ear` | the pass that adds up what is heard, and what a relay keeps of that |
-//! | `leader`, `task` | what comes before a pass begins: which one, and what for |
+//! | `computation` | what a relay holds while it does its share, and which pass the leader begins |
+//! | `sweep` | a sweep of targets (Algorithms 1 and 4) and its verdict |
+//! | `gathering` | the joint method: the pass that gathers what a relay has to know of the others, and its own solution of the chain |
+//! | `turn` | a turn of Algorithm 2 |
+//! | `sense` | the pass that adds up what is heard, and what a relay keeps of that |
 //!
 //! What answers a relay is a sign of life, from when the relay said what is answered: what came of a pass, by the neighbour onward, as of
 //! when the pass was first handed on; the next pass, by the neighbour back, as of when what came of the last one was first handed back. A
 //! leader whose firmware has it begin again does not wait for that: then the sign is too new by one pass at most.
 
-mod chosen;
 mod computation;
-mod ear;
 mod gathering;
-mod leader;
-mod seats;
 mod sense;
 pub(crate) mod state;
 mod sweep;
-mod sweeping;
-mod task;
 #[cfg(test)]
 mod tests;
 mod turn;
-mod turning;
 
 use super::context::{Context, Effects, Member};
 use super::retransmit::{Again, Retransmit, Trip};
@@ -42,7 +33,7 @@ use crate::time::Instant;
 use crate::wire::message::Message;
 
 use computation::{ADJUST, ALTITUDE, Computation};
-use ear::{Findings, SENSING, Sensing};
+use sense::{Findings, SENSING, Sensing};
 use state::{Action, Phase};
 
 /// What is to be sent.

@@ -1,13 +1,18 @@
 //! A relay's share of a sweep (Algorithms 1 and 4), and of its verdict.
+//!
+//! Algorithms 1 and 4 on board: a relay's share of a sweep of targets, and of its verdict.
 
+use super::computation::LeaderTask;
 use super::computation::{ADJUST, ALTITUDE, Computation, PassKind};
 use super::state::Action;
-use super::sweeping::{Sweeping, fingerprint};
-use super::task::LeaderTask;
+use crate::mission::Heading;
 use crate::node::context::Context;
 use crate::optimiser::PerTarget;
 use crate::optimiser::ladder::Ladder;
-use crate::optimiser::pass::Behind;
+use crate::optimiser::pass::{Behind, Link, close};
+use crate::optimiser::spacing::Stand;
+use crate::optimiser::verdict::Verdict;
+use crate::place::Station;
 use crate::settings::Method;
 use crate::wire::message::{Answer, Sweep};
 
@@ -167,4 +172,170 @@ impl Computation {
         self.task.rest();
         Action::Answer { agreed: true }
     }
+}
+
+/// A sweep, as one relay sees it.
+#[derive(Clone, Debug)]
+pub(crate) struct Sweeping {
+    pub(crate) ladder: Ladder,
+    /// What it came with, as [`fingerprint`] sums it up.
+    pub(crate) fingerprint: u32,
+    /// Whether it is of relays where the joint method has them across the line.
+    pub(crate) chosen: bool,
+    /// Whether a relay after this one differs from what the mission says of all.
+    pub(crate) own: bool,
+    behind: Option<Behind>,
+    /// The reaches of the relay before.
+    from: PerTarget,
+    /// This relay's reach for each target.
+    pub(crate) reaches: PerTarget,
+    /// Whether these are all.
+    done: bool,
+    pub(crate) verdict: Verdict,
+    /// Where this relay goes by the verdict, m along x.
+    place: Option<f32>,
+    /// Where the relay before is to.
+    stand: Option<f32>,
+}
+
+impl Sweeping {
+    pub(crate) const fn new(ladder: Ladder) -> Self {
+        Self {
+            ladder,
+            fingerprint: 0,
+            chosen: false,
+            own: false,
+            behind: None,
+            from: PerTarget::new(),
+            reaches: PerTarget::new(),
+            done: false,
+            verdict: Verdict {
+                commit: None,
+                slacks: PerTarget::new(),
+            },
+            place: None,
+            stand: None,
+        }
+    }
+
+    /// A sweep has come from the relay before, or begins.
+    pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
+        self.fingerprint = fingerprint(behind, from);
+        self.behind = behind;
+        self.from.clone_from(from);
+        self.reaches.clear();
+        self.done = false;
+        self.own = false;
+        self.place = None;
+        self.stand = None;
+    }
+
+    /// Works out this relay's reaches, as many as one call may, and whether that is all; at the last relay, the verdict too.
+    ///
+    /// Bounded by 16 reaches; in a field by 128 of its points, or by one target.
+    pub(crate) fn go_on(&mut self, link: Link<'_>) -> bool {
+        let link = self.link(link);
+        let targets = self.ladder.targets();
+        self.done = link.go_on(&targets, &self.from, &mut self.reaches);
+        if self.done && link.mission.after(link.index).is_none() {
+            self.verdict = close(&link, self.ladder, &self.reaches);
+            let place = self
+                .committed()
+                .and_then(|(target, reach)| Some(link.ending(target, reach)?.1));
+            self.settle(&link, place);
+        }
+        self.done
+    }
+
+    /// Takes a verdict that has come back, if it fits: what is committed must be met, by a target this relay has a place for.
+    pub(crate) fn take(&mut self, link: Link<'_>, answer: &Answer) -> bool {
+        let link = self.link(link);
+        let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
+        let met = |target: u8| {
+            slacks
+                .get(usize::from(target))
+                .is_some_and(|slack| *slack >= 0.0)
+        };
+        let fits = slacks.len() <= self.reaches.len() && verdict.commit.is_none_or(met);
+        if !(self.done && fits) {
+            return false;
+        }
+        let stand = |(_, reach): (f32, f32)| match (answer.stand, link.mission.heading()) {
+            (None, _) => Some(reach),
+            (Some(x_m), Heading::TowardRx) => (x_m <= reach).then_some(x_m),
+            (Some(x_m), Heading::TowardTx) => (reach..=link.mission.config().distance_m)
+                .contains(&x_m)
+                .then_some(x_m),
+        };
+        self.verdict = verdict.clone();
+        self.own = answer.own;
+        let place = self.committed().and_then(stand);
+        self.settle(&link, place);
+        true
+    }
+
+    /// Goes to `place` by the verdict, if from there the relay before can be told where to be; else nothing is committed.
+    fn settle(&mut self, link: &Link<'_>, place: Option<f32>) {
+        let Some(commit) = self.verdict.commit else {
+            return;
+        };
+        let before = self.from.get(usize::from(commit)).copied();
+        let stand = match (self.committed(), before, place) {
+            (Some((target, _)), Some(from_m), Some(place)) => link.stand(target, from_m, place),
+            _ => None,
+        };
+        match stand {
+            Some(stand) => {
+                self.place = place;
+                self.stand = match stand {
+                    Stand::AtReach => None,
+                    Stand::At(x_m) => Some(x_m),
+                };
+            }
+            None => self.verdict.commit = None,
+        }
+    }
+
+    /// The target that is committed, and this relay's reach for it.
+    fn committed(&self) -> Option<(f32, f32)> {
+        let commit = usize::from(self.verdict.commit?);
+        Some((
+            *self.ladder.targets().get(commit)?,
+            *self.reaches.get(commit)?,
+        ))
+    }
+
+    /// The place that this relay takes by the verdict, m along x, and the target it is for.
+    pub(crate) fn agreed(&self) -> Option<(f32, f32)> {
+        Some((self.place?, self.committed()?.0))
+    }
+
+    /// Where the relay before is to stand; `None` at its reach.
+    pub(crate) const fn stand(&self) -> Option<f32> {
+        self.stand
+    }
+
+    /// Whether all of its share has been worked out.
+    pub(crate) const fn is_done(&self) -> bool {
+        self.done
+    }
+
+    fn link<'a>(&self, link: Link<'a>) -> Link<'a> {
+        Link {
+            behind: self.behind,
+            plain: link.plain || self.ladder.is_plain(),
+            ..link
+        }
+    }
+}
+
+/// What the relay before says of itself, summed up: it says the same whenever it says the same pass, unless it was rebooted.
+pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
+    let held = behind.map_or([0.0; 3], |behind| {
+        let Station { at, power_w } = behind.relay;
+        [at.y_m, at.altitude_m, power_w]
+    });
+    held.iter().chain(from).fold(0, |sum: u32, value| {
+        sum.rotate_left(5).wrapping_add(value.to_bits())
+    })
 }
