@@ -45,7 +45,7 @@ pub use event::Event;
 pub use field::{Field, FieldPoint};
 pub use geodetic::Geodetic;
 #[cfg(feature = "upload")]
-pub use ground::{Ground, Progress};
+pub use ground::{FlownMission, Ground, Progress};
 pub use line::LineError;
 pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfig, Profile};
 pub use node::round::state::Phase;

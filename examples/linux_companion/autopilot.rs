@@ -8,12 +8,14 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use rustix::event::PollFlags;
 use serde_json::{Value, json};
 use uav_relay::flight::autopilot::carrot::Pace;
+use uav_relay::flight::autopilot::clearance::Named;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::trust::Mistrust;
 use uav_relay::flight::autopilot::{
     Autopilot, AutopilotEvent, FlightMode, Kind, ReleaseCause, WaitReason,
 };
 use uav_relay::flight::axis::Axis;
+use uav_relay::flight::mavlink::frame::Address;
 use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Event, Instant, Placement, Relay, Sites};
@@ -22,7 +24,7 @@ use crate::answers::{Answer, Answers};
 use crate::astray::{Astray, Off};
 use crate::datagrams::Datagrams;
 use crate::relay::seed;
-use crate::waits;
+use crate::{lost, waits};
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 use uav_relay_scenario::endpoint::Endpoint;
@@ -91,6 +93,8 @@ pub(crate) struct Companion {
     state: Option<&'static str>,
     answers: Answers,
     astray: Astray,
+    /// Lost relays that the operator has cleared over MAVLink, until they are taken.
+    cleared: Vec<u16>,
 }
 
 impl Companion {
@@ -115,6 +119,7 @@ impl Companion {
             state: None,
             answers: Answers::new(now),
             astray: Astray::default(),
+            cleared: Vec::new(),
         })
     }
 
@@ -192,6 +197,9 @@ impl Companion {
         while let Some(sample) = self.link.poll_sample() {
             relay.handle_sample(now, sample);
         }
+        if let Some(side) = self.link.poll_cleared() {
+            relay.clear_lost(now, side);
+        }
         self.link.handle_ready(now, relay.is_ready());
         self.link.handle_hold(now, waits::reasons(relay));
         self.link.handle_setpoint(now, relay.setpoint());
@@ -210,12 +218,18 @@ impl Companion {
                     continue;
                 }
                 AutopilotEvent::State(state) => self.state = Some(word(state)),
+                AutopilotEvent::LostCleared { relays, .. } => self.cleared.extend(numbers(relays)),
                 _ => {}
             }
             said(now, log, event);
         }
         self.tell_unanswered(now, log);
         self.tell_astray(now, log, relay);
+    }
+
+    /// Removes the lost relays that the operator has cleared over MAVLink.
+    pub(crate) fn take_cleared(&mut self) -> Vec<u16> {
+        std::mem::take(&mut self.cleared)
     }
 
     /// Writes a line about a drone that is far from its line, and has the operator read it.
@@ -410,6 +424,14 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
                 format_args!("ready: its pilot may choose OFFBOARD or GUIDED"),
             );
         }
+        AutopilotEvent::LostCleared { side, relays, from } => {
+            let text = lost::cleared(numbers(relays), side);
+            commanded(now, log, "cleared", &text, relays, from);
+        }
+        AutopilotEvent::ClearRefused { relays, from } => {
+            let text = "the command has to name all lost relays of one side, and no others";
+            commanded(now, log, "command refused", text, relays, from);
+        }
         AutopilotEvent::FenceBreached => {
             log.tell(now, EVENT, format_args!("says that its fence is breached"));
         }
@@ -418,6 +440,27 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
         }
         other => log.tell(now, EVENT, format_args!("{other:?}")),
     }
+}
+
+/// Returns the numbers of relays that a command names.
+fn numbers(relays: Named) -> impl Iterator<Item = u16> {
+    relays.into_iter().filter(|node| *node != 0)
+}
+
+/// Writes a line about an operator's command over MAVLink, with its sender.
+fn commanded(now: Instant, log: &Log, event: &str, text: &str, relays: Named, from: Address) {
+    let named: Vec<String> = numbers(relays).map(|node| node.to_string()).collect();
+    let command = format!("MAV_CMD_USER_1 {}", named.join(" "));
+    let command = command.trim();
+    let Address { system, component } = from;
+    let by = format!("MAVLink system {system}, component {component}");
+    let fields = json!({ "command": command, "by": by });
+    log.say(
+        now,
+        event,
+        fields,
+        format_args!("{text} (`{command}` by {by})"),
+    );
 }
 
 const fn cause(cause: ReleaseCause) -> &'static str {

@@ -109,14 +109,12 @@ impl Lost {
         }
         relay.clear_lost(now, side);
         self.nodes.retain(|node| !named.contains(node));
-        let stream = match side {
-            Side::Upstream => "upstream",
-            Side::Downstream => "downstream",
-        };
-        Ok(format!(
-            "{} cleared: this relay keeps clear of no lost relay {stream} any more",
-            listed(named)
-        ))
+        Ok(cleared(named, side))
+    }
+
+    /// The operator has cleared these relays by a command over MAVLink.
+    pub(crate) fn are_cleared(&mut self, named: &[u16]) {
+        self.nodes.retain(|node| !named.contains(node));
     }
 
     /// Returns the number of a relay that can be lost.
@@ -137,6 +135,18 @@ impl Lost {
         }
         Ok(number)
     }
+}
+
+/// Returns the line about relays of one side that were cleared.
+pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> String {
+    let stream = match side {
+        Side::Upstream => "upstream",
+        Side::Downstream => "downstream",
+    };
+    format!(
+        "{} cleared: this relay keeps clear of no lost relay {stream} any more",
+        listed(named)
+    )
 }
 
 /// Returns `relay 3 is` or `relays 3, 4 are`.

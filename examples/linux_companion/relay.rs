@@ -164,6 +164,7 @@ impl Flight {
         }
         if let Some(autopilot) = &mut self.autopilot {
             autopilot.drive(time, log, relay);
+            self.lost.are_cleared(&autopilot.take_cleared());
             drone = autopilot.place(time);
         }
         let reopen = self.ports.tend(time, log);

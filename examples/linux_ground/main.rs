@@ -10,8 +10,9 @@
 //! It is the transmitter or the receiver of the chain: connect it where the relay next to that listens, or to the channel that
 //! all hear (`--shared`). `--of`, `--network` and the options of the mission say what the relays were loaded with, as `linux_companion`
 //! was given it, or as a file has it (`--config`): another channel than the paper's, or a field, only that can say.
-//! The options that begin with `--new-` say what is different from now on. Every upload has a larger `--version` than the
-//! one before, and the epoch file is this program's own.
+//! The options that begin with `--new-` say what is different from now on. The chain is asked what it flies, and values that none of them states stay
+//! so. Every change is shown, with the distance that each relay moves, and is to be confirmed (`--yes`, `--dry-run`). Every upload has a
+//! larger `--version` than the one before, and the epoch file is this program's own.
 //!
 //! With `--stand` it does not end: it answers the relays and tells them how strong the interference is where it stands
 //! (`--measurements`). Neither a port that vanishes nor a full disk nor a reader that stops ends it or holds it up. It takes no upload
@@ -24,6 +25,9 @@
 //! | --- | --- |
 //! | `options.rs` | the command line, checked |
 //! | `new.rs` | what is different in a new mission |
+//! | `uploading.rs` | the stages of an upload |
+//! | `change.rs` | log lines for what an upload changes |
+//! | `forecast.rs` | where the relays will fly |
 //! | `station.rs` | the loop |
 //! | `measurements.rs` | how strong the interference is, from a FIFO, a file or datagrams |
 //! | `heard.rs` | which relays are heard |
@@ -32,6 +36,10 @@
 //! What it has in common with the relay is a library, `examples/linux`.
 #![cfg_attr(unix, forbid(unsafe_code))]
 
+#[cfg(unix)]
+mod change;
+#[cfg(unix)]
+mod forecast;
 #[cfg(unix)]
 mod heard;
 #[cfg(unix)]
@@ -44,6 +52,8 @@ mod options;
 mod report;
 #[cfg(unix)]
 mod station;
+#[cfg(unix)]
+mod uploading;
 
 #[cfg(unix)]
 fn main() -> std::process::ExitCode {
@@ -55,9 +65,9 @@ fn main() -> std::process::ExitCode {
     };
     match station::stand(&plan) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(line) => {
+        Err(uploading::Fault { line, status }) => {
             uav_relay_linux::command::complain(&line);
-            ExitCode::FAILURE
+            ExitCode::from(status)
         }
     }
 }

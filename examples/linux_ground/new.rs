@@ -13,13 +13,13 @@ use uav_relay_linux::mission::{
 };
 use uav_relay_linux::site::site;
 
-/// The options of a new mission; what is not among them is as it was loaded.
+/// The options of a new mission; what is not among them stays as it is flown.
 #[derive(Args, Debug)]
 #[group(id = "new", multiple = true, requires = "version")]
 #[expect(clippy::struct_field_names, reason = "as the options are called")]
 pub(crate) struct NewOptions {
-    /// Where the transmitter is from now on; then the distance follows. Without it and --new-site-rx, relays fly between the sites that they
-    /// were loaded with
+    /// Where the transmitter is from now on; then the distance follows. Without it and --new-site-rx, relays stay on the line that they
+    /// fly along
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
     new_site_tx: Option<Geodetic>,
     /// Where the receiver is from now on
@@ -31,7 +31,7 @@ pub(crate) struct NewOptions {
     /// New altitude of every relay, m, 0.1 to 1e4
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = altitude)]
     new_altitude: Option<f32>,
-    /// New altitudes to choose from, m, 0.1 to 1e4; without it those of --band, or the new altitude alone
+    /// New altitudes to choose from, m, 0.1 to 1e4; without it those of before, or the new altitude alone where there was one alone
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     new_band: Option<Band>,
     /// New room to the left of the line to the receiver, as y in m, -1e5 to 0
@@ -60,12 +60,41 @@ pub(crate) struct NewOptions {
 /// Distance along the line at which the order of two relays is certain, m: twice the companion's usual position error.
 const ORDER_M: f32 = 2.0;
 
-/// How far the ends of the new line may be from the one that was loaded, beside its own length, m.
+/// How far the ends of the new line may be from the one that is flown along, beside its own length, m.
 const FAR_M: f64 = 100_000.0;
 
+/// The mission that the values which are not stated are taken from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Basis {
+    pub(crate) config: MissionConfig,
+    /// Sites of the line that is flown along, if they are known.
+    pub(crate) line: Option<Sites>,
+    /// The upload that this is, if it is none that was loaded.
+    pub(crate) upload: Option<Upload>,
+}
+
+impl Basis {
+    /// The mission that was loaded, flown between `sited` if any were given.
+    pub(crate) const fn loaded(loaded: &Mission, sited: Option<Sites>) -> Self {
+        Self {
+            config: *loaded.config(),
+            line: sited,
+            upload: None,
+        }
+    }
+
+    /// An upload, which has no sites of its own where relays fly between `sited`.
+    pub(crate) fn flown(upload: Upload, sited: Option<Sites>) -> Self {
+        Self {
+            config: *upload.config(),
+            line: upload.sites().or(sited),
+            upload: Some(upload),
+        }
+    }
+}
+
 impl NewOptions {
-    /// The upload of a mission in place of `loaded`, which was flown between the sites `sited` if any were given, over the band `loaded_band` if
-    /// one was.
+    /// Returns the upload that replaces `basis` at relays that were loaded with `loaded`, between the sites `sited` if any were given.
     ///
     /// # Errors
     /// One line that names the option and what is wrong.
@@ -74,15 +103,20 @@ impl NewOptions {
         version: u16,
         loaded: &Mission,
         sited: Option<Sites>,
-        loaded_band: Option<Band>,
+        basis: &Basis,
     ) -> Result<Upload, String> {
-        let (sites, along_m) = match self.moved(sited, loaded.config())? {
+        let own = basis.upload.and_then(|upload| upload.sites());
+        let (sites, along_m) = match self.moved(basis.line, &basis.config)? {
             Some((sites, along_m)) => (Some(sites), Some(along_m)),
-            None => (None, None),
+            None => (own, None),
         };
-        let config = self.changed(loaded.config(), loaded_band, along_m);
-        let keeps = sited.is_some() && sites.is_none();
-        if keeps && config.distance_m.to_bits() != loaded.config().distance_m.to_bits() {
+        let config = self.changed(&basis.config, along_m);
+        let kept_m = match own {
+            Some(_) => basis.config.distance_m,
+            None => loaded.config().distance_m,
+        };
+        let keeps = along_m.is_none() && (sited.is_some() || own.is_some());
+        if keeps && config.distance_m.to_bits() != kept_m.to_bits() {
             return Err(format!(
                 "--new-distance {}: must be that of --distance where the relays keep their sites; else give --new-site-tx or --new-site-rx",
                 config.distance_m
@@ -100,21 +134,21 @@ impl NewOptions {
     /// Returns the sites of the new mission and their distance, m, if one has moved.
     fn moved(
         &self,
-        loaded: Option<Sites>,
+        line: Option<Sites>,
         config: &MissionConfig,
     ) -> Result<Option<(Sites, f32)>, String> {
         let (tx, rx) = (self.new_site_tx, self.new_site_rx);
-        let Some(loaded) = loaded.filter(|_| tx.is_some() || rx.is_some()) else {
+        let Some(line) = line.filter(|_| tx.is_some() || rx.is_some()) else {
             return Ok(None);
         };
         let sites = Sites {
-            tx: tx.unwrap_or(loaded.tx),
-            rx: rx.unwrap_or(loaded.rx),
+            tx: tx.unwrap_or(line.tx),
+            rx: rx.unwrap_or(line.rx),
         };
         let name = if rx.is_some() { "rx" } else { "tx" };
         let named = |error: &dyn fmt::Display| format!("--new-site-{name}: {error}");
         let axis = Axis::between(sites).map_err(|error| named(&error))?;
-        let before = Axis::between(loaded).map_err(|error| named(&error))?;
+        let before = Axis::between(line).map_err(|error| named(&error))?;
         near(&before, &axis, sites).map_err(|line| named(&line))?;
         let (turn, most) = (before.turn_rad(&axis).to_degrees(), most_turn_deg(config));
         if turn > most {
@@ -133,37 +167,38 @@ impl NewOptions {
         }
     }
 
-    fn changed(
-        &self,
-        loaded: &MissionConfig,
-        loaded_band: Option<Band>,
-        along_m: Option<f32>,
-    ) -> MissionConfig {
-        let altitude_m = self.new_altitude.unwrap_or(loaded.common.altitude_m);
-        let alone = Band::at(altitude_m);
+    fn changed(&self, basis: &MissionConfig, along_m: Option<f32>) -> MissionConfig {
+        let altitude_m = self.new_altitude.unwrap_or(basis.common.altitude_m);
+        // One altitude alone follows the altitude.
+        let is_alone = basis.band.least_m.to_bits() == basis.band.most_m.to_bits();
+        let band = if is_alone {
+            Band::at(altitude_m)
+        } else {
+            basis.band
+        };
         MissionConfig {
-            distance_m: self.new_distance.or(along_m).unwrap_or(loaded.distance_m),
-            min_separation_m: self.new_min_separation.unwrap_or(loaded.min_separation_m),
-            tx_power_w: self.new_tx_power.unwrap_or(loaded.tx_power_w),
+            distance_m: self.new_distance.or(along_m).unwrap_or(basis.distance_m),
+            min_separation_m: self.new_min_separation.unwrap_or(basis.min_separation_m),
+            tx_power_w: self.new_tx_power.unwrap_or(basis.tx_power_w),
             common: Profile {
                 altitude_m,
-                power_w: self.new_uav_power.unwrap_or(loaded.common.power_w),
+                power_w: self.new_uav_power.unwrap_or(basis.common.power_w),
             },
-            band: self.new_band.or(loaded_band).unwrap_or(alone),
+            band: self.new_band.unwrap_or(band),
             lateral: Band {
-                least_m: self.new_lateral_min.unwrap_or(loaded.lateral.least_m),
-                most_m: self.new_lateral_max.unwrap_or(loaded.lateral.most_m),
+                least_m: self.new_lateral_min.unwrap_or(basis.lateral.least_m),
+                most_m: self.new_lateral_max.unwrap_or(basis.lateral.most_m),
             },
             interference: self
                 .new_interferer
-                .map_or(loaded.interference, Interference::Source),
-            noise_w: self.new_noise.unwrap_or(loaded.noise_w),
-            ..*loaded
+                .map_or(basis.interference, Interference::Source),
+            noise_w: self.new_noise.unwrap_or(basis.noise_w),
+            ..*basis
         }
     }
 }
 
-/// Refuses a line that is far from the one that was loaded: drones fly there, and have no place along it.
+/// Refuses a line that is far from the one that is flown along: drones fly there, and have no place along it.
 ///
 /// # Errors
 /// How far it is, how far it may be, and whether latitude and longitude look swapped.
@@ -190,7 +225,7 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
         ""
     };
     Err(format!(
-        "the new line is {:.0} km from the one of --site-tx and --site-rx: must be within {:.0} km, where the drones are{hint}",
+        "the new line is {:.0} km from the one that is flown along: must be within {:.0} km, where the drones are{hint}",
         far_m / 1e3,
         most_m / 1e3
     ))

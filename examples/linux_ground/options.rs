@@ -1,11 +1,12 @@
 //! The command line, checked.
 
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{ArgAction, CommandFactory as _, Parser, ValueEnum};
-use uav_relay::{Duration, Mission, Side, Upload, Wiring};
+use uav_relay::wire::upload::UploadError;
+use uav_relay::{Adjust, Duration, Mission, Side, Sites, Upload, Wiring};
 use uav_relay_linux::command;
 use uav_relay_linux::config::{self, Beyond, Given, Override};
 use uav_relay_linux::log::LogOptions;
@@ -14,13 +15,15 @@ use uav_relay_linux::site::SiteOptions;
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::key;
 
-use crate::new::NewOptions;
+use crate::forecast::Loaded;
+use crate::new::{Basis, NewOptions};
 
 /// The transmitter or the receiver of a chain of relays in flight: uploads a new mission to it, or stays at its post (--stand). The options up to --min-separation say what the relays were loaded with; those
-/// that begin with --new- what is different from now on, and without any of them it is what they were loaded with. The number of
-/// relays stays.
+/// that begin with --new- what is different from now on. Values that none of them states stay as the chain flies them: the chain is asked first. Every change is shown, and how far
+/// each relay moves, and nothing is uploaded before it is confirmed. The number of relays stays.
 #[derive(Parser, Debug)]
 #[command(name = "linux_ground", version, disable_version_flag = true)]
+#[expect(clippy::struct_excessive_bools, reason = "one for each option")]
 struct Options {
     /// TOML file with the scenario that the relays were loaded with, and sections `network` and `ground`: what it says, options of the
     /// command line say otherwise
@@ -63,8 +66,24 @@ struct Options {
     loaded: MissionOptions,
     #[command(flatten)]
     sites: SiteOptions,
+    /// How the relays find their positions, for the moves that are shown: as the first relay was given it
+    #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
+    method: Method,
     #[command(flatten)]
     new: NewOptions,
+    /// Ends after it has shown what the upload changes; nothing is uploaded
+    #[arg(long, requires = "version", conflicts_with = "stand")]
+    dry_run: bool,
+    /// Uploads without asking; needed where standard input is no terminal
+    #[arg(long, requires = "version")]
+    yes: bool,
+    /// Uploads also what leaves the geofence of --altitude, --band, --lateral-min-m, --lateral-max-m and --distance: for relays without a drone,
+    /// which have no geofence. Relays that fly one refuse it
+    #[arg(long, requires = "version")]
+    no_fence: bool,
+    /// Takes values that are not stated from what the relays were loaded with, and not from what they fly
+    #[arg(long, requires = "version")]
+    from_loaded: bool,
     /// How strong the interference is here, line by line: a FIFO, a file whose last line counts, or `udp:PORT` or `udp:HOST:PORT` to be
     /// told there. A line is the mean power that is received here, W, 1e-30 to 1e6, or dBm with that unit behind it, as -95 dBm. The relays near by are told of it, those that --listen
     #[arg(
@@ -97,12 +116,43 @@ enum End {
     Rx,
 }
 
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Method {
+    Align,
+    Joint,
+    Adjust,
+}
+
+/// An upload, as far as the command line states it.
+#[derive(Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "one for each option")]
+pub(crate) struct Change {
+    pub(crate) version: u16,
+    new: NewOptions,
+    pub(crate) sited: Option<Sites>,
+    pub(crate) dry_run: bool,
+    /// True if nobody has to confirm it.
+    pub(crate) yes: bool,
+    pub(crate) no_fence: bool,
+    pub(crate) from_loaded: bool,
+}
+
+impl Change {
+    /// Returns the upload in place of `basis`.
+    ///
+    /// # Errors
+    /// One line that names the option and what is wrong.
+    pub(crate) fn upload(&self, loaded: &Mission, basis: &Basis) -> Result<Upload, String> {
+        self.new.upload(self.version, loaded, self.sited, basis)
+    }
+}
+
 /// What to upload, and where.
 pub(crate) struct Plan {
     pub(crate) tty: PathBuf,
     pub(crate) baud: u32,
-    pub(crate) loaded: Mission,
-    pub(crate) upload: Option<Upload>,
+    pub(crate) loaded: Loaded,
+    pub(crate) change: Option<Change>,
     pub(crate) stands: bool,
     pub(crate) measurements: Option<String>,
     pub(crate) end: Side,
@@ -155,17 +205,38 @@ fn plan(options: Options, beyond: &Beyond) -> Result<Plan, String> {
         .config(options.of, interference, beyond.channel)?;
     let loaded = mission(base, "--")?;
     let sited = options.sites.of(options.loaded.distance)?;
-    let upload = options
-        .version
-        .map(|version| {
-            options
-                .new
-                .upload(version, &loaded, sited, options.loaded.band)
-        })
-        .transpose()?;
+    let key = key::load("--key-file", &options.key_file)?;
+    let change = options.version.map(|version| Change {
+        version,
+        new: options.new,
+        sited,
+        dry_run: options.dry_run,
+        yes: options.yes,
+        no_fence: options.no_fence,
+        from_loaded: options.from_loaded,
+    });
+    if let Some(change) = &change {
+        if loaded.field().is_some() {
+            return Err(UploadError::Field.to_string());
+        }
+        if !change.yes && !change.dry_run && !std::io::stdin().is_terminal() {
+            let version = change.version;
+            return Err(format!(
+                "--version {version}: nobody can confirm the upload, since standard input is no terminal; give --yes, or --dry-run to see what it changes"
+            ));
+        }
+    }
     Ok(Plan {
-        loaded,
-        upload,
+        loaded: Loaded {
+            mission: loaded,
+            method: match options.method {
+                Method::Align => uav_relay::Method::Align,
+                Method::Joint => uav_relay::Method::Joint,
+                Method::Adjust => uav_relay::Method::Adjust(Adjust::default()),
+            },
+            profiles: beyond.profiles.clone(),
+        },
+        change,
         stands: options.stand,
         measurements: options.measurements,
         end: match options.end {
@@ -178,7 +249,7 @@ fn plan(options: Options, beyond: &Beyond) -> Result<Plan, String> {
             Wiring::Pair
         },
         network: options.network,
-        key: key::load("--key-file", &options.key_file)?,
+        key,
         timeout: Duration::from_millis(1_000 * options.timeout),
         baud: options.baud,
         tty: options.tty,

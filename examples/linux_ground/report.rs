@@ -3,7 +3,9 @@
 use serde_json::json;
 use uav_relay::guard::config::GuardConfig;
 use uav_relay::wire::digest::digest;
-use uav_relay::{Ground, Instant, Mission, MissionConfig, Progress, Side, Stats, Upload};
+use uav_relay::{
+    FlownMission, Ground, Instant, Mission, MissionConfig, Progress, Side, Stats, Upload,
+};
 use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::site::Between;
@@ -13,8 +15,8 @@ use crate::options::Plan;
 
 /// Who listens where.
 pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
-    let (end, relays, network) = (name(plan.end), plan.loaded.relays(), plan.network);
-    let (base, baud) = (digest(&plan.loaded), plan.baud);
+    let (end, relays, network) = (name(plan.end), plan.loaded.mission.relays(), plan.network);
+    let (base, baud) = (digest(&plan.loaded.mission), plan.baud);
     let tty = plan.tty.display();
     log.say(
         Instant::ZERO,
@@ -77,8 +79,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
 }
 
 /// That the relays hold a newer mission.
-pub(crate) fn outdated(upload: &Upload, held: u16) -> String {
-    let version = upload.version();
+pub(crate) fn outdated(version: u16, held: u16) -> String {
     match held.checked_add(1) {
         Some(next) => {
             format!(
@@ -91,29 +92,49 @@ pub(crate) fn outdated(upload: &Upload, held: u16) -> String {
     }
 }
 
-/// That a relay refuses it, and by which number most likely: relays that were loaded with the mission that this station was told of have
-/// the geofence of that, unless a firmware set another one.
+/// The mission that the chain flies, as a relay says.
+pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
+    let FlownMission {
+        by, version, flies, ..
+    } = *flown;
+    let fields = json!({ "relay": by, "version": version, "flies": flies });
+    let what = match (version, flies) {
+        (0, _) => format!("relay {by} flies the mission that it was loaded with"),
+        (_, true) => format!("relay {by} flies version {version}"),
+        (_, false) => format!("relay {by} holds version {version}, and does not fly it yet"),
+    };
+    log.say(now, "current", fields, format_args!("{what}"));
+}
+
+/// That a relay refuses it, and by which number most likely.
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
-    let (loaded, new) = (plan.loaded.config(), upload.config());
+    let version = upload.version();
+    let who = format!("--version {version}: relay {by}, or one beyond it, refuses it");
+    match outside(plan, upload) {
+        Some(outside) => format!("{who}: {outside}"),
+        None => format!("{who}: the log of the one that does says why"),
+    }
+}
+
+/// Returns which value of `upload` leaves the geofence, with its range. Relays that were loaded with the mission that this station was told of have the
+/// geofence of that, unless a firmware set another one.
+pub(crate) fn outside(plan: &Plan, upload: &Upload) -> Option<String> {
+    let (loaded, new) = (plan.loaded.mission.config(), upload.config());
     let fence = |config: &MissionConfig| {
         let guard =
             Mission::try_new(*config).map(|mission| GuardConfig::of(&mission, config.common));
-        guard.map(|guard| guard.fence)
+        guard.ok().map(|guard| guard.fence)
     };
-    let version = upload.version();
-    let who = format!("--version {version}: relay {by}, or one beyond it, refuses it");
-    let (Ok(own), Ok(asked)) = (fence(loaded), fence(new)) else {
-        return who;
-    };
+    let (own, asked) = (fence(loaded)?, fence(new)?);
     let range = |what: &str, is: [f32; 2], of: [f32; 2], options: &str| {
         let is = match is {
             [least, most] if least.to_bits() == most.to_bits() => least.to_string(),
             [least, most] => format!("{least} to {most}"),
         };
         let [least, most] = of;
-        format!(
-            "{who}: {what} {is} m: must be within {least} to {most} m, the geofence of relays that were loaded with {options}"
-        )
+        Some(format!(
+            "{what} {is} m: must be within {least} to {most} m, the geofence of relays that were loaded with {options}"
+        ))
     };
     let asked_h = [asked.least_altitude_m, asked.most_altitude_m];
     let own_h = [own.least_altitude_m, own.most_altitude_m];
@@ -131,14 +152,13 @@ pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
         let (is, of) = ([asked.most_x_m; 2], [own.least_x_m, own.most_x_m]);
         range("distance", is, of, "this --distance")
     } else {
-        format!("{who}: the log of the one that does says why")
+        None
     }
 }
 
 /// That the chain does not fly it in time, and why most likely.
-pub(crate) fn late(plan: &Plan, upload: &Upload, progress: Progress, ground: &Ground) -> String {
+pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Ground) -> String {
     let seconds = plan.timeout.as_micros() / 1_000_000;
-    let version = upload.version();
     let state = match progress {
         Progress::Held { by } => {
             format!("relay {by} holds version {version}, and the chain does not fly it yet")
@@ -162,7 +182,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
             stats.mission,
             format!(
                 "hellos are of relays that were loaded with another mission than 0x{:04x}; say what they were loaded with",
-                digest(&plan.loaded)
+                digest(&plan.loaded.mission)
             ),
         ),
         (
@@ -205,7 +225,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
         // A relay that flies another mission says no more than that it is there.
         None if stats.handshakes > 0 => format!(
             "one is there and says nothing: it was loaded with another mission than 0x{:04x}, most likely",
-            digest(&plan.loaded)
+            digest(&plan.loaded.mission)
         ),
         None => format!(
             "nothing was heard; is --tty {} the one toward the chain, and are --network {}, --baud {}, --end and --key-file right? The log of a relay that hears this says more",

@@ -1,12 +1,12 @@
 //! The loop: move bytes, hand on what is measured, say how far the upload is, sleep.
 
-use std::os::fd::BorrowedFd;
+use std::os::fd::{AsFd as _, BorrowedFd};
 
 use rustix::event::PollFlags;
 use serde_json::{Value, json};
 use uav_relay::serial::SerialPort as _;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Auth, Ground, Instant, Key, Progress};
+use uav_relay::{Auth, Ground, Instant, Key, Progress, Upload};
 use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::refusals::Refusals;
@@ -19,12 +19,10 @@ use crate::heard::Hearing;
 use crate::measurements::{Measurements, name};
 use crate::options::Plan;
 use crate::report;
+use crate::uploading::{Fault, Over, Uploading};
 
 /// Buffers that are read at once, at most.
 const READS: usize = 64;
-
-/// How it went on, if it is over.
-type Over = Option<Result<(), String>>;
 
 /// An end of the chain, and all that it is connected to.
 struct Station<'a> {
@@ -37,16 +35,16 @@ struct Station<'a> {
     measurements: Option<Measurements>,
     hearing: Hearing,
     refusals: Refusals,
-    progress: Progress,
-    /// Until when the upload is to be flown; `None` once that is told, or where there is none.
-    late_at: Option<Instant>,
+    uploading: Option<Uploading>,
+    /// True once standard input has bytes, while the operator is asked.
+    is_answered: bool,
 }
 
 /// Stays at its post until it is told to stop, or only until the chain flies the new mission.
 ///
 /// # Errors
 /// One line that says why it could not begin, or why the chain does not fly it.
-pub(crate) fn stand(plan: &Plan) -> Result<(), String> {
+pub(crate) fn stand(plan: &Plan) -> Result<(), Fault> {
     let mut station = Station::begin(plan)?;
     station.service.ready();
     let over = loop {
@@ -85,13 +83,10 @@ impl<'a> Station<'a> {
             }
             tap::tell(&service.log, asked, &written);
         }
-        let mut ground = Ground::new(&plan.loaded, plan.end, plan.network, plan.wiring, auth);
-        let begun = service.now();
-        if let Some(upload) = plan.upload {
-            ground
-                .upload(begun, upload)
-                .map_err(|error| error.to_string())?;
-        }
+        let loaded = &plan.loaded.mission;
+        let mut ground = Ground::new(loaded, plan.end, plan.network, plan.wiring, auth);
+        let change = plan.change.as_ref();
+        let uploading = change.map(|_| Uploading::begin(service.now(), plan, &mut ground));
         Ok(Self {
             plan,
             service,
@@ -101,8 +96,8 @@ impl<'a> Station<'a> {
             measurements,
             hearing: Hearing::default(),
             refusals: Refusals::default(),
-            progress: Progress::Idle,
-            late_at: plan.upload.map(|_| begun + plan.timeout),
+            uploading,
+            is_answered: false,
         })
     }
 
@@ -121,9 +116,12 @@ impl<'a> Station<'a> {
         if over.is_some() {
             return over;
         }
+        // The next stage of an upload begins with a frame.
+        self.send();
         let alive = self.tell(time);
         let measured = self.measurements.as_ref().and_then(Measurements::wake);
-        let others = [silent, alive, measured, self.late_at, self.tty.wake()];
+        let late = self.uploading.as_ref().and_then(Uploading::wake);
+        let others = [silent, alive, measured, late, self.tty.wake()];
         let wake = others
             .into_iter()
             .flatten()
@@ -148,6 +146,12 @@ impl<'a> Station<'a> {
             ground.measured(power_w);
         }
         ground.handle_timeout(time);
+        self.send();
+    }
+
+    /// Writes what the port takes.
+    fn send(&mut self) {
+        let Self { ground, tty, .. } = self;
         loop {
             if !self.outgoing.is_empty() {
                 let sent = tty.write(&self.outgoing).unwrap_or(0);
@@ -165,40 +169,31 @@ impl<'a> Station<'a> {
         }
     }
 
-    /// Says how far the upload is; that it is over where that ends the program.
+    /// Does the next step of the upload; returns how it ended where that ends the program.
     fn uploading(&mut self, time: Instant) -> Over {
-        let (Some(upload), stands) = (&self.plan.upload, self.plan.stands) else {
-            return None;
+        let Self {
+            plan,
+            ground,
+            uploading,
+            service,
+            ..
+        } = self;
+        let uploading = uploading.as_mut()?;
+        let over = if std::mem::take(&mut self.is_answered) {
+            uploading.answer(time, plan, ground, &answered())
+        } else {
+            None
         };
-        let log = &self.service.log;
-        let progress = self.ground.progress();
-        let is_new = std::mem::replace(&mut self.progress, progress) != progress;
-        if is_new {
-            report::progress(log, time, upload, progress);
+        let change = plan.change.as_ref()?;
+        let over = over.or_else(|| uploading.turn(time, &service.log, plan, change, ground))?;
+        if !plan.stands {
+            return Some(over);
         }
-        let fault = match progress {
-            Progress::Flown { .. } => {
-                self.late_at = None;
-                return (!stands).then_some(Ok(()));
-            }
-            Progress::Outdated { version } => {
-                self.late_at = None;
-                is_new.then(|| report::outdated(upload, version))
-            }
-            Progress::Refused { by } => {
-                self.late_at = None;
-                is_new.then(|| report::refused(self.plan, upload, by))
-            }
-            _ => {
-                let is_late = self.late_at.take_if(|at| *at <= time).is_some();
-                is_late.then(|| report::late(self.plan, upload, progress, &self.ground))
-            }
-        }?;
-        if stands {
-            log.tell(time, "not flown", format_args!("{fault}"));
-            return None;
+        if let Err(fault) = over {
+            let line = fault.line;
+            service.log.tell(time, "not flown", format_args!("{line}"));
         }
-        Some(Err(fault))
+        None
     }
 
     /// Does what signals and the socket ask for, and says when to come back at the latest.
@@ -210,8 +205,10 @@ impl<'a> Station<'a> {
             tty,
             measurements,
             hearing,
+            uploading,
             ..
         } = self;
+        let uploading = uploading.as_ref().and_then(Uploading::upload);
         service.tend(time, "station", |log, command| {
             if let Some((command, _)) = command {
                 let text =
@@ -224,9 +221,9 @@ impl<'a> Station<'a> {
                 "uptime_s": time.as_micros() / 1_000_000,
                 "station": {
                     "end": name(plan.end),
-                    "relays": plan.loaded.relays(),
+                    "relays": plan.loaded.mission.relays(),
                     "hears": hearing.nodes(),
-                    "upload": upload(plan, ground),
+                    "upload": upload(uploading, ground),
                     "counters": counted(ground.stats()),
                 },
                 "measurements": measurements.as_ref().map(Measurements::status),
@@ -242,11 +239,20 @@ impl<'a> Station<'a> {
         let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
         let measured = self.measurements.as_ref().and_then(Measurements::fd);
         others.extend(measured.map(|fd| (fd, PollFlags::IN)));
+        let stdin = std::io::stdin();
+        let asks = self
+            .uploading
+            .as_ref()
+            .is_some_and(Uploading::is_confirming);
+        if asks {
+            others.push((stdin.as_fd(), PollFlags::IN));
+        }
         let Ok(found) = sleep(span, std::iter::once(&mut self.tty), &others) else {
             Service::nap(span);
             return None;
         };
-        Service::is_over(&found).then(|| self.stop())
+        self.is_answered = asks && found.last().is_some_and(|found| !found.is_empty());
+        Service::is_over(&found).then(|| self.stop().map_err(Fault::from))
     }
 
     fn stop(&self) -> Result<(), String> {
@@ -260,9 +266,18 @@ impl<'a> Station<'a> {
     }
 }
 
+/// Reads the operator's answer, which is there: a line, or nothing at the end of standard input.
+fn answered() -> String {
+    let mut line = String::new();
+    match std::io::stdin().read_line(&mut line) {
+        Ok(_) => line,
+        Err(_) => String::new(),
+    }
+}
+
 /// What is uploaded, and how far that is.
-fn upload(plan: &Plan, ground: &Ground) -> Value {
-    let Some(upload) = &plan.upload else {
+fn upload(upload: Option<&Upload>, ground: &Ground) -> Value {
+    let Some(upload) = upload else {
         return Value::Null;
     };
     let progress = match ground.progress() {

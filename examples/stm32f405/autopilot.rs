@@ -170,6 +170,9 @@ impl Autopilot {
         while let Some(sample) = self.link.poll_sample() {
             relay.handle_sample(now, sample);
         }
+        if let Some(side) = self.link.poll_cleared() {
+            relay.clear_lost(now, side);
+        }
     }
 
     /// Has the operator's ground station show what happened.

@@ -111,6 +111,14 @@ pub(crate) fn autopilot(event: AutopilotEvent) {
         AutopilotEvent::Waits(reason) => {
             defmt::warn!("autopilot: cannot be engaged, {}", reason);
         }
+        AutopilotEvent::LostCleared { relays, from, .. } => {
+            defmt::warn!("relays {} are cleared, by MAVLink {}", relays, from);
+        }
+        AutopilotEvent::ClearRefused { relays, from } => defmt::warn!(
+            "relays {} are not cleared: name all lost relays of one side; by MAVLink {}",
+            relays,
+            from
+        ),
         AutopilotEvent::FenceBreached => defmt::warn!("autopilot: its fence is breached"),
         AutopilotEvent::State(State::Silent) => {
             defmt::warn!("autopilot: silent; look at the cable, the baud rate and MAVLink 2");

@@ -99,7 +99,7 @@ local messages = {
         { name = "newest_view", kind = "view", unit = "", text = "the latest view that the sender has heard of" },
         { name = "holds", kind = "digest", unit = "", text = "digest of the newest mission that it holds" },
         { name = "holds_version", kind = "u16", unit = "", text = "version of that" },
-        { name = "offer_number", kind = "u16", unit = "", text = "number for the offer that answers it; 0 at a node that takes none" },
+        { name = "offer_number", kind = "u16", unit = "", text = "number for the offer that answers it; 0 at a node that takes none, and at Tx and Rx while they do not ask which mission is flown" },
         { name = "hears", kind = "u8", unit = "", text = "the nodes on this side that it hears, bit 0 for the nearest, bit 3 for the fourth" },
         { name = "flags", kind = "flags", words = { "ask", "form", "fresh", "ready", "flies", "whole", "refused" }, unit = "", text = "flags" },
     } },

@@ -188,6 +188,10 @@ impl AsyncAutopilot {
                 relay.handle_sample(now, sample);
                 handed = true;
             }
+            if let Some(side) = link.poll_cleared() {
+                relay.clear_lost(now, side);
+                handed = true;
+            }
             let setpoint = relay.setpoint();
             link.handle_ready(now, relay.is_ready());
             let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));

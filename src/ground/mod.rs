@@ -10,9 +10,11 @@
 //! | `Refused` | it refuses it, or knows of a relay that does | done: another upload, of a larger version, has to fit |
 //! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
 
+mod flown;
 mod levels;
 mod progress;
 
+pub use flown::FlownMission;
 pub use progress::Progress;
 
 use levels::Levels;
@@ -87,6 +89,9 @@ pub struct Ground {
     within: u16,
     upload: Option<Upload>,
     progress: Progress,
+    /// Number of the question which mission is flown; 0 while there is none.
+    question: u16,
+    flown: Option<FlownMission>,
     /// How far away the relay that is asked is, 1 for the next.
     distance: u16,
     unanswered: u8,
@@ -127,6 +132,8 @@ impl Ground {
             within: reach.min(all),
             upload: None,
             progress: Progress::Idle,
+            question: 0,
+            flown: None,
             distance: 1,
             unanswered: 0,
             holds: None,
@@ -143,6 +150,26 @@ impl Ground {
         }
     }
 
+    /// Asks the chain which mission it flies, in place of an upload that is under way. [`Ground::flown`] returns the answer.
+    ///
+    /// The relay that is asked answers with the upload that it holds. A ground that was told only what the relays were loaded with learns
+    /// in this way what earlier uploads have changed.
+    pub fn ask_flown(&mut self, now: Instant) {
+        self.upload = None;
+        self.progress = Progress::Idle;
+        self.flown = None;
+        self.question = match self.question.wrapping_add(1) {
+            0 => 1,
+            number => number,
+        };
+        self.start(now);
+    }
+
+    /// Returns the mission that the relay asked holds, once it has answered [`Ground::ask_flown`].
+    pub const fn flown(&self) -> Option<&FlownMission> {
+        self.flown.as_ref()
+    }
+
     /// Uploads `upload` from now on, in place of one that is under way.
     ///
     /// # Errors
@@ -153,13 +180,18 @@ impl Ground {
         }
         self.upload = Some(upload);
         self.progress = Progress::Offering;
+        self.start(now);
+        Ok(())
+    }
+
+    /// Sends the first hello of an upload or of a question.
+    fn start(&mut self, now: Instant) {
         self.holds = None;
         self.answer = None;
         self.unanswered = 0;
         self.due = true;
         self.clock = MonotonicClock::new(now);
         self.again = Some(now + PATIENCE);
-        Ok(())
     }
 
     /// Tells the relays near by how strong the interference is here: mean received power, W, over enough time that its relative error is
@@ -249,12 +281,18 @@ impl Ground {
                             bump(&mut self.stats.received);
                             self.answered(sender, distance, hello);
                         }
+                        Ok(Message::Offer { upload, answer })
+                            if self.is_answer(&upload, answer) =>
+                        {
+                            bump(&mut self.stats.received);
+                            self.told(sender, upload);
+                        }
                         Ok(Message::Hello(_)) => bump(&mut self.stats.mission),
                         _ => bump(&mut self.stats.malformed),
                     },
                     Checked::Handshake { first } => {
                         bump(&mut self.stats.handshakes);
-                        self.due |= first && self.is_under_way();
+                        self.due |= first && (self.is_under_way() || self.is_asking());
                         if first {
                             self.levels.owe(distance);
                         }
@@ -268,8 +306,57 @@ impl Ground {
         }
     }
 
+    /// Returns true while a question waits for its answer.
+    const fn is_asking(&self) -> bool {
+        self.upload.is_none()
+            && self.question != 0
+            && !matches!(&self.flown, Some(flown) if flown.is_known())
+    }
+
+    /// Returns true if `upload`, in an offer with the number `answer`, is the answer to the question.
+    fn is_answer(&self, upload: &Upload, answer: u16) -> bool {
+        self.is_asking() && answer == self.question && upload.base() == self.base
+    }
+
+    /// Relay `by` has sent the upload that it holds.
+    fn told(&mut self, by: u16, upload: Upload) {
+        let flies = matches!(&self.flown, Some(flown) if flown.by == by && flown.flies && flown.version == upload.version());
+        self.flown = Some(FlownMission {
+            by,
+            version: upload.version(),
+            flies,
+            upload: Some(upload),
+        });
+        self.due = false;
+        self.again = None;
+    }
+
+    /// Relay `by` has answered a question by a hello; where it holds an upload, that follows.
+    fn answered_question(&mut self, by: u16, distance: u16, hello: Hello) {
+        self.unanswered = 0;
+        self.distance = distance;
+        // A mission that is refused need not be the one held: then the upload that follows says which is.
+        if hello.refused && self.flown.is_some() {
+            return;
+        }
+        let flown = FlownMission {
+            by,
+            version: hello.holds.version,
+            flies: hello.flies,
+            upload: None,
+        };
+        if flown.is_known() {
+            self.due = false;
+            self.again = None;
+        }
+        self.flown = Some(flown);
+    }
+
     /// Relay `by` has said what it holds.
     fn answered(&mut self, by: u16, distance: u16, hello: Hello) {
+        if self.is_asking() {
+            return self.answered_question(by, distance, hello);
+        }
         let Some(upload) = &self.upload else { return };
         let mission_id = upload.id();
         self.unanswered = 0;
@@ -388,14 +475,19 @@ impl Ground {
         if !core::mem::take(&mut self.due) {
             return self.next_level(header, frame);
         }
-        let upload = self.upload?;
         let to = self.to();
-        let older = self.holds.is_some_and(|holds| holds < upload.id());
+        let loaded = MissionId {
+            version: 0,
+            digest: self.base,
+        };
+        let id = self.upload.map_or(loaded, |upload| upload.id());
+        let older = self.holds.is_some_and(|holds| holds < id);
         let answer = self.answer.filter(|_| older && self.session.knows(to));
-        let message = if let Some(answer) = answer {
+        let message = if let (Some(upload), Some(answer)) = (self.upload, answer) {
             self.answer = None;
             Message::Offer { upload, answer }
         } else {
+            let asks = self.upload.is_none();
             self.asked = true;
             Message::Hello(Hello {
                 mission: self.base,
@@ -407,11 +499,11 @@ impl Ground {
                 form: false,
                 fresh: false,
                 ready: true,
-                holds: upload.id(),
+                holds: id,
                 flies: false,
                 whole: false,
                 refused: false,
-                nonce: 0,
+                nonce: if asks { self.question } else { 0 },
             })
         };
         say(&mut self.session, to, &message, header, frame)

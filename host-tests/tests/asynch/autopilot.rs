@@ -13,8 +13,8 @@ use futures_executor::LocalPool;
 use futures_util::task::LocalSpawnExt as _;
 use host_tests::fixtures;
 use mavlink::dialects::common::{
-    EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot,
-    MavLandedState, MavMessage, MavModeFlag, MavState, MavType,
+    COMMAND_LONG_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA,
+    MavAutopilot, MavCmd, MavLandedState, MavMessage, MavModeFlag, MavState, MavType,
     SET_POSITION_TARGET_GLOBAL_INT_DATA, TIMESYNC_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
@@ -26,7 +26,7 @@ use uav_relay::flight::autopilot::{
 };
 use uav_relay::flight::axis::Axis;
 use uav_relay::guard::config::GuardConfig;
-use uav_relay::{Duration, Geodetic, Instant, Mission, Placement, Relay, Settings, Sites};
+use uav_relay::{Duration, Geodetic, Instant, Mission, Placement, Relay, Settings, Side, Sites};
 
 use crate::time::Time;
 use crate::wire::BYTE_TIME;
@@ -90,6 +90,9 @@ struct Vehicle {
     given_at: Cell<Instant>,
     place: Cell<Placement>,
     told: RefCell<Vec<(Instant, Placement)>>,
+    /// Commands of a ground station to forward, and the results that have come back.
+    commands: RefCell<VecDeque<MavMessage>>,
+    results: RefCell<Vec<u32>>,
 }
 
 fn sites() -> Sites {
@@ -143,8 +146,16 @@ async fn fly(vehicle: &Vehicle, time: &Time, mut to: Uart, from: Uart) -> Infall
                     let Ok(_) = to.write(&raw(number, &answer)).await;
                     number = number.wrapping_add(1);
                 }
+                MavMessage::COMMAND_ACK(ack) if ack.command == MavCmd::MAV_CMD_USER_1 => {
+                    vehicle.results.borrow_mut().push(ack.result as u32);
+                }
                 _ => {}
             }
+        }
+        let command = vehicle.commands.borrow_mut().pop_front();
+        if let Some(command) = command {
+            let Ok(_) = to.write(&raw(number, &command)).await;
+            number = number.wrapping_add(1);
         }
         if vehicle.mute.get() {
             continue;
@@ -187,9 +198,9 @@ fn point(target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Geodetic {
     }
 }
 
-/// One relay between the sites, with a guard.
-fn relay() -> Relay {
-    let mut config = fixtures::paper(1);
+/// The first of so many relays between the sites, with a guard.
+fn relay(relays: u16) -> Relay {
+    let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
     let mission = Mission::try_new(config).unwrap();
     let guard = GuardConfig {
@@ -223,6 +234,11 @@ struct Scene {
 impl Scene {
     /// With `tells` the firmware hands the link the relay's events.
     fn new(tells: bool) -> Self {
+        Self::of(1, tells)
+    }
+
+    /// The same of the first of so many relays.
+    fn of(relays: u16, tells: bool) -> Self {
         let time = Time::default();
         let pool = LocalPool::new();
         let [to_link, from_link] = [Uart::default(), Uart::default()];
@@ -231,6 +247,8 @@ impl Scene {
             given_at: Cell::new(Instant::from_millis(3_000)),
             place: Cell::new(START),
             told: RefCell::default(),
+            commands: RefCell::default(),
+            results: RefCell::default(),
         });
         let seen = Rc::<RefCell<Seen>>::default();
         let task = {
@@ -238,7 +256,7 @@ impl Scene {
             let (mut rx, mut tx) = (to_link.clone(), from_link.clone());
             let (to, from) = (to_link, from_link.clone());
             async move {
-                let mut relay = relay();
+                let mut relay = relay(relays);
                 let relay = AsyncRelay::new(&mut relay);
                 let link = || AsyncLink::new(Uart::default(), Uart::default(), BYTE_TIME);
                 let mut ports = AsyncPair::new(link(), link());
@@ -372,4 +390,24 @@ fn a_stuck_writer_keeps_nobody_from_hearing() {
         seen.events[before..],
         [AutopilotEvent::State(State::Silent)]
     );
+}
+
+/// As on a board: the firmware hands on the relay's events, and nothing else.
+#[test]
+fn an_operator_clears_a_lost_relay() {
+    let mut scene = Scene::of(2, true);
+    scene.run(60_000);
+    let command = MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        param1: 2.0,
+        command: MavCmd::MAV_CMD_USER_1,
+        target_system: 1,
+        target_component: 191,
+        ..COMMAND_LONG_DATA::DEFAULT
+    });
+    scene.vehicle.commands.borrow_mut().push_back(command);
+    scene.run(2_000);
+    assert_eq!(*scene.vehicle.results.borrow(), [0]);
+    let seen = scene.seen.borrow();
+    let is_cleared = |event: &AutopilotEvent| matches!(event, AutopilotEvent::LostCleared { side: Side::Downstream, relays, .. } if relays[0] == 2);
+    assert!(seen.events.iter().any(is_cleared), "{:?}", seen.events);
 }

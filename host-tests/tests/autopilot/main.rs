@@ -2,6 +2,7 @@
 
 mod any;
 mod arducopter;
+mod clearance;
 mod flights;
 mod motion;
 mod px4;

@@ -42,10 +42,21 @@ pub(crate) fn axis() -> Axis {
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) enum Said {
     Heartbeat,
-    Interval { id: u32 },
+    Interval {
+        id: u32,
+    },
     Target(Target),
     Text(String),
-    Value { name: String, value: f32 },
+    Value {
+        name: String,
+        value: f32,
+    },
+    /// The answer to a command: which one, its result, and to whom.
+    Ack {
+        command: u32,
+        result: u32,
+        to: [u8; 2],
+    },
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -334,9 +345,14 @@ impl Vehicle {
     }
 
     fn say(&mut self, message: &MavMessage) {
+        self.say_from([SYSTEM, 1], message);
+    }
+
+    /// Forwards a message of a ground station or of another component.
+    pub(crate) fn say_from(&mut self, [system, component]: [u8; 2], message: &MavMessage) {
         let header = MavHeader {
-            system_id: SYSTEM.into(),
-            component_id: 1,
+            system_id: system.into(),
+            component_id: component,
             sequence: self.number,
         };
         self.number = self.number.wrapping_add(1);
@@ -378,6 +394,12 @@ impl Vehicle {
                     id: command.param1 as u32,
                 }
             }
+            MavMessage::COMMAND_ACK(ack) => Said::Ack {
+                command: ack.command as u32,
+                result: ack.result as u32,
+                // An extension of the message, which the decoder does not read.
+                to: frame[18..20].try_into().unwrap(),
+            },
             MavMessage::SET_POSITION_TARGET_GLOBAL_INT(target) => Said::Target(self.told(&target)),
             MavMessage::STATUSTEXT(text) => Said::Text(text.text.to_str().unwrap().to_owned()),
             MavMessage::NAMED_VALUE_FLOAT(value) => Said::Value {

@@ -14,6 +14,7 @@ JSON object a line, with the drone's own place and mode; standard input has an o
     reboot, mute, speak          begins anew on the ground; says nothing; says something
     stranger, vehicle            heartbeats of no known autopilot; of its own kind again
     noise 150                    a SiK radio hears so much between frames
+    clear 2                      a ground station clears relay 2: MAV_CMD_USER_1 to the companion, by way of this autopilot
     unplug, plug                 the tty or the UDP port vanishes; another one is there
 """
 
@@ -181,12 +182,20 @@ class Drone:
                 self.is_stranger = word == "stranger"
             case ["noise", noise]:
                 self.noise(int(noise))
+            case ["clear", *relays]:
+                self.forward(relays)
             case ["unplug"]:
                 self.port.close()
             case ["plug"]:
                 self.plug()
             case _:
                 raise ValueError(words)
+
+    def forward(self, relays):
+        """A command of a ground station, which the autopilot forwards to the companion as it is."""
+        station = common.MAVLink(None, 255, 190)
+        numbers = [float(relay) for relay in relays] + [0.0] * (7 - len(relays))
+        self.port.write(common.MAVLink_command_long_message(SYSTEM, 191, 31010, 0, *numbers).pack(station))
 
     def noise(self, noise):
         """What a SiK radio says on the same link: it cannot sign."""

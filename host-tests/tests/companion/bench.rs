@@ -31,7 +31,7 @@ while True:
 fn the_bench_of_the_page_runs_twice() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let bench = PAGE.split("### Two boxes on a bench").nth(1).unwrap();
-    let script = bench.split("```bash\n").nth(1).unwrap();
+    let script = bench.split("```bash tested\n").nth(1).unwrap();
     let script = script.split("```").next().unwrap();
     assert!(!script.contains("sleep 2"), "it waits for what it needs");
     let mut script = script.to_owned();

@@ -145,3 +145,55 @@ fn a_client_that_sends_a_part_of_a_command_is_answered() {
     silent.read_to_string(&mut text).unwrap();
     assert!(text.contains("\"has_lease\""), "the state: {text}");
 }
+
+/// By way of the autopilot of its neighbour, as a ground station sends it.
+#[test]
+fn an_operator_clears_a_relay_by_a_mavlink_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (link, socket) = (path("tty"), path("status"));
+    let at = crate::peer::on_earth(300.0, 0.0).map(|number| number.to_string());
+    let [lat, lon, amsl] = &at;
+    let mut drone = crate::peer::Peer::start("autopilot.py", &["px4", &link, lat, lon, amsl]);
+    let channel = Medium::new(2, QUIET);
+    let distance = crate::peer::distance_m().to_string();
+    let quick = ["--probe-after-ms", "500", "--dead-after-ms", "1500"];
+    let second = ["--index", "2", "--of", "2", "--distance", &distance];
+    let second = [&second[..], &["--shared", channel.tty(1)], &quick].concat();
+    let second = Relay::start(&second);
+    let options = crate::peer::options(&link);
+    let mut first: Vec<&str> = options.iter().map(String::as_str).collect();
+    first[3] = "2";
+    first.extend(["--shared", channel.tty(0), "--status-socket", &socket]);
+    first.extend(quick);
+    let mut relay = Relay::start(&first);
+    relay.line("converged: ");
+    relay.line("autopilot: on the ground");
+    drop(second);
+    relay.line("lost: ");
+    assert_eq!(
+        asked(Path::new(&socket))["relay"]["lost"],
+        serde_json::json!([2])
+    );
+    let answer = |drone: &crate::peer::Peer, result: u64| {
+        let ack = drone.hears(|heard| heard.is("COMMAND_ACK") && heard.0["result"] == result);
+        assert_eq!(ack.0["command"], 31_010);
+        let to = [&ack.0["target_system"], &ack.0["target_component"]];
+        assert_eq!(to, [255, 190]);
+        assert_eq!(ack.0["from"], serde_json::json!([7, 191]));
+    };
+    drone.order("clear 1");
+    answer(&drone, 2);
+    relay.line(
+        "command refused: the command has to name all lost relays of one side, and no others (`MAV_CMD_USER_1 1` by MAVLink system 255, component 190)",
+    );
+    drone.order("clear 2");
+    answer(&drone, 0);
+    relay.line(
+        "cleared: relay 2 is cleared: this relay keeps clear of no lost relay downstream any more (`MAV_CMD_USER_1 2` by MAVLink system 255, component 190)",
+    );
+    assert_eq!(
+        asked(Path::new(&socket))["relay"]["lost"],
+        serde_json::json!([])
+    );
+}

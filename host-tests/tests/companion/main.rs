@@ -5,6 +5,7 @@ mod astray;
 mod bench;
 mod binary;
 mod captured;
+mod change;
 mod cleared;
 mod datagrams;
 mod ending;

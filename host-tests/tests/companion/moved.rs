@@ -39,6 +39,7 @@ fn a_drone_stays_where_it_is_and_then_flies_along_the_new_line() {
         let mut ground = vec![
             "--of",
             "1",
+            "--yes",
             "--version",
             "1",
             "--end",

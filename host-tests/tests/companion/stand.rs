@@ -290,6 +290,8 @@ fn a_station_that_stands_uploads_and_stands_on() {
         );
         let mut options = vec!["--stand", "--end", "tx", "--of", "1", "--tty", wire.tty(1)];
         options.extend(["--version", version, "--new-altitude", "30"]);
+        // A relay without a drone has no geofence.
+        options.extend(["--yes", "--no-fence"]);
         options.extend(["--measurements", level.to_str().unwrap()]);
         options.extend(["--capture", capture.to_str().unwrap()]);
         options.extend(signed.iter().map(String::as_str));

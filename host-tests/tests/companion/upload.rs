@@ -9,7 +9,7 @@ use uav_relay_scenario::{Interference, Scenario, Source};
 use crate::medium::{Medium, Noise, QUIET};
 use crate::positions::{fifo, write};
 use crate::process::{Ended, Relay};
-use crate::pty::make_raw;
+use crate::pty::{Pty, make_raw};
 use crate::signed::Files;
 use crate::simulated;
 
@@ -44,7 +44,7 @@ fn relay(files: &Files, index: usize, ttys: &[&str]) -> Relay {
 /// The ground of two relays, which uploads [`NEW`] as `version`.
 fn ground(files: &Files, version: &str, more: &[&str]) -> Relay {
     let options = files.options("key", "ground");
-    let mut arguments = vec!["--of", "2", "--version", version];
+    let mut arguments = vec!["--of", "2", "--yes", "--version", version];
     arguments.extend(NEW);
     arguments.extend(more);
     arguments.extend(options.iter().map(String::as_str));
@@ -277,6 +277,15 @@ fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
         if range.is_some() {
             more.extend(["--new-band", &own]);
         }
+        if let Some(range) = range {
+            let ended = ground(&files, "5", &more).end();
+            let line = format!(
+                "--version 5: altitude {altitude} m: must be within {range}, the geofence of relays that were loaded with this --altitude and --band"
+            );
+            assert_eq!((ended.status, &ended.stderr[..]), (Some(1), &[line][..]));
+            assert!(!relays[0].has_said("refused: "), "nothing was sent");
+            more.push("--no-fence");
+        }
         let ended = ground(&files, "5", &more).end();
         let Some(range) = range else {
             assert_eq!(ended.status, Some(0), "{ended:?}");
@@ -297,7 +306,6 @@ fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
 }
 
 /// Options of the ground, and what the line must have in it.
-#[expect(clippy::too_many_lines, reason = "a table")]
 fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
     let wrong: &[(&[&str], &[&str])] = &[
         (&["--version", "0"], &["--version", "'0'", "1 to 65535"]),
@@ -321,14 +329,6 @@ fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
             &["--new-altitude", "'0'", "0.1 to 10000.0"],
         ),
         (
-            &["--new-band", "30,300"],
-            &["--new-band 30,300", "LEAST to MOST", "--new-altitude 20"],
-        ),
-        (
-            &["--new-min-separation", "501"],
-            &["--new-min-separation 501", "--new-distance 1000", "--of 3"],
-        ),
-        (
             &["--min-separation", "501"],
             &["--min-separation 501", "--distance 1000"],
         ),
@@ -337,29 +337,52 @@ fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
             &["--distance 1000", "must be 1343.795 m"],
         ),
         (
-            &[
-                "--site-tx",
-                "47.4,8.54,420",
-                "--site-rx",
-                "47.41,8.55,431",
-                "--distance",
-                "1343.795",
-                "--new-distance",
-                "1343.8",
-            ],
-            &[
-                "--new-distance 1343.8",
-                "that of --distance",
-                "--new-site-tx",
-            ],
-        ),
-        (
             &["--new-site-rx", "47.41,8.56,431"],
             &["--site-tx", "not provided"],
         ),
         (
             &[SITED, &["--new-site-rx", "47.41"]].concat(),
             &["--new-site-rx", "'47.41'", "LAT,LON,AMSL"],
+        ),
+        (
+            &["--key-file", "nowhere"],
+            &["--key-file nowhere", "cannot be read"],
+        ),
+    ];
+    wrong
+        .iter()
+        .map(|(options, parts)| (options.to_vec(), parts.to_vec()))
+        .collect()
+}
+
+/// Sites, and their distance.
+const SITED: &[&str] = &[
+    "--site-tx",
+    "47.4,8.54,420",
+    "--site-rx",
+    "47.41,8.55,431",
+    "--distance",
+    "1343.795",
+];
+
+/// The same where it depends on what the chain flies: the ground asks that first.
+fn unfit() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
+    let unfit: &[(&[&str], &[&str])] = &[
+        (
+            &["--new-band", "30,300"],
+            &["--new-band 30,300", "LEAST to MOST", "--new-altitude 20"],
+        ),
+        (
+            &["--new-min-separation", "1001"],
+            &["--new-min-separation 1001", "--new-distance 1000", "--of 2"],
+        ),
+        (
+            &[SITED, &["--new-distance", "1343.8"]].concat(),
+            &[
+                "--new-distance 1343.8",
+                "that of --distance",
+                "--new-site-tx",
+            ],
         ),
         (
             &[SITED, &["--new-site-rx", "47.4,8.54,420"]].concat(),
@@ -383,7 +406,7 @@ fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
             .concat(),
             &[
                 "--new-site-rx",
-                "km from the one of --site-tx and --site-rx",
+                "km from the one that is flown along",
                 "must be within 102 km",
                 "are latitude and longitude swapped?",
             ],
@@ -400,33 +423,65 @@ fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
             .concat(),
             &["--new-distance 1000", "must be 187", "be left out"],
         ),
-        (
-            &["--key-file", "nowhere"],
-            &["--key-file nowhere", "cannot be read"],
-        ),
     ];
-    wrong
+    unfit
         .iter()
         .map(|(options, parts)| (options.to_vec(), parts.to_vec()))
         .collect()
 }
 
-/// Sites, and their distance.
-const SITED: &[&str] = &[
-    "--site-tx",
-    "47.4,8.54,420",
-    "--site-rx",
-    "47.41,8.55,431",
-    "--distance",
-    "1343.795",
-];
+#[test]
+fn an_upload_that_does_not_fit_what_is_flown_is_named() {
+    let files = [Files::new(), Files::new()];
+    let wires = [Medium::new(2, QUIET), Medium::new(2, QUIET)];
+    // Relays 1 of 2 over 1000 m, and over the distance of the sites.
+    let _relays = [0, 1].map(|at: usize| {
+        let mut ttys = vec!["--upstream", wires[at].tty(1), "--downstream", "/dev/null"];
+        let spare = Pty::new();
+        let path = spare.path().to_str().unwrap().to_owned();
+        ttys[3] = &path;
+        if at == 1 {
+            ttys.extend(["--distance", "1343.795"]);
+        }
+        let mut relay = relay(&files[at], 1, &ttys);
+        relay.line("started: ");
+        (relay, spare)
+    });
+    for (options, parts) in unfit() {
+        let sited = options.contains(&"--site-tx");
+        let mut all = vec!["--of", "2", "--version", "1", "--yes", "--end", "tx"];
+        all.extend(["--tty", wires[usize::from(sited)].tty(0)]);
+        let own = files[usize::from(sited)].options("key", "ground");
+        all.extend(own.iter().map(String::as_str));
+        all.extend(["--timeout", "20"]);
+        all.extend(&options);
+        let Ended { status, stderr, .. } = Relay::ground(&all).end();
+        assert_eq!((status, stderr.len()), (Some(2), 1), "{all:?}: {stderr:?}");
+        for part in parts {
+            assert!(
+                stderr[0].contains(part),
+                "{all:?}: {part} not in {stderr:?}"
+            );
+        }
+    }
+}
 
 #[test]
 fn wrong_options_of_the_ground_are_named() {
     let files = Files::new();
     let good = files.options("key", "ground");
     for (wrong, parts) in wrong() {
-        let mut all = vec!["--tty", "a", "--end", "tx", "--of", "3", "--version", "1"];
+        let mut all = vec![
+            "--tty",
+            "a",
+            "--end",
+            "tx",
+            "--of",
+            "3",
+            "--version",
+            "1",
+            "--yes",
+        ];
         all.extend(good.iter().map(String::as_str));
         // What is given twice would be another mistake.
         if let Some(at) = all.iter().position(|option| *option == wrong[0]) {

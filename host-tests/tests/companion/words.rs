@@ -128,7 +128,7 @@ fn frames_that_are_refused_say_why() {
 /// An upload that does not come about, and why: to that end with these options.
 fn upload_fails(files: &Files, tty: &str, key: &str, more: &[&str], why: &str) {
     let options = files.options(key, "ground");
-    let mut all = vec!["--tty", tty, "--version", "3", "--timeout", "8"];
+    let mut all = vec!["--tty", tty, "--version", "3", "--yes", "--timeout", "8"];
     all.extend(more);
     all.extend(options.iter().map(String::as_str));
     let line = said(Relay::ground(&all), 1);

@@ -20,6 +20,14 @@ fn messages() -> Vec<Outgoing<'static>> {
             id: rng.random_range(0..1000),
             interval_us: rng.random_range(0..10_000_000),
         });
+        all.push(Outgoing::CommandAck {
+            command: 31_010,
+            result: rng.random_range(0..10),
+            to: Address {
+                system: rng.random(),
+                component: rng.random(),
+            },
+        });
         all.push(Outgoing::SetPosition {
             boot_ms: rng.random(),
             at: Geodetic {
@@ -128,6 +136,27 @@ fn pymavlink_reads_every_field_of_what_is_said() {
                     [id as f32, interval_us as f32, 0.0, 0.0, 0.0, 0.0, 0.0]
                 );
             }
+            Outgoing::CommandAck {
+                command,
+                result,
+                to,
+            } => {
+                assert_eq!(kind, "COMMAND_ACK");
+                let said = [
+                    "command",
+                    "result",
+                    "progress",
+                    "result_param2",
+                    "target_system",
+                    "target_component",
+                ]
+                .map(integer);
+                let [system, component] = [to.system, to.component].map(i64::from);
+                assert_eq!(
+                    said,
+                    [command.into(), result.into(), 0, 0, system, component]
+                );
+            }
             Outgoing::SetPosition {
                 boot_ms,
                 at,
@@ -201,6 +230,15 @@ fn the_mavlink_crate_reads_every_field_of_what_is_said() {
             (Outgoing::Heartbeat, MavMessage::HEARTBEAT(said)) => {
                 assert_eq!((said.mavtype as u32, said.autopilot as u32), (18, 8));
                 assert_eq!((said.custom_mode, said.mavlink_version), (0, 3));
+            }
+            (
+                Outgoing::CommandAck {
+                    command, result, ..
+                },
+                MavMessage::COMMAND_ACK(said),
+            ) => {
+                assert_eq!(said.command as u32, u32::from(command));
+                assert_eq!(said.result as u32, u32::from(result));
             }
             (Outgoing::SetMessageInterval { id, interval_us }, MavMessage::COMMAND_LONG(said)) => {
                 assert_eq!(said.command as u32, 511);

@@ -19,6 +19,7 @@ fn bytes(rng: &mut ChaCha8Rng) -> [u8; 4] {
 }
 
 /// What pymavlink is asked to write, and what is to be read of it. Numbers of enums are any.
+#[expect(clippy::too_many_lines, reason = "a table")]
 pub(super) fn written() -> Vec<(String, Option<Incoming>)> {
     let mut rng = rng(2);
     let mut all = Vec::new();
@@ -101,6 +102,22 @@ pub(super) fn written() -> Vec<(String, Option<Incoming>)> {
         all.push((
             json!({"name": "COMMAND_ACK", "command": command, "result": result}),
             Some(Incoming::CommandAck { command, result }),
+        ));
+        let parameters: [f32; 7] = [0; 7].map(|_| f32::from(rng.random::<i16>()) / 8.0);
+        let [system, component, confirmation, _] = bytes(&mut rng);
+        let mut order = json!({"name": "COMMAND_LONG", "command": 31_010, "target_system": system,
+            "target_component": component, "confirmation": confirmation});
+        for (number, parameter) in (1..).zip(parameters) {
+            order[format!("param{number}")] = parameter.into();
+        }
+        all.push((
+            order,
+            Some(Incoming::CommandLong {
+                command: 31_010,
+                parameters,
+                to: Address { system, component },
+                is_repeated: confirmation > 0,
+            }),
         ));
         // What says nothing to a companion is passed over.
         all.push((

@@ -1,7 +1,8 @@
 //! The view from above: where there is room beside the line, and nowhere else.
 
 use roxmltree::{Document, Node};
-use uav_relay_sim::svg::{Picture, Room, draw};
+use uav_relay_scenario::{Scenario, mission};
+use uav_relay_sim::svg::{Picture, Room, draw, room};
 
 use super::{all, chain, extent, has_text, level, number, tip};
 
@@ -72,6 +73,42 @@ fn without_room_beside_the_line_there_is_one_view() {
     let document = Document::parse(&svg).unwrap();
     assert!(!has_text(&document, "from above") && !has_text(&document, "y (m)"));
     assert!(all(&document, "line", "edge").is_empty());
+}
+
+/// Relays that stay on the line, and an interferer beside it: from the side alone it would seem to be below the chain.
+#[test]
+fn an_interferer_beside_the_line_is_seen_beside_it() {
+    let (mission, _) = mission::mission(&Scenario::default(), 8, 1e-4).unwrap();
+    let picture = level(8);
+    for (y, sign) in [(400.0, 1.0), (-400.0, -1.0)] {
+        let interferers = vec![(80.0, 500.0, y)];
+        let svg = draw(&Picture {
+            room: room(&mission, [0.0; 8], &interferers),
+            interferers,
+            ..picture.clone()
+        });
+        let document = Document::parse(&svg).unwrap();
+        assert!(has_text(&document, "from above") && has_text(&document, "y (m)"));
+        assert!(all(&document, "line", "edge").is_empty(), "no room");
+        let [_, relays] = parts(&document, "circle", "relay", "cy");
+        assert_eq!(relays.len(), 8);
+        let line = number(&relays[0], "cy");
+        assert!(relays.iter().all(|relay| number(relay, "cy") == line));
+        let marks = all(&document, "path", "source");
+        let tops: Vec<f64> = marks.iter().filter_map(top).collect();
+        let above = tops.iter().copied().fold(0.0, f64::max) + 6.0;
+        assert!(sign * (above - line) > 60.0, "{above} and {line}");
+    }
+    for interferers in [vec![(80.0, 500.0, 0.0)], vec![], vec![(80.0, 9e3, 5.0)]] {
+        assert_eq!(room(&mission, [0.0; 8], &interferers), None);
+    }
+}
+
+/// y of the top corner of a marker that has a tip.
+fn top(mark: &Node) -> Option<f64> {
+    mark.children().find(|child| child.has_tag_name("title"))?;
+    let start = mark.attribute("d")?[1..].split('L').next()?;
+    start.split_once(' ')?.1.parse().ok()
 }
 
 #[test]

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use uav_relay::ground::Progress;
 use uav_relay::guard::config::GuardConfig;
-use uav_relay::{Band, Event, LineError, Profile, Settings};
+use uav_relay::{Band, Event, FlownMission, LineError, Profile, Settings};
 
 use super::wires::Wires;
 use super::*;
@@ -368,4 +368,40 @@ fn of_two_ground_stations_at_once_the_newer_upload_is_flown_by_all() {
         "{} pairs of uploads, all flown; the slowest after {worst} ms",
         settled.len()
     );
+}
+
+/// A ground that knows only what the relays were loaded with asks which mission is flown: from either end, with frames lost, whether the relays were
+/// given an upload or not.
+#[test]
+fn the_ground_learns_which_mission_is_flown() {
+    for round in 0..40 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed() + round);
+        let relays = rng.random_range(1..=6);
+        let base = mission(relays);
+        let mut wires = Wires::new(base, round, |_| Settings::default());
+        wires.loss = [0.0, 0.3][rng.random_range(0..2)];
+        let end = ENDS[rng.random_range(0..2)];
+        wires.ask_flown(&base, end);
+        let known = |it: &Wires| it.flown(end).filter(FlownMission::is_known);
+        assert!(wires.until(60, |it| known(it).is_some()), "round {round}");
+        let near = if end == Side::Upstream { 1 } else { relays };
+        let flown = known(&wires).unwrap();
+        assert_eq!((flown.by, flown.version, flown.upload), (near, 0, None));
+        // Another ground uploads from the other end.
+        let sent = Upload::new(&base, 4, moved(&base, 700.0, -300.0)).unwrap();
+        wires.upload(&base, ENDS[1 - end as usize], sent);
+        assert!(wires.until(300, |it| it.versions().iter().all(|it| *it == 4)));
+        wires.ask_flown(&base, end);
+        assert!(wires.until(60, |it| known(it).is_some()), "round {round}");
+        let flown = known(&wires).unwrap();
+        assert_eq!((flown.by, flown.version), (near, 4));
+        assert_eq!(flown.upload, Some(sent), "round {round}");
+        assert!(flown.flies || wires.loss > 0.0, "round {round}");
+        // It goes on from there with the next version.
+        let next = Upload::new(&base, 5, moved(&base, 200.0, 100.0)).unwrap();
+        wires.upload(&base, end, next);
+        assert!(wires.until(300, |it| {
+            matches!(it.progress(end), Progress::Flown { .. })
+        }));
+    }
 }

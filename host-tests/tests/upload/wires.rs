@@ -6,7 +6,9 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::ground::Progress;
 use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::{Auth, Event, Ground, Identity, Key, Placement, Port, Relay, Settings, Wiring};
+use uav_relay::{
+    Auth, Event, FlownMission, Ground, Identity, Key, Placement, Port, Relay, Settings, Wiring,
+};
 
 use super::*;
 
@@ -83,6 +85,18 @@ impl Wires {
         let ground = self.grounds[end as usize]
             .get_or_insert_with(|| Ground::new(base, end, NETWORK, Wiring::Pair, auth()));
         ground.upload(now, upload).unwrap();
+    }
+
+    /// The ground at `end`, which was told that the relays were loaded with `base`, asks which mission is flown.
+    pub(crate) fn ask_flown(&mut self, base: &Mission, end: Side) {
+        let now = self.now;
+        let ground = self.grounds[end as usize]
+            .get_or_insert_with(|| Ground::new(base, end, NETWORK, Wiring::Pair, auth()));
+        ground.ask_flown(now);
+    }
+
+    pub(crate) fn flown(&self, end: Side) -> Option<FlownMission> {
+        self.grounds[end as usize].as_ref()?.flown().copied()
     }
 
     pub(crate) fn progress(&self, end: Side) -> Progress {

@@ -1,10 +1,13 @@
 //! Events that the firmware is told of.
 
 use super::astray::OffLine;
+use super::clearance::Named;
+use super::kind::Kind;
 use super::mode::{Release, WaitReason};
 use super::state::State;
 use super::trust::Mistrust;
-use super::vehicle::Kind;
+use crate::flight::mavlink::frame::Address;
+use crate::side::Side;
 
 /// An event of the link to an autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -32,6 +35,23 @@ pub enum AutopilotEvent {
     /// The drone is so far from its line that it has no place along it: are these the sites of this flight? It is told once on the ground and
     /// at most once in 10 s in the air.
     OffLine(OffLine),
+    /// The operator has cleared all relays that are lost on one side, by a command over MAVLink. [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared)
+    /// has it for the relay.
+    LostCleared {
+        /// The side.
+        side: Side,
+        /// Numbers of the relays, and zeros.
+        relays: Named,
+        /// The sender of the command.
+        from: Address,
+    },
+    /// The operator's command to clear lost relays was denied: it does not name exactly the relays that are lost on one side.
+    ClearRefused {
+        /// Numbers of the relays that it names, and zeros.
+        relays: Named,
+        /// The sender of the command.
+        from: Address,
+    },
     /// The signatures of the two do not fit.
     Mistrusted(Mistrust),
 }
@@ -48,6 +68,8 @@ pub(super) struct Events {
     pub(super) breached: bool,
     pub(super) refused: bool,
     pub(super) off_line: Option<OffLine>,
+    /// [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`].
+    pub(super) clearance: Option<AutopilotEvent>,
 }
 
 impl Events {
@@ -70,6 +92,9 @@ impl Events {
         }
         if let Some(waits) = self.waits.take() {
             return Some(waits);
+        }
+        if let Some(clearance) = self.clearance.take() {
+            return Some(clearance);
         }
         if let Some(off_line) = self.off_line.take() {
             return Some(AutopilotEvent::OffLine(off_line));

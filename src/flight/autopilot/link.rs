@@ -2,8 +2,10 @@
 
 use super::astray::{Astray, OffLine};
 use super::carrot::{Carrot, Pace};
+use super::clearance::{CLEAR_LOST, Clearance};
 use super::clock::millis;
 use super::event::{AutopilotEvent, Events};
+use super::kind::Kind;
 use super::mode::{FlightMode, Release, ReleaseCause, WaitReason};
 use super::noise::RadioNoise;
 use super::report::{Line, Report, Topic};
@@ -11,12 +13,13 @@ use super::state::{Observed, State};
 use super::streams::Streams;
 use super::target::Target;
 use super::trust::Trust;
-use super::vehicle::{Kind, Position, Vehicle, VehicleUpdate};
+use super::vehicle::{Position, Vehicle, VehicleUpdate};
 use crate::event::Event;
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
+use crate::flight::mavlink::incoming::Incoming;
 use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing};
-use crate::flight::mavlink::parser::{Counters, Parser};
+use crate::flight::mavlink::parser::{Counters, Parser, Received};
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::Signing;
 use crate::geodetic::Geodetic;
@@ -58,7 +61,7 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 /// # Contract
 /// - *Inputs* take anything, never fail and do a bounded amount of work.
 /// - *Time* is an argument. After a backward step of the caller's clock timers go on as if no time had passed between the two calls.
-/// - After every input call [`poll_transmit`](Self::poll_transmit), [`poll_position`](Self::poll_position) and
+/// - After every input call [`poll_transmit`](Self::poll_transmit), [`poll_position`](Self::poll_position), [`poll_cleared`](Self::poll_cleared) and
 ///   [`poll_event`](Self::poll_event) until each gives `None`, and hand the relay what [`is_flown`](Self::is_flown) says; then sleep
 ///   until [`poll_timeout`](Self::poll_timeout) or the next byte.
 #[derive(Clone, Debug)]
@@ -98,6 +101,7 @@ pub struct Autopilot {
     report: Report,
     position: Option<Position>,
     astray: Astray,
+    clearance: Clearance,
     /// What a radio has heard where the drone was, W.
     noise: RadioNoise,
     events: Events,
@@ -135,6 +139,7 @@ impl Autopilot {
             report: Report::default(),
             position: None,
             astray: Astray::default(),
+            clearance: Clearance::default(),
             noise: RadioNoise::NONE,
             events: Events::default(),
             sequence: 0,
@@ -155,6 +160,7 @@ impl Autopilot {
             self.parser.push(*byte);
             while let Some(received) = self.trust.next_received(now, &mut self.parser) {
                 self.noise.hear(now, &received, &self.vehicle);
+                self.obey(&received);
                 let was_breached = self.vehicle.is_breached;
                 let heard = self.vehicle.hear(now, &received, &self.axis);
                 if self.vehicle.is_breached && !was_breached {
@@ -168,6 +174,37 @@ impl Autopilot {
                 self.take(now, heard);
             }
         }
+    }
+
+    /// Takes an operator's command to this companion, from anybody whom the link believes.
+    fn obey(&mut self, received: &Received) {
+        let Some(Incoming::CommandLong {
+            command: CLEAR_LOST,
+            parameters,
+            to,
+            is_repeated,
+        }) = received.message
+        else {
+            return;
+        };
+        if to != self.own() {
+            return;
+        }
+        let event = self
+            .clearance
+            .command(received.from, parameters, is_repeated);
+        let line = match event {
+            Some(AutopilotEvent::LostCleared { .. }) => {
+                Line::info(Topic::Clearance, "relay: lost relays are cleared")
+            }
+            Some(_) => {
+                let text = ["relay: denied, name all lost relays of one side", ""];
+                Line::warning(Topic::Clearance, text)
+            }
+            None => return,
+        };
+        self.events.clearance = event;
+        self.report.tell(line);
     }
 
     fn take(&mut self, now: Instant, heard: VehicleUpdate) {
@@ -302,6 +339,7 @@ impl Autopilot {
     /// Takes an event of the relay: the operator reads of those that matter in flight. Of a new view that is one line, on a drone that is
     /// engaged: what keeps another one from its place is told by [`handle_hold`](Self::handle_hold) and by the reasons not to engage it.
     pub fn handle_event(&mut self, event: Event) {
+        self.clearance.hear(event);
         match event {
             Event::Reformed => self.is_new_view = true,
             Event::Converged => {
@@ -507,6 +545,14 @@ impl Autopilot {
 
     /// The same without a signature.
     fn next_frame(&mut self, now: Instant) -> Option<FrameBytes> {
+        if let Some((to, result)) = self.clearance.take_answer() {
+            let command = CLEAR_LOST;
+            return Some(self.frame(Outgoing::CommandAck {
+                command,
+                result,
+                to,
+            }));
+        }
         if self.heartbeat_at <= now {
             self.heartbeat_at = now + HEARTBEAT;
             return Some(self.frame(Outgoing::Heartbeat));
@@ -638,6 +684,11 @@ impl Autopilot {
     /// several since the last call the newest; without the feature `sensing` none.
     pub fn poll_sample(&mut self) -> Option<Sample> {
         self.noise.take()
+    }
+
+    /// Returns the side whose lost relays the operator has cleared: for `Relay::clear_lost`. It is returned once.
+    pub const fn poll_cleared(&mut self) -> Option<Side> {
+        self.clearance.take_cleared()
     }
 
     /// The next event.

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | `link` | the link: bytes, setpoints and the time in; frames, places and events out |
 //! | [`state`] | who flies: the table of states |
+//! | `kind` | whose autopilot it is |
 //! | `vehicle` | what the autopilot has said of itself |
 //! | `clock` | the autopilot's clock, on the relay's; the relay's own |
 //! | `echo` | how late the link is |
@@ -12,6 +13,7 @@
 //! | `target` | what it is told to fly to, and how often |
 //! | [`carrot`] | the target on its way to the setpoint |
 //! | `astray` | a drone that is far from its line |
+//! | `clearance` | the operator's command to clear lost relays |
 //! | `event` | what the firmware is told |
 //! | `noise` | what a radio hears between frames |
 //! | `report` | what the operator reads |
@@ -21,9 +23,11 @@
 
 mod astray;
 pub mod carrot;
+pub mod clearance;
 mod clock;
 mod echo;
 mod event;
+mod kind;
 mod link;
 mod mode;
 mod noise;
@@ -36,6 +40,7 @@ mod vehicle;
 
 pub use astray::OffLine;
 pub use event::AutopilotEvent;
+pub use kind::Kind;
 pub use link::Autopilot;
 pub use mode::{FlightMode, Release, ReleaseCause, WaitReason};
-pub use vehicle::{Kind, Position};
+pub use vehicle::Position;

@@ -1,6 +1,6 @@
 //! Flight modes, as operators know them.
 
-use super::vehicle::Kind;
+use super::kind::Kind;
 
 /// What the autopilot is doing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -42,10 +42,12 @@ pub(super) enum Topic {
     Relay,
     /// The autopilot's fence.
     Fence,
+    /// The operator's command to clear lost relays.
+    Clearance,
 }
 
 impl Topic {
-    const COUNT: usize = 6;
+    const COUNT: usize = 7;
 }
 
 /// A line, in two parts.

@@ -1,6 +1,6 @@
-//! What an autopilot says, of that what a companion needs.
+//! Messages from the autopilot, and from ground stations behind it, that a companion needs.
 
-use super::frame::MAX_PAYLOAD;
+use super::frame::{Address, MAX_PAYLOAD};
 use super::table::id;
 
 /// The payload of a message, with the zeros at its end that are not sent.
@@ -98,6 +98,17 @@ pub enum Incoming {
         /// `MAV_FRAME`: 5 is above the mean sea level.
         frame: u8,
     },
+    /// COMMAND_LONG.
+    CommandLong {
+        /// Which command.
+        command: u16,
+        /// Its seven parameters.
+        parameters: [f32; 7],
+        /// The system and the component that it is for.
+        to: Address,
+        /// True if it was sent before and not answered.
+        is_repeated: bool,
+    },
     /// COMMAND_ACK.
     CommandAck {
         /// Which command.
@@ -156,6 +167,15 @@ impl Incoming {
                 altitude_m: payload.f32(12),
                 type_mask: payload.u16(48),
                 frame: payload.u8(50),
+            },
+            id::COMMAND_LONG => Self::CommandLong {
+                command: payload.u16(28),
+                parameters: [0, 4, 8, 12, 16, 20, 24].map(|at| payload.f32(at)),
+                to: Address {
+                    system: payload.u8(30),
+                    component: payload.u8(31),
+                },
+                is_repeated: payload.u8(32) > 0,
             },
             id::COMMAND_ACK => Self::CommandAck {
                 command: payload.u16(0),

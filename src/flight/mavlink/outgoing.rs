@@ -39,6 +39,15 @@ pub enum Outgoing<'a> {
         /// µs from one to the next.
         interval_us: u32,
     },
+    /// COMMAND_ACK: the answer to a command.
+    CommandAck {
+        /// Which command.
+        command: u16,
+        /// `MAV_RESULT`.
+        result: u8,
+        /// The sender of the command.
+        to: Address,
+    },
     /// SET_POSITION_TARGET_GLOBAL_INT, above the mean sea level (frame 5).
     SetPosition {
         /// Since the companion began, ms.
@@ -92,6 +101,7 @@ impl Outgoing<'_> {
         match self {
             Self::Heartbeat => id::HEARTBEAT,
             Self::SetMessageInterval { .. } => id::COMMAND_LONG,
+            Self::CommandAck { .. } => id::COMMAND_ACK,
             Self::SetPosition { .. } => id::SET_POSITION_TARGET_GLOBAL_INT,
             Self::TimeSync { .. } => id::TIMESYNC,
             Self::StatusText { .. } => id::STATUSTEXT,
@@ -141,6 +151,14 @@ impl Outgoing<'_> {
                 to_frame.bytes(&[0; 20]);
                 to_frame.bytes(&SET_MESSAGE_INTERVAL.to_le_bytes());
                 to_frame.bytes(&[to.system, to.component, 0]);
+            }
+            Self::CommandAck {
+                command,
+                result,
+                to,
+            } => {
+                to_frame.bytes(&command.to_le_bytes());
+                to_frame.bytes(&[result, 0, 0, 0, 0, 0, to.system, to.component]);
             }
             Self::SetPosition {
                 boot_ms,

@@ -33,7 +33,14 @@ impl Node {
                 }
                 self.layers.neighbours.at_mut(side).ground = true;
             }
-            Message::Hello(hello) => self.layers.neighbours.at_mut(side).ground |= hello.ask,
+            Message::Hello(hello) => {
+                let is_older = hello.holds < self.layers.update.latest();
+                let neighbour = self.layers.neighbours.at_mut(side);
+                neighbour.ground |= hello.ask;
+                if is_older {
+                    neighbour.ground_asks = hello.nonce;
+                }
+            }
             Message::Level { power_w, .. } => self.handle_sample(
                 now,
                 match side {
@@ -46,22 +53,24 @@ impl Node {
         true
     }
 
-    /// What the ground at `side` is told, once it is owed: to which node.
-    pub(super) fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Hello)> {
-        if !core::mem::take(&mut self.layers.neighbours.at_mut(side).ground) {
-            return None;
-        }
+    /// Returns what the ground at `side` is owed, a hello or the upload that it asked for, and its node number.
+    pub(super) fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Message)> {
         let to = match side {
             Side::Upstream => 0,
             Side::Downstream => self.member.all.saturating_add(1),
         };
+        if !core::mem::take(&mut self.layers.neighbours.at_mut(side).ground) {
+            let answer = core::mem::take(&mut self.layers.neighbours.at_mut(side).ground_asks);
+            let upload = *self.layers.update.upload().filter(|_| answer != 0)?;
+            return Some((to, Message::Offer { upload, answer }));
+        }
         let nonce = self.ask_number(now);
         let hello = Hello {
             neighbour: 0,
             form: false,
             ..self.hello(now, side, false, nonce)
         };
-        Some((to, hello))
+        Some((to, Message::Hello(hello)))
     }
 
     /// Whether an offer of that number answers a hello of late; one that does not is counted.

@@ -36,8 +36,8 @@ impl Node {
             if let Some(offer) = self.next_offer(now, side) {
                 return Some(offer);
             }
-            if let Some((to, hello)) = self.next_report(now, side) {
-                return Some((side, to, Message::Hello(hello)));
+            if let Some((to, report)) = self.next_report(now, side) {
+                return Some((side, to, report));
             }
         }
         let (side, to, fence) = self.steering.poll_transmit()?;

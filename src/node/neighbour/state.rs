@@ -99,6 +99,9 @@ pub(crate) struct Neighbour {
     /// Whether the ground at this side is owed a hello.
     #[cfg(feature = "upload")]
     pub(crate) ground: bool,
+    /// Number of the ground's hello that asks for the upload held here; 0 for none.
+    #[cfg(feature = "upload")]
+    pub(crate) ground_asks: u16,
     /// When to look for a sign of life again.
     look_at: Option<Instant>,
     pub(super) hellos: Hellos,
@@ -135,6 +138,8 @@ impl Neighbour {
         offer: false,
         #[cfg(feature = "upload")]
         ground: false,
+        #[cfg(feature = "upload")]
+        ground_asks: 0,
         look_at: None,
         hellos: Hellos::NONE,
     };

@@ -140,6 +140,13 @@ pub(crate) async fn autopilot(link: &AsyncAutopilot) -> Infallible {
             }
             AutopilotEvent::Released(release) => warn!("autopilot: released, {}", release),
             AutopilotEvent::Waits(reason) => warn!("autopilot: cannot be engaged, {}", reason),
+            AutopilotEvent::LostCleared { relays, from, .. } => {
+                warn!("relays {} are cleared, by MAVLink {}", relays, from);
+            }
+            AutopilotEvent::ClearRefused { relays, from } => warn!(
+                "relays {} are not cleared: name all lost relays of one side; by MAVLink {}",
+                relays, from
+            ),
             AutopilotEvent::FenceBreached => warn!("autopilot: its fence is breached"),
             AutopilotEvent::Refused => warn!(
                 "autopilot: does not fly where it is told to; is the place outside its fence?"

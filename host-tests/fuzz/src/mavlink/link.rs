@@ -6,13 +6,13 @@ use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind};
 use uav_relay::flight::axis::Axis;
 use uav_relay::pointing::Bearing;
-use uav_relay::{Duration, Instant, Placement};
+use uav_relay::{Duration, Event, Instant, Placement, Side};
 
 use super::payload::{float, long, sized};
 use super::peer::Peer;
 use super::wire::{
-    ACK, EXTENDED_STATE, GLOBAL_POSITION, HEARTBEAT, POSITION_TARGET, SENT, SET_POSITION, VALUE,
-    checksum, frame,
+    ACK, COMMAND, EXTENDED_STATE, GLOBAL_POSITION, HEARTBEAT, POSITION_TARGET, SENT, SET_POSITION,
+    VALUE, checksum, frame,
 };
 use crate::heap::without;
 use crate::input::Input;
@@ -20,8 +20,8 @@ use crate::input::Input;
 /// Operations in one run.
 const MOST_OPERATIONS: usize = 256;
 
-/// Frames that may be due at once: a heartbeat, three requests, a target, three lines, four numbers, and as many again.
-const MOST_FRAMES: usize = 24;
+/// Frames that may be due at once: a heartbeat, three requests, an answer, a target, three lines, four numbers, and as many again.
+const MOST_FRAMES: usize = 26;
 
 /// How far from the line a target may be, m: 5 km, and what a flat earth is off there.
 const AROUND_M: f64 = 5_040.0;
@@ -103,10 +103,10 @@ impl Link {
                 self.hear(input.piece(), lengths);
             }
             1 | 2 => self.heartbeat(input),
-            3 => {
-                let landed = input.below(6);
-                self.says(input, &frame(EXTENDED_STATE, [1, 1], &[0, landed], 0));
-            }
+            3 => match input.below(7) {
+                6 => self.clears(input),
+                landed => self.says(input, &frame(EXTENDED_STATE, [1, 1], &[0, landed], 0)),
+            },
             4 => {
                 let place = near(input);
                 self.position(input, place);
@@ -209,7 +209,14 @@ impl Link {
         let mut both = [self.autopilot.clone(), other];
         let [one, other] = both.each_mut().map(|link| {
             let sent: Vec<_> = core::iter::from_fn(|| link.poll_transmit(self.now)).collect();
-            (sent, link.poll_position(), link.state(), link.counters())
+            let cleared = link.poll_cleared();
+            (
+                sent,
+                link.poll_position(),
+                cleared,
+                link.state(),
+                link.counters(),
+            )
         });
         assert_eq!(one, other, "by how the bytes are cut");
         if let Some(peer) = &mut self.peer {
@@ -236,6 +243,33 @@ impl Link {
         let mut payload = mode.to_le_bytes().to_vec();
         payload.extend([2, autopilot, armed | 1, 4, 3]);
         self.says(input, &frame(HEARTBEAT, [1, component], &payload, 0));
+    }
+
+    /// A relay is lost, and an operator clears it, or others.
+    fn clears(&mut self, input: &mut Input<'_>) {
+        let node = 1 + u16::from(input.below(9));
+        let side = if input.flag() {
+            Side::Upstream
+        } else {
+            Side::Downstream
+        };
+        without(|| {
+            self.autopilot
+                .handle_event(Event::NeighbourLost { side, node });
+        });
+        let mut payload = Vec::new();
+        for _ in 0..7 {
+            let named = match input.below(4) {
+                0 => f32::from(node),
+                1 => input.any_number(),
+                _ => 0.0,
+            };
+            payload.extend(named.to_le_bytes());
+        }
+        payload.extend(31_010_u16.to_le_bytes());
+        let component = if input.below(4) == 3 { 1 } else { 191 };
+        payload.extend([1, component, input.below(2)]);
+        self.says(input, &frame(COMMAND, [255, 190], &payload, 0));
     }
 
     /// Where the drone is, said late or by a clock that is off.
@@ -286,15 +320,22 @@ impl Link {
             assert!([x_m, y_m, altitude_m].iter().all(|part| part.is_finite()));
             assert!(position.at <= self.now, "it comes from the future");
         }
-        let mut events = 0;
+        let cleared = self.autopilot.poll_cleared();
+        assert_eq!(self.autopilot.poll_cleared(), None, "once");
+        let (mut events, mut tells) = (0, false);
         while let Some(event) = self.autopilot.poll_event() {
             if let AutopilotEvent::Found(kind) = event {
                 assert_eq!(self.kind.replace(kind), None, "found twice");
             }
+            tells |= matches!(
+                event,
+                AutopilotEvent::LostCleared { .. } | AutopilotEvent::ClearRefused { .. }
+            );
             events += 1;
-            // Seven, and four kinds of mistrust.
-            assert!(events <= 11, "it never ends");
+            // Eight, and four kinds of mistrust.
+            assert!(events <= 12, "it never ends");
         }
+        assert!(tells || cleared.is_none(), "cleared without a word");
         assert_eq!(
             self.autopilot.is_flown(),
             self.autopilot.state() == State::Engaged

@@ -55,7 +55,7 @@ pub(super) fn extra(id: u32) -> u8 {
 }
 
 /// What the link may send.
-pub(super) const SENT: [Kind; 6] = [HEARTBEAT, COMMAND, SET_POSITION, TIMESYNC, TEXT, VALUE];
+pub(super) const SENT: [Kind; 7] = [HEARTBEAT, COMMAND, ACK, SET_POSITION, TIMESYNC, TEXT, VALUE];
 
 /// A frame; zeros at the end of its payload are left out, but for the first byte.
 pub(super) fn frame(kind: Kind, from: [u8; 2], payload: &[u8], flags: u8) -> Vec<u8> {

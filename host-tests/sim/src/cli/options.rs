@@ -64,7 +64,7 @@ pub struct Options {
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub json: bool,
-    /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
+    /// Draw the chain from the side, and from above where there is room or an interferer beside the line, with each hop's SIR
     #[arg(long, value_name = "FILE", value_parser = file)]
     pub svg: Option<PathBuf>,
     /// Write every frame that is put on the air to a pcapng capture, with virtual times, for `cargo decode` and Wireshark

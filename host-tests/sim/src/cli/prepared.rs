@@ -309,6 +309,7 @@ fn drawn(
             let believed = believed.map(|at| [at.power_w, at.x_m, at.y_m].map(f64::from).into());
             (before, believed.into_iter().collect(), Others::Believed)
         };
+    let room = room(mission, aside, &interferers);
     Picture {
         title_method: report.method.clone(),
         distance_m: f64::from(mission.config().distance_m),
@@ -316,7 +317,7 @@ fn drawn(
         others,
         others_are,
         nodes,
-        room: room(mission, aside),
+        room,
         hop_sir,
         lost,
         left_out,

@@ -15,7 +15,7 @@ const PLOT_BOTTOM: f64 = BOTTOM + ABOVE;
 /// Height of the words.
 const SIZE: f64 = 10.0;
 
-/// Interferers farther aside than this many times the room are told of at the edge of the plot.
+/// Interferers farther aside than this many times the room, or where there is none than the line is long, are told of at the edge of the plot.
 const FARTHEST: f64 = 2.0;
 
 /// Draws the view; `side` has the scale along the line.
@@ -35,7 +35,7 @@ pub(super) fn draw(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &
     let mut labels = Labels::inside((LEFT, PLOT_TOP), (RIGHT, PLOT_BOTTOM));
     axis::draw(canvas, &frame, "y (m)");
     let edges = [room.least_m, room.most_m].map(|y| frame.h.at(y));
-    for edge in edges {
+    for edge in edges.into_iter().filter(|_| !room.is_line()) {
         canvas.edge((LEFT, edge), (RIGHT, edge));
     }
     let hops = hops::of(&seen, &frame);
@@ -45,6 +45,10 @@ pub(super) fn draw(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &
     let placed = sources::from_above(canvas, &mut labels, &frame, &seen);
     sources::label_from_above(canvas, &mut labels, &placed);
     hops::label(canvas, &mut labels, &hops);
+    if room.is_line() {
+        nodes::label(canvas, &mut labels, &frame, &seen);
+        return;
+    }
     // What has a halo may stand on an edge, what has none may not.
     for edge in edges {
         labels.take_line([(LEFT, edge), (RIGHT, edge)]);
@@ -56,7 +60,11 @@ pub(super) fn draw(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &
 /// The scale aside: it holds the room, all relays, and the interferers that are not too far.
 fn upright(seen: &Picture, room: &Room) -> Scale {
     let (mut low, mut high) = (room.least_m.min(0.0), room.most_m.max(0.0));
-    let reach = FARTHEST * high.max(-low).max(1e-3);
+    let reach = if room.is_line() {
+        length(seen)
+    } else {
+        FARTHEST * high.max(-low).max(1e-3)
+    };
     let relays = seen.nodes.iter().map(|(_, y)| *y);
     let interferers = seen.interferers.iter().chain(&seen.others);
     let sources = interferers.map(|(_, _, y)| *y);

@@ -1,4 +1,4 @@
-//! A picture of the chain from the side, and from above where there is room beside the line, as one self-contained SVG file.
+//! A picture of the chain from the side, and from above where there is room or an interferer beside the line, as one self-contained SVG file.
 //!
 //! The markup is written here by hand: it is a handful of shapes, the order and the digits of every attribute stay
 //! ours (the same run gives the same bytes), and a crate would bring nothing but a second vocabulary.

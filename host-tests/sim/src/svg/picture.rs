@@ -2,6 +2,8 @@
 
 use uav_relay::Mission;
 
+use super::sources::near;
+
 /// Size of the picture in its own units; at half a page wide the smallest text is still about 5 pt.
 pub(super) const WIDTH: f64 = 480.0;
 pub(super) const HEIGHT: f64 = 330.0;
@@ -81,10 +83,25 @@ pub struct Room {
     pub y_m: Vec<f64>,
 }
 
-/// The room beside the line in `mission`, if there is any, with relays at these y, m.
-pub fn room(mission: &Mission, y_m: impl IntoIterator<Item = f64>) -> Option<Room> {
+impl Room {
+    /// Returns true if relays are to stay on the line: then the view from above is there for the interferers.
+    pub(super) const fn is_line(&self) -> bool {
+        self.least_m == 0.0 && self.most_m == 0.0
+    }
+}
+
+/// Returns the room beside the line in `mission`, with relays at these y, m. `None` where there is none and no interferer is beside the line
+/// either: from the side each would seem to be below the chain.
+pub fn room(
+    mission: &Mission,
+    y_m: impl IntoIterator<Item = f64>,
+    interferers: &[(f64, f64, f64)],
+) -> Option<Room> {
     let lateral = mission.config().lateral;
-    (!lateral.is_single()).then(|| Room {
+    let distance_m = f64::from(mission.config().distance_m);
+    let is_beside = |(_, x_m, y_m): &(f64, f64, f64)| near(*x_m, distance_m) && *y_m != 0.0;
+    let is_seen = !lateral.is_single() || interferers.iter().any(is_beside);
+    is_seen.then(|| Room {
         least_m: f64::from(lateral.least_m),
         most_m: f64::from(lateral.most_m),
         y_m: y_m.into_iter().collect(),

@@ -176,6 +176,7 @@ fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
         room: room(
             &plan.mission,
             plan.places.iter().map(|(place, _)| f64::from(place.y_m)),
+            &scenario.sources(),
         ),
         hop_sir: plan.sirs.clone(),
         ..Picture::default()

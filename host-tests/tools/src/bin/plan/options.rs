@@ -32,7 +32,7 @@ pub(crate) struct Options {
     /// One JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,
-    /// Draw the chain from the side, and from above where there is room beside the line, with each hop's SIR
+    /// Draw the chain from the side, and from above where there is room or an interferer beside the line, with each hop's SIR
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
     /// Write sites, relays, hops and interferers on earth, for a map (GeoJSON); needs a scenario with a site

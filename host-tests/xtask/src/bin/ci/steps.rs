@@ -97,6 +97,10 @@ pub(crate) fn all() -> Vec<Step> {
         "tests",
         "cargo test --workspace --no-fail-fast --locked",
     ));
+    steps.push(step(
+        "the commands of the pages",
+        "cargo run --quiet --package uav-relay-xtask --bin pages",
+    ));
     steps.extend(SETS.map(with_features));
     steps.push(Step {
         environment: &[("RUSTDOCFLAGS", "-D warnings")],

@@ -1,0 +1,102 @@
+//! What an upload changes, as log lines: each value that differs, and how far each relay moves.
+
+use serde_json::json;
+use uav_relay::{Band, Instant, Interference, MissionConfig, Placement};
+use uav_relay_linux::log::Log;
+use uav_relay_linux::site::degrees;
+
+use crate::forecast::Move;
+use crate::new::Basis;
+
+/// Logs each value that differs.
+pub(crate) fn tell(log: &Log, now: Instant, before: &Basis, after: &Basis) {
+    let pairs = values(before).into_iter().zip(values(after));
+    let mut is_same = true;
+    for ((name, old), (_, new)) in pairs.filter(|((_, old), (_, new))| old != new) {
+        is_same = false;
+        let fields = json!({ "value": name, "old": old, "new": new });
+        log.say(
+            now,
+            "change",
+            fields,
+            format_args!("{name}: {old} -> {new}"),
+        );
+    }
+    if is_same {
+        log.tell(now, "change", format_args!("none"));
+    }
+}
+
+/// Returns the values of a mission by their names, each as text with its unit.
+fn values(basis: &Basis) -> Vec<(&'static str, String)> {
+    let MissionConfig {
+        distance_m,
+        min_separation_m,
+        tx_power_w,
+        common,
+        band,
+        lateral,
+        interference,
+        noise_w,
+        ..
+    } = basis.config;
+    let range = |Band { least_m, most_m }| format!("{least_m} to {most_m} m");
+    let site = |at: Option<_>| at.map_or("not known".to_owned(), degrees);
+    vec![
+        ("transmitter", site(basis.line.map(|line| line.tx))),
+        ("receiver", site(basis.line.map(|line| line.rx))),
+        ("distance", format!("{distance_m} m")),
+        ("altitude", format!("{} m", common.altitude_m)),
+        ("altitudes to choose from", range(band)),
+        ("room to the side", range(lateral)),
+        ("power of the transmitter", format!("{tx_power_w} W")),
+        ("power of a relay", format!("{} W", common.power_w)),
+        (
+            "interferer",
+            match interference {
+                Interference::Source(at) => {
+                    format!("{} W at x {} m, y {} m", at.power_w, at.x_m, at.y_m)
+                }
+                Interference::Unknown => "measured by the relays".to_owned(),
+                Interference::Field(_) => "a field".to_owned(),
+            },
+        ),
+        ("noise", format!("{noise_w} W")),
+        ("least separation", format!("{min_separation_m} m")),
+    ]
+}
+
+/// Logs how far each relay moves.
+pub(crate) fn tell_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
+    let Some(moves) = moves else {
+        let what = "cannot be computed in advance, since the relays measure the interference or find no positions";
+        log.tell(now, "move", format_args!("{what}"));
+        return;
+    };
+    let place = |at: Placement| json!({ "x_m": at.x_m, "y_m": at.y_m, "h_m": at.altitude_m });
+    for Move {
+        index,
+        before,
+        after,
+        metres,
+    } in moves
+    {
+        let fields = json!({ "relay": index, "metres": metres, "from": place(*before), "to": place(*after) });
+        let at = |p: &Placement| {
+            format!(
+                "x {:.1} m, y {:.1} m, altitude {:.1} m",
+                p.x_m, p.y_m, p.altitude_m
+            )
+        };
+        log.say(
+            now,
+            "move",
+            fields,
+            format_args!(
+                "relay {index} moves {metres:.1} m, from {} to {}",
+                at(before),
+                at(after)
+            ),
+        );
+    }
+}

@@ -1,0 +1,101 @@
+//! An operator's command to clear a lost relay, through the autopilot of its neighbour.
+
+use mavlink::dialects::common::{COMMAND_LONG_DATA, MavCmd, MavMessage};
+use uav_relay::flight::autopilot::{AutopilotEvent, Kind};
+use uav_relay::flight::mavlink::frame::Address;
+use uav_relay::{Event, Side};
+
+use crate::vehicle::{SYSTEM, Said, Vehicle};
+
+/// QGroundControl.
+const STATION: [u8; 2] = [255, 190];
+
+const FROM: Address = Address {
+    system: 255,
+    component: 190,
+};
+
+fn command(to: [u8; 2], relays: [f32; 2], confirmation: u8) -> MavMessage {
+    MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        param1: relays[0],
+        param2: relays[1],
+        command: MavCmd::MAV_CMD_USER_1,
+        target_system: to[0],
+        target_component: to[1],
+        confirmation,
+        ..COMMAND_LONG_DATA::DEFAULT
+    })
+}
+
+/// The answers so far: result, and to whom.
+fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
+    let said = vehicle.said.iter();
+    said.filter_map(|(_, said)| match said {
+        Said::Ack {
+            command: 31_010,
+            result,
+            to,
+        } => Some((*result, *to)),
+        _ => None,
+    })
+    .collect()
+}
+
+#[test]
+fn an_operator_clears_a_lost_relay_by_a_command_to_the_companion() {
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        let mut vehicle = Vehicle::new(kind);
+        vehicle.fly_off();
+        let side = Side::Downstream;
+        vehicle
+            .link
+            .handle_event(Event::NeighbourLost { side, node: 3 });
+        let own = [SYSTEM, 191];
+        // To the autopilot, to another system, to nobody by name: not for this companion.
+        for to in [[SYSTEM, 1], [SYSTEM + 1, 191], [0, 0], [SYSTEM, 0]] {
+            vehicle.say_from(STATION, &command(to, [3.0, 0.0], 0));
+        }
+        vehicle.run(1_000);
+        assert_eq!(answers(&vehicle), []);
+        assert_eq!(vehicle.link.poll_cleared(), None);
+
+        // Relay 4 is not lost.
+        vehicle.say_from(STATION, &command(own, [4.0, 0.0], 0));
+        vehicle.run(1_000);
+        assert_eq!(answers(&vehicle), [(2, STATION)], "denied");
+        assert_eq!(vehicle.link.poll_cleared(), None);
+        let relays = [4, 0, 0, 0, 0, 0, 0];
+        let refused = AutopilotEvent::ClearRefused { relays, from: FROM };
+        assert!(vehicle.events.contains(&refused), "{:?}", vehicle.events);
+
+        vehicle.say_from(STATION, &command(own, [3.0, 0.0], 0));
+        vehicle.run(1_000);
+        assert_eq!(answers(&vehicle)[1..], [(0, STATION)], "accepted");
+        assert_eq!(vehicle.link.poll_cleared(), Some(side));
+        assert_eq!(vehicle.link.poll_cleared(), None, "once");
+        let relays = [3, 0, 0, 0, 0, 0, 0];
+        let cleared = AutopilotEvent::LostCleared {
+            side,
+            relays,
+            from: FROM,
+        };
+        assert!(vehicle.events.contains(&cleared), "{:?}", vehicle.events);
+
+        // The answer was lost.
+        vehicle.events.clear();
+        vehicle.say_from(STATION, &command(own, [3.0, 0.0], 1));
+        vehicle.run(1_000);
+        assert_eq!(answers(&vehicle)[2..], [(0, STATION)], "accepted again");
+        assert_eq!(vehicle.link.poll_cleared(), None);
+        assert_eq!(vehicle.events, []);
+        // The operator reads both.
+        for line in [
+            "relay: denied, name all lost relays of one side",
+            "relay: lost relays are cleared",
+        ] {
+            let text = Said::Text(line.to_owned());
+            let has_said = vehicle.said.iter().any(|(_, said)| *said == text);
+            assert!(has_said, "{line}");
+        }
+    }
+}

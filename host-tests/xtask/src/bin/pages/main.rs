@@ -1,0 +1,112 @@
+//! What the pages for users tell them to type, typed: the blocks of commands are run in a folder that looks like a clean clone, and what a page
+//! says that they print is compared with what they print.
+//!
+//! A page is read as a user reads it. A block of commands is a fence `sh`, `bash` or `console`; in a `console` only lines that begin with `$ ` are
+//! commands. A block `text` that follows it under the same heading is what it prints, and so are the other lines of a `console`.
+//!
+//! | word behind `sh`, `bash` or `console` | the block |
+//! | --- | --- |
+//! | none | is run |
+//! | `hardware` | needs a board, a drone, a radio or a simulator of one |
+//! | `root` | needs root |
+//! | `slow` | takes minutes, and is what another step of `cargo ci` does |
+//! | `tested` | is run by a test of its own |
+//! | `window` | opens a window |
+//!
+//! A command has to succeed, unless its comment begins with `exit status N`: then it has to end with that one.
+//!
+//! What is printed is compared line by line: every line of the page has to come, in that order, with others between them. Spaces at the end do
+//! not count. A line `...` stands for any lines. In a block `text noisy` each number stands for any number.
+//!
+//! The commands of `.cargo/config.toml` are the binaries that were built before, so no block waits for the compiler.
+
+mod compare;
+mod page;
+mod shell;
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+
+use page::{Block, Kind};
+
+/// The pages, in the order in which a new user reads them.
+const PAGES: [&str; 12] = [
+    "README.md",
+    "examples/LINUX.md",
+    "examples/BOARDS.md",
+    "examples/SCENARIOS.md",
+    "examples/PAGE.md",
+    "examples/CAPTURES.md",
+    "src/docs/firmware.md",
+    "src/docs/flight.md",
+    "src/docs/lost_relays.md",
+    "src/docs/planning.md",
+    "src/docs/sensing.md",
+    "src/docs/uploads.md",
+];
+
+/// Runs the commands of the pages, and compares what they print with what the pages say.
+#[derive(Parser)]
+#[command(name = "pages")]
+struct Options {
+    /// Only the pages whose names contain this
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    only: String,
+}
+
+fn main() -> ExitCode {
+    let Options { only } = Options::parse();
+    let root = Path::new(".");
+    match walk(root, &only) {
+        Ok(0) => ExitCode::SUCCESS,
+        Ok(faults) => {
+            println!("pages: {faults} blocks do not print what the page says");
+            ExitCode::FAILURE
+        }
+        Err(line) => {
+            println!("pages: {line}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs every block that can be run; returns how many do not print what the page says.
+fn walk(root: &Path, only: &str) -> Result<usize, String> {
+    let shell = shell::Shell::build(root)?;
+    let (mut faults, mut run, mut left_out) = (0, 0, 0);
+    for name in PAGES.into_iter().filter(|name| name.contains(only)) {
+        let text =
+            std::fs::read_to_string(root.join(name)).map_err(|error| format!("{name}: {error}"))?;
+        let blocks = page::blocks(&text).map_err(|error| format!("{name}:{error}"))?;
+        shell.clean()?;
+        for (at, block) in blocks.iter().enumerate() {
+            let Kind::Commands(why_not) = &block.kind else {
+                continue;
+            };
+            if why_not.is_some() {
+                left_out += 1;
+                continue;
+            }
+            run += 1;
+            let begun = Instant::now();
+            let output = shell.run(&block.commands());
+            let seconds = begun.elapsed().as_secs_f64();
+            println!("{name}:{}: {seconds:.1} s", block.line);
+            let fault = output.and_then(|output| {
+                let quoted = blocks.get(at + 1).filter(|next| next.prints(block));
+                let said = |block: &Block| compare::compare(&block.printed(), &output, block.noisy);
+                said(block)?;
+                quoted.map_or(Ok(()), said)
+            });
+            if let Err(fault) = fault {
+                faults += 1;
+                println!("{name}:{}: {fault}", block.line);
+            }
+        }
+    }
+    println!("pages: {run} blocks were run, {left_out} cannot be");
+    Ok(faults)
+}

@@ -1,0 +1,139 @@
+//! A folder that looks like a clean clone, and a shell in it for which `cargo chain` and the like are binaries that are there.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Packages with the programs of the pages.
+const PACKAGES: [&str; 4] = [
+    "uav-relay-sim",
+    "uav-relay-tools",
+    "uav-relay-decode",
+    "uav-relay-linux",
+];
+
+/// Time that a block may take, s.
+const LIMIT_S: u32 = 60;
+
+/// What is not in a clean clone.
+const NOT_CLONED: [&str; 2] = ["target", ".git"];
+
+/// A folder and what is defined before each block.
+#[derive(Debug)]
+pub(crate) struct Shell {
+    folder: PathBuf,
+    root: PathBuf,
+    before: String,
+}
+
+impl Shell {
+    /// Builds the programs.
+    ///
+    /// # Errors
+    /// What does not work.
+    pub(crate) fn build(root: &Path) -> Result<Self, String> {
+        let failed = |what: &str, error: &dyn std::fmt::Display| format!("{what}: {error}");
+        let mut build = Command::new("cargo");
+        build.args(["build", "--quiet", "--locked", "--bins"]);
+        for package in PACKAGES {
+            build.args(["--package", package]);
+        }
+        let status = build.current_dir(root).status();
+        if !status.is_ok_and(|status| status.success()) {
+            return Err("the programs do not build".to_owned());
+        }
+        let target =
+            std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
+        let target = target
+            .canonicalize()
+            .map_err(|error| failed("target", &error))?;
+        let root = root
+            .canonicalize()
+            .map_err(|error| failed("root", &error))?;
+        let aliases = std::fs::read_to_string(root.join(".cargo/config.toml"))
+            .map_err(|error| failed(".cargo/config.toml", &error))?;
+        Ok(Self {
+            folder: target.join("pages"),
+            root,
+            before: functions(&aliases, &target.join("debug")),
+        })
+    }
+
+    /// Makes the folder anew: a page is read in a clean clone.
+    ///
+    /// # Errors
+    /// What does not work.
+    pub(crate) fn clean(&self) -> Result<(), String> {
+        let failed = |error: std::io::Error| format!("{}: {error}", self.folder.display());
+        // Nothing may be there.
+        let _ = std::fs::remove_dir_all(&self.folder);
+        std::fs::create_dir_all(&self.folder).map_err(failed)?;
+        for entry in std::fs::read_dir(&self.root).map_err(failed)?.flatten() {
+            let name = entry.file_name();
+            if !NOT_CLONED.iter().any(|other| name == *other) {
+                let link = self.folder.join(&name);
+                std::os::unix::fs::symlink(entry.path(), link).map_err(failed)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs a script as a user types it, until its first command that fails; returns what it prints.
+    ///
+    /// # Errors
+    /// The status that it ends with, and its last lines.
+    pub(crate) fn run(&self, script: &str) -> Result<String, String> {
+        let limit = format!("{LIMIT_S}");
+        let script = format!("exec 2>&1\n{}\n{script}\n", self.before);
+        let output = Command::new("timeout")
+            .args(["--kill-after=5", &limit, "bash", "-e", "-c", &script])
+            .current_dir(&self.folder)
+            .stdin(Stdio::null())
+            .output()
+            .map_err(|error| format!("timeout: {error}"))?;
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        if output.status.success() {
+            return Ok(said);
+        }
+        let lines: Vec<&str> = said.lines().collect();
+        let last = lines
+            .get(lines.len().saturating_sub(5)..)
+            .unwrap_or_default();
+        Err(format!(
+            "ends with {} after\n  {}",
+            output.status,
+            last.join("\n  ")
+        ))
+    }
+}
+
+/// Returns a function `cargo` that runs the binaries in `bin` for the aliases of `config` whose programs are built.
+fn functions(config: &str, bin: &Path) -> String {
+    let mut cases = String::new();
+    for line in config.lines() {
+        let Some((name, command)) = line.split_once(" = \"run ") else {
+            continue;
+        };
+        let mut words = command.split_whitespace();
+        let program = words.by_ref().skip_while(|word| *word != "--bin").nth(1);
+        let path = bin.join(program.unwrap_or_default());
+        if path.is_file() {
+            // Writing to a string cannot fail.
+            let _ = writeln!(cases, "{name}) shift; '{}' \"$@\";;", path.display());
+        }
+    }
+    format!("cargo() {{ case \"$1\" in\n{cases}*) command cargo \"$@\";;\nesac; }}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::functions;
+
+    #[test]
+    fn an_alias_whose_program_is_there_is_a_case_of_the_function() {
+        let config = "[alias]\nsh = \"run --package p --bin sh --\"\nother = \"run --package p --bin not-there --\"\n";
+        let all = functions(config, std::path::Path::new("/bin"));
+        assert!(all.contains("sh) shift; '/bin/sh' \"$@\";;"), "{all}");
+        assert!(!all.contains("other"), "{all}");
+    }
+}

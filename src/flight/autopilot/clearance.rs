@@ -1,0 +1,224 @@
+//! The operator's command to clear lost relays: COMMAND_LONG 31010 (MAV_CMD_USER_1), answered by COMMAND_ACK.
+//!
+//! The guard keeps clear of a relay that fell silent, because its drone may still hover. Only a person can know that it has landed. The guard
+//! frees all of one side at once, so a command has to name every relay that is lost there.
+//!
+//! | command to this system and component | result |
+//! | --- | --- |
+//! | its seven parameters name, apart from zeros, exactly the lost relays of one side | accepted: [`AutopilotEvent::LostCleared`](super::AutopilotEvent::LostCleared) |
+//! | the same again, numbered as a repetition | accepted, and nothing else |
+//! | any other numbers | denied: [`AutopilotEvent::ClearRefused`](super::AutopilotEvent::ClearRefused) |
+
+use heapless::Vec;
+
+use super::event::AutopilotEvent;
+use crate::event::Event;
+use crate::flight::mavlink::frame::Address;
+use crate::side::Side;
+
+/// MAV_CMD_USER_1.
+pub(super) const CLEAR_LOST: u16 = 31_010;
+
+/// Relays that one command can name.
+pub const MOST: usize = 7;
+
+/// `MAV_RESULT`.
+const ACCEPTED: u8 = 0;
+const DENIED: u8 = 2;
+
+/// Numbers of relays, 0 for none.
+pub type Named = [u16; MOST];
+
+/// The relays that are lost on one side.
+#[derive(Clone, Debug, Default)]
+struct LostSide {
+    nodes: Vec<u16, MOST>,
+    /// True once more relays are lost than a command can name.
+    is_full: bool,
+}
+
+/// The lost relays of both sides, and the answer to the last command.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Clearance {
+    upstream: LostSide,
+    downstream: LostSide,
+    /// The last command that was accepted.
+    accepted: Option<(Address, Named)>,
+    /// The answer that is due: to whom, and its `MAV_RESULT`.
+    answer: Option<(Address, u8)>,
+    /// The side that the relay is to clear.
+    cleared: Option<Side>,
+}
+
+impl Clearance {
+    const fn side_mut(&mut self, side: Side) -> &mut LostSide {
+        match side {
+            Side::Upstream => &mut self.upstream,
+            Side::Downstream => &mut self.downstream,
+        }
+    }
+
+    /// Takes an event of the relay.
+    pub(super) fn hear(&mut self, event: Event) {
+        match event {
+            Event::NeighbourLost { side, node } => {
+                let lost = self.side_mut(side);
+                if !lost.nodes.contains(&node) && lost.nodes.push(node).is_err() {
+                    lost.is_full = true;
+                }
+            }
+            Event::NeighbourBack { side, node } => {
+                self.side_mut(side).nodes.retain(|it| *it != node);
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes a command with these parameters; returns the event for the firmware.
+    pub(super) fn command(
+        &mut self,
+        from: Address,
+        parameters: [f32; MOST],
+        is_repeated: bool,
+    ) -> Option<AutopilotEvent> {
+        let relays = parameters.map(number);
+        if is_repeated && self.accepted == Some((from, relays)) {
+            self.answer = Some((from, ACCEPTED));
+            return None;
+        }
+        let named = parameters.iter().filter(|it| **it != 0.0).count();
+        let is_valid = named > 0 && relays.iter().filter(|it| **it != 0).count() == named;
+        let sides = [Side::Upstream, Side::Downstream];
+        let side = sides
+            .into_iter()
+            .find(|side| is_valid && self.side_mut(*side).is_all_of(&relays));
+        let Some(side) = side else {
+            self.answer = Some((from, DENIED));
+            return Some(AutopilotEvent::ClearRefused { relays, from });
+        };
+        self.side_mut(side).nodes.clear();
+        self.accepted = Some((from, relays));
+        self.answer = Some((from, ACCEPTED));
+        self.cleared = Some(side);
+        Some(AutopilotEvent::LostCleared { side, relays, from })
+    }
+
+    /// Removes the answer that is due.
+    pub(super) const fn take_answer(&mut self) -> Option<(Address, u8)> {
+        self.answer.take()
+    }
+
+    /// Removes the side that the relay is to clear.
+    pub(super) const fn take_cleared(&mut self) -> Option<Side> {
+        self.cleared.take()
+    }
+}
+
+impl LostSide {
+    /// Returns true if these are all relays that are lost here, and one is.
+    fn is_all_of(&self, named: &Named) -> bool {
+        let is_named = |node: &u16| named.contains(node);
+        let is_lost = |node: &u16| *node == 0 || self.nodes.contains(node);
+        !self.is_full
+            && !self.nodes.is_empty()
+            && self.nodes.iter().all(is_named)
+            && named.iter().all(is_lost)
+    }
+}
+
+/// Returns the number of a relay that a parameter gives, 0 for anything else.
+fn number(parameter: f32) -> u16 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "saturates, and is compared"
+    )]
+    let number = parameter as u16;
+    if f32::from(number).to_bits() == parameter.to_bits() {
+        number
+    } else {
+        0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ACCEPTED, Clearance, DENIED};
+    use crate::event::Event;
+    use crate::flight::autopilot::AutopilotEvent;
+    use crate::flight::mavlink::frame::Address;
+    use crate::side::Side;
+
+    const FROM: Address = Address {
+        system: 255,
+        component: 190,
+    };
+
+    fn parameters(named: &[f32]) -> [f32; 7] {
+        core::array::from_fn(|at| named.get(at).copied().unwrap_or(0.0))
+    }
+
+    #[test]
+    fn a_command_names_exactly_the_lost_relays_of_one_side() {
+        let mut clearance = Clearance::default();
+        let side = Side::Downstream;
+        for node in [4, 5] {
+            clearance.hear(Event::NeighbourLost { side, node });
+        }
+        clearance.hear(Event::NeighbourLost {
+            side: Side::Upstream,
+            node: 2,
+        });
+        for wrong in [
+            &[][..],
+            &[4.0],
+            &[4.0, 5.0, 2.0],
+            &[4.0, 6.0],
+            &[4.5, 5.0],
+            &[-4.0, 5.0],
+            &[f32::NAN],
+            &[f32::INFINITY, 4.0, 5.0],
+            &[4.0, 5.0, 0.5],
+        ] {
+            let event = clearance.command(FROM, parameters(wrong), false);
+            let is_refused = matches!(event, Some(AutopilotEvent::ClearRefused { from: FROM, .. }));
+            assert!(is_refused, "{wrong:?}: {event:?}");
+            assert_eq!(clearance.take_answer(), Some((FROM, DENIED)));
+            assert_eq!(clearance.take_cleared(), None);
+        }
+        let named = parameters(&[5.0, 0.0, 4.0]);
+        let event = clearance.command(FROM, named, false);
+        let relays = [5, 0, 4, 0, 0, 0, 0];
+        let cleared = AutopilotEvent::LostCleared {
+            side,
+            relays,
+            from: FROM,
+        };
+        assert_eq!(event, Some(cleared));
+        assert_eq!(clearance.take_answer(), Some((FROM, ACCEPTED)));
+        assert_eq!(clearance.take_cleared(), Some(side));
+        // The answer was lost: the same once more does nothing else.
+        assert_eq!(clearance.command(FROM, named, true), None);
+        assert_eq!(clearance.take_answer(), Some((FROM, ACCEPTED)));
+        assert_eq!(clearance.take_cleared(), None);
+        // A new command of that kind names nobody who is lost.
+        let event = clearance.command(FROM, named, false);
+        assert!(matches!(event, Some(AutopilotEvent::ClearRefused { .. })));
+    }
+
+    #[test]
+    fn a_relay_that_is_back_is_not_lost_and_more_than_seven_are_not_cleared() {
+        let mut clearance = Clearance::default();
+        let side = Side::Upstream;
+        clearance.hear(Event::NeighbourLost { side, node: 2 });
+        clearance.hear(Event::NeighbourBack { side, node: 2 });
+        let event = clearance.command(FROM, parameters(&[2.0]), false);
+        assert!(matches!(event, Some(AutopilotEvent::ClearRefused { .. })));
+        for node in 1..=8 {
+            clearance.hear(Event::NeighbourLost { side, node });
+        }
+        let all = core::array::from_fn(|at| at as f32 + 1.0);
+        let event = clearance.command(FROM, all, false);
+        assert!(matches!(event, Some(AutopilotEvent::ClearRefused { .. })));
+    }
+}
