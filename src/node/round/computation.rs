@@ -1,8 +1,7 @@
 //! What a relay holds while it does its share of an algorithm: the pass that is under way, its place, its targets.
 //!
-//! What the leader has beyond every other relay: which pass comes next.
-//!
-//! What the leader works out before it begins a pass: its prediction, the targets or altitudes to try next.
+//! The leader has a task besides: which pass comes next, and what it works out before it begins one: its prediction, the targets or
+//! altitudes to try.
 
 use super::gathering::Seats;
 use super::sense::{SENSING, Sense, Sensing};

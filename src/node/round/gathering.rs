@@ -3,9 +3,7 @@
 //! A pass has room for a few relays. Each that differs adds itself while there is room, and what came of the pass tells all of them. Where
 //! a roster is full, the next pass goes on after the last relay in it.
 //!
-//! What the relays of a view bring along, as far as a relay knows it.
-//!
-//! A relay's own solution of the chain by the joint method: where it is to be.
+//! Then each relay solves the chain by itself, and takes its own place of the solution.
 
 use super::computation::{ChainSolver, LeaderTask};
 use super::computation::{Chosen, Computation, PassKind};

@@ -1,6 +1,4 @@
 //! A relay's share of a sweep (Algorithms 1 and 4), and of its verdict.
-//!
-//! Algorithms 1 and 4 on board: a relay's share of a sweep of targets, and of its verdict.
 
 use super::computation::LeaderTask;
 use super::computation::{ADJUST, ALTITUDE, Computation, PassKind};

@@ -1,6 +1,6 @@
 //! A relay's turn in Algorithm 2, and what comes back of the turns after its own.
 //!
-//! Algorithm 2 on board: a token goes from relay to relay; whoever has it looks for a better place and tells both neighbours.
+//! A token goes from relay to relay; whoever has it looks for a better place and tells both neighbours.
 //!
 //! The token brings the place of the relay before, what comes back brings that of the relay after: the first pass is for
 //! looking alone. On the way back the worst SIR is gathered, so that the leader knows that of the chain after every round.
