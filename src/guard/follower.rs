@@ -220,24 +220,35 @@ impl FenceFollower {
     }
 
     /// After a report: the owner waits to hear that the newest fence has been cleared.
-    pub(super) fn settle(&mut self, own: &Own) {
-        if self.is_agreed() && own.reachable.is_known() && own.reachable.low_m >= self.fence_m {
-            self.clear = true;
-            self.association.due |= !self.told;
+    pub(super) fn settle(&mut self, own: &Own, low_m: f32) {
+        if self.is_agreed() && own.reachable.is_known() {
+            self.clear |= own.reachable.low_m >= self.fence_m;
+            self.association.due |= low_m >= self.fence_m && !self.told;
         }
     }
 
-    /// Returns the pending message. A relay that is not `placed`, in order with its neighbour downstream, has one only for a request.
-    pub(super) fn tell(&mut self, own: &Own, placed: bool) -> Option<Fence> {
+    /// Returns the highest x at which the neighbour upstream may be, or any relay beyond it that is not the separation below it yet, m.
+    pub(super) fn high_m(&self, own: &Own) -> f32 {
+        if self.is_agreed() {
+            self.fence_m - self.asked_m.min(own.config.separation_m)
+        } else {
+            f32::NEG_INFINITY
+        }
+    }
+
+    /// Returns the pending message, with `low_m` as the place that counts. A relay that is not `placed`, in order with its neighbour
+    /// downstream, has one only for a request.
+    pub(super) fn tell(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.tells_halt());
         if self.association.node == 0 || !is_due {
             return None;
         }
         self.association.due = false;
-        self.told = own.reachable.low_m >= self.fence_m;
+        self.told = low_m >= self.fence_m;
         let mut fence = self.association.fence(own);
-        (fence.number, fence.x_m) = (self.number, own.reachable.low_m);
+        (fence.number, fence.x_m) = (self.number, low_m);
         if !placed {
+            fence.x_m = own.reachable.low_m;
             fence.flags |= Fence::UNPLACED;
         } else if self.taken_m <= self.asked_m {
             fence.flags |= Fence::AGREES;

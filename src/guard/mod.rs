@@ -27,12 +27,12 @@
 //! | | rule | so that |
 //! | --- | --- | --- |
 //! | 1 | The follower never lowers its setpoint below the newest fence that it has received, and flies up to that fence if it is below. | its promise holds |
-//! | 2 | It tells the newest fence that it has received, and the low end of its own interval. | - |
+//! | 2 | It tells the newest fence that it has received, and the low end of its own interval, or what it counts on downstream (rule 3) if that is lower: relays that are in order but for the error of their reports may add up. | a relay is known to be beyond all that are upstream |
 //! | 3 | The owner counts on the lowest of that low end, if told together with the newest fence, and every fence announced since. | no message under way lets the follower come nearer than it is counted on |
 //! | 4 | The owner never raises its setpoint to less than the step before what it counts on. | the two intervals are the step apart |
 //! | 5 | The owner announces no fence nearer than the step beyond the high end of its own interval. | a fence that is lowered has been cleared already |
 //! | 6 | As far as 5 allows, the fence goes halfway between the two agreed places, and half the step on. | both can reach their places |
-//! | 7 | The first fence is the separation beyond the owner's own interval. Other fences, and moves across the line, begin when the follower has cleared it. | a start that is too close is opened first, and no relay sinks onto another |
+//! | 7 | The first fence is the separation beyond the owner's own interval, and beyond what the fence upstream of it leaves to that one's owner. Other fences, and moves across the line, begin when the follower has cleared it. | a start that is too close is opened first, and no relay sinks onto another |
 //! | 8 | The first setpoint is the place reported last, side and altitude included, even outside the geofence. It stays until both neighbours are known to be in order: the follower has told that it is beyond the owner, the owner has announced a fence. A relay tells the one neighbour a place that counts only once it is in order with the other one. | nothing is granted before the order is known, after a start as after a reboot or a new link |
 //! | 9 | Nothing lapses with time: the last limit of a neighbour that is replaced or starts anew stays until it speaks for itself, or [`Guard::forget`]; if it was never heard, this relay goes no farther toward it. | no relay flies into a silent one that still hovers |
 //! | 10 | With a fence the owner tells the step that it asks for. From a step below the separation until the next one that is the separation, neither moves across the line: the owner from asking on, the follower from receiving on. | the place across the line that the follower told stays true |
@@ -291,7 +291,8 @@ impl Guard {
             self.own.begin(found, now);
             return self.own.setpoint;
         };
-        self.follower.settle(&self.own);
+        let low_m = self.owner.low_m(&self.own);
+        self.follower.settle(&self.own, low_m);
         self.clear_near();
         let is_ordered = self.is_ordered();
         self.halt(is_ordered, now);
@@ -327,7 +328,8 @@ impl Guard {
         self.own.reachable.go(next.x_m, now);
         self.own.go(next, now);
         if self.follower.is_ordered() {
-            self.owner.settle(&self.own, taken_m);
+            let upstream_m = self.follower.high_m(&self.own);
+            self.owner.settle(&self.own, taken_m, upstream_m);
         }
         self.own.setpoint
     }
@@ -429,11 +431,14 @@ impl Guard {
             let taken_m = self.follower.taken_m();
             self.follower.agree(own, self.owner.kept(own, taken_m));
         }
-        if let Some(fence) = self.follower.tell(own, placed) {
+        let low_m = self.owner.low_m(own);
+        if let Some(fence) = self.follower.tell(own, low_m, placed) {
             return Some((Side::Upstream, self.follower.association.node, fence));
         }
         let moves = self.follower.is_ordered();
-        let fence = self.owner.tell(own, self.follower.taken_m(), moves)?;
+        let upstream_m = self.follower.high_m(own);
+        let taken_m = self.follower.taken_m();
+        let fence = self.owner.tell(own, taken_m, upstream_m, moves)?;
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 

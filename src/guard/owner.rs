@@ -149,6 +149,18 @@ impl FenceOwner {
         self.counted_m - own.reachable.high_m >= least_m
     }
 
+    /// Returns the lowest x at which this relay, or any relay beyond it that is not in order with it but for the error of the reports, may
+    /// be, m.
+    pub(super) fn low_m(&self, own: &Own) -> f32 {
+        let low_m = own.reachable.low_m;
+        let is_lower = self.counted_m < low_m - 2.0 * own.config.rounding();
+        if !self.association.is_none() && self.is_heard() && is_lower {
+            self.counted_m
+        } else {
+            low_m
+        }
+    }
+
     /// How far this relay stays from what the neighbour is counted on, m, where the follower has allowed the one upstream `taken_m`.
     pub(super) fn apart(&self, own: &Own, taken_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
@@ -266,7 +278,7 @@ impl FenceOwner {
     /// Where the fence may be best now, m, if there is to be one, and how far this relay would stay before it; and whether it is there
     /// for good.
     #[inline(never)] // called from several places
-    fn wish(&self, own: &Own, taken_m: f32) -> Option<(f32, f32, bool)> {
+    fn wish(&self, own: &Own, taken_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.is_heard() || !self.is_beyond(own) {
             return None;
         }
@@ -280,7 +292,7 @@ impl FenceOwner {
         };
         let nearest = own.reachable.high_m + self.apart(own, taken_m).max(ask);
         if !self.clear {
-            return Some((nearest, ask, true));
+            return Some((nearest.max(upstream_m + own.config.separation_m), ask, true));
         }
         let other_m = own.goal_of(self.association.node, self.target_m);
         let goal = 0.5 * (own.goal_m() + other_m + best);
@@ -288,8 +300,8 @@ impl FenceOwner {
     }
 
     /// After the setpoint has moved: a fence that gets where it stays is told at once, what is under way only when reminded.
-    pub(super) fn settle(&mut self, own: &Own, taken_m: f32) {
-        if let Some((x_m, ask, last)) = self.wish(own, taken_m) {
+    pub(super) fn settle(&mut self, own: &Own, taken_m: f32, upstream_m: f32) {
+        if let Some((x_m, ask, last)) = self.wish(own, taken_m, upstream_m) {
             let stays = last || own.reachable.is_still();
             self.association.due |= stays && self.is_other(own, x_m, ask);
         }
@@ -301,11 +313,17 @@ impl FenceOwner {
     }
 
     /// What there is to tell. It is here that the fence moves, if it may: what nobody is told costs no number.
-    pub(super) fn tell(&mut self, own: &Own, taken_m: f32, moves: bool) -> Option<Fence> {
+    pub(super) fn tell(
+        &mut self,
+        own: &Own,
+        taken_m: f32,
+        upstream_m: f32,
+        moves: bool,
+    ) -> Option<Fence> {
         if self.association.node == 0 || !core::mem::take(&mut self.association.due) {
             return None;
         }
-        let wish = self.wish(own, taken_m);
+        let wish = self.wish(own, taken_m, upstream_m);
         if let Some((x_m, ask, _)) =
             wish.filter(|(x_m, ask, _)| moves && self.is_other(own, *x_m, *ask))
         {

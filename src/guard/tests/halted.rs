@@ -434,3 +434,52 @@ fn an_old_fence_says_nothing_of_where_its_owner_is() {
         assert_eq!(reason == Some(HoldReason::Order), is_wrong, "{reason:?}");
     }
 }
+
+/// Relays 2 and 3 are in order only by the error of their reports, 2.5 m below each other: what relay 2 tells upstream is the lower one
+/// of the two, so that relay 1 counts on no more.
+#[test]
+fn gaps_that_are_negative_by_the_error_add_up() {
+    let config = GuardConfig {
+        hover_m: 2.0,
+        ..config()
+    };
+    let places = [100.0, 103.0, 100.5].map(at);
+    let mut guards = [1_u16, 2, 3].map(|k| {
+        let neighbours = [(k > 1).then(|| k - 1), (k < 3).then(|| k + 1)];
+        Guard::new(config, neighbours, 7 + u32::from(k), Instant::ZERO)
+    });
+    let mut told = None;
+    for second in 1..10 {
+        for k in 0..3 {
+            let now = Instant::from_millis(1_000 * second);
+            let y_m = [0.0, 20.0, -20.0][k];
+            let place = Placement { y_m, ..places[k] };
+            let end = Placement {
+                y_m,
+                ..at([90.0, 200.0, 300.0][k])
+            };
+            let guard = &mut guards[k];
+            guard.commit(end);
+            guard.position(now, place);
+            // Setpoints are not flown: what relay 2 tells is looked at before anything has moved.
+            guard.steer(now);
+            guard.remind();
+            while let Some((side, to, fence)) = guards[k].poll() {
+                let counts = fence.flags & (Fence::UNPLACED | Fence::RELEASED) == 0;
+                if k == 1 && side == Side::Upstream && counts {
+                    told = told.or(Some(fence.x_m));
+                }
+                let from = if k == 0 {
+                    1
+                } else if k == 1 {
+                    2
+                } else {
+                    3
+                };
+                guards[usize::from(to) - 1].hear(side.other(), from, &fence);
+            }
+        }
+    }
+    let told = told.expect("relay 2 is in order with relay 3");
+    assert!((100.0..=100.5).contains(&told), "{told}");
+}
