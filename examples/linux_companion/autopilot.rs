@@ -13,8 +13,8 @@ use uav_relay::flight::autopilot::trust::Mistrust;
 use uav_relay::flight::autopilot::{
     Autopilot, AutopilotEvent, FlightMode, Kind, ReleaseCause, WaitReason,
 };
+use uav_relay::flight::autopilot::{Signing, Stamp};
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Event, Instant, Placement, Relay, Sites};
 

@@ -28,4 +28,8 @@
 pub mod autopilot;
 pub mod axis;
 pub mod course;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod mavlink;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod mavlink;

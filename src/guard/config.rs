@@ -71,7 +71,7 @@ impl GuardConfig {
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
     /// # use paper::*;
-    /// use uav_relay::guard::config::GuardConfig;
+    /// use uav_relay::GuardConfig;
     ///
     /// let guard = GuardConfig::of(&MISSION, MISSION.config().common);
     /// assert!(guard.is_valid());

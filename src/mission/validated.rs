@@ -6,6 +6,7 @@ use super::parts::{Heading, Interference, Interferer, within};
 use super::unknown::{FAR, even_gains};
 use crate::field::{Field, InNoise};
 use crate::power_ratio::PowerRatio;
+use crate::wire::digest::digest;
 
 /// A validated mission, with what is derived from it once.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -217,6 +218,13 @@ impl Mission {
     /// The parameters as they were given.
     pub const fn config(&self) -> &MissionConfig {
         &self.config
+    }
+
+    /// Returns the 16-bit digest of all parameters, by which relays detect that their missions differ.
+    ///
+    /// It detects mistakes, not attacks: two different missions have the same digest once in 65 536.
+    pub fn digest(&self) -> u16 {
+        digest(self)
     }
 
     /// Number of relays N.

@@ -7,3 +7,6 @@
 
 pub mod fleet;
 pub mod single;
+
+pub use crate::optimiser::plan::silent_place;
+pub use crate::optimiser::search::Infeasible;

@@ -35,10 +35,24 @@ pub mod belief;
 pub(crate) mod doubt;
 mod ends;
 mod factor;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod fit;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod fit;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod level;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod level;
 pub(crate) mod listener;
 mod nearest;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod sums;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod sums;
 pub(crate) mod terms;
 pub(crate) mod track;
+
+pub use fit::Unfit;

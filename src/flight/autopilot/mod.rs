@@ -39,3 +39,8 @@ pub use event::AutopilotEvent;
 pub use link::Autopilot;
 pub use mode::{FlightMode, Release, ReleaseCause, WaitReason};
 pub use vehicle::{Kind, Position};
+
+pub use super::mavlink::outgoing::FrameBytes;
+pub use super::mavlink::parser::Counters;
+#[cfg(feature = "mavlink-signing")]
+pub use super::mavlink::signing::{Flaw, Signing, Stamp};

@@ -21,7 +21,15 @@ mod edge_noise;
 pub mod free;
 pub mod given_altitude;
 pub mod given_x;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod guide;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod guide;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod locus;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod locus;
 pub mod noise;
 pub mod stochastic;

@@ -148,7 +148,7 @@ fn clippy() -> Vec<Step> {
         on_target("clippy, target, no features", "--no-default-features"),
         on_target(
             "clippy, target, its log, asynchronous",
-            "--features defmt,async",
+            "--features defmt,async,internals",
         ),
     ]
 }
