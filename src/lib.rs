@@ -29,6 +29,10 @@ mod optimiser;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod optimiser;
+#[cfg(not(feature = "internals"))]
+mod place;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod place;
 pub mod planning;
 pub mod pointing;

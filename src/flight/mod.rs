@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`axis`] | the line from transmitter to receiver on earth, and places along it |
 //! | [`course`] | that line for a mission, and how fast it is flown |
-//! | [`mavlink`] | the bytes that autopilots speak |
+//! | `mavlink` | the bytes that autopilots speak |
 //! | [`autopilot`] | where to fly, who flies, and where the drone is |
 //!
 //! ```

@@ -255,7 +255,7 @@ impl Mission {
     }
 
     /// The field as the receivers hear it, with their noise, where there is one.
-    pub const fn heard(&self) -> Option<InNoise<'_>> {
+    pub(crate) const fn heard(&self) -> Option<InNoise<'_>> {
         match self.field() {
             Some(field) => Some(field.in_noise(self.config.noise_w)),
             None => None,

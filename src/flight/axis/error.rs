@@ -16,12 +16,12 @@ pub enum AxisError {
     Tx(Geodetic),
     /// The latitude or longitude of the receiver is not on earth.
     Rx(Geodetic),
-    /// The sites are nearer to each other than [`SHORTEST_M`].
+    /// The sites are nearer to each other than 10 m.
     TooShort {
         /// The distance, m.
         distance_m: f64,
     },
-    /// The sites are farther from each other than [`LONGEST_M`].
+    /// The sites are farther from each other than 100 km.
     TooLong {
         /// The distance, m: of the chord.
         distance_m: f64,

@@ -14,6 +14,16 @@
 //! SIR_2 rises with x and falls with the altitude, always. Where receivers have noise SIR_1 may turn once more, and the best place of
 //! Theorem 3 may lie inside the box (`touching`); the mission's noise is in all of them but [`noise`], which has its own.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 pub mod aside;
 mod corridor;
 mod edge;

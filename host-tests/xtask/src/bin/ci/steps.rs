@@ -102,6 +102,10 @@ pub(crate) fn all() -> Vec<Step> {
         environment: &[("RUSTDOCFLAGS", "-D warnings")],
         ..step("documentation", "cargo doc --workspace --no-deps --locked")
     });
+    steps.push(step(
+        "public items",
+        "cargo run --quiet --package uav-relay-xtask --bin items",
+    ));
     steps.extend(firmware());
     steps.extend(embassy());
     steps.push(step(
