@@ -3,9 +3,17 @@
 use crate::geodetic::Geodetic;
 
 /// The shortest line: the units of a latitude turn it by a thousandth.
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(unreachable_pub, reason = "public with the feature `internals`")
+)]
 pub const SHORTEST_M: f64 = 10.0;
 
 /// The longest line whose accuracy is known.
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(unreachable_pub, reason = "public with the feature `internals`")
+)]
 pub const LONGEST_M: f64 = 100_000.0;
 
 /// What is wrong with a pair of sites.

@@ -8,6 +8,7 @@
     allow(
         dead_code,
         unused_imports,
+        clippy::trivially_copy_pass_by_ref,
         unreachable_pub,
         reason = "the tests of this workspace use these items through the feature `internals`"
     )
